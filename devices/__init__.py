@@ -1,0 +1,1 @@
+"""Devices: protocols, codecs, drivers, the simulated hand and the one safety filter."""

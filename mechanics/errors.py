@@ -1,0 +1,48 @@
+"""The one exception hierarchy. Libraries raise these; only the command line exits.
+
+Every message says what came, what is allowed and what to do, in one line.
+"""
+
+
+class PalpateError(Exception):
+    """Base of every error that a user can mend; the command line prints it and exits with 2."""
+
+
+class RecordingError(PalpateError):
+    """A recording is unreadable, incomplete, or physically impossible."""
+
+
+class ContactError(PalpateError):
+    """A recording holds no usable boundary phase or too few palpations."""
+
+
+class SurfaceError(PalpateError):
+    """No closed, oriented surface could be made of the touched points."""
+
+
+class MeshError(PalpateError):
+    """A tetrahedral mesh is empty, inverted, open or without a fixed base."""
+
+
+class ModelError(PalpateError):
+    """A MODEL folder is missing a file, or its files contradict one another."""
+
+
+class CacheError(PalpateError):
+    """A cached compliance is corrupt or belongs to other content (callers rebuild it)."""
+
+
+class OptionError(PalpateError):
+    """An option or argument is outside what is allowed."""
+
+
+class DeviceError(PalpateError):
+    """A device is absent, refused, unplugged or misbehaving."""
+
+
+class SceneError(PalpateError):
+    """A scene or phantom is unknown or wrongly described."""
+
+
+class DiagnosisError(PalpateError):
+    """The data cannot carry a diagnosis (too few palpations, no model that fits)."""

@@ -1,0 +1,310 @@
+"""A recording: what a haptic device with a force sensor logs while a person explores one object.
+
+Two files of one stem: `NAME.csv` or `NAME.csv.gz` (samples) and `NAME.toml` (what they mean). The format is
+described in docs/recording-format.md. SI units; device frame; forces are kept as the force on the tool.
+"""
+
+from __future__ import annotations
+
+import gzip
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from mechanics.errors import RecordingError
+from mechanics.files import atomic_file, sha256_of_file
+
+REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
+QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Samples and description of one exploration; arrays are read-only.
+
+    t: (n,) s, strictly increasing. position: (n, 3) m, centre of the spherical tip, device frame.
+    force_on_tool: (n, 3) N, the reaction that pushes the tool out, device frame.
+    quaternion: (n, 4) unit (w, x, y, z), tool frame to device frame, or None.
+    boundary_phase: (start, end) s of phase I, or None where it is to be detected.
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    force_on_tool: np.ndarray
+    sample_rate_hz: float
+    tip_radius_m: float
+    quaternion: np.ndarray | None = None
+    boundary_phase: tuple[float, float] | None = None
+    tool_mass_kg: float = 0.0
+    force_noise_std_n: float | None = None
+    position_resolution_m: float | None = None
+    object_name: str = "object"
+    poisson_ratio: float | None = None
+    base_model: Path | None = None
+    truth: Mapping[str, Any] | None = None
+    path: Path | None = None
+    sha256: str = ""
+    description: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        for name in ("t", "position", "force_on_tool", "quaternion"):
+            value = getattr(self, name)
+            if value is not None:
+                value = np.ascontiguousarray(value, dtype=float)
+                value.setflags(write=False)
+                object.__setattr__(self, name, value)
+        for name in ("truth", "description"):
+            value = getattr(self, name)
+            if isinstance(value, dict):
+                object.__setattr__(self, name, MappingProxyType(value))
+        _check_samples(self)
+
+    @property
+    def name(self) -> str:
+        """The stem of the files, or the object's name where the recording was never on disk."""
+        return self.path.name.removesuffix(".gz").rsplit(".", 1)[0] if self.path else self.object_name
+
+
+def _check_samples(recording: Recording) -> None:
+    t, position, force = recording.t, recording.position, recording.force_on_tool
+    if t.ndim != 1 or len(t) < 2:
+        raise RecordingError(
+            f"a recording needs at least 2 samples; got {t.size}: record a whole exploration"
+        )
+    if position.shape != (len(t), 3) or force.shape != (len(t), 3):
+        raise RecordingError(
+            f"position {position.shape} and force {force.shape} must both be ({len(t)}, 3), one row a sample"
+        )
+    for columns, values in (("t", t[:, None]), ("x,y,z", position), ("fx,fy,fz", force)):
+        bad = np.flatnonzero(~np.isfinite(values).all(axis=1))
+        if len(bad):
+            raise RecordingError(
+                f"{len(bad)} samples have a value in {columns} that is not a finite number "
+                f"(first in data row {bad[0] + 1}): every value must be finite; remove or repair those rows"
+            )
+    back = np.flatnonzero(np.diff(t) <= 0)
+    if len(back):
+        i = back[0]
+        raise RecordingError(
+            f"time goes from {t[i]:.6g} s to {t[i + 1]:.6g} s after data row {i + 1} "
+            f"({len(back)} such places): t must increase strictly; sort the rows or mend the clock"
+        )
+    if recording.quaternion is not None:
+        norms = np.linalg.norm(recording.quaternion, axis=1)
+        if recording.quaternion.shape != (len(t), 4) or not np.all(np.abs(norms - 1) < 1e-2):
+            raise RecordingError("qw,qx,qy,qz must be unit quaternions (norm 1 within 0.01) in every row")
+    if not recording.tip_radius_m > 0:
+        raise RecordingError(f"tip_radius_m is {recording.tip_radius_m}; it must be greater than 0 m")
+    if not recording.sample_rate_hz > 0:
+        raise RecordingError(f"sample_rate_hz is {recording.sample_rate_hz}; it must be greater than 0 Hz")
+    nu = recording.poisson_ratio
+    if nu is not None and not -1 < nu < 0.5:
+        raise RecordingError(f"poisson_ratio is {nu}; it must lie between -1 and 0.5 (0.49 for silicone)")
+    if recording.boundary_phase is not None:
+        start, end = recording.boundary_phase
+        if not start < end:
+            raise RecordingError(f"boundary_phase = [{start}, {end}]: the start must come before the end (s)")
+    span = np.abs(position).max()
+    if span > 10.0:
+        raise RecordingError(f"positions reach {span:.4g} m: x, y, z must be metres (are these millimetres?)")
+
+
+def recording_files(path: Path | str) -> tuple[Path, Path]:
+    """(samples, description) for a recording named by its .csv, .csv.gz or .toml."""
+    path = Path(path)
+    if path.name.endswith(".csv.gz"):
+        stem = path.name.removesuffix(".csv.gz")
+    elif path.suffix in (".csv", ".toml"):
+        stem = path.name.removesuffix(path.suffix)
+    else:
+        raise RecordingError(f"'{path}' is no recording: name its .csv, .csv.gz or .toml")
+    if path.suffix == ".toml":
+        candidates = [path.with_name(stem + ending) for ending in (".csv.gz", ".csv")]
+        samples = next((c for c in candidates if c.exists()), candidates[1])
+    else:
+        samples = path
+    description = path.with_name(stem + ".toml")
+    for file in (samples, description):
+        if not file.is_file():
+            raise RecordingError(
+                f"'{file}' does not exist: a recording is NAME.csv (or NAME.csv.gz) and NAME.toml side by side"
+            )
+    return samples, description
+
+
+def read_recording(path: Path | str) -> Recording:
+    """Read and validate a recording.
+
+    Raises RecordingError for missing files or columns, values that are not finite, time that does not
+    increase, impossible radii or ratios; the message names the first place.
+    """
+    samples, description = recording_files(path)
+    try:
+        table = tomllib.loads(description.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise RecordingError(f"'{description}' is no valid TOML: {error}") from error
+    data = _read_table(samples)
+    about = table.get("recording", {})
+    sensor = table.get("sensor", {})
+    thing = table.get("object", {})
+    tool = table.get("tool", {})
+    if "tip_radius_m" not in tool:
+        raise RecordingError(f"'{description}' has no [tool] tip_radius_m: state the tip's radius in metres")
+    force_on = about.get("force_on")
+    if force_on not in ("tool", "object"):
+        raise RecordingError(
+            f"'{description}' says [recording] force_on = {force_on!r}: allowed are \"tool\" (the reaction that "
+            'pushes the tool out) and "object" (its negative)'
+        )
+    force = np.column_stack([data[c] for c in ("fx", "fy", "fz")])
+    quaternion = None
+    if all(c in data for c in QUATERNION_COLUMNS):
+        quaternion = np.column_stack([data[c] for c in QUATERNION_COLUMNS])
+    t = data["t"]
+    rate = about.get("sample_rate_hz")
+    if rate is None:
+        rate = (len(t) - 1) / (t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 1000.0
+    phase = about.get("boundary_phase")
+    base = thing.get("model")
+    try:
+        return Recording(
+            t=t,
+            position=np.column_stack([data[c] for c in ("x", "y", "z")]),
+            force_on_tool=force if force_on == "tool" else -force,
+            quaternion=quaternion,
+            sample_rate_hz=float(rate),
+            tip_radius_m=float(tool["tip_radius_m"]),
+            tool_mass_kg=float(tool.get("mass_kg", 0.0)),
+            boundary_phase=None if phase is None else (float(phase[0]), float(phase[1])),
+            force_noise_std_n=_optional_float(sensor.get("force_noise_std_n")),
+            position_resolution_m=_optional_float(sensor.get("position_resolution_m")),
+            object_name=str(thing.get("name", "object")),
+            poisson_ratio=_optional_float(thing.get("poisson_ratio")),
+            base_model=None if base is None else (description.parent / base),
+            truth=table.get("truth"),
+            path=samples,
+            sha256=sha256_of_file(samples),
+            description=table,
+        )
+    except RecordingError as error:
+        raise RecordingError(f"'{samples}': {error}") from error
+    except (TypeError, ValueError, IndexError) as error:
+        raise RecordingError(f"'{description}' holds a value of the wrong kind: {error}") from error
+
+
+def _optional_float(value: Any) -> float | None:
+    return None if value is None else float(value)
+
+
+def _read_table(path: Path) -> dict[str, np.ndarray]:
+    """Columns by name; raises RecordingError where the header or a row does not fit."""
+    opener = gzip.open if path.suffix == ".gz" else open
+    try:
+        with opener(path, "rt", encoding="utf-8-sig") as file:
+            header = [name.strip() for name in file.readline().split(",")]
+            missing = [c for c in REQUIRED_COLUMNS if c not in header]
+            if missing:
+                raise RecordingError(
+                    f"'{path}' lacks the columns {', '.join(missing)} (its header has {', '.join(header)}): "
+                    f"needed are {', '.join(REQUIRED_COLUMNS)}"
+                )
+            wanted = [c for c in (*REQUIRED_COLUMNS, *QUATERNION_COLUMNS) if c in header]
+            values = np.loadtxt(
+                file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2, comments=None
+            )
+    except (ValueError, UnicodeDecodeError) as error:
+        raise RecordingError(
+            f"'{path}' has a row that is not {len(header)} decimal numbers: {error}"
+        ) from error
+    except (OSError, EOFError) as error:  # gzip raises these on a truncated or corrupt file
+        raise RecordingError(f"'{path}' cannot be read ({error}): is it whole?") from error
+    return dict(zip(wanted, values.T, strict=True))
+
+
+def write_recording(
+    path: Path | str, recording: Recording, *, truth: Mapping[str, Any] | None = None
+) -> Path:
+    """Write `NAME.csv.gz` (or `.csv`) and `NAME.toml`; the description goes last, so a half pair never reads.
+
+    Times are written to 0.1 ms, positions to 1 nm, forces to 1 uN. Returns the path of the samples.
+    """
+    path = Path(path)
+    if path.suffix == ".toml":
+        path = path.with_suffix(".csv.gz")
+    if not path.name.endswith((".csv", ".csv.gz")):
+        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
+    columns = [recording.t[:, None], recording.position, recording.force_on_tool]
+    formats = ["%.4f"] + ["%.9f"] * 3 + ["%.6f"] * 3
+    names = list(REQUIRED_COLUMNS)
+    if recording.quaternion is not None:
+        columns.append(recording.quaternion)
+        formats += ["%.7f"] * 4
+        names += QUATERNION_COLUMNS
+    with atomic_file(path) as temporary:
+        opener = gzip.open if path.suffix == ".gz" else open
+        with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
+            np.savetxt(
+                file, np.hstack(columns), fmt=formats, delimiter=",", header=",".join(names), comments=""
+            )
+    table: dict[str, Any] = {
+        "recording": {"sample_rate_hz": recording.sample_rate_hz, "force_on": "tool"},
+        "tool": {"tip_radius_m": recording.tip_radius_m, "mass_kg": recording.tool_mass_kg},
+        "sensor": {},
+        "object": {"name": recording.object_name},
+    }
+    if recording.boundary_phase is not None:
+        table["recording"]["boundary_phase"] = list(recording.boundary_phase)
+    for key in ("force_noise_std_n", "position_resolution_m"):
+        if getattr(recording, key) is not None:
+            table["sensor"][key] = getattr(recording, key)
+    if recording.poisson_ratio is not None:
+        table["object"]["poisson_ratio"] = recording.poisson_ratio
+    if recording.base_model is not None:
+        table["object"]["model"] = str(recording.base_model)
+    truth = truth if truth is not None else recording.truth
+    if truth is not None:
+        table["truth"] = dict(truth)
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    with atomic_file(path.with_name(stem + ".toml")) as temporary:
+        temporary.write_text(dump_toml(table), encoding="utf-8")
+    return path
+
+
+def dump_toml(table: Mapping[str, Any], prefix: str = "") -> str:
+    """A mapping of scalars, lists and nested mappings as TOML text (the standard library only reads TOML)."""
+    lines: list[str] = []
+    nested: list[tuple[str, Mapping[str, Any]]] = []
+    for key, value in table.items():
+        if isinstance(value, Mapping):
+            nested.append((key, value))
+        elif value is not None:
+            lines.append(f"{_toml_key(key)} = {_toml_value(value)}")
+    for key, value in nested:
+        name = f"{prefix}.{_toml_key(key)}" if prefix else _toml_key(key)
+        body = dump_toml(value, name)
+        only_tables = value and all(isinstance(v, Mapping) for v in value.values())
+        lines.append(body if only_tables else f"\n[{name}]\n{body}")
+    return "\n".join(lines).rstrip("\n") + "\n"
+
+
+def _toml_key(key: str) -> str:
+    return key if key.replace("_", "").replace("-", "").isalnum() else '"' + key.replace('"', '\\"') + '"'
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, bool | np.bool_):
+        return "true" if value else "false"
+    if isinstance(value, int | np.integer):
+        return str(int(value))
+    if isinstance(value, float | np.floating):
+        text = repr(float(value))
+        return text if any(c in text for c in ".einf") else text + ".0"
+    if isinstance(value, list | tuple | np.ndarray):
+        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
+    text = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
+    return f'"{text}"'

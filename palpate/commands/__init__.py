@@ -1,0 +1,1 @@
+"""One module a sub-command: `SUMMARY`, `add_arguments(parser)` and `run(arguments) -> int`."""
