@@ -1,0 +1,102 @@
+"""A self-contained HTML page: headings, paragraphs, tables, figures; pictures are embedded, nothing is fetched."""
+
+from __future__ import annotations
+
+import base64
+import html
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from mechanics.files import atomic_file
+
+_STYLE = """
+:root { color-scheme: light; }
+body { font: 16px/1.5 system-ui, sans-serif; color: #1c2430; background: #fff; max-width: 62rem;
+       margin: 2rem auto; padding: 0 1.2rem; }
+h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
+p.lead { font-size: 1.15rem; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
+figcaption { color: #55606e; font-size: .92rem; } table { border-collapse: collapse; margin: .8rem 0; }
+th, td { padding: .3rem .8rem; border-bottom: 1px solid #d9dee5; text-align: right; }
+th:first-child, td:first-child { text-align: left; } th { border-bottom: 2px solid #8a96a5; }
+footer { margin-top: 3rem; color: #77808c; font-size: .85rem; }
+"""
+
+
+class Page:
+    """Collects parts in order; `write` renders them whole."""
+
+    def __init__(self, title: str) -> None:
+        self.title = title
+        self._parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
+
+    def heading(self, text: str) -> None:
+        """A section's heading."""
+        self._parts.append(f"<h2>{html.escape(text)}</h2>")
+
+    def lead(self, text: str) -> None:
+        """The answer, in large type."""
+        self._parts.append(f'<p class="lead">{html.escape(text)}</p>')
+
+    def paragraph(self, text: str) -> None:
+        """Plain words."""
+        self._parts.append(f"<p>{html.escape(text)}</p>")
+
+    def table(self, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
+        """A table; floats to four significant digits."""
+        head = "".join(f"<th>{html.escape(h)}</th>" for h in header)
+        body = "".join("<tr>" + "".join(f"<td>{_cell(v)}</td>" for v in row) + "</tr>" for row in rows)
+        self._parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+
+    def figure(self, picture: Any, caption: str) -> None:
+        """A picture: a matplotlib figure, a PNG's path, or an (h, w, 3) uint8 image."""
+        data = base64.b64encode(png_bytes(picture)).decode()
+        caption = html.escape(caption)
+        self._parts.append(
+            f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
+            f"<figcaption>{caption}</figcaption></figure>"
+        )
+
+    def write(self, path: Path | str) -> Path:
+        """Write the page whole; returns its path."""
+        text = (
+            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f"<title>{html.escape(self.title)}</title><style>{_STYLE}</style></head><body>"
+            + "\n".join(self._parts)
+            + "<footer>Made by palpate. Forces are on the tool; SI units.</footer></body></html>"
+        )
+        with atomic_file(path) as temporary:
+            temporary.write_text(text, encoding="utf-8")
+        return Path(path)
+
+
+def png_bytes(picture: Any) -> bytes:
+    """PNG data of a matplotlib figure, a PNG file, or an (h, w, 3) uint8 image."""
+    if isinstance(picture, str | Path):
+        return Path(picture).read_bytes()
+    buffer = io.BytesIO()
+    if hasattr(picture, "savefig"):
+        picture.savefig(buffer, format="png", dpi=110, bbox_inches="tight")
+    else:
+        from PIL import Image
+
+        Image.fromarray(picture).save(buffer, format="PNG")
+    return buffer.getvalue()
+
+
+def save_figures(folder: Path | str, figures: dict[str, Any]) -> dict[str, Path]:
+    """Write each picture as `folder/NAME.png`; returns the paths by name."""
+    paths = {}
+    for name, picture in figures.items():
+        paths[name] = Path(folder) / f"{name}.png"
+        with atomic_file(paths[name]) as temporary:
+            temporary.write_bytes(png_bytes(picture))
+    return paths
+
+
+def _cell(value: Any) -> str:
+    if isinstance(value, float):
+        return "&ndash;" if value != value else f"{value:.4g}"
+    return html.escape(str(value))
