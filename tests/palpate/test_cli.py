@@ -1,0 +1,78 @@
+"""The command line: help everywhere, exit codes, one line an error, options generated from dataclasses."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from mechanics.options import option
+from palpate import cli
+from palpate.arguments import add_options, emit_json, options_from
+
+
+@dataclass(frozen=True)
+class SampleOptions:
+    mesh_size_m: float = option(0.01, "edge length", unit="m", flag="--mesh-size")
+    surface: str = option("auto", "which surface", choices=("auto", "hull"))
+    threshold_n: float | None = option(None, "contact threshold", unit="N")
+    holds: bool = option(True, "use holds")
+    repeats: int = option(3, "how many")
+
+
+def parse(*words: str) -> SampleOptions:
+    parser = argparse.ArgumentParser()
+    add_options(parser, SampleOptions)
+    return options_from(parser.parse_args(words), SampleOptions)
+
+
+def test_options_become_flags_and_come_back():
+    assert parse() == SampleOptions()
+    given = parse(
+        "--mesh-size", "0.005", "--surface", "hull", "--threshold-n", "1", "--no-holds", "--repeats", "4"
+    )
+    assert given == SampleOptions(0.005, "hull", 1.0, False, 4)
+
+
+@pytest.mark.parametrize("words", [("--surface", "cube"), ("--mesh-size", "nan"), ("--mesh-size", "wide")])
+def test_bad_option_values_exit_with_2(words, capsys):
+    with pytest.raises(SystemExit) as stop:
+        parse(*words)
+    assert stop.value.code == 2
+
+
+@pytest.mark.parametrize("name", cli.COMMANDS)
+def test_every_command_is_there_or_says_so(name, capsys):
+    try:
+        code = cli.main([name, "--help"])
+    except SystemExit as stop:
+        assert stop.code == 0
+        assert "--help" in capsys.readouterr().out
+    else:
+        assert code == 2
+        assert len(capsys.readouterr().err.strip().splitlines()) == 1
+
+
+def test_an_unknown_command_lists_what_is_allowed(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["reconstrct"])
+    assert stop.value.code == 2
+    assert "reconstruct" in capsys.readouterr().err
+
+
+def test_top_level_help_is_quick_to_import():
+    heavy = "{'numba', 'pyvista', 'matplotlib'} & set(sys.modules)"
+    code = f"import sys, palpate.cli; sys.exit(bool({heavy}))"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
+
+
+def test_json_holds_no_nan_and_is_alone_on_stdout(tmp_path, capsys):
+    emit_json({"a": np.array([1.0, np.nan]), "b": np.int64(3)}, "-")
+    assert json.loads(capsys.readouterr().out) == {"a": [1.0, None], "b": 3}
+    emit_json({"a": 1}, str(tmp_path / "x.json"))
+    assert json.loads((tmp_path / "x.json").read_text()) == {"a": 1}
