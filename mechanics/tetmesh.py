@@ -24,9 +24,9 @@ FACES6 = np.array(
 
 @dataclass(frozen=True)
 class TetMesh:
-    """points: (n, 3) m, device frame. tetrahedra: (m, 4) linear or (m, 10) quadratic, VTK order, positive volume.
+    """points: (n, 3) m, device frame. tetrahedra: (m, 4) linear or (m, 10) quadratic, VTK order.
 
-    fixed: (n,) bool, base nodes with zero displacement. touchable: (n,) bool, surface nodes not on the base.
+    fixed: (n,) bool, base nodes with zero displacement. touchable: (n,) bool, surface nodes off the base.
     Raises MeshError where shapes disagree, a volume is not positive, or nothing is fixed or touchable.
     """
 

@@ -1,4 +1,4 @@
-"""The command line generated from options dataclasses (mechanics.options), and arguments that commands share."""
+"""The command line generated from options dataclasses, and the arguments that commands share."""
 
 from __future__ import annotations
 

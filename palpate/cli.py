@@ -1,6 +1,6 @@
 """The `palpate` command: finds the sub-command's module, parses, runs, and turns errors into one line.
 
-Exit codes: 0 success, 1 a check that the user asked for failed, 2 bad arguments or bad input, 130 interrupted.
+Exit codes: 0 success, 1 a check that the user asked for failed, 2 bad arguments or input, 130 interrupted.
 """
 
 from __future__ import annotations

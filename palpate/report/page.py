@@ -1,4 +1,4 @@
-"""A self-contained HTML page: headings, paragraphs, tables, figures; pictures are embedded, nothing is fetched."""
+"""A self-contained HTML page: headings, paragraphs, tables and embedded pictures; nothing is fetched."""
 
 from __future__ import annotations
 
