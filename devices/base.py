@@ -1,8 +1,8 @@
 """What a device is: small protocols, the specification with its limits, and whether one is there.
 
-A device gives positions, or takes forces, or both; what it cannot do it does not have. `read` and `send_force`
-never block: whatever waits for hardware runs in the device's own thread (devices.io_thread). The safety filter
-(devices.safety) is applied by the caller, last, before `send_force`.
+A device gives positions, or takes forces, or both; what it cannot do it does not have. `read` and
+`send_force` never block: whatever waits for hardware runs in the device's own thread (devices.io_thread). The
+safety filter (devices.safety) is applied by the caller, last, before `send_force`.
 """
 
 from __future__ import annotations
@@ -29,8 +29,8 @@ class DeviceSpec:
 
     control: 'position' (states carry position_m) or 'rate' (a deflection: states carry velocity_m_per_s and a
     position that stays zero; devices.mapper integrates it). sensed_axes: of x, y, z, rx, ry, rz.
-    actuated_axes: of x, y, z; empty where there is no force. max_stiffness_n_per_m, max_damping_n_s_per_m: what
-    it renders stably at 1 kHz. 0 stands for 'none' in every limit of a device without force.
+    actuated_axes: of x, y, z; empty where there is no force. max_stiffness_n_per_m, max_damping_n_s_per_m:
+    what it renders stably at 1 kHz. 0 stands for 'none' in every limit of a device without force.
     """
 
     name: str
@@ -75,7 +75,7 @@ class PositionSource(Protocol):
 
 @runtime_checkable
 class ForceSink(Protocol):
-    """Takes forces. Nothing is sent before `enable_force`, nor after an unplugging until it is called again."""
+    """Takes forces. Nothing is sent before `enable_force`, nor after unplugging until it is called again."""
 
     spec: DeviceSpec
 
@@ -122,7 +122,5 @@ def finite_vector(force_n: np.ndarray) -> np.ndarray:
     """(3,) float copy; raises DeviceError where it is no 3-vector (values that are not finite pass)."""
     vector = np.array(force_n, dtype=float)
     if vector.shape != (3,):
-        raise DeviceError(
-            f"a force of shape {vector.shape} was sent; a device takes (3,) newtons on the tool"
-        )
+        raise DeviceError(f"a force of shape {vector.shape} was sent; a device takes (3,) N on the tool")
     return vector

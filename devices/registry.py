@@ -1,0 +1,48 @@
+"""Every device by name: one entry a device, its module loaded only when asked for."""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from devices.base import Availability, Clock, PositionSource, host_clock
+from mechanics.errors import DeviceError
+
+DEVICES: dict[str, tuple[str, str]] = {
+    "simulated": ("devices.simulated", "SimulatedHand"),
+}
+"""name: (module, class). A module also has `find() -> list[Availability]`."""
+
+
+@dataclass(frozen=True)
+class DeviceChoice:
+    """A device by name and the keywords of its class: can be pickled, so that the servo process builds it."""
+
+    name: str
+    options: Mapping[str, Any] = field(default_factory=dict)
+
+    def make(self, clock: Clock = host_clock) -> PositionSource:
+        """The device, not yet open."""
+        return make_device(self.name, clock=clock, **self.options)
+
+
+def _module(name: str) -> Any:
+    if name not in DEVICES:
+        raise DeviceError(f"'{name}' is no device; allowed are {', '.join(DEVICES)} (see 'palpate devices')")
+    return importlib.import_module(DEVICES[name][0])
+
+
+def make_device(name: str, *, clock: Clock = host_clock, **options: Any) -> PositionSource:
+    """A device by name, not yet open; raises DeviceError for a name that is not known."""
+    module = _module(name)
+    return getattr(module, DEVICES[name][1])(clock=clock, **options)
+
+
+def find_devices(names: list[str] | None = None) -> list[Availability]:
+    """What is there, and for the rest why not, in the registry's order."""
+    found: list[Availability] = []
+    for name in names or DEVICES:
+        found += _module(name).find()
+    return found

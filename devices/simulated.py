@@ -1,0 +1,156 @@
+"""The simulated hand: a device without hardware, for demonstrations, tests and headless sessions.
+
+It has mass, damping, stiffness and tremor (devices.impedance), an intention (devices.intention), and feels
+the force that is sent to it. It advances in fixed steps up to the clock whenever it is read, so that with a
+fake clock a session is the same bit for bit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Self
+
+import numpy as np
+
+from devices.base import Availability, Clock, DeviceSpec, finite_vector, host_clock
+from devices.impedance import HandImpedance
+from devices.intention import FreeExploration, Intention
+from mechanics.errors import DeviceError
+from mechanics.options import option
+from mechanics.state import TipState
+
+SPEC = DeviceSpec(
+    name="simulated",
+    title="simulated hand",
+    actuated_axes=("x", "y", "z"),
+    max_force_n=20.0,
+    max_stiffness_n_per_m=5000.0,
+    max_damping_n_s_per_m=50.0,
+    max_speed_m_per_s=2.0,
+    workspace_radius_m=0.3,
+    buttons=1,
+)
+LONGEST_CATCH_UP_S = 0.1
+TREMOR_HZ = (8.0, 9.7, 11.3)
+
+
+@dataclass(frozen=True)
+class SimulatedOptions:
+    """The simulated hand. Impedance values are of a light grasp; tremor is physiological, rms an axis."""
+
+    mass_kg: float = option(0.15, "moving mass of hand and tool", unit="kg", flag="--hand-mass")
+    damping_n_s_per_m: float = option(12.0, "the grasp's damping", unit="N s/m", flag="--hand-damping")
+    stiffness_n_per_m: float = option(600.0, "the grasp's stiffness", unit="N/m", flag="--hand-stiffness")
+    tremor_m: float = option(2e-5, "tremor, rms an axis", unit="m", flag="--tremor")
+
+
+class SimulatedHand:
+    """A PositionSource and ForceSink. `intention` defaults to exploring a 10 cm ball round the origin.
+
+    buttons: a function from time (s since open) to the button mask, none by default.
+    """
+
+    spec = SPEC
+
+    def __init__(
+        self,
+        options: SimulatedOptions | None = None,
+        intention: Intention | None = None,
+        *,
+        clock: Clock = host_clock,
+        seed: int = 0,
+    ) -> None:
+        self.options = options or SimulatedOptions()
+        self.intention = intention or FreeExploration(np.zeros(3), 0.1, seed=seed)
+        self.impedance = HandImpedance(
+            self.options.mass_kg, self.options.damping_n_s_per_m, self.options.stiffness_n_per_m
+        )
+        self._clock = clock
+        self._phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (len(TREMOR_HZ), 3))
+        self._open = False
+        self._force_enabled = False
+        self._force = np.zeros(3)
+        self._sequence = -1
+
+    def open(self) -> None:
+        """Take the hand to where the intention starts."""
+        self._start_s = self._clock()
+        self._steps = 0
+        self._velocity = np.zeros(3)
+        self._intended = self._intend(0.0, np.zeros(3))
+        self._position = self._intended.copy()
+        self._open = True
+        self._sequence += 1
+
+    def _intend(self, time_s: float, position_m: np.ndarray) -> np.ndarray:
+        amplitude = self.options.tremor_m * np.sqrt(2.0 / len(TREMOR_HZ))
+        angle = 2 * np.pi * np.array(TREMOR_HZ)[:, None] * time_s + self._phases
+        tremor = amplitude * np.sin(angle).sum(axis=0)
+        return self.intention.place(time_s, position_m, self._felt) + tremor
+
+    @property
+    def _felt(self) -> np.ndarray:
+        return self._force if self._force_enabled else np.zeros(3)
+
+    def read(self) -> TipState:
+        """Advance to the clock and return the tip; raises DeviceError before `open`."""
+        if not self._open:
+            raise DeviceError("the simulated hand is not open: call open() or use it in a with statement")
+        step = self.impedance.step_s
+        elapsed = self._clock() - self._start_s
+        due = int(elapsed / step + 1e-6)
+        if due - self._steps > LONGEST_CATCH_UP_S / step:
+            # a paused program must not replay seconds of hand at once; the hand's own time skips them
+            skipped = due - self._steps - int(LONGEST_CATCH_UP_S / step)
+            self._start_s += skipped * step
+            due -= skipped
+        if due > self._steps:
+            self._sequence += 1
+        while self._steps < due:
+            self._steps += 1
+            following = self._intend(self._steps * step, self._position)
+            self._position, self._velocity = self.impedance.step(
+                self._position, self._velocity, self._intended, following, self._felt
+            )
+            self._intended = following
+        return TipState(
+            time_s=self._start_s + self._steps * step,
+            sequence=self._sequence,
+            position_m=self._position,
+            velocity_m_per_s=self._velocity,
+            force_enabled=self._force_enabled,
+        )
+
+    def enable_force(self) -> None:
+        """From now on the hand feels what is sent."""
+        if not self._open:
+            raise DeviceError("the simulated hand is not open: open it before enabling force")
+        self._force_enabled = True
+
+    def disable_force(self) -> None:
+        """The hand feels nothing any more."""
+        self._force_enabled = False
+        self._force = np.zeros(3)
+
+    def send_force(self, force_on_tool_n: np.ndarray) -> None:
+        """(3,) N on the tool, held until the next one; ignored until force is enabled."""
+        force = finite_vector(force_on_tool_n)
+        if self._force_enabled:
+            self._force = np.where(np.isfinite(force), force, 0.0)
+
+    def close(self) -> None:
+        """Let go."""
+        self.disable_force()
+        self._open = False
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+def find() -> list[Availability]:
+    """Always there."""
+    return [Availability(SPEC.name, SPEC.title, True, SPEC, where="in this program")]
