@@ -11,7 +11,9 @@ from devices.base import Availability, Clock, PositionSource, host_clock
 from mechanics.errors import DeviceError
 
 DEVICES: dict[str, tuple[str, str]] = {
+    "mouse": ("devices.mouse", "MouseDevice"),
     "simulated": ("devices.simulated", "SimulatedHand"),
+    "replay": ("devices.replay", "ReplayDevice"),
 }
 """name: (module, class). A module also has `find() -> list[Availability]`."""
 

@@ -1,0 +1,147 @@
+"""The mouse in the touch window: the window writes where the hand means to be, this gives a 1 kHz tip from
+it.
+
+A mouse moves at the window's 60 Hz; a critically damped hand of `follow_s` follows it, so that the renderer
+gets a smooth path and a velocity. There is no force to feel: the window shows it as an arrow and a plot.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+
+from devices.base import Availability, Clock, DeviceSpec, host_clock
+from devices.channel import PoseChannel
+from devices.impedance import HandImpedance
+from mechanics.errors import DeviceError
+from mechanics.options import option
+from mechanics.state import TipState
+
+SPEC = DeviceSpec(
+    name="mouse",
+    title="mouse in the touch window",
+    workspace_radius_m=0.3,
+    max_speed_m_per_s=1.0,
+    buttons=3,
+)
+WINDOW_SILENT_S = 0.5
+_ZERO = np.zeros(3)
+
+
+@dataclass(frozen=True)
+class MouseOptions:
+    """follow_s: how long the tip takes to come up with the mouse."""
+
+    follow_s: float = option(0.04, "time in which the tip follows the mouse", unit="s", flag="--mouse-follow")
+
+
+class MouseDevice:
+    """A PositionSource over a PoseChannel that the touch window writes at every frame."""
+
+    spec = SPEC
+
+    def __init__(
+        self,
+        channel: Path | str | None = None,
+        options: MouseOptions | None = None,
+        *,
+        clock: Clock = host_clock,
+    ) -> None:
+        self._path = channel
+        self._clock = clock
+        rate = 4.0 / (options or MouseOptions()).follow_s
+        self._hand = HandImpedance(1.0, 2.0 * rate, rate * rate)
+        self._channel: PoseChannel | None = None
+        self._sequence = -1
+        self._position: np.ndarray | None = None
+
+    def open(self) -> None:
+        """Attach to the window's channel; raises DeviceError where no window offers one."""
+        if self._path is None:
+            raise DeviceError(
+                "the mouse works in the touch window only: run 'palpate touch ... --device mouse' "
+                "with a screen, or headless with --device simulated"
+            )
+        try:
+            self._channel = PoseChannel(self._path)
+        except OSError as error:
+            raise DeviceError(
+                f"the touch window's channel '{self._path}' is gone: start the window again"
+            ) from error
+        self._position = None
+        self._time = self._clock()
+
+    def read(self) -> TipState:
+        """The following tip, advanced to the clock; disconnected while the window is silent."""
+        if self._channel is None:
+            raise DeviceError("the mouse is not open: call open() or use it in a with statement")
+        now = self._clock()
+        pose = self._channel.read()
+        if pose is None:
+            self._sequence = max(self._sequence, 0)
+            fault = "no pose from the window yet"
+            return TipState(self._time, self._sequence, _ZERO, connected=False, fault=fault)
+        if self._position is None:
+            self._position, self._velocity = np.array(pose.position_m), _ZERO
+            self._target = self._position
+            self._sequence += 1
+        target = np.array(pose.position_m)
+        steps = int((now - self._time) / self._hand.step_s)
+        if steps > 0:
+            self._sequence += 1
+        for _ in range(min(steps, 100)):
+            self._position, self._velocity = self._hand.step(
+                self._position, self._velocity, target, target, _ZERO
+            )
+        self._time += steps * self._hand.step_s
+        silent = now - pose.time_s > WINDOW_SILENT_S
+        return TipState(
+            time_s=min(self._time, pose.time_s + WINDOW_SILENT_S),
+            sequence=self._sequence,
+            position_m=self._position,
+            velocity_m_per_s=self._velocity,
+            buttons=pose.buttons,
+            connected=not silent,
+            fault="the window is silent" if silent else "",
+        )
+
+    def pressed(self, button: int) -> bool:
+        """Whether left (0), middle (1) or right (2) is down."""
+        pose = self._channel.read() if self._channel else None
+        return bool(pose and pose.buttons >> button & 1)
+
+    def close(self) -> None:
+        """Let go of the channel."""
+        if self._channel is not None:
+            self._channel.close()
+            self._channel = None
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+
+def find() -> list[Availability]:
+    """There wherever a window can open: on a screen, or on macOS and Windows."""
+    import os
+    import sys
+
+    variables = ("DISPLAY", "WAYLAND_DISPLAY")
+    if sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in variables):
+        return [Availability(SPEC.name, SPEC.title, True, SPEC, where="on this screen")]
+    return [
+        Availability(
+            SPEC.name,
+            SPEC.title,
+            False,
+            SPEC,
+            why_not="there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set)",
+            remedy="use a desktop, 'ssh -X' or 'xvfb-run', or --device simulated --headless",
+        )
+    ]
