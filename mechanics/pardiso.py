@@ -1,0 +1,108 @@
+"""MKL Pardiso for symmetric positive definite matrices: factor, solve, Schur complement. Absent where MKL is.
+
+Only this module speaks to the library; `available()` tells whether it is there (x86-64 wheels of pypardiso).
+"""
+
+from __future__ import annotations
+
+import ctypes
+from functools import cache
+
+import numpy as np
+import scipy.sparse as sp
+
+_SYMMETRIC_POSITIVE_DEFINITE = 2
+
+
+@cache
+def _library() -> ctypes.CDLL | None:
+    try:
+        from pypardiso import PyPardisoSolver
+
+        library = PyPardisoSolver().libmkl
+    except (ImportError, OSError):
+        return None
+    library.pardiso.argtypes = None  # pypardiso's typed pointers; this handle to the library is our own
+    return library
+
+
+def available() -> bool:
+    """True where MKL Pardiso can be loaded."""
+    return _library() is not None
+
+
+class Pardiso:
+    """A factorisation of a symmetric positive definite matrix; frees MKL's memory when it dies.
+
+    matrix: (n, n) sparse, both triangles stored. With `schur` (indices of k unknowns) the factorisation stops
+    there and `.schur` is the dense (k, k) Schur complement on those unknowns, in ascending order of index.
+    Raises ArithmeticError where the matrix is not positive definite.
+    """
+
+    def __init__(self, matrix: sp.csr_matrix, schur: np.ndarray | None = None) -> None:
+        upper = sp.triu(matrix, format="csr")
+        upper.sort_indices()
+        self.size = upper.shape[0]
+        self._values = np.ascontiguousarray(upper.data, dtype=np.float64)
+        self._rows = upper.indptr.astype(np.int32)
+        self._columns = upper.indices.astype(np.int32)
+        self._handle = np.zeros(64, dtype=np.int64)
+        self._iparm = np.zeros(64, dtype=np.int32)
+        self._iparm[0] = 1  # the values below, not the library's defaults
+        self._iparm[1] = 2  # nested dissection
+        self._iparm[34] = 1  # zero-based indices
+        self._perm = np.zeros(self.size, dtype=np.int32)
+        self.schur: np.ndarray | None = None
+        if schur is not None:
+            self._perm[schur] = 1
+            self._iparm[35] = 2  # Schur complement, factors of the rest are kept
+            k = int(self._perm.sum())
+            self.schur = np.zeros((k, k))
+        self._call(12, np.zeros(1), np.zeros(1) if self.schur is None else self.schur, 0)
+        self.factor_nonzeros = int(self._iparm[17])
+
+    def solve(self, right: np.ndarray) -> np.ndarray:
+        """Solutions for right-hand sides (n,) or (n, r)."""
+        right = np.asfortranarray(right, dtype=np.float64)
+        solution = np.zeros_like(right, order="F")
+        self._call(33, right, solution, 1 if right.ndim == 1 else right.shape[1])
+        return solution
+
+    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int) -> None:
+        def integer(value: int) -> ctypes._Pointer:
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def pointer(array: np.ndarray) -> ctypes.c_void_p:
+            return ctypes.c_void_p(array.ctypes.data)
+
+        error = ctypes.c_int32(0)
+        _library().pardiso(
+            pointer(self._handle),
+            integer(1),
+            integer(1),
+            integer(_SYMMETRIC_POSITIVE_DEFINITE),
+            integer(phase),
+            integer(self.size),
+            pointer(self._values),
+            pointer(self._rows),
+            pointer(self._columns),
+            pointer(self._perm),
+            integer(count),
+            pointer(self._iparm),
+            integer(0),
+            pointer(right),
+            pointer(solution),
+            ctypes.byref(error),
+        )
+        if error.value:
+            raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
+
+    def free(self) -> None:
+        """Release the factor."""
+        if self._handle.any():
+            self._call(-1, np.zeros(1), np.zeros(1), 0)
+            self._handle[:] = 0
+
+    def __del__(self) -> None:
+        if getattr(self, "_handle", None) is not None and _library is not None:
+            self.free()

@@ -1,0 +1,142 @@
+"""Touch sites: the far-field give of an object at given points of its surface, from one solve each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.errors import MeshError
+from mechanics.patch import PatchSampler, half_space_compliance
+from mechanics.progress import Progress, silent
+from mechanics.solver import Solver
+from mechanics.tetmesh import TetMesh
+
+PATCH_WIDTH_IN_MESH_SIZES = 0.8
+_BATCH = 16
+
+
+@dataclass(frozen=True)
+class TouchSites:
+    """k touch sites of one object; device frame, SI units, unit modulus.
+
+    points, normals: (k, 3), surface points and outward unit normals. curvature: (k,) 1/m, mean of the principal
+    curvatures, positive where the object is convex. far: (k, 3, 3) far-field compliance, 1/m: the displacement
+    of the patch a unit force, less that of a half-space. patch_width_m, poisson_ratio: what they hold for.
+    """
+
+    points: np.ndarray
+    normals: np.ndarray
+    curvature: np.ndarray
+    far: np.ndarray
+    patch_width_m: float
+    poisson_ratio: float
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def __post_init__(self) -> None:
+        for name in ("points", "normals", "curvature", "far"):
+            array = np.ascontiguousarray(getattr(self, name), dtype=float)
+            array.setflags(write=False)
+            object.__setattr__(self, name, array)
+
+
+def typical_edge(mesh: TetMesh) -> float:
+    """Median edge length of the touchable surface, m."""
+    p = mesh.points[mesh.touchable_surface[:, :3]]
+    return float(np.median(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)))
+
+
+def touch_sites(
+    mesh: TetMesh,
+    points: np.ndarray,
+    normals: np.ndarray,
+    poisson_ratio: float,
+    modulus_ratio: np.ndarray | None = None,
+    *,
+    patch_width_m: float | None = None,
+    curvature: np.ndarray | float | None = None,
+    solver: Solver | None = None,
+    progress: Progress = silent,
+) -> TouchSites:
+    """Far-field compliance at surface points (k, 3) m with outward normals (k, 3).
+
+    mesh: linear or quadratic (use quadratic: linear tetrahedra lock). patch_width_m: None takes 0.8 surface
+    edges. curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh. solver: reuse a
+    factorisation of the same mesh, Poisson's ratio and moduli. Raises MeshError for points off the surface.
+    """
+    points = np.atleast_2d(np.asarray(points, dtype=float))
+    normals = np.atleast_2d(np.asarray(normals, dtype=float))
+    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    if points.shape != normals.shape or points.shape[1] != 3 or not (length > 0).all():
+        raise MeshError(
+            f"points {points.shape} and normals {normals.shape} must both be (k, 3), normals not 0"
+        )
+    normals = normals / length
+    width = patch_width_m or PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh)
+    solver = solver or Solver(mesh, poisson_ratio, modulus_ratio)
+    sampler = PatchSampler(mesh, width)
+    far = np.empty((len(points), 3, 3))
+    for start in range(0, len(points), _BATCH):
+        batch = range(start, min(start + _BATCH, len(points)))
+        patches = [sampler.weights(points[i]) for i in batch]
+        far[list(batch)] = patch_compliance(solver, patches)
+        progress("touch sites", (batch[-1] + 1) / len(points))
+    for i, normal in enumerate(normals):
+        far[i] -= half_space_compliance(normal, poisson_ratio, width)
+    if curvature is None:
+        curvature = mean_curvature(mesh, points, normals)
+    bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))
+    return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio))
+
+
+def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """(k, 3, 3) mean displacement a unit force of each patch (nodes, weights), unit modulus, 1/m; symmetric."""
+    forces = np.zeros((len(solver.mesh.points), 3, 3 * len(patches)))
+    for k, (nodes, weights) in enumerate(patches):
+        for axis in range(3):
+            forces[nodes, axis, 3 * k + axis] = weights
+    displacement = solver.solve(forces)
+    result = np.empty((len(patches), 3, 3))
+    for k, (nodes, weights) in enumerate(patches):
+        block = np.einsum("n,nar->ar", weights, displacement[nodes][:, :, 3 * k : 3 * k + 3])
+        result[k] = (block + block.T) / 2
+    return result
+
+
+def mean_curvature(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, *, reach_m: float | None = None
+) -> np.ndarray:
+    """(k,) 1/m mean of the principal curvatures at surface points, convex positive: a paraboloid fitted to nodes.
+
+    Nodes within `reach_m` (None: 1.8 surface edges) whose triangles face the normal within 50 degrees take part;
+    near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
+    """
+    from mechanics.tetmesh import vertex_normals
+
+    triangles = mesh.touchable_surface[:, :3]
+    nodes = np.unique(triangles)
+    facing = vertex_normals(mesh.points, triangles)[nodes]
+    reach = reach_m or 1.8 * typical_edge(mesh)
+    result = np.zeros(len(points))
+    for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
+        offset = mesh.points[nodes] - point
+        near = (np.linalg.norm(offset, axis=1) < reach) & (facing @ normal > np.cos(np.radians(50)))
+        if near.sum() < 6:
+            continue
+        u, v = tangents(normal)
+        x, y, z = offset[near] @ u, offset[near] @ v, offset[near] @ normal
+        columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
+        fit = np.linalg.lstsq(columns, z, rcond=None)[0]
+        result[i] = -(fit[3] + fit[5])
+    return result
+
+
+def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors that make a right-handed frame (u, v, n) with the unit normal."""
+    helper = np.eye(3)[np.argmin(np.abs(normal))]
+    u = np.cross(helper, normal)
+    u /= np.linalg.norm(u)
+    return u, np.cross(normal, u)

@@ -1,0 +1,67 @@
+"""Factorise a mesh's stiffness once, then solve many loads: MKL Pardiso where present, SuperLU elsewhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse.linalg as spla
+
+from mechanics import pardiso
+from mechanics.elasticity import stiffness
+from mechanics.errors import MeshError
+from mechanics.tetmesh import TetMesh
+
+BACKENDS = ("pardiso", "superlu")
+
+
+class Solver:
+    """Displacements for nodal forces on a mesh with a fixed base, for unit Young's modulus.
+
+    modulus_ratio: (m,) or None. backend: 'pardiso', 'superlu' or None for the best that is there.
+    The factorisation is done in the constructor. Raises MeshError where nothing is fixed (rigid motion).
+    """
+
+    def __init__(
+        self,
+        mesh: TetMesh,
+        poisson_ratio: float,
+        modulus_ratio: np.ndarray | None = None,
+        *,
+        backend: str | None = None,
+        mean_dilatation: bool = False,
+    ) -> None:
+        self.mesh = mesh
+        self.poisson_ratio = poisson_ratio
+        self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
+        self.free = free_dofs(mesh)
+        full = stiffness(mesh, poisson_ratio, modulus_ratio, mean_dilatation=mean_dilatation)
+        self.matrix = full[self.free][:, self.free].tocsr()
+        try:
+            if self.backend == "pardiso":
+                self._solve = pardiso.Pardiso(self.matrix).solve
+            else:
+                self._solve = spla.splu(
+                    self.matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
+                ).solve
+        except (ArithmeticError, RuntimeError) as error:
+            raise MeshError(
+                f"the stiffness cannot be factorised ({error}): fix at least three nodes that are not in line, "
+                "in every connected part of the mesh"
+            ) from error
+
+    def solve(self, forces: np.ndarray) -> np.ndarray:
+        """Nodal displacements times the modulus, (n, 3) or (n, 3, r), m Pa, for forces of the same shape, N."""
+        forces = np.asarray(forces, dtype=float)
+        flat = forces.reshape(3 * len(self.mesh.points), -1)
+        result = np.zeros_like(flat)
+        result[self.free] = self._solve(np.asfortranarray(flat[self.free])).reshape(len(self.free), -1)
+        return result.reshape(forces.shape)
+
+
+def free_dofs(mesh: TetMesh) -> np.ndarray:
+    """Indices of the degrees of freedom that are not fixed and belong to some element."""
+    used = np.zeros(len(mesh.points), dtype=bool)
+    used[mesh.tetrahedra.ravel()] = True
+    if mesh.fixed[used].sum() < 3:
+        raise MeshError("fewer than 3 nodes are fixed: the object would move as a rigid body")
+    nodes = np.flatnonzero(used & ~mesh.fixed)
+    return (3 * nodes[:, None] + np.arange(3)).ravel()

@@ -1,0 +1,222 @@
+"""The force of a touch: a sphere that sticks to an elastic body, followed along the path of its centre.
+
+The displacement d of the tip since first touch is shared by the local dent and the give of the whole object,
+    d = dent(F) + far F / E,
+with the normal dent after a law of mechanics.dent and a tangential stick: every ring of the contact circle holds
+the place where it first touched (method of dimensionality reduction with sticking springs, Popov & Hess 2015,
+equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go. Unilateral, no adhesion.
+
+The kernels are plain numba on arrays: 1 kHz rendering, replay and fits run the same ones. `state` is a float
+array of STATE_SIZE, zero before first touch; it holds the ring memory and the last dent.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numba import njit
+
+from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
+from mechanics.sites import tangents
+
+_RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
+STATE_SIZE = 4 + 3 * _RINGS
+"""state[0]: rings held; state[1]: dent along -n, m; state[2:4]: tangential dent, m; then (radius, cumulated origin)."""
+
+
+@njit(cache=True, error_model="numpy")
+def _origin_integral(state, a):  # type: ignore[no-untyped-def]
+    """Integral over the radius 0..a of the tangential origin of each ring, for a within what is held."""
+    count = int(state[0])
+    low, high = 0, count - 1
+    while low < high:
+        middle = (low + high) // 2
+        if state[4 + 3 * middle] < a:
+            low = middle + 1
+        else:
+            high = middle
+    end = 4 + 3 * low
+    if low == 0:
+        a0, u0, v0 = 0.0, 0.0, 0.0
+    else:
+        a0, u0, v0 = state[end - 3], state[end - 2], state[end - 1]
+    width = state[end] - a0
+    f = (a - a0) / width if width > 0.0 else 1.0
+    return low, u0 + f * (state[end + 1] - u0), v0 + f * (state[end + 2] - v0)
+
+
+@njit(cache=True, error_model="numpy")
+def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):  # type: ignore[no-untyped-def]
+    """Tangential force and dent for contact radius a: free = d_t - C_tn F_n, stick = k_t / a."""
+    count = int(state[0])
+    top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
+    if a >= top:
+        # the new ring touches half way between the last dent and this one
+        new = a - top
+        mu = (state[5 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * new * state[2]
+        mv = (state[6 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * new * state[3]
+        reach = a - 0.5 * new
+    else:
+        _, mu, mv = _origin_integral(state, a)
+        reach = a
+    k = stick * reach
+    bu = free_u + stick * (cuu * mu + cuv * mv)
+    bv = free_v + stick * (cuv * mu + cvv * mv)
+    m00, m01, m11 = 1.0 + k * cuu, k * cuv, 1.0 + k * cvv
+    det = m00 * m11 - m01 * m01
+    du = (m11 * bu - m01 * bv) / det
+    dv = (m00 * bv - m01 * bu) / det
+    return k * du - stick * mu, k * dv - stick * mv, du, dv
+
+
+@njit(cache=True, error_model="numpy")
+def _remember(state, a, du, dv, thin):  # type: ignore[no-untyped-def]
+    count = int(state[0])
+    top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
+    if a > top:
+        u = (state[5 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * (a - top) * (du + state[2])
+        v = (state[6 + 3 * (count - 1)] if count > 0 else 0.0) + 0.5 * (a - top) * (dv + state[3])
+        before = state[4 + 3 * (count - 2)] if count > 1 else 0.0
+        if count == 0 or (top - before >= thin and count < _RINGS):
+            count += 1
+    elif count > 0:
+        low, u, v = _origin_integral(state, a)
+        count = low + 1
+    else:
+        return
+    state[0] = count
+    end = 4 + 3 * (count - 1)
+    state[end], state[end + 1], state[end + 2] = a, u, v
+    state[2], state[3] = du, dv
+
+
+@njit(cache=True, error_model="numpy")
+def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):  # type: ignore[no-untyped-def]
+    """Advance one touch to displacement d: (f_u, f_v, f_n) on the tool, N, local frame (u, v, n).
+
+    state: (STATE_SIZE,), changed in place; all zero before first touch. d: (3,) m since first touch, local frame
+    (n outward: d[2] < 0 presses in). far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a
+    dent law. radius: effective, m. plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
+    """
+    press = -d[2]
+    if not press > 0.0:
+        state[0] = state[1] = state[2] = state[3] = 0.0
+        return 0.0, 0.0, 0.0
+    cuu, cuv, cvv, cnn = far[0, 0], far[0, 1], far[1, 1], far[2, 2]
+    cun, cvn = far[0, 2], far[1, 2]
+    low, high = 0.0, np.inf
+    dent = state[1] if state[1] > 0.0 else 0.5 * press
+    tolerance = 1e-10 * radius
+    fn = fu = fv = a = du = dv = 0.0
+    for _ in range(60):
+        fn, stiffness, a = dent_force(table, dent, radius, plane_strain_modulus)
+        # on the object the normal force is -fn n; its far-field give appears in the tangential balance
+        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[0] + cun * fn, d[1] + cvn * fn)
+        excess = dent + cnn * fn - cun * fu - cvn * fv - press
+        if excess > 0.0:
+            high = dent
+        else:
+            low = dent
+        step = -excess / (1.0 + cnn * stiffness)
+        if abs(step) < tolerance:
+            break
+        dent += step
+        if not (low < dent < high):
+            dent = 0.5 * (low + high) if high < np.inf else 2.0 * low + tolerance
+    _remember(state, a, du, dv, radius / 64.0)
+    state[1] = dent
+    return -fu, -fv, fn
+
+
+@njit(cache=True, error_model="numpy")
+def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out):  # type: ignore[no-untyped-def]
+    """Follow a path: d (n, 3) m and out (n, 3) N on the tool in the global frame; far (3, 3) m/N global."""
+    local_far = frame @ far @ frame.T
+    state = np.zeros(STATE_SIZE)
+    local = np.empty(3)
+    for i in range(d.shape[0]):
+        for r in range(3):
+            local[r] = frame[r, 0] * d[i, 0] + frame[r, 1] * d[i, 1] + frame[r, 2] * d[i, 2]
+        fu, fv, fn = touch_step(state, local, local_far, table, radius, plane_strain_modulus, stick)
+        for c in range(3):
+            out[i, c] = frame[0, c] * fu + frame[1, c] * fv + frame[2, c] * fn
+
+
+@njit(cache=True, error_model="numpy")
+def _touch_paths(d, starts, frames, fars, table, radii, plane_strain_modulus, stick, out):  # type: ignore[no-untyped-def]
+    for k in range(len(starts) - 1):
+        part = slice(starts[k], starts[k + 1])
+        touch_path(d[part], frames[k], fars[k], table, radii[k], plane_strain_modulus, stick, out[part])
+
+
+def site_frame(normal: np.ndarray) -> np.ndarray:
+    """(3, 3) rows u, v, n: turns a global vector into the local frame of a site."""
+    u, v = tangents(normal)
+    return np.stack([u, v, normal])
+
+
+def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]:
+    """(E*, 8 G / (2 - nu)), Pa: what the kernels want."""
+    nu = poisson_ratio
+    return young_modulus_pa / (1 - nu**2), 4 * young_modulus_pa / ((1 + nu) * (2 - nu))
+
+
+def touch_force(
+    displacement: np.ndarray,
+    normal: np.ndarray,
+    far: np.ndarray,
+    *,
+    young_modulus_pa: float,
+    poisson_ratio: float,
+    tip_radius_m: float,
+    curvature: float = 0.0,
+    law: str | DentLaw = "sphere",
+) -> np.ndarray:
+    """Force on the tool (n, 3), N, along the path of one touch; device frame.
+
+    displacement: (n, 3) m, the tip's centre less where it was at first touch, in order of time. normal: (3,)
+    outward. far: (3, 3) 1/m, unit modulus (TouchSites.far). curvature: 1/m, mean, convex positive.
+    """
+    starts = np.array([0, len(displacement)])
+    return touch_forces(
+        displacement,
+        starts,
+        np.asarray(normal)[None],
+        np.asarray(far)[None],
+        young_modulus_pa=young_modulus_pa,
+        poisson_ratio=poisson_ratio,
+        tip_radius_m=tip_radius_m,
+        curvature=np.array([curvature]),
+        law=law,
+    )
+
+
+def touch_forces(
+    displacement: np.ndarray,
+    starts: np.ndarray,
+    normals: np.ndarray,
+    far: np.ndarray,
+    *,
+    young_modulus_pa: float,
+    poisson_ratio: float,
+    tip_radius_m: float,
+    curvature: np.ndarray | float = 0.0,
+    law: str | DentLaw = "sphere",
+) -> np.ndarray:
+    """Force on the tool (n, 3), N, of k touches whose paths follow one another.
+
+    displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (starts has k + 1 entries) and begins
+    untouched. normals: (k, 3). far: (k, 3, 3) 1/m, unit modulus. curvature: (k,) or one, 1/m.
+    """
+    table = (law if isinstance(law, DentLaw) else dent_law(law)).table
+    displacement = np.ascontiguousarray(displacement, dtype=float)
+    starts = np.ascontiguousarray(starts, dtype=np.int64)
+    count = len(starts) - 1
+    radii = np.broadcast_to(effective_radius(tip_radius_m, np.asarray(curvature, dtype=float)), (count,))
+    plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
+    out = np.zeros_like(displacement)
+    frames = np.array([site_frame(n) for n in np.asarray(normals, dtype=float)]).reshape(count, 3, 3)
+    fars = np.ascontiguousarray(np.asarray(far, dtype=float) / young_modulus_pa)
+    _touch_paths(
+        displacement, starts, frames, fars, table, np.ascontiguousarray(radii), plane_strain, stick, out
+    )
+    return out
