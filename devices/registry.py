@@ -12,15 +12,16 @@ from mechanics.errors import DeviceError
 
 DEVICES: dict[str, tuple[str, str]] = {
     "mouse": ("devices.mouse", "MouseDevice"),
+    "spacemouse": ("devices.spacemouse", "make"),
     "simulated": ("devices.simulated", "SimulatedHand"),
     "replay": ("devices.replay", "ReplayDevice"),
 }
-"""name: (module, class). A module also has `find() -> list[Availability]`."""
+"""name: (module, what makes one there). A module also has `find() -> list[Availability]`."""
 
 
 @dataclass(frozen=True)
 class DeviceChoice:
-    """A device by name and the keywords of its class: can be pickled, so that the servo process builds it."""
+    """A device by name and the keywords of its maker: can be pickled, so that the servo process builds it."""
 
     name: str
     options: Mapping[str, Any] = field(default_factory=dict)

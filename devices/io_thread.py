@@ -1,0 +1,249 @@
+"""One thread a device: drains what comes in, sends the newest force, reconnects; nobody else ever waits.
+
+A driver supplies a `Wire` (blocking calls); `ThreadedDevice` makes a device of it. Rules that hold for
+every wire:
+
+* force goes out only after `enable_force`, and zero goes out before the wire is released, whatever happened;
+* no fresh `send_force` for `STALE_FORCE_S`: zero goes out (the caller has stalled; devices.safety cannot
+know); * a wire that raises counts as unplugged: force is disabled, states say `connected=False`, and the
+thread tries
+  again, waiting longer each time; force then needs a new `enable_force`.
+"""
+
+from __future__ import annotations
+
+import atexit
+import threading
+import weakref
+from dataclasses import dataclass, field
+from typing import Protocol, Self
+
+import numpy as np
+
+from devices.base import Clock, DeviceSpec, finite_vector, host_clock
+from mechanics.errors import DeviceError
+from mechanics.state import IDENTITY_QUATERNION, TipState
+
+STALE_FORCE_S = 0.02
+POLL_S = 0.001
+FIRST_RETRY_S = 0.1
+LONGEST_RETRY_S = 2.0
+ZERO = np.zeros(3)
+ZERO.setflags(write=False)
+
+
+@dataclass(frozen=True)
+class Reading:
+    """What a wire read: SI, the device's frame. Fields as in TipState."""
+
+    position_m: np.ndarray = field(default_factory=lambda: ZERO)
+    velocity_m_per_s: np.ndarray = field(default_factory=lambda: ZERO)
+    quaternion: tuple[float, float, float, float] = IDENTITY_QUATERNION
+    buttons: int = 0
+    calibrated: bool = True
+    fault: str = ""
+
+
+class Wire(Protocol):
+    """The blocking side of a driver; only the device's own thread calls it. Any exception means unplugged."""
+
+    spec: DeviceSpec
+
+    def connect(self) -> None:
+        """Open; raises DeviceError that says what is missing."""
+
+    def exchange(self, force_on_tool_n: np.ndarray | None, timeout_s: float) -> Reading | None:
+        """Send the force (None: force is off), drain the input, return the newest reading if there is one.
+
+        Waits at most about `timeout_s` for input.
+        """
+
+    def disconnect(self) -> None:
+        """Zero the force if that is still possible, release everything; never raises."""
+
+
+@dataclass
+class Rate:
+    """Readings counted by the thread: `hz` and the spread of their spacing, over the last whole second."""
+
+    hz: float = 0.0
+    jitter_s: float = 0.0
+
+
+class ThreadedDevice:
+    """A PositionSource over a Wire; `ForcefulDevice` adds the ForceSink."""
+
+    def __init__(self, wire: Wire, *, clock: Clock = host_clock) -> None:
+        self.wire = wire
+        self.spec = wire.spec
+        self.rate = Rate()
+        self._clock = clock
+        self._force: np.ndarray = ZERO
+        self._force_time_s = float("-inf")
+        self._force_enabled = False
+        self._sent = False
+        self._connected = False
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+        self._spacings: list[float] = []
+        self._state = TipState(clock(), -1, ZERO, connected=False, calibrated=False, fault="not open")
+
+    def open(self) -> None:
+        """Connect (raises DeviceError that says what is missing), then start the thread."""
+        if self._thread is not None:
+            return
+        self.wire.connect()
+        self._connected = True
+        self._stop.clear()
+        self._state = self._flagged(fault="")
+        self._thread = threading.Thread(target=self._run, name=f"{self.spec.name} i/o", daemon=True)
+        self._thread.start()
+        # daemon threads die silently at exit: zero the force and release the hardware first
+        reference = weakref.ref(self)
+        self._at_exit = lambda: (device := reference()) and device.close()
+        atexit.register(self._at_exit)
+
+    def read(self) -> TipState:
+        """The newest state, at once."""
+        return self._state
+
+    def pressed(self, button: int) -> bool:
+        """Whether button 0, 1, ... is down."""
+        return bool(self._state.buttons >> button & 1)
+
+    def close(self) -> None:
+        """Zero the force, stop the thread, release the device; harmless when repeated."""
+        self._force_enabled = False
+        if self._thread is None:
+            return
+        self._stop.set()
+        self._thread.join(timeout=2.0)
+        if self._thread.is_alive():
+            raise DeviceError(
+                f"{self.spec.title} does not answer: its thread hangs in a driver call; unplug and replug it"
+            )
+        self._thread = None
+        atexit.unregister(self._at_exit)
+        self._connected = False
+        self._state = self._flagged(fault="closed")
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
+
+    def _flagged(self, fault: str) -> TipState:
+        """The last state with the device's flags of now; its time, sequence and place stay what they were."""
+        last = self._state
+        return TipState(
+            last.time_s,
+            last.sequence,
+            last.position_m,
+            ZERO,
+            last.quaternion,
+            last.buttons,
+            connected=self._connected,
+            calibrated=last.calibrated and self._connected,
+            force_enabled=self._force_enabled,
+            fault=fault,
+        )
+
+    def _due_force(self) -> np.ndarray | None:
+        if not self._force_enabled:
+            # one zero after the last force: the device would hold it otherwise
+            was, self._sent = self._sent, False
+            return ZERO if was else None
+        self._sent = True
+        fresh = self._clock() - self._force_time_s <= STALE_FORCE_S
+        return self._force if fresh else ZERO
+
+    def _run(self) -> None:
+        retry_s = FIRST_RETRY_S
+        try:
+            while not self._stop.is_set():
+                if not self._connected:
+                    if self._stop.wait(retry_s):
+                        break
+                    retry_s = min(2.0 * retry_s, LONGEST_RETRY_S)
+                    self._reconnect()
+                    continue
+                try:
+                    reading = self.wire.exchange(self._due_force(), POLL_S)
+                except Exception as error:  # a driver's thread must outlive whatever its library raises
+                    self._lose(error)
+                    continue
+                if reading is not None:
+                    retry_s = FIRST_RETRY_S
+                    self._publish(reading)
+        finally:
+            self._force_enabled = False
+            self.wire.disconnect()
+
+    def _reconnect(self) -> None:
+        try:
+            self.wire.connect()
+        except Exception as error:  # still away: the state keeps saying so
+            self._state = self._flagged(fault=_plain(error))
+            return
+        self._connected = True
+
+    def _lose(self, error: Exception) -> None:
+        self._force_enabled = self._sent = False
+        self._force_time_s = float("-inf")
+        self._connected = False
+        self.wire.disconnect()
+        self._state = self._flagged(fault=f"disconnected: {_plain(error)}")
+
+    def _publish(self, reading: Reading) -> None:
+        now = self._clock()
+        self._spacings.append(now - self._state.time_s)
+        if sum(self._spacings) >= 1.0:
+            spacings = np.array(self._spacings)
+            self.rate = Rate(1.0 / max(spacings.mean(), 1e-9), float(spacings.std()))
+            self._spacings.clear()
+        self._state = TipState(
+            now,
+            self._state.sequence + 1,
+            reading.position_m,
+            reading.velocity_m_per_s,
+            reading.quaternion,
+            reading.buttons,
+            connected=True,
+            calibrated=reading.calibrated,
+            force_enabled=self._force_enabled,
+            fault=reading.fault,
+        )
+
+
+class ForcefulDevice(ThreadedDevice):
+    """A ThreadedDevice whose wire has actuated axes: also a ForceSink."""
+
+    def enable_force(self) -> None:
+        """From now on forces are sent; raises DeviceError while away or not calibrated."""
+        state = self._state
+        if not (self._connected and state.connected):
+            raise DeviceError(
+                f"{self.spec.title} is not connected ({state.fault}): plug it in, then enable force"
+            )
+        if not state.calibrated:
+            raise DeviceError(
+                f"{self.spec.title} is not calibrated: move it to its end stops, then enable force"
+            )
+        self._force, self._force_time_s = ZERO, float("-inf")
+        self._force_enabled = True
+
+    def disable_force(self) -> None:
+        """The thread sends zero at its next turn, and nothing more."""
+        self._force_enabled = False
+
+    def send_force(self, force_on_tool_n: np.ndarray) -> None:
+        """(3,) N on the tool, the device's frame; NaN counts as zero. Ignored until force is enabled."""
+        force = finite_vector(force_on_tool_n)
+        self._force = force if np.isfinite(force).all() else ZERO
+        self._force_time_s = self._clock()
+
+
+def _plain(error: Exception) -> str:
+    return str(error) or type(error).__name__
