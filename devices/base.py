@@ -25,7 +25,7 @@ host_clock: Clock = time.perf_counter
 
 @dataclass(frozen=True)
 class DeviceSpec:
-    """What a device can do; SI units, its own frame.
+    """What a device can do; SI units, device frame: x right, y away from the person, z up.
 
     control: 'position' (states carry position_m) or 'rate' (a deflection: states carry velocity_m_per_s and a
     position that stays zero; devices.mapper integrates it). sensed_axes: of x, y, z, rx, ry, rz.

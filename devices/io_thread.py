@@ -5,7 +5,8 @@ every wire:
 
 * force goes out only after `enable_force`, and zero goes out before the wire is released, whatever happened;
 * no fresh `send_force` for `STALE_FORCE_S`: zero goes out (the caller has stalled; devices.safety cannot
-know); * a wire that raises counts as unplugged: force is disabled, states say `connected=False`, and the
+know); * a reading with a fault, or not calibrated, disables force as well;
+* a wire that raises counts as unplugged: force is disabled, states say `connected=False`, and the
 thread tries
   again, waiting longer each time; force then needs a new `enable_force`.
 """
@@ -198,6 +199,8 @@ class ThreadedDevice:
 
     def _publish(self, reading: Reading) -> None:
         now = self._clock()
+        if reading.fault or not reading.calibrated:
+            self._force_enabled = False
         self._spacings.append(now - self._state.time_s)
         if sum(self._spacings) >= 1.0:
             spacings = np.array(self._spacings)
@@ -231,6 +234,8 @@ class ForcefulDevice(ThreadedDevice):
             raise DeviceError(
                 f"{self.spec.title} is not calibrated: move it to its end stops, then enable force"
             )
+        if state.fault:
+            raise DeviceError(f"{self.spec.title} has a fault ({state.fault}): mend it, then enable force")
         self._force, self._force_time_s = ZERO, float("-inf")
         self._force_enabled = True
 

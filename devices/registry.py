@@ -13,6 +13,10 @@ from mechanics.errors import DeviceError
 DEVICES: dict[str, tuple[str, str]] = {
     "mouse": ("devices.mouse", "MouseDevice"),
     "spacemouse": ("devices.spacemouse", "make"),
+    "pid-ffb": ("devices.pid_ffb", "make"),
+    "haply": ("devices.haply", "make"),
+    "forcedimension": ("devices.forcedimension", "make"),
+    "openhaptics": ("devices.openhaptics", "make"),
     "simulated": ("devices.simulated", "SimulatedHand"),
     "replay": ("devices.replay", "ReplayDevice"),
 }
