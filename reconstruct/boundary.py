@@ -1,0 +1,180 @@
+"""Phase I: the tip slides on the rigid support around the object (paper, section 2.1).
+
+From its path come the support plane, in any device frame, and the outline of the object's base.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import gaussian_filter1d
+
+from mechanics.errors import ContactError
+from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class BoundaryOptions:
+    """How the base is sampled."""
+
+    base_spacing_m: float = option(0.005, "threshold d of the farthest-point sampling of the base", unit="m")
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The object's base and the plane it stands on; device frame, m.
+
+    support_point, support_normal: (3,), the plane of the support's surface, its normal into the object.
+    outline: (k, 3) dense points of the base's rim on the plane, in order along the path; the tip's radius is
+    taken off. outward: (k, 3) unit normals of the rim within the plane, out of the object. centres: (k, 3) where
+    the tip's centre was. points: (j, 3) P_B of the paper, farthest-point sample of the outline.
+    interval: sample indices (first, last) of phase I; flatness_m: rms of the path off the plane.
+    """
+
+    support_point: np.ndarray
+    support_normal: np.ndarray
+    outline: np.ndarray
+    outward: np.ndarray
+    centres: np.ndarray
+    points: np.ndarray
+    interval: tuple[int, int]
+    flatness_m: float
+
+    def height(self, points: np.ndarray) -> np.ndarray:
+        """Height of points (..., 3) above the support, m."""
+        return (np.asarray(points) - self.support_point) @ self.support_normal
+
+
+def runs(mask: np.ndarray) -> list[tuple[int, int]]:
+    """[start, end) of each run of true values."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
+    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
+    """(centre, unit normal, rms) of the plane through points (n, 3), robust (Tukey's biweight on distances)."""
+    weight = np.ones(len(points))
+    for _ in range(12):
+        centre = np.average(points, axis=0, weights=weight)
+        offset = points - centre
+        normal = np.linalg.eigh((offset * weight[:, None]).T @ offset)[1][:, 0]
+        distance = offset @ normal
+        scale = max(1.4826 * np.median(np.abs(distance)), 1e-7)
+        weight = np.clip(1 - (distance / (6 * scale)) ** 2, 0, None) ** 2
+    return centre, normal, float(np.sqrt(np.average(distance**2, weights=weight)))
+
+
+def farthest_points(points: np.ndarray, spacing_m: float, start: int = 0) -> np.ndarray:
+    """Indices of a farthest-point sample: added until no point is further than `spacing_m` from the sample."""
+    chosen = [start]
+    distance = np.linalg.norm(points - points[start], axis=1)
+    while distance.max() > spacing_m:
+        chosen.append(int(np.argmax(distance)))
+        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
+    return np.array(chosen)
+
+
+def find_interval(
+    t: np.ndarray,
+    position: np.ndarray,
+    touching: np.ndarray,
+    given: tuple[float, float] | None,
+    tip_radius_m: float,
+) -> tuple[int, int]:
+    """Sample indices [first, last) of phase I.
+
+    given: approximate times from the recording; contact that starts inside is followed to its end. Without
+    them: the contacts in which the tip slides further than 16 radii while it stays in one plane.
+    touching: (n,) bool. Raises ContactError where there is none.
+    """
+    found = runs(touching)
+    if given is not None:
+        inside = [(a, b) for a, b in found if t[min(b, len(t) - 1)] > given[0] and t[a] < given[1]]
+        inside = [(a, b) for a, b in inside if _travel(position[a:b]) > 2 * tip_radius_m]
+        if not inside:
+            raise ContactError(
+                f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): trace "
+                "the object's base first, or give [object] model = PATH of a model whose base stands in"
+            )
+        return inside[0][0], inside[-1][1]
+    for a, b in found:
+        if _travel(position[a:b]) < 16 * tip_radius_m:
+            continue
+        if fit_plane(position[a:b])[2] < 0.1 * tip_radius_m:
+            return a, b
+    raise ContactError(
+        "no boundary phase found: no contact slides further than 16 tip radii in one plane; trace the object's base "
+        "first, state [recording] boundary_phase, or give [object] model = PATH of a model whose base stands in"
+    )
+
+
+def _travel(points: np.ndarray) -> float:
+    # positions come in steps, so the path is measured on every 50th sample
+    return float(np.linalg.norm(np.diff(points[::50], axis=0), axis=1).sum()) if len(points) > 50 else 0.0
+
+
+def find_boundary(
+    position: np.ndarray,
+    force_on_tool: np.ndarray,
+    touching: np.ndarray,
+    interval: tuple[int, int],
+    tip_radius_m: float,
+    options: BoundaryOptions,
+) -> Boundary:
+    """Support plane and base outline from the samples of phase I (low-passed position, force on the tool).
+
+    Raises ContactError where the path does not go round the object.
+    """
+    first, last = interval
+    inside = np.arange(first, last)[touching[first:last]]
+    path, force = position[inside], force_on_tool[inside]
+    centre, normal, flatness = fit_plane(path)
+    if np.mean(force @ normal) < 0:
+        normal = -normal
+    centre = centre - tip_radius_m * normal
+    height = (path - centre) @ normal - tip_radius_m
+    path = path[np.abs(height) < max(6 * flatness, 2e-4)]
+    path = path - ((path - centre) @ normal)[:, None] * normal
+    path = _resampled(path, 0.0005)
+    if len(path) < 20:
+        raise ContactError("the boundary phase is shorter than 1 cm: trace the object's whole base")
+    smooth = gaussian_filter1d(path, 3.0, axis=0, mode="nearest")
+    tangent = np.gradient(smooth, axis=0)
+    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    winding = _winding(smooth, normal)
+    if abs(winding) < 0.8 * 2 * np.pi:
+        raise ContactError(
+            f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least 288 are "
+            "needed: trace the whole base"
+        )
+    outward = np.cross(tangent, normal) * np.sign(winding)
+    outline = smooth - tip_radius_m * outward
+    chosen = farthest_points(outline, options.base_spacing_m)
+    return Boundary(
+        support_point=outline.mean(axis=0),
+        support_normal=normal,
+        outline=outline,
+        outward=outward,
+        centres=smooth + tip_radius_m * normal,
+        points=outline[chosen],
+        interval=interval,
+        flatness_m=flatness,
+    )
+
+
+def _resampled(path: np.ndarray, step_m: float) -> np.ndarray:
+    """The path at equal steps of its length; a step is taken only once the tip has moved so far (no jitter)."""
+    kept = [0]
+    for i in range(0, len(path), 5):
+        if np.linalg.norm(path[i] - path[kept[-1]]) >= step_m:
+            kept.append(i)
+    return path[kept]
+
+
+def _winding(path: np.ndarray, normal: np.ndarray) -> float:
+    """Angle (rad) by which the path turns round the middle of its extent, counter-clockwise about the normal."""
+    middle = (path.max(axis=0) + path.min(axis=0)) / 2
+    offset = path - middle
+    a, b = offset[:-1], offset[1:]
+    return float(np.arctan2(np.cross(a, b) @ normal, np.einsum("ij,ij->i", a, b)).sum())

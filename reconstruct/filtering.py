@@ -1,0 +1,49 @@
+"""Zero-phase low-pass filtering of forces and positions (paper, section 2.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import butter, sosfiltfilt
+
+from mechanics.errors import OptionError
+from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class FilterOptions:
+    """Cut-off of the zero-phase low-pass; forward and backward second-order Butterworth."""
+
+    cutoff_hz: float = option(25.0, "cut-off of the zero-phase low-pass", unit="Hz", flag="--cutoff")
+
+
+def low_pass(values: np.ndarray, sample_rate_hz: float, cutoff_hz: float) -> np.ndarray:
+    """Values (n,) or (n, k) without phase shift, -6 dB at the cut-off; unchanged where the cut-off is too high.
+
+    Raises OptionError where the cut-off is not positive.
+    """
+    if not cutoff_hz > 0:
+        raise OptionError(f"the cut-off is {cutoff_hz} Hz; it must be greater than 0 Hz")
+    if cutoff_hz >= 0.45 * sample_rate_hz:
+        return np.array(values, dtype=float)
+    sections = butter(2, cutoff_hz, fs=sample_rate_hz, output="sos")
+    padding = min(len(values) - 1, int(3 * sample_rate_hz / cutoff_hz))
+    return sosfiltfilt(sections, values, axis=0, padlen=padding)
+
+
+def noise_gain(sample_rate_hz: float, cutoff_hz: float) -> float:
+    """Standard deviation of white noise after `low_pass` over that before it."""
+    if cutoff_hz >= 0.45 * sample_rate_hz:
+        return 1.0
+    n = int(20 * sample_rate_hz / cutoff_hz) | 1
+    impulse = np.zeros(n)
+    impulse[n // 2] = 1.0
+    return float(np.linalg.norm(low_pass(impulse, sample_rate_hz, cutoff_hz)))
+
+
+def white_noise_std(values: np.ndarray) -> float:
+    """Standard deviation of white noise an axis in (n, k) samples, from second differences (robust to presses)."""
+    second = np.diff(np.atleast_2d(values.T).T, n=2, axis=0)
+    mad = np.median(np.abs(second - np.median(second, axis=0)), axis=0)
+    return float(np.median(1.4826 * mad / np.sqrt(6.0)))
