@@ -1,0 +1,309 @@
+"""The one safety filter: last on every path from a renderer to a device.
+
+    0 where anything is wrong, else clamp(slew(ramp * fade * wanted))
+
+It knows no clock and no device: one compiled step on plain arrays, called once a tick by the servo with the
+device's newest raw state. What is wrong falls in two kinds. *Passing* faults (a force that is not finite, a
+stale or non-finite pose, outside the workspace) give zero at once and a fresh ramp when they are over.
+*Latching* faults (unplugged, calibration lost, device fault, over-speed, a jump of the pose, a clock that
+runs backwards) give zero until force is enabled anew. docs/safety.md lists every fault with its bound.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from devices.base import DeviceSpec
+from mechanics.errors import OptionError
+from mechanics.options import option
+
+OFF, NOT_FINITE, STALE, OUTSIDE, DISCONNECTED, UNCALIBRATED, FAULT, OVER_SPEED, JUMP, CLOCK = (
+    1 << k for k in range(10)
+)
+RAMP, CLAMPED, SLEWED, FADED, PASSIVITY = (1 << k for k in range(10, 15))
+ZEROING = OFF | NOT_FINITE | STALE | OUTSIDE | DISCONNECTED | UNCALIBRATED | FAULT | OVER_SPEED | JUMP | CLOCK
+LATCHING = DISCONNECTED | UNCALIBRATED | FAULT | OVER_SPEED | JUMP | CLOCK
+
+WORDS = {
+    OFF: "force is off",
+    NOT_FINITE: "a pose or force is not a number",
+    STALE: "no fresh pose",
+    OUTSIDE: "outside the workspace",
+    DISCONNECTED: "the device is not connected",
+    UNCALIBRATED: "the device is not calibrated",
+    FAULT: "the device reports a fault",
+    OVER_SPEED: "too fast",
+    JUMP: "the pose jumped",
+    CLOCK: "the clock went backwards",
+    RAMP: "ramping in",
+    CLAMPED: "clamped to the greatest force",
+    SLEWED: "limited in its rise",
+    FADED: "fading at the workspace's edge",
+    PASSIVITY: "damped to stay passive",
+}
+
+
+def reason_words(reasons: int) -> str:
+    """The filter's reasons in plain words, '' where nothing was changed."""
+    return ", ".join(word for bit, word in WORDS.items() if int(reasons) & bit)
+
+
+@dataclass(frozen=True)
+class SafetyOptions:
+    """What the filter allows; the device's own specification is never exceeded."""
+
+    max_force_n: float | None = option(None, "greatest force; the device's own limit if lower", unit="N")
+    slew_n_per_s: float = option(2000.0, "fastest rise of the force", unit="N/s", flag="--slew")
+    ramp_s: float = option(0.5, "time over which force rises after it is enabled", unit="s", flag="--ramp")
+    stale_s: float = option(0.02, "a pose older than this gives zero force", unit="s", flag="--stale")
+    max_speed_m_per_s: float | None = option(None, "faster than this trips the filter", unit="m/s")
+    jump_m: float = option(0.005, "a jump of the pose beyond what the greatest speed explains", unit="m")
+    workspace_radius_m: float | None = option(None, "no force outside this radius", unit="m")
+
+    def __post_init__(self) -> None:
+        for name in ("slew_n_per_s", "ramp_s", "stale_s", "jump_m"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
+        for name in ("max_force_n", "max_speed_m_per_s", "workspace_radius_m"):
+            value = getattr(self, name)
+            if value is not None and not (math.isfinite(value) and value > 0):
+                raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
+
+
+class SafetyParameters(NamedTuple):
+    """Scalars that the compiled step reads; SI."""
+
+    max_force_n: float
+    slew_n_per_s: float
+    ramp_s: float
+    stale_s: float
+    max_speed_m_per_s: float
+    jump_m: float
+    workspace_radius_m: float
+
+
+class SafetyState(NamedTuple):
+    """Memory between ticks, preallocated; `reasons` is the last tick's, `counts` how often each occurred.
+
+    force: (3,) N, the last output. gain: of the ramp, 0 to 1. since: s since the last fresh pose.
+    """
+
+    force: np.ndarray
+    position: np.ndarray
+    speed: np.ndarray
+    gain: np.ndarray
+    since: np.ndarray
+    sequence: np.ndarray
+    latched: np.ndarray
+    enable: np.ndarray
+    reasons: np.ndarray
+    counts: np.ndarray
+    workspace_centre: np.ndarray
+
+
+class Reading(NamedTuple):
+    """The device's newest raw state, as the filter needs it: (3,) arrays in the device frame, SI."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    age_s: float
+    sequence: int
+    connected: bool
+    calibrated: bool
+    fault: bool
+
+
+def safety_parameters(options: SafetyOptions, spec: DeviceSpec) -> SafetyParameters:
+    """The tighter of what the user allows and what the device can do."""
+
+    def tighter(mine: float | None, device: float) -> float:
+        if not spec.has_force:
+            return math.inf  # such a device states 0 for every limit, and its force stays 0
+        return device if mine is None else min(mine, device)
+
+    return SafetyParameters(
+        tighter(options.max_force_n, spec.max_force_n) if spec.has_force else 0.0,
+        options.slew_n_per_s,
+        options.ramp_s,
+        options.stale_s,
+        tighter(options.max_speed_m_per_s, spec.max_speed_m_per_s),
+        options.jump_m,
+        tighter(options.workspace_radius_m, spec.workspace_radius_m),
+    )
+
+
+def safety_state(workspace_centre_m: np.ndarray | None = None) -> SafetyState:
+    """A filter with force off; the workspace is a ball round `workspace_centre_m`, device frame (origin)."""
+    centre = np.zeros(3) if workspace_centre_m is None else np.array(workspace_centre_m, dtype=float)
+    return SafetyState(
+        force=np.zeros(3),
+        position=np.full(3, np.nan),
+        speed=np.zeros(1),
+        gain=np.zeros(1),
+        since=np.zeros(1),
+        sequence=np.full(1, -1, dtype=np.int64),
+        latched=np.zeros(1, dtype=np.int64),
+        enable=np.zeros(1, dtype=np.int64),
+        reasons=np.zeros(1, dtype=np.int64),
+        counts=np.zeros(len(WORDS), dtype=np.int64),
+        workspace_centre=centre,
+    )
+
+
+SPEED_TIME_S = 0.005
+"""Time constant of the speed estimate: one coarse encoder step in a tick must not look like over-speed."""
+
+
+@njit(cache=True, nogil=True)
+def _finite3(vector):
+    return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])
+
+
+@njit(cache=True, nogil=True)
+def _norm3(vector):
+    return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
+
+
+@njit(cache=True, nogil=True)
+def _motion_faults(parameters, state, reading, dt_s):
+    """Over-speed, jump and a sequence that runs backwards, from fresh finite poses only."""
+    faults = 0
+    if reading.sequence < state.sequence[0] or reading.age_s < -0.001:
+        faults |= CLOCK
+    if reading.sequence != state.sequence[0]:
+        if _finite3(state.position):
+            moved = 0.0
+            for i in range(3):
+                moved += (reading.position[i] - state.position[i]) ** 2
+            moved = math.sqrt(moved)
+            # several ticks may pass between two poses of a slow device: the pose's age tells how many
+            between = max(dt_s, state.since[0])
+            if moved > parameters.jump_m + parameters.max_speed_m_per_s * between:
+                faults |= JUMP
+            share = between / (SPEED_TIME_S + between)
+            state.speed[0] += share * (moved / between - state.speed[0])
+        for i in range(3):
+            state.position[i] = reading.position[i]
+        state.sequence[0] = reading.sequence
+        state.since[0] = 0.0
+    state.since[0] += dt_s
+    told = _norm3(reading.velocity) if _finite3(reading.velocity) else 0.0
+    if max(told, state.speed[0]) > parameters.max_speed_m_per_s:
+        faults |= OVER_SPEED
+    return faults
+
+
+@njit(cache=True, nogil=True)
+def safety_step(parameters, state, wanted, reading, enable, dt_s):
+    """Filter one tick's force; writes `state.force`, returns the reasons (bits; `reason_words` reads them).
+
+    wanted: (3,) N on the tool, device frame. enable: 0 for force off, else the number of the user's enabling;
+    a latched fault is left only by a number not seen before. dt_s: s since the last call.
+    """
+    reasons = 0
+    if not (math.isfinite(dt_s) and dt_s >= 0.0):
+        reasons |= CLOCK
+        dt_s = 0.0
+    if not reading.connected:
+        reasons |= DISCONNECTED
+    if not reading.calibrated:
+        reasons |= UNCALIBRATED
+    if reading.fault:
+        reasons |= FAULT
+    if not (reading.age_s <= parameters.stale_s):
+        reasons |= STALE
+    fade = 1.0
+    if _finite3(reading.position):
+        reasons |= _motion_faults(parameters, state, reading, dt_s)
+        distance = 0.0
+        for i in range(3):
+            distance += (reading.position[i] - state.workspace_centre[i]) ** 2
+        excess = math.sqrt(distance) / parameters.workspace_radius_m - 1.0
+        if excess > 0.05:
+            reasons |= OUTSIDE
+        elif excess > 0.0:
+            fade = 1.0 - excess / 0.05
+    else:
+        reasons |= NOT_FINITE
+    if not _finite3(wanted):
+        reasons |= NOT_FINITE
+
+    if enable != state.enable[0]:
+        state.enable[0] = enable
+        state.latched[0] = 0
+        state.gain[0] = 0.0
+    state.latched[0] |= reasons & LATCHING
+    reasons |= state.latched[0]
+    if enable == 0:
+        reasons |= OFF
+
+    if reasons & ZEROING:
+        state.gain[0] = 0.0
+        for i in range(3):
+            state.force[i] = 0.0
+    else:
+        if state.gain[0] < 1.0:
+            state.gain[0] = min(1.0, state.gain[0] + dt_s / parameters.ramp_s)
+            reasons |= RAMP
+        if fade < 1.0:
+            reasons |= FADED
+        reasons |= _limit(parameters, state, wanted, fade * state.gain[0], dt_s)
+    state.reasons[0] = reasons
+    for k in range(state.counts.size):
+        if reasons & (1 << k):
+            state.counts[k] += 1
+    return reasons
+
+
+@njit(cache=True, nogil=True)
+def _limit(parameters, state, wanted, gain, dt_s):
+    """Clamp keeping direction, then slew: falling towards zero is free, rising and turning are limited."""
+    reasons = 0
+    length = gain * _norm3(wanted)
+    scale = gain
+    if length > parameters.max_force_n:
+        scale = gain * parameters.max_force_n / length
+        reasons |= CLAMPED
+    # the nearest point of the segment from zero to the last force is reached at once
+    along, last2 = 0.0, 0.0
+    for i in range(3):
+        along += scale * wanted[i] * state.force[i]
+        last2 += state.force[i] * state.force[i]
+    share = min(max(along / last2, 0.0), 1.0) if last2 > 0.0 else 0.0
+    change2 = 0.0
+    for i in range(3):
+        change2 += (scale * wanted[i] - share * state.force[i]) ** 2
+    change = math.sqrt(change2)
+    step = parameters.slew_n_per_s * dt_s
+    part = 1.0
+    if change > step:
+        part = step / change
+        reasons |= SLEWED
+    for i in range(3):
+        state.force[i] = share * state.force[i] + part * (scale * wanted[i] - share * state.force[i])
+    return reasons
+
+
+class SafetyFilter:
+    """The same filter as an object, for tests, tools and a loop written in Python."""
+
+    def __init__(
+        self, options: SafetyOptions, spec: DeviceSpec, workspace_centre_m: np.ndarray | None = None
+    ) -> None:
+        self.parameters = safety_parameters(options, spec)
+        self.state = safety_state(workspace_centre_m)
+
+    def step(
+        self, wanted_n: np.ndarray, reading: Reading, enable: int, dt_s: float
+    ) -> tuple[np.ndarray, str]:
+        """(3,) N that may be sent, and why it differs from what was wanted."""
+        reasons = safety_step(
+            self.parameters, self.state, np.asarray(wanted_n, dtype=float), reading, enable, dt_s
+        )
+        return self.state.force.copy(), reason_words(reasons)

@@ -1,0 +1,25 @@
+"""The servo: the 1 kHz loop in its own process (docs/servo.md)."""
+
+from devices.safety import SafetyOptions
+from palpate.servo.client import Servo
+from palpate.servo.headless import exploring_hand, run_headless
+from palpate.servo.options import ServoOptions
+from palpate.servo.recorder import Recorder
+from palpate.servo.report import ServoReport, ServoSnapshot
+from palpate.servo.source import FreeAirSource, ModelSource, RendererSource
+from render.passivity import PassivityOptions
+
+__all__ = [
+    "FreeAirSource",
+    "ModelSource",
+    "PassivityOptions",
+    "Recorder",
+    "RendererSource",
+    "SafetyOptions",
+    "Servo",
+    "ServoOptions",
+    "ServoReport",
+    "ServoSnapshot",
+    "exploring_hand",
+    "run_headless",
+]

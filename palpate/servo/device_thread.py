@@ -1,0 +1,181 @@
+"""The device's side of the servo process: reads it just before each tick, sends the force just after.
+
+The loop never waits for this thread, nor for the interpreter's lock that it needs; poses and commands pass
+through two seqlocked blocks. Where no tick has come for 20 ms it sends zero, and zero is the last thing it
+sends, whatever ended it. A driver's own dead man's switch comes after this one.
+"""
+
+from __future__ import annotations
+
+import os
+import select
+import threading
+import time
+from typing import Any
+
+import numpy as np
+
+from devices import mapper
+from devices.base import ForceSink
+from devices.mapper import Mapping
+from mechanics.errors import PalpateError
+from mechanics.state import TipState
+from palpate.servo.clock import COMPILED
+from palpate.servo.layout import DEADLINE, ENABLE, STOP
+from palpate.servo.loop import ServoLoop
+from palpate.servo.tick import (
+    IN_BUTTONS,
+    IN_CALIBRATED,
+    IN_CONNECTED,
+    IN_ENABLED,
+    IN_FAULT,
+    IN_FORCE_MAP,
+    IN_POSITION,
+    IN_QUATERNION,
+    IN_SEQUENCE,
+    IN_TIME,
+    IN_TIP,
+    IN_TIP_VELOCITY,
+    IN_VELOCITY,
+    IN_WIDTH,
+    OUT_FORCE,
+    OUT_TIME,
+    OUT_WIDTH,
+    put_pose,
+    take_command,
+)
+
+STALE_COMMAND_S = 0.02
+ZERO = np.zeros(3)
+
+
+class DeviceThread:
+    """Owns the open device from `start` to `join`."""
+
+    def __init__(
+        self, device: Any, mapping: Mapping, loop: ServoLoop, *, read_ahead_s: float, on_start: Any = None
+    ) -> None:
+        self.device = device
+        self.mapping = mapping
+        self.words: list[str] = []
+        self._loop = loop
+        self._arrays = loop.arrays
+        self._read_ahead_ns = round(read_ahead_s * 1e9)
+        self._on_start = on_start
+        self._mapper_state = mapper.start(mapping)
+        self._mapped: tuple[int, TipState] | None = None
+        self._pose = np.zeros(IN_WIDTH)
+        self._command = np.zeros(OUT_WIDTH)
+        self._enabled = 0
+        self._sink = device if isinstance(device, ForceSink) else None
+        self._thread = threading.Thread(target=self._run, name="servo device", daemon=True)
+
+    def prepare(self) -> None:
+        """Take a first pose, so that the loop's first tick has one and everything here is loaded."""
+        self.read_pose()
+        take_command(self._arrays, self._command)
+
+    def start(self) -> None:
+        """Begin reading and sending."""
+        self._thread.start()
+
+    def join(self, timeout_s: float | None = None) -> bool:
+        """Wait for the end; True once zero was sent and the device closed."""
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def set_mapping(self, mapping: Mapping) -> None:
+        """Take another mapping from the next reading on; the tip leaps there, so enable force afterwards."""
+        self._mapper_state, self.mapping = mapper.start(mapping), mapping
+
+    def read_pose(self) -> None:
+        """Read the device and hand its pose to the next tick."""
+        raw = self.device.read()
+        if self._mapped is None or raw.sequence != self._mapped[0]:
+            self._mapper_state, tip = mapper.step(self.mapping, self._mapper_state, raw)
+            self._mapped = raw.sequence, tip
+        tip = self._mapped[1]
+        pose = self._pose
+        pose[IN_TIME] = raw.time_s
+        pose[IN_SEQUENCE] = raw.sequence
+        pose[IN_CONNECTED] = raw.connected
+        pose[IN_CALIBRATED] = raw.calibrated
+        pose[IN_FAULT] = bool(raw.fault)
+        # the mapper clears the flag while the clutch is held
+        pose[IN_ENABLED] = tip.force_enabled or not raw.force_enabled
+        pose[IN_BUTTONS] = raw.buttons
+        pose[IN_POSITION : IN_POSITION + 3] = raw.position_m
+        pose[IN_VELOCITY : IN_VELOCITY + 3] = raw.velocity_m_per_s
+        pose[IN_TIP : IN_TIP + 3] = tip.position_m
+        pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3] = tip.velocity_m_per_s
+        pose[IN_QUATERNION : IN_QUATERNION + 4] = tip.quaternion
+        pose[IN_FORCE_MAP : IN_FORCE_MAP + 9] = (self.mapping.force_scale * self.mapping.rotation.T).ravel()
+        put_pose(self._arrays, pose)
+
+    def send_command(self, *, fresh: bool = True) -> None:
+        """Send the newest command, or zero where it is not fresh; follow enabling and disabling."""
+        if self._sink is None:
+            return
+        self._follow_enable()
+        if fresh and take_command(self._arrays, self._command) >= 0:
+            age = time.perf_counter() - self._command[OUT_TIME]
+            if age <= STALE_COMMAND_S:
+                self._sink.send_force(self._command[OUT_FORCE : OUT_FORCE + 3])
+                return
+        self._sink.send_force(ZERO)
+
+    def _follow_enable(self) -> None:
+        wanted = int(self._arrays.control[ENABLE])
+        if wanted == self._enabled:
+            return
+        self._enabled = wanted
+        try:
+            if wanted:
+                self._sink.enable_force()
+            else:
+                self._sink.disable_force()
+        except PalpateError as error:
+            self.words.append(str(error))
+
+    def _run(self) -> None:
+        poll = None
+        if COMPILED:
+            poll = select.poll()
+            poll.register(self._loop.wake_descriptor, select.POLLIN)
+        try:
+            if self._on_start is not None:
+                self._on_start()
+            while self._arrays.control[STOP] == 0:
+                sleep_to_read(int(self._arrays.counts[DEADLINE]) - self._read_ahead_ns)
+                self.read_pose()
+                self.send_command(fresh=self._await_tick(poll))
+        except Exception as error:  # whatever a driver raises must end in zero force, with its reason
+            self.words.append(f"the device failed: {error}")
+            self._arrays.control[STOP] = 1
+        finally:
+            self._release()
+
+    def _await_tick(self, poll: Any) -> bool:
+        if poll is None:
+            came = self._loop.ticked.wait(STALE_COMMAND_S)
+            self._loop.ticked.clear()
+            return came
+        if not poll.poll(STALE_COMMAND_S * 1000):
+            return False
+        os.eventfd_read(self._loop.wake_descriptor)
+        return True
+
+    def _release(self) -> None:
+        try:
+            if self._sink is not None:
+                self._sink.send_force(ZERO)
+                self._sink.disable_force()
+        finally:
+            self.device.close()
+
+
+def sleep_to_read(deadline_ns: int) -> None:
+    """Sleep until the reading is due; imprecise by the operating system's timer, which is enough here."""
+    left = deadline_ns * 1e-9 - time.perf_counter()
+    if left > 0:
+        time.sleep(min(left, STALE_COMMAND_S))

@@ -1,0 +1,80 @@
+"""A renderer of nothing: for trying a device without an object, and as the empty loop of the benchmark."""
+
+from __future__ import annotations
+
+from typing import NamedTuple, Self
+
+import numpy as np
+from numba import njit
+
+
+class FreeAirParameters(NamedTuple):
+    """What every renderer has; nothing of it matters in free air."""
+
+    friction: np.ndarray
+    series_compliance: np.ndarray
+
+
+class FreeAirState(NamedTuple):
+    """The fields that every renderer's state has."""
+
+    forces: np.ndarray
+    touching: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    depths: np.ndarray
+    stiffness: np.ndarray
+    radii_m: np.ndarray
+    dt_s: np.ndarray
+
+
+@njit(cache=True, nogil=True)
+def _kernel(parameters, state, tips):
+    state.forces[:] = 0.0
+
+
+class FreeAir:
+    """No object: no force anywhere."""
+
+    kernel = staticmethod(_kernel)
+
+    def __init__(self, tip_radius_m: float = 0.005) -> None:
+        self.tip_radius_m = tip_radius_m
+        self.parameters = FreeAirParameters(np.full(1, np.inf), np.zeros(1))
+
+    @property
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """No points, no triangles."""
+        return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
+
+    def start(self, radii_m: np.ndarray | None = None, dt_s: float = 0.001) -> FreeAirState:
+        """One entry a tip."""
+        radii = np.array([self.tip_radius_m] if radii_m is None else radii_m, dtype=float)
+        m = len(radii)
+        return FreeAirState(
+            np.zeros((m, 3)),
+            np.zeros(m, dtype=np.int64),
+            np.zeros((m, 3)),
+            np.zeros((m, 3)),
+            np.zeros(m),
+            np.zeros(m),
+            radii,
+            np.array([dt_s]),
+        )
+
+    def step(self, state: FreeAirState, tips: np.ndarray) -> tuple[FreeAirState, np.ndarray]:
+        """Zero force."""
+        _kernel(self.parameters, state, tips)
+        return state, state.forces
+
+    def with_modulus(self, young_modulus_pa: float) -> Self:
+        """Air stays air."""
+        return self
+
+    def with_friction(self, mu: float) -> Self:
+        """Air stays air."""
+        return self
+
+    def with_series_compliance(self, compliance_m_per_n: float) -> Self:
+        """Air stays air."""
+        return self

@@ -1,0 +1,88 @@
+"""A servo session without a window: start, enable, wait, stop, report; with a recording on demand."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping as MappingType
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from devices.intention import FreeExploration
+from devices.mapper import Mapping
+from devices.registry import DeviceChoice
+from mechanics.model import Model, read_model
+from mechanics.progress import Progress, silent
+from palpate.servo.client import Servo
+from palpate.servo.options import ServoOptions
+from palpate.servo.recorder import Recorder
+from palpate.servo.report import ServoReport
+
+POLL_S = 0.2
+
+
+def exploring_hand(model: Model, *, seed: int = 0, target_force_n: float = 1.0) -> DeviceChoice:
+    """The simulated hand, pressing a model from all free sides until it feels `target_force_n`."""
+    points = model.mesh.points[np.unique(model.mesh.touchable_surface)]
+    centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    radius = float(np.linalg.norm(points - centre, axis=1).max()) + 2.0 * model.tip_radius_m
+    intention = FreeExploration(
+        centre,
+        radius,
+        up=model.support_normal,
+        target_force_n=target_force_n,
+        speed_m_per_s=0.05,
+        seed=seed,
+    )
+    return DeviceChoice("simulated", {"intention": intention, "seed": seed})
+
+
+def run_headless(
+    model: Model | Path | str,
+    renderer: str = "fem",
+    device: str | DeviceChoice = "simulated",
+    seconds: float = 10.0,
+    *,
+    options: ServoOptions | None = None,
+    mapping: Mapping | None = None,
+    render_options: Any = None,
+    device_options: MappingType[str, Any] | None = None,
+    record: Path | str | None = None,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> ServoReport:
+    """Feel `model` for `seconds` and report; prints nothing.
+
+    device: a name or DeviceChoice; 'simulated' without options explores the model by itself. record: a
+    recording (NAME.csv or NAME.csv.gz) of what was touched. Raises the PalpateError that stopped it.
+    """
+    if isinstance(device, str):
+        if device == "simulated" and not device_options:
+            known = model if isinstance(model, Model) else read_model(model)
+            device = exploring_hand(known, seed=seed)
+        else:
+            device = DeviceChoice(device, dict(device_options or {}))
+    with Servo(
+        model,
+        renderer=renderer,
+        device=device,
+        options=options,
+        mapping=mapping,
+        render_options=render_options,
+    ) as servo:
+        servo.start(lambda stage, fraction: progress(stage, 0.3 * fraction))
+        recorder = Recorder(servo) if record is not None else None
+        servo.enable()
+        start = time.perf_counter()
+        while (elapsed := time.perf_counter() - start) < seconds and servo.alive:
+            progress("touching", 0.3 + 0.7 * elapsed / seconds)
+            time.sleep(min(POLL_S, max(seconds - elapsed, 0.0)))
+            if recorder is not None:
+                recorder.collect()
+        result = servo.report()
+        servo.stop()
+        if recorder is not None and record is not None:
+            recorder.write(record)
+        progress("touching", 1.0)
+        return result

@@ -1,0 +1,134 @@
+"""The memory that the servo shares with its parent: named arrays in one block, and what their cells mean.
+
+Writers: the parent writes `control`; the servo's loop writes everything else. Blocks with a `_version` are
+read through palpate.servo.seqlock; the ring's rows are complete up to `ring_head`.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from multiprocessing import shared_memory
+
+import numpy as np
+
+from palpate.servo.histogram import BINS
+
+RING_ROWS = 8192
+MOST_TIPS = 32
+
+STOP, ENABLE = range(2)
+"""Cells of `control`: STOP not 0 ends the loop; ENABLE: 0 for force off, else the number of the enabling."""
+
+TICKS, MISSED, LATE, CONTACT_TICKS, DEADLINE, STARTED, STATUS = range(7)
+"""Cells of `counts` (int64): ticks run, deadlines skipped, ticks started late, ticks in contact, the next
+deadline (ns), the first deadline (ns), and whether the loop runs."""
+
+TIP_WIDTH = 15
+HEAD_WIDTH = 32
+ROW = np.dtype(
+    [
+        ("tick", "f8"),
+        ("time_s", "f8"),
+        ("position", "f8", 3),
+        ("tip", "f8", 3),
+        ("rendered", "f8", 3),
+        ("command", "f8", 3),
+        ("quaternion", "f8", 4),
+        ("reasons", "f8"),
+        ("buttons", "f8"),
+        ("touching", "f8"),
+        ("enabled", "f8"),
+        ("lateness_s", "f8"),
+        ("compute_s", "f8"),
+    ]
+)
+"""One tick in the ring. position, command: device frame; tip (the first), rendered (the sum over tips, on the
+tool): scene frame; compute_s is of the tick before."""
+
+ROW_WIDTH = ROW.itemsize // 8
+
+_FIELDS: tuple[tuple[str, str, tuple[int, ...]], ...] = (
+    ("control", "i8", (8,)),
+    ("counts", "i8", (16,)),
+    ("ring_head", "i8", (1,)),
+    ("ring", "f8", (RING_ROWS, ROW_WIDTH)),
+    ("snapshot_version", "i8", (1,)),
+    ("snapshot", "f8", (HEAD_WIDTH + MOST_TIPS * TIP_WIDTH,)),
+    ("compute_bins", "i8", (BINS,)),
+    ("compute_extremes", "i8", (3,)),
+    ("lateness_bins", "i8", (BINS,)),
+    ("lateness_extremes", "i8", (3,)),
+    ("reason_counts", "i8", (16,)),
+    ("energies", "f8", (8,)),
+    ("peak", "f8", (2,)),
+)
+
+
+@dataclass(frozen=True)
+class SharedArrays:
+    """Views of the shared block; shapes and meanings above."""
+
+    control: np.ndarray
+    counts: np.ndarray
+    ring_head: np.ndarray
+    ring: np.ndarray
+    snapshot_version: np.ndarray
+    snapshot: np.ndarray
+    compute_bins: np.ndarray
+    compute_extremes: np.ndarray
+    lateness_bins: np.ndarray
+    lateness_extremes: np.ndarray
+    reason_counts: np.ndarray
+    energies: np.ndarray
+    peak: np.ndarray
+
+
+def total_bytes() -> int:
+    """Bytes of the block."""
+    return sum(8 * math.prod(shape) for _, _, shape in _FIELDS)
+
+
+def views(buffer: memoryview | bytearray) -> SharedArrays:
+    """The named arrays in a block of `total_bytes()`."""
+    arrays, offset = {}, 0
+    for name, kind, shape in _FIELDS:
+        size = math.prod(shape)
+        arrays[name] = np.frombuffer(buffer, dtype=kind, count=size, offset=offset).reshape(shape)
+        offset += 8 * size
+    return SharedArrays(**arrays)
+
+
+class SharedBlock:
+    """The block itself: made by the parent, attached by name in the servo; `close` gives it back."""
+
+    def __init__(self, name: str | None = None) -> None:
+        self.owner = name is None
+        if name is None:
+            self._memory = shared_memory.SharedMemory(create=True, size=total_bytes())
+        else:
+            self._memory = shared_memory.SharedMemory(name=name)
+            # before Python 3.13 attaching registers the block with this process's tracker, which would
+            # remove it when this process ends
+            from multiprocessing import resource_tracker
+
+            resource_tracker.unregister(self._memory._name, "shared_memory")
+        self.arrays: SharedArrays | None = views(self._memory.buf)
+
+    @property
+    def name(self) -> str:
+        """What the servo attaches by."""
+        return self._memory.name
+
+    def close(self) -> None:
+        """Drop the views; the owner also removes the block."""
+        self.arrays = None
+        try:
+            self._memory.close()
+        except BufferError:
+            pass  # a view is still held by a caller: the pages go when it does
+        if self.owner:
+            try:
+                self._memory.unlink()
+            except FileNotFoundError:
+                pass

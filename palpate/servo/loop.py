@@ -1,0 +1,178 @@
+"""The loop round the tick: absolute deadlines, no interpreter in between.
+
+`ServoLoop` runs in a thread of the servo process. On Linux the whole loop is one compiled call that holds no
+interpreter lock, returning only to stop or to swap the renderer; elsewhere Python sleeps and calls the tick.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit, types
+
+from palpate.servo.clock import COMPILED, compiled_now_ns, compiled_sleep_until, sleep_until
+from palpate.servo.layout import DEADLINE, STATUS, STOP
+from palpate.servo.tick import TickArrays, TickParameters, account, after, before
+
+_write = types.ExternalFunction("write", types.intp(types.int32, types.voidptr, types.uintp))
+
+SWAP = 7
+"""Cell of `control` by which this process's own threads ask the loop to come back."""
+
+
+@njit(nogil=True)
+def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
+    """A whole tick with the renderer's kernel in its middle."""
+    before(arrays)
+    kernel(model, state, arrays.tips)
+    after(
+        arrays,
+        parameters,
+        state.forces,
+        state.points,
+        state.normals,
+        state.depths,
+        state.touching,
+        state.stiffness,
+        state.radii_m,
+        now_ns,
+        deadline_ns,
+    )
+
+
+@njit(nogil=True)
+def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
+    """Tick until told to stop or swap; `wake` is a file descriptor told after each tick, -1 for none."""
+    for _ in range(most_ticks):
+        if arrays.control[STOP] != 0 or arrays.control[SWAP] != 0:
+            return
+        deadline = arrays.counts[DEADLINE]
+        compiled_sleep_until(arrays.timespec, deadline)
+        started = compiled_now_ns(arrays.timespec)
+        one_tick(kernel, model, state, arrays, parameters, started, deadline)
+        ended = compiled_now_ns(arrays.timespec)
+        account(arrays, parameters, deadline, started, ended)
+        if wake >= 0:
+            _write(wake, arrays.word.ctypes, 8)
+
+
+class Program(NamedTuple):
+    """A renderer made ready: compiled, warmed up, with its state."""
+
+    renderer: Any
+    state: Any
+    parameters: TickParameters
+
+
+def make_program(
+    renderer: Any, arrays: TickArrays, parameters: TickParameters, state: Any | None = None
+) -> Program:
+    """Compile the loop for this renderer and touch its memory; nothing of a running loop is changed.
+
+    state: kept where the renderer is only retuned (same kernel), else a fresh one.
+    """
+    if state is None:
+        radius = float(renderer.start().radii_m[0])
+        state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
+        warm_up(renderer, state)
+        state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
+    if COMPILED:
+        compiled_loop(renderer.kernel, renderer.parameters, state, arrays, parameters, -1, 0)
+    return Program(renderer, state, parameters)
+
+
+def warm_up(renderer: Any, state: Any, places: int = 100) -> None:
+    """Press at places all over the surface, so that code is compiled and pages are in memory."""
+    tips = np.full((len(state.forces), 3), np.nan)
+    renderer.kernel(renderer.parameters, state, tips)
+    points, _ = renderer.surface
+    if not len(points):
+        return
+    centre = points.mean(axis=0)
+    for k in np.linspace(0, len(points) - 1, places).astype(int):
+        for depth in (1.2, 1.0, 0.98):
+            tips[:] = centre + depth * (points[k] - centre)
+            renderer.kernel(renderer.parameters, state, tips)
+
+
+class ServoLoop:
+    """The loop's thread and what it runs. `ticked` is set after each tick where the loop runs in Python."""
+
+    def __init__(self, program: Program, arrays: TickArrays, *, on_start: Any = None) -> None:
+        self.arrays = arrays
+        self._program = program
+        self._pending: Program | None = None
+        self._swapped = threading.Event()
+        self._on_start = on_start
+        self.ticked = threading.Event()
+        self._wake = os.eventfd(0, os.EFD_NONBLOCK) if COMPILED else -1
+        self._thread = threading.Thread(target=self._run, name="servo loop", daemon=True)
+
+    @property
+    def program(self) -> Program:
+        """What runs now."""
+        return self._program
+
+    @property
+    def wake_descriptor(self) -> int:
+        """Readable after each tick (Linux), else -1."""
+        return self._wake
+
+    def start(self, first_deadline_ns: int | None = None) -> None:
+        """Begin ticking, a period from now."""
+        period = self._program.parameters.period_ns
+        self.arrays.counts[DEADLINE] = first_deadline_ns or time.perf_counter_ns() + 2 * period
+        self.arrays.counts[STATUS] = 1
+        self._thread.start()
+
+    def swap(self, program: Program, timeout_s: float = 1.0) -> bool:
+        """Go on with another program between two ticks; False where the loop did not answer."""
+        self._swapped.clear()
+        self._pending = program
+        self.arrays.control[SWAP] = 1
+        return self._swapped.wait(timeout_s)
+
+    def join(self, timeout_s: float | None = None) -> bool:
+        """Wait for the end; True once the loop has ended."""
+        self._thread.join(timeout_s)
+        return not self._thread.is_alive()
+
+    def _run(self) -> None:
+        try:
+            if self._on_start is not None:
+                self._on_start()
+            while self.arrays.control[STOP] == 0:
+                if self._pending is not None:
+                    self._program, self._pending = self._pending, None
+                    self.arrays.control[SWAP] = 0
+                    self._swapped.set()
+                renderer, state, parameters = self._program
+                if COMPILED:
+                    compiled_loop(
+                        renderer.kernel,
+                        renderer.parameters,
+                        state,
+                        self.arrays,
+                        parameters,
+                        self._wake,
+                        np.iinfo(np.int64).max,
+                    )
+                else:
+                    portable_tick(self._program, self.arrays)
+                    self.ticked.set()
+        finally:
+            self.arrays.counts[STATUS] = 0
+
+
+def portable_tick(program: Program, arrays: TickArrays) -> None:
+    """One tick driven from Python, for platforms whose sleep the compiled loop cannot call."""
+    deadline = int(arrays.counts[DEADLINE])
+    sleep_until(deadline)
+    started = time.perf_counter_ns()
+    renderer, state, parameters = program
+    one_tick(renderer.kernel, renderer.parameters, state, arrays, parameters, started, deadline)
+    account(arrays, parameters, deadline, started, time.perf_counter_ns())

@@ -1,0 +1,55 @@
+"""Options of the servo."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from devices.safety import SafetyOptions
+from mechanics.errors import OptionError
+from mechanics.options import option
+from render.passivity import PassivityOptions
+
+
+@dataclass(frozen=True)
+class ServoOptions:
+    """The loop's rate, what happens without a parent, and the tool's tips.
+
+    tip_offsets_m: (m, 3), the tips' centres in the tool's frame (turned by the device's orientation).
+    """
+
+    rate_hz: float = option(1000.0, "ticks a second", unit="Hz", flag="--rate")
+    on_orphan: str = option(
+        "stop", "when the window dies: stop with zero force, or go on", choices=("stop", "continue")
+    )
+    coupling: bool = option(True, "soften stiffness beyond what the device renders stably")
+    support: bool = option(True, "the support is felt as a rigid plane beside the object")
+    support_stiffness_n_per_m: float = option(1500.0, "the support's stiffness, or the device's", unit="N/m")
+    support_damping_n_s_per_m: float = option(2.0, "the support's damping", unit="N s/m")
+    support_friction: float = option(0.2, "friction on the support")
+    read_ahead_s: float = option(250e-6, "how long before a tick the device is read", unit="s")
+    late_s: float = option(200e-6, "a tick that starts later than this counts as late", unit="s")
+    priority: int = option(60, "real-time priority where permitted, 0 for none")
+    tip_offsets_m: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
+    safety: SafetyOptions = field(default_factory=SafetyOptions)
+    passivity: PassivityOptions = field(default_factory=PassivityOptions)
+
+    def __post_init__(self) -> None:
+        if not (math.isfinite(self.rate_hz) and 10.0 <= self.rate_hz <= 10_000.0):
+            raise OptionError(f"rate_hz is {self.rate_hz}; allowed is 10 to 10000")
+        if self.on_orphan not in ("stop", "continue"):
+            raise OptionError(f"on_orphan is '{self.on_orphan}'; allowed are stop, continue")
+        if not 0 <= self.priority <= 98:
+            raise OptionError(f"priority is {self.priority}; allowed is 0 to 98")
+        if not 0.0 <= self.read_ahead_s < 1.0 / self.rate_hz:
+            raise OptionError(f"read_ahead_s is {self.read_ahead_s}; allowed is 0 to less than a tick")
+        offsets = np.asarray(self.tip_offsets_m, dtype=float)
+        if offsets.ndim != 2 or offsets.shape[1] != 3 or not np.isfinite(offsets).all():
+            raise OptionError("tip_offsets_m needs three finite numbers a tip")
+
+    @property
+    def period_ns(self) -> int:
+        """One tick."""
+        return round(1e9 / self.rate_hz)

@@ -1,0 +1,238 @@
+"""The servo process: makes renderer and device, warms up, ticks until told to stop.
+
+Started by palpate.servo.client as `python -m palpate.servo BLOCK` with a pickled `Job` on standard
+input, further pickled commands after it, and one JSON line a message on standard output. Threads: this one
+waits for commands (end of input: the parent is gone), the loop ticks, the device thread talks to the device.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import pickle
+import signal
+import sys
+import threading
+import traceback
+from dataclasses import dataclass, field
+from typing import Any, BinaryIO
+
+import numpy as np
+
+from devices.mapper import MapperOptions, Mapping
+from devices.registry import DeviceChoice
+from devices.safety import safety_parameters
+from mechanics.errors import OptionError, PalpateError
+from mechanics.model import Model
+from palpate.servo.device_thread import DeviceThread
+from palpate.servo.layout import ENABLE, MOST_TIPS, STOP, SharedBlock
+from palpate.servo.loop import Program, ServoLoop, make_program
+from palpate.servo.options import ServoOptions
+from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
+from palpate.servo.source import RendererSource, no_support
+from palpate.servo.tick import TickParameters, tick_arrays
+from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
+from render.passivity import passivity_parameters
+from render.support import SupportParameters
+
+
+@dataclass(frozen=True)
+class Job:
+    """What the servo is to run; everything in it can be pickled."""
+
+    source: RendererSource
+    device: DeviceChoice
+    options: ServoOptions = field(default_factory=ServoOptions)
+    mapping: Mapping | None = None
+
+
+class ServoProcess:
+    """The process's state; `run` is its whole life."""
+
+    def __init__(self, block: SharedBlock, job: Job, tell: Any) -> None:
+        self.job = job
+        self.block = block
+        self._tell = tell
+        self._device = job.device.make()
+        self._mapping = job.mapping or Mapping.from_options(
+            MapperOptions(), rate=self._device.spec.control == "rate"
+        )
+        offsets = np.array(job.options.tip_offsets_m, dtype=float)
+        if len(offsets) > MOST_TIPS:
+            raise OptionError(f"{len(offsets)} tips were asked for; allowed are up to {MOST_TIPS}")
+        assert block.arrays is not None
+        self._arrays = tick_arrays(block.arrays, offsets, np.zeros(3))
+        self._source = job.source
+        self._loop: ServoLoop | None = None
+
+    def _progress(self, stage: str, fraction: float) -> None:
+        self._tell({"stage": stage, "fraction": fraction})
+
+    def _delay_ticks(self) -> float:
+        """From reading a pose to its force acting: read ahead of the tick, answered after it."""
+        options = self.job.options
+        own = options.read_ahead_s * options.rate_hz + 0.15
+        return own + max(0.0, options.rate_hz / self._device.spec.rate_hz - 1.0)
+
+    def _coupled(self, renderer: Any) -> Any:
+        """The renderer behind the virtual coupling that this device demands."""
+        renderer = renderer.with_series_compliance(0.0)
+        options, spec = self.job.options, self._device.spec
+        if not (options.coupling and spec.has_force and len(renderer.surface[1])):
+            return renderer
+        limit = stable_stiffness_n_per_m(spec.max_stiffness_n_per_m, options.rate_hz, self._delay_ticks())
+        limit /= max(self._mapping.force_scale * self._mapping.scale, 1e-12)
+        stiffest = stiffest_n_per_m(renderer, spec.max_force_n)
+        compliance = series_compliance_m_per_n(stiffest, limit)
+        if compliance > 0:
+            self._tell(
+                {
+                    "word": f"virtual coupling: {1 / compliance:.0f} N/m in series (stiffest place "
+                    f"{stiffest:.0f} N/m, device limit {limit:.0f} N/m)"
+                }
+            )
+        return renderer.with_series_compliance(compliance)
+
+    def _parameters(self, model: Model | None) -> TickParameters:
+        options, spec = self.job.options, self._device.spec
+        return TickParameters(
+            options.period_ns,
+            round(options.late_s * 1e9),
+            safety_parameters(options.safety, spec),
+            passivity_parameters(
+                options.passivity,
+                max_damping_n_s_per_m=spec.max_damping_n_s_per_m,
+                delay_ticks=self._delay_ticks(),
+            ),
+            self._support(model),
+        )
+
+    def _support(self, model: Model | None) -> SupportParameters:
+        options = self.job.options
+        if model is None or not options.support:
+            return no_support()
+        stiffness = options.support_stiffness_n_per_m
+        if self._device.spec.has_force:
+            stiffness = min(stiffness, self._device.spec.max_stiffness_n_per_m)
+        return SupportParameters(
+            model.support_point,
+            model.support_normal,
+            stiffness,
+            options.support_damping_n_s_per_m,
+            options.support_friction,
+        )
+
+    def run(self, commands: BinaryIO) -> None:
+        """Warm up, tick, follow commands, and end in zero force."""
+        quiet_interpreter()
+        self._progress("loading the model", 0.0)
+        renderer, self._model = self._source.make(self._progress)
+        self._progress("compiling the loop", 0.95)
+        program = make_program(self._coupled(renderer), self._arrays, self._parameters(self._model))
+        locked = lock_memory()
+        if locked:
+            self._tell({"word": locked})
+        self._device.open()
+        priority = self.job.options.priority
+
+        def begin_loop() -> None:
+            word = real_time_thread(priority)
+            if word:
+                self._tell({"word": word})
+
+        self._loop = ServoLoop(program, self._arrays, on_start=begin_loop)
+        pump = DeviceThread(
+            self._device,
+            self._mapping,
+            self._loop,
+            read_ahead_s=self.job.options.read_ahead_s,
+            on_start=lambda: real_time_thread(max(priority - 5, 0)),
+        )
+        self._pump = pump
+        pump.prepare()
+        self._loop.start()
+        pump.start()
+        self._tell({"ready": True, "tip_radius_m": float(program.state.radii_m[0])})
+        try:
+            threading.Thread(target=self._follow, args=(commands,), daemon=True).start()
+            while not self._loop.join(0.1):
+                pass
+        finally:
+            self._arrays.control[STOP] = 1
+            pump.join(3.0)
+            for word in pump.words:
+                self._tell({"word": word})
+
+    def _follow(self, commands: BinaryIO) -> None:
+        """Take commands until the input ends, which is the parent's end."""
+        while True:
+            try:
+                name, value = pickle.load(commands)
+            except (EOFError, OSError, pickle.UnpicklingError):
+                break
+            try:
+                self._obey(name, value)
+                self._tell({"done": name})
+            except Exception as error:  # a command that fails must not end the loop that holds the device
+                self._tell({"failed": name, "why": str(error)})
+        if self.job.options.on_orphan == "stop":
+            self._arrays.control[ENABLE] = 0
+            self._arrays.control[STOP] = 1
+
+    def _obey(self, name: str, value: Any) -> None:
+        assert self._loop is not None
+        now = self._loop.program
+        if name == "modulus":
+            self._swap(now._replace(renderer=self._coupled(now.renderer.with_modulus(value))))
+        elif name == "friction":
+            self._swap(now._replace(renderer=now.renderer.with_friction(value)))
+        elif name == "source":
+            renderer, model = value.make(self._progress)
+            program = make_program(self._coupled(renderer), self._arrays, self._parameters(model))
+            self._source, self._model = value, model
+            self._swap(program)
+        elif name == "mapping":
+            self._mapping = value
+            self._pump.set_mapping(value)
+        else:
+            raise OptionError(f"'{name}' is no command of the servo")
+
+    def _swap(self, program: Program) -> None:
+        assert self._loop is not None
+        if not self._loop.swap(program):
+            raise PalpateError("the loop did not answer: stop the servo and start it again")
+
+
+def main(argv: list[str]) -> int:
+    """Run a servo process; 0 after an ordinary end, 2 after an error that was told to the parent."""
+    # libraries may print: keep the parent's line for messages alone
+    line = os.fdopen(os.dup(1), "w", buffering=1)
+    os.dup2(2, 1)
+
+    def tell(message: dict[str, Any]) -> None:
+        try:
+            line.write(json.dumps(message) + "\n")
+        except (OSError, ValueError):
+            pass  # the parent is gone; the loop is told by the end of its input
+
+    block = SharedBlock(argv[1])
+    assert block.arrays is not None
+    control = block.arrays.control
+
+    def end(number: int, frame: Any) -> None:
+        control[ENABLE] = 0
+        control[STOP] = 1
+
+    signal.signal(signal.SIGTERM, end)
+    signal.signal(signal.SIGINT, end)
+    commands = sys.stdin.buffer
+    try:
+        ServoProcess(block, pickle.load(commands), tell).run(commands)
+    except PalpateError as error:
+        tell({"error": str(error), "kind": type(error).__name__})
+        return 2
+    except Exception as error:
+        tell({"error": f"{type(error).__name__}: {error}", "trace": traceback.format_exc()})
+        return 2
+    tell({"ended": True})
+    return 0

@@ -1,0 +1,52 @@
+"""A recording of a servo session: the ring's rows, drained by the parent, written as any other recording."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import RecordingError
+from mechanics.recording import Recording, write_recording
+from palpate.servo.client import Servo
+
+
+class Recorder:
+    """Call `collect` at least every few seconds, then `write`.
+
+    Recorded are the first tip's centre and the rendered force on the tool (support included), scene frame.
+    """
+
+    def __init__(self, servo: Servo) -> None:
+        self._servo = servo
+        self._rows: list[np.ndarray] = []
+        self._next = int(servo.arrays.ring_head[0])
+
+    def collect(self) -> None:
+        """Take what came since the last time."""
+        rows, self._next = self._servo.history(self._next)
+        if len(rows):
+            self._rows.append(rows)
+
+    def recording(self, tip_radius_m: float, object_name: str = "object") -> Recording:
+        """What was collected; raises RecordingError where there is nothing."""
+        rows = np.concatenate(self._rows) if self._rows else np.zeros(0)
+        rows = rows[np.isfinite(rows["tip"]).all(axis=1)] if len(rows) else rows
+        if len(rows) < 2:
+            raise RecordingError("nothing was recorded: the servo ran for less than two ticks")
+        period_s = self._servo.options.period_ns * 1e-9
+        return Recording(
+            t=(rows["tick"] - rows["tick"][0]) * period_s,
+            position=rows["tip"],
+            force_on_tool=rows["rendered"],
+            quaternion=rows["quaternion"],
+            sample_rate_hz=self._servo.options.rate_hz,
+            tip_radius_m=tip_radius_m,
+            object_name=object_name,
+        )
+
+    def write(self, path: Path | str, tip_radius_m: float | None = None) -> Path:
+        """Write the recording; the tip's radius is the model's unless given."""
+        self.collect()
+        radius = self._servo.tip_radius_m if tip_radius_m is None else tip_radius_m
+        return write_recording(path, self.recording(radius))

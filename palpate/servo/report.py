@@ -1,0 +1,192 @@
+"""What a servo session did: ticks, deadlines, forces, faults, energy; and the newest tick for a window."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from devices.safety import WORDS, reason_words
+from palpate.servo.histogram import Histogram
+from palpate.servo.layout import (
+    CONTACT_TICKS,
+    HEAD_WIDTH,
+    LATE,
+    MISSED,
+    ROW,
+    ROW_WIDTH,
+    TICKS,
+    TIP_WIDTH,
+    SharedArrays,
+)
+from palpate.servo.seqlock import read_copy
+from render.passivity import DISSIPATED, LEAST
+
+
+@dataclass(frozen=True)
+class ServoReport:
+    """SI; the histograms' summaries in microseconds.
+
+    late_ticks: started more than the options' `late_s` after their deadline; missed_ticks: never run.
+    energy_given_back_j: most that the hand ever got back net, energy_damped_j: what the controller took.
+    reasons: ticks on which the safety filter gave each reason. words: what the system did not permit.
+    """
+
+    ticks: int
+    seconds: float
+    rate_hz: float
+    missed_ticks: int
+    late_ticks: int
+    compute: Histogram
+    lateness: Histogram
+    peak_rendered_n: float
+    peak_force_n: float
+    contact_share: float
+    energy_given_back_j: float
+    energy_damped_j: float
+    reasons: dict[str, int] = field(default_factory=dict)
+    words: tuple[str, ...] = ()
+    cpu_s: float = float("nan")
+    wall_s: float = float("nan")
+
+    @property
+    def compute_us(self) -> dict[str, float]:
+        """Compute time of a tick: median, p99, p99.9, max, mean."""
+        return self.compute.summary()
+
+    @property
+    def lateness_us(self) -> dict[str, float]:
+        """Start of a tick after its deadline: median, p99, p99.9, max, mean."""
+        return self.lateness.summary()
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {
+            "ticks": self.ticks,
+            "seconds": self.seconds,
+            "rate_hz": self.rate_hz,
+            "missed_ticks": self.missed_ticks,
+            "late_ticks": self.late_ticks,
+            "compute_us": self.compute_us,
+            "lateness_us": self.lateness_us,
+            "peak_rendered_n": self.peak_rendered_n,
+            "peak_force_n": self.peak_force_n,
+            "contact_share": self.contact_share,
+            "energy_given_back_j": self.energy_given_back_j,
+            "energy_damped_j": self.energy_damped_j,
+            "reasons": dict(self.reasons),
+            "words": list(self.words),
+            "cpu_s": self.cpu_s,
+            "wall_s": self.wall_s,
+        }
+
+    def __str__(self) -> str:
+        c, late = self.compute_us, self.lateness_us
+        lines = [
+            f"{self.ticks} ticks in {self.seconds:.1f} s ({self.rate_hz:.1f} Hz), "
+            f"{self.missed_ticks} missed, {self.late_ticks} late",
+            f"compute  median {c['median']:.1f}  p99 {c['p99']:.1f}  p99.9 {c['p99.9']:.1f}  "
+            f"max {c['max']:.1f} us",
+            f"lateness median {late['median']:.1f}  p99 {late['p99']:.1f}  p99.9 {late['p99.9']:.1f}  "
+            f"max {late['max']:.1f} us",
+            f"in contact {100 * self.contact_share:.0f} % of the time, greatest force "
+            f"{self.peak_force_n:.2f} N, energy given back at most {1000 * self.energy_given_back_j:.3f} mJ",
+        ]
+        return "\n".join([*lines, *self.words])
+
+
+def report(
+    arrays: SharedArrays, period_ns: int, words: tuple[str, ...], cpu_s: float, wall_s: float
+) -> ServoReport:
+    """Read the counters."""
+    counts = arrays.counts
+    ticks, missed = int(counts[TICKS]), int(counts[MISSED])
+    seconds = (ticks + missed) * period_ns * 1e-9
+    return ServoReport(
+        ticks=ticks,
+        seconds=seconds,
+        rate_hz=ticks / seconds if seconds else 0.0,
+        missed_ticks=missed,
+        late_ticks=int(counts[LATE]),
+        compute=_histogram(arrays.compute_bins, arrays.compute_extremes),
+        lateness=_histogram(arrays.lateness_bins, arrays.lateness_extremes),
+        peak_rendered_n=float(arrays.peak[0]),
+        peak_force_n=float(arrays.peak[1]),
+        contact_share=int(counts[CONTACT_TICKS]) / ticks if ticks else 0.0,
+        energy_given_back_j=-float(arrays.energies[LEAST]) + 0.0,
+        energy_damped_j=float(arrays.energies[DISSIPATED]),
+        reasons={
+            word: int(n)
+            for bit, word in WORDS.items()
+            if (n := arrays.reason_counts[bit.bit_length() - 1]) > 0
+        },
+        words=words,
+        cpu_s=cpu_s,
+        wall_s=wall_s,
+    )
+
+
+def _histogram(bins: np.ndarray, extremes: np.ndarray) -> Histogram:
+    return Histogram(bins.copy(), int(extremes[1]), int(extremes[2]))
+
+
+@dataclass(frozen=True)
+class ServoSnapshot:
+    """The newest tick, for a window. m tips; scene frame but for `device_position_m` and `command_n`.
+
+    forces_n: (m, 3) rendered, on the tool; command_n: (3,) sent to the device. reason: '' or plain words.
+    """
+
+    tick: int
+    time_s: float
+    device_position_m: np.ndarray
+    command_n: np.ndarray
+    quaternion: np.ndarray
+    buttons: int
+    force_enabled: bool
+    reason: str
+    tips: np.ndarray
+    forces_n: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    depths: np.ndarray
+    touching: np.ndarray
+    stiffness: np.ndarray
+
+
+def snapshot(arrays: SharedArrays) -> ServoSnapshot | None:
+    """A consistent copy; None before the first tick."""
+    block = read_copy(arrays.snapshot_version, arrays.snapshot)
+    if block is None or block[HEAD_WIDTH - 1] == 0:
+        return None
+    row = block[:ROW_WIDTH].view(ROW)[0]
+    m = int(block[HEAD_WIDTH - 1])
+    tips = block[HEAD_WIDTH : HEAD_WIDTH + m * TIP_WIDTH].reshape(m, TIP_WIDTH)
+    return ServoSnapshot(
+        tick=int(row["tick"]),
+        time_s=float(row["time_s"]),
+        device_position_m=row["position"].copy(),
+        command_n=row["command"].copy(),
+        quaternion=row["quaternion"].copy(),
+        buttons=int(row["buttons"]),
+        force_enabled=bool(row["enabled"]),
+        reason=reason_words(int(row["reasons"])),
+        tips=tips[:, :3].copy(),
+        forces_n=tips[:, 3:6].copy(),
+        points=tips[:, 6:9].copy(),
+        normals=tips[:, 9:12].copy(),
+        depths=tips[:, 12].copy(),
+        touching=tips[:, 13] != 0,
+        stiffness=tips[:, 14].copy(),
+    )
+
+
+def ring_rows(arrays: SharedArrays, since: int) -> tuple[np.ndarray, int]:
+    """Rows written after the first `since` ones that the ring still holds, and how many there are by now."""
+    rows = len(arrays.ring)
+    head = int(arrays.ring_head[0])
+    # a margin, since the writer goes on while these rows are copied
+    first = max(since, head - rows + rows // 8)
+    picked = arrays.ring[np.arange(first, head) % rows].copy()
+    return picked.view(ROW).reshape(-1), head

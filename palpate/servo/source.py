@@ -1,0 +1,82 @@
+"""Where the servo process gets its renderer from: small recipes that can be pickled."""
+
+from __future__ import annotations
+
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any, Protocol
+
+from mechanics.model import Model, read_model, write_model
+from mechanics.progress import Progress
+from render.support import SupportParameters
+
+
+class RendererSource(Protocol):
+    """Makes a renderer in the servo process."""
+
+    name: str
+
+    def make(self, progress: Progress) -> tuple[Any, Model | None]:
+        """The renderer, and the model behind it where there is one."""
+
+
+@dataclass(frozen=True)
+class ModelSource:
+    """A renderer by name on a MODEL folder; render_options are the renderer's own, None for defaults."""
+
+    path: Path
+    name: str = "fem"
+    render_options: Any = None
+
+    def make(self, progress: Progress) -> tuple[Any, Model | None]:
+        """Read the model, load or condense its compliance."""
+        import render
+
+        model = read_model(self.path)
+        keywords = {} if self.render_options is None else {"options": self.render_options}
+        return render.create(self.name, model, progress=progress, **keywords), model
+
+    def named(self, name: str) -> ModelSource:
+        """The same model through another renderer."""
+        return replace(self, name=name)
+
+
+@dataclass(frozen=True)
+class FreeAirSource:
+    """No object."""
+
+    name: str = "free-air"
+
+    def make(self, progress: Progress) -> tuple[Any, Model | None]:
+        """A renderer of nothing."""
+        from palpate.servo.free_air import FreeAir
+
+        return FreeAir(), None
+
+
+class ModelFolder:
+    """A MODEL folder for a model that may be in memory only; `close` removes what was written for it."""
+
+    def __init__(self, model: Model | Path | str) -> None:
+        self._temporary: tempfile.TemporaryDirectory[str] | None = None
+        if isinstance(model, Model):
+            if model.path is not None:
+                self.path = model.path
+                return
+            self._temporary = tempfile.TemporaryDirectory(prefix="palpate-")
+            self.path = write_model(Path(self._temporary.name) / "model", model)
+        else:
+            self.path = Path(model)
+
+    def close(self) -> None:
+        """Remove the folder where it was made for this."""
+        if self._temporary is not None:
+            self._temporary.cleanup()
+
+
+def no_support() -> SupportParameters:
+    """A support plane that is not there."""
+    import numpy as np
+
+    return SupportParameters(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0)

@@ -1,0 +1,208 @@
+"""Time-domain passivity: no energy comes out of the rendering that did not go in.
+
+A force held over a tick does work on a moving hand that the model's continuous force would not do: a half
+tick late on the way in it absorbs too little, on the way out it gives too much, K |dx|^2 / 2 a tick for a
+stiffness K; every further tick of delay adds K |dx|^2. Two parts mend it:
+
+1. *Reference following* (Ryu, Preusche, Hannaford, Hirzinger 2005): the energy that the model's force
+   exchanges along the measured path, by the trapezoidal rule, is the reference; what the held force gave
+   beyond it is owed, and a variable damper on the hand takes it back at once, spread over `payback_s`.
+2. *Net guard* (the passivity controller of Hannaford and Ryu 2002, acting before the energy leaves): over
+   each contact, the part of the force along the motion is cut to what the observed energy still affords.
+
+Signs: forces on the tool, device frame; energy is positive where it went into the rendering. Pure step on
+preallocated arrays; it knows no clock.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mechanics.errors import OptionError
+from mechanics.options import option
+
+LONGEST_DELAY_TICKS = 64
+
+
+@dataclass(frozen=True)
+class PassivityOptions:
+    """How strictly energy is kept, and what it may cost."""
+
+    passivity: bool = option(True, "time-domain passivity observer and controller")
+    allowance_j: float = option(2e-4, "energy that may be owed before the guard cuts in", unit="J")
+    payback_s: float = option(0.005, "time over which owed energy is damped away", unit="s")
+    velocity_time_s: float = option(0.002, "time constant of the velocity that damping uses", unit="s")
+
+    def __post_init__(self) -> None:
+        for name in ("allowance_j", "payback_s", "velocity_time_s"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value > 0):
+                raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
+
+
+class PassivityParameters(NamedTuple):
+    """Scalars of the compiled step. delay_ticks: from a pose to the force that it caused, in ticks."""
+
+    active: bool
+    allowance_j: float
+    payback_s: float
+    velocity_time_s: float
+    max_damping_n_s_per_m: float
+    delay_ticks: float
+
+
+class PassivityState(NamedTuple):
+    """Memory between ticks. energies: (5,) J: net in this contact, owed, dissipated by the damper, least net,
+    net since the start."""
+
+    position: np.ndarray
+    velocity: np.ndarray
+    moved: np.ndarray
+    base: np.ndarray
+    damping_force: np.ndarray
+    commanded: np.ndarray
+    acting: np.ndarray
+    energies: np.ndarray
+    ticks: np.ndarray
+    cut: np.ndarray
+
+
+NET, OWED, DISSIPATED, LEAST, TOTAL = range(5)
+
+
+def passivity_parameters(
+    options: PassivityOptions, *, max_damping_n_s_per_m: float, delay_ticks: float = 0.0
+) -> PassivityParameters:
+    """max_damping_n_s_per_m: what the device renders stably. delay_ticks: 0 where the force that a pose
+    causes acts from the instant of that pose; raises OptionError beyond LONGEST_DELAY_TICKS - 2."""
+    if not 0.0 <= delay_ticks <= LONGEST_DELAY_TICKS - 2:
+        raise OptionError(f"delay_ticks is {delay_ticks}; allowed is 0 to {LONGEST_DELAY_TICKS - 2}")
+    return PassivityParameters(
+        options.passivity,
+        options.allowance_j,
+        options.payback_s,
+        options.velocity_time_s,
+        max_damping_n_s_per_m,
+        delay_ticks,
+    )
+
+
+def passivity_state() -> PassivityState:
+    """At rest, nothing exchanged."""
+    return PassivityState(
+        position=np.full(3, np.nan),
+        velocity=np.zeros(3),
+        moved=np.zeros(3),
+        base=np.zeros(3),
+        damping_force=np.zeros(3),
+        commanded=np.zeros((LONGEST_DELAY_TICKS, 3)),
+        acting=np.zeros(3),
+        energies=np.zeros(5),
+        ticks=np.zeros(2, dtype=np.int64),
+        cut=np.zeros(1),
+    )
+
+
+@njit(cache=True, nogil=True)
+def passivity_before(parameters, state, wanted, position, fresh, dt_s):
+    """Observe the last interval and change `wanted` (3,) in place; True where it was changed.
+
+    position: (3,) m, the device's. fresh: whether it is a new reading. Call `passivity_after` with the force
+    that was really sent, in the same tick.
+    """
+    energies = state.energies
+    known = math.isfinite(state.position[0]) and math.isfinite(position[0] + position[1] + position[2])
+    whole = int(parameters.delay_ticks)
+    part = parameters.delay_ticks - whole
+    tick = state.ticks[0]
+    state.ticks[1] += 1
+    for i in range(3):
+        state.acting[i] += (1.0 - part) * state.commanded[(tick - 1 - whole) % LONGEST_DELAY_TICKS, i]
+        state.acting[i] += part * state.commanded[(tick - 2 - whole) % LONGEST_DELAY_TICKS, i]
+    if fresh:
+        between = state.ticks[1] * dt_s
+        share = between / (parameters.velocity_time_s + between)
+        given, force2, touch2 = 0.0, 0.0, 0.0
+        for i in range(3):
+            moved = position[i] - state.position[i] if known else 0.0
+            state.moved[i] = moved
+            state.velocity[i] += share * (moved / between - state.velocity[i])
+            given += state.acting[i] / state.ticks[1] * moved
+            # the reference's half of this tick; the other half is added once this tick's force is known
+            energies[OWED] -= 0.5 * state.base[i] * moved
+            force2 += wanted[i] * wanted[i]
+            touch2 += state.acting[i] * state.acting[i]
+            state.acting[i] = 0.0
+        energies[NET] -= given
+        energies[TOTAL] -= given
+        energies[OWED] += given
+        state.ticks[1] = 0
+        if force2 == 0.0 and touch2 == 0.0:
+            # out of contact nothing is stored: what was dissipated is no licence for the next contact
+            energies[NET] = min(energies[NET], 0.0)
+        if math.isfinite(position[0] + position[1] + position[2]):
+            for i in range(3):
+                state.position[i] = position[i]
+    else:
+        for i in range(3):
+            state.moved[i] = 0.0
+    energies[LEAST] = min(energies[LEAST], energies[TOTAL])
+    for i in range(3):
+        state.damping_force[i] = 0.0
+    if not parameters.active:
+        return False
+    return _control(parameters, state, wanted, dt_s)
+
+
+@njit(cache=True, nogil=True)
+def _control(parameters, state, wanted, dt_s):
+    velocity, energies = state.velocity, state.energies
+    speed2 = velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2
+    force2 = wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2
+    changed = False
+    if speed2 <= 1e-12 or force2 == 0.0:
+        return False
+    if energies[OWED] > 0.0:
+        damping = min(
+            energies[OWED] / (speed2 * max(parameters.payback_s, dt_s)), parameters.max_damping_n_s_per_m
+        )
+        for i in range(3):
+            state.damping_force[i] = -damping * velocity[i]
+            wanted[i] += state.damping_force[i]
+        changed = True
+    speed = math.sqrt(speed2)
+    along = (wanted[0] * velocity[0] + wanted[1] * velocity[1] + wanted[2] * velocity[2]) / speed
+    horizon = speed * dt_s * (1.0 + parameters.delay_ticks)
+    affordable = max(0.0, energies[NET] + parameters.allowance_j) / horizon
+    if along > affordable:
+        for i in range(3):
+            cut = (along - affordable) * velocity[i] / speed
+            state.damping_force[i] -= cut
+            wanted[i] -= cut
+        state.cut[0] += 1.0
+        changed = True
+    return changed
+
+
+@njit(cache=True, nogil=True)
+def passivity_after(state, wanted, sent):
+    """Remember the force `sent`, which safety made of the `wanted` that `passivity_before` left."""
+    wanted2, sent2 = 0.0, 0.0
+    for i in range(3):
+        wanted2 += wanted[i] * wanted[i]
+        sent2 += sent[i] * sent[i]
+    share = min(1.0, math.sqrt(sent2 / wanted2)) if wanted2 > 0.0 else 0.0
+    energies = state.energies
+    for i in range(3):
+        moved = state.moved[i]
+        state.base[i] = sent[i] - share * state.damping_force[i]
+        energies[OWED] -= 0.5 * state.base[i] * moved
+        energies[DISSIPATED] -= share * state.damping_force[i] * moved
+        state.commanded[state.ticks[0] % LONGEST_DELAY_TICKS, i] = sent[i]
+    energies[OWED] = min(max(energies[OWED], -1e-5), 1e-1)
+    state.ticks[0] += 1
