@@ -1,0 +1,130 @@
+"""Tetrahedra inside a surface: base exactly on the support and fixed, everything else touchable (section 2.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.errors import MeshError
+from mechanics.options import option
+from mechanics.progress import Progress, silent
+from mechanics.tetmesh import FACES, TetMesh
+from reconstruct.proximity import closest, distance, sample
+from reconstruct.surface import Surface
+from reconstruct.tetwild import tetrahedralize
+
+_SAMPLES = 4000
+
+
+@dataclass(frozen=True)
+class MeshingOptions:
+    """Size and fidelity of the tetrahedra."""
+
+    mesh_size_m: float = option(0.010, "edge length l of the tetrahedra", unit="m", flag="--mesh-size")
+    surface_distance_m: float = option(
+        0.002, "bound sigma on the distance between mesh and surface", unit="m", flag="--surface-distance"
+    )
+    radius_edge_ratio: float = option(2.0, "bound rho on circumradius over shortest edge")
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """Achieved quality. radius_edge_ratio: (m,). surface_distance_m: (k,) of samples of mesh and surface, both ways.
+
+    edge_m: (e,) edge lengths. volume_m3 of the mesh; surface_volume_m3 of the surface it fills.
+    """
+
+    radius_edge_ratio: np.ndarray
+    surface_distance_m: np.ndarray
+    edge_m: np.ndarray
+    volume_m3: float
+    surface_volume_m3: float
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """A linear mesh in the device frame, its quality and the surface's uncertainty (n,) m at its nodes."""
+
+    mesh: TetMesh
+    report: MeshReport
+    shape_uncertainty_m: np.ndarray
+
+
+def mesh_surface(
+    surface: Surface, options: MeshingOptions | None = None, progress: Progress = silent
+) -> Meshing:
+    """Fill the surface with linear tetrahedra (`mesh.quadratic()` adds mid-edge nodes).
+
+    Raises MeshError where the mesher fails or the mesh does not stand on the support.
+    """
+    options = options or MeshingOptions()
+    if not options.mesh_size_m > 0:
+        raise MeshError(f"--mesh-size is {options.mesh_size_m} m; it must be greater than 0")
+    progress("meshing", 0.0)
+    up, origin = surface.support_normal, surface.support_point
+    envelope = 0.1 * options.surface_distance_m
+    points, cells = tetrahedralize(
+        surface.vertices, surface.triangles, edge_m=options.mesh_size_m, envelope_m=envelope
+    )
+    points, fixed = _stand(points, cells, origin, up, 2 * envelope)
+    on_surface = np.zeros(len(points), dtype=bool)
+    on_surface[_boundary(cells)] = True
+    mesh = TetMesh(points, cells, fixed, on_surface & ~fixed)
+    progress("meshing", 1.0)
+    return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
+
+
+def _boundary(cells: np.ndarray) -> np.ndarray:
+    faces = cells[:, FACES].reshape(-1, 3)
+    _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
+    return faces[first[counts == 1]]
+
+
+def _stand(
+    points: np.ndarray, cells: np.ndarray, origin: np.ndarray, up: np.ndarray, reach_m: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes of downward faces within `reach_m` of the support, put on it; and which they are."""
+    faces = _boundary(cells)
+    corner = points[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    height = (points - origin) @ up
+    base = (np.abs(height[faces]) < reach_m).all(axis=1) & (normal @ up < -0.7)
+    if not base.any():
+        raise MeshError("the mesh has no face on the support: the surface does not stand on it")
+    fixed = np.zeros(len(points), dtype=bool)
+    fixed[faces[base]] = True
+    points = points.copy()
+    points[fixed] -= height[fixed, None] * up
+    return points, fixed
+
+
+def quality(mesh: TetMesh, surface: Surface) -> MeshReport:
+    """Radius-edge ratios, edge lengths, and distances between the mesh's boundary and the surface."""
+    corner = mesh.points[mesh.tetrahedra[:, :4]]
+    a, b, c = (corner[:, k] - corner[:, 0] for k in (1, 2, 3))
+    cross = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
+    six = np.einsum("ij,ij->i", a, cross[0])
+    centre = sum((v * v).sum(axis=1)[:, None] * w for v, w in zip((a, b, c), cross, strict=True))
+    radius = np.linalg.norm(centre, axis=1) / (2 * six)
+    edges = np.linalg.norm(corner[:, [0, 1, 2, 0, 1, 2]] - corner[:, [1, 2, 0, 3, 3, 3]], axis=2)
+    shell, given = (mesh.points, mesh.surface[:, :3]), (surface.vertices, surface.triangles)
+    out = distance(*given, sample(*shell, _SAMPLES))
+    back = distance(*shell, sample(*given, _SAMPLES))
+    return MeshReport(
+        radius_edge_ratio=radius / edges.min(axis=1),
+        surface_distance_m=np.concatenate([out, back]),
+        edge_m=edges.ravel(),
+        volume_m3=float(mesh.volumes.sum()),
+        surface_volume_m3=surface.volume_m3,
+    )
+
+
+def uncertainty_at(mesh: TetMesh, surface: Surface) -> np.ndarray:
+    """(n,) the surface's uncertainty at each node: of the closest place on it; 0 on the base's nodes inside."""
+    found = np.zeros(len(mesh.points))
+    nodes = np.flatnonzero(mesh.touchable)
+    _, triangle, weight = closest(surface.vertices, surface.triangles, mesh.points[nodes])
+    found[nodes] = (weight * surface.uncertainty_m[surface.triangles[triangle]]).sum(axis=1)
+    return found

@@ -1,0 +1,39 @@
+"""Closest points on a triangle surface, by VTK's cell locator."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def closest(
+    vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For points (k, 3): closest points (k, 3), their triangle (k,), and barycentric weights (k, 3) in it."""
+    import pyvista
+
+    shell = pyvista.PolyData.from_regular_faces(np.asarray(vertices, dtype=float), np.asarray(triangles))
+    index, found = shell.find_closest_cell(np.asarray(points, dtype=float), return_closest_point=True)
+    index, found = np.atleast_1d(index), np.atleast_2d(found)
+    a, b, c = (np.asarray(vertices)[np.asarray(triangles)[index, k]] for k in range(3))
+    u, v, w = b - a, c - a, found - a
+    uu, vv, uv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (v, v), (u, v)))
+    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+    area = np.maximum(uu * vv - uv * uv, 1e-300)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    weights = np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
+    return found, index, weights / weights.sum(axis=1, keepdims=True)
+
+
+def distance(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k,) m, unsigned distance of points (k, 3) from the surface."""
+    return np.linalg.norm(closest(vertices, triangles, points)[0] - points, axis=1)
+
+
+def sample(vertices: np.ndarray, triangles: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
+    """(count, 3) points spread evenly by area over the surface; the same for the same seed."""
+    generator = np.random.default_rng(seed)
+    corner = np.asarray(vertices)[np.asarray(triangles)]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    chosen = corner[generator.choice(len(area), count, p=area / area.sum())]
+    r, s = np.sqrt(generator.random(count)), generator.random(count)
+    return np.einsum("ik,ikj->ij", np.column_stack([1 - r, r * (1 - s), r * s]), chosen)

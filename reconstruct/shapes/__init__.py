@@ -1,0 +1,1 @@
+"""Shapes: candidates for the surface of a touched object, one file each."""

@@ -1,0 +1,84 @@
+"""Tetrahedra inside a closed surface by fTetWild, in a process of its own.
+
+fTetWild leaves a file in the current folder, prints, and cannot be stopped: a child process in a temporary folder
+keeps all three away from the caller.
+"""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import MeshError
+
+_CHILD = """
+import sys, numpy as np, pytetwild
+given = np.load("surface.npz")
+points, cells = pytetwild.tetrahedralize(
+    given["vertices"], given["triangles"], edge_length_abs=float(given["edge"]), epsilon=float(given["envelope"]),
+    stop_energy=float(given["energy"]), num_threads=int(given["threads"]), num_opt_iter=int(given["passes"]),
+)
+np.savez("mesh.npz", points=points, cells=cells)
+"""
+
+
+def tetrahedralize(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    *,
+    edge_m: float,
+    envelope_m: float,
+    energy: float = 10.0,
+    passes: int = 80,
+    threads: int = 0,
+    timeout_s: float = 120.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
+
+    edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
+    energy: the optimisation stops at this AMIPS energy (3 is ideal). Raises MeshError where nothing comes back.
+    """
+    diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
+        np.savez(
+            Path(folder) / "surface.npz",
+            vertices=np.asarray(vertices, dtype=np.float64),
+            triangles=np.asarray(triangles, dtype=np.int32),
+            edge=edge_m,
+            envelope=envelope_m / diagonal,
+            energy=energy,
+            passes=passes,
+            threads=threads,
+        )
+        try:
+            done = subprocess.run(
+                [sys.executable, "-c", _CHILD],
+                cwd=folder,
+                capture_output=True,
+                timeout=timeout_s,
+                check=False,
+            )
+        except subprocess.TimeoutExpired as error:
+            raise MeshError(
+                f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size ({edge_m} m was asked for)"
+            ) from error
+        result = Path(folder) / "mesh.npz"
+        if not result.is_file():
+            words = done.stderr.decode(errors="replace").strip().splitlines()
+            raise MeshError(f"the mesher gave no mesh ({words[-1] if words else f'exit {done.returncode}'})")
+        with np.load(result) as found:
+            points, cells = found["points"], found["cells"].astype(np.int64)
+    if not len(cells):
+        raise MeshError(f"the mesher gave no tetrahedra: --mesh-size {edge_m} m does not fit the object")
+    corner = points[cells]
+    volume = np.einsum(
+        "ij,ij->i",
+        np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]),
+        corner[:, 3] - corner[:, 0],
+    )
+    cells[volume < 0] = cells[volume < 0][:, [0, 2, 1, 3]]
+    return points, cells
