@@ -1,0 +1,125 @@
+"""The renderer's interface: one step on plain preallocated arrays, the same for servo, replay, tests and
+diagnosis.
+
+A renderer owns read-only `parameters` and a compiled `kernel(parameters, state, tips)`; the state is a
+NamedTuple of arrays that belongs to the caller. The kernel allocates nothing, reads no clock and is
+deterministic: the same parameters, state and tips give the same bits.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from mechanics.errors import OptionError
+from mechanics.model import Model
+
+
+class State(Protocol):
+    """What every renderer's state holds; m tips, device frame, SI units. Renderers add arrays of their own.
+
+    forces: (m, 3) N on the tools. touching: (m,) int64, 1 where the tip is held by the surface.
+    points: (m, 3) the material point of the undeformed surface that holds the tip; normals: (m, 3) outward
+    there. depths: (m,) m, -n . (tip - point - R n). stiffness: (m,) N/m, change of the normal force with
+    depth, 0 in air. radii_m: (m,). dt_s: (1,) time that a step covers; only terms with memory read it.
+    """
+
+    forces: np.ndarray
+    touching: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    depths: np.ndarray
+    stiffness: np.ndarray
+    radii_m: np.ndarray
+    dt_s: np.ndarray
+
+
+class Renderer(ABC):
+    """Base of the renderers: `start` makes a state, `step` advances it; see the module's words."""
+
+    name: str
+    model: Model
+    parameters: Any
+    kernel: Callable[[Any, Any, np.ndarray], None]
+
+    @abstractmethod
+    def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> Any:
+        """A fresh state with one entry a tip; radii default to the model's one tip."""
+
+    @abstractmethod
+    def with_modulus(self, young_modulus_pa: float) -> Renderer:
+        """The same renderer for another global Young's modulus, without any precomputation."""
+
+    @property
+    @abstractmethod
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """Points (n, 3) m and outward triangles (k, 3) of the surface that is touched and drawn."""
+
+    @abstractmethod
+    def displacement_of(
+        self,
+        points: np.ndarray,
+        normals: np.ndarray,
+        forces_on_tool: np.ndarray,
+        radii_m: np.ndarray,
+        depths: np.ndarray,
+    ) -> np.ndarray:
+        """(n, 3) m, displacement of the surface's points under contacts at (c, 3) points; for drawing."""
+
+    def step(self, state: Any, tips: np.ndarray) -> tuple[Any, np.ndarray]:
+        """Advance by one tick: tips (m, 3) m are centres; returns the state and its forces (m, 3) N on the
+        tools.
+
+        The state is changed in place and returned; the forces are its own array, overwritten by the next
+        step. A tip that is not finite gets zero force and loses its contact.
+        """
+        self.kernel(self.parameters, state, tips)
+        return state, state.forces
+
+    def displacement(self, state: Any) -> np.ndarray:
+        """(n, 3) m, displacement of the surface's points in this state."""
+        held = np.flatnonzero(state.touching)
+        return self.displacement_of(
+            state.points[held],
+            state.normals[held],
+            state.forces[held],
+            state.radii_m[held],
+            state.depths[held],
+        )
+
+
+class Grip(NamedTuple):
+    """The part of a state that says where each tip is held (render.contact): m tips.
+
+    triangle: (m,) of the contact surface, -1 in air; weights: (m, 3) barycentric. armed: (m,) the tip has
+    been outside, so an entry counts. previous: (m, 3) m, where the sweep for the next entry starts, and
+    clearance: (m,) m, how far from there it may move unseen.
+    """
+
+    triangle: np.ndarray
+    weights: np.ndarray
+    armed: np.ndarray
+    previous: np.ndarray
+    clearance: np.ndarray
+
+
+def new_grip(tips: int) -> Grip:
+    """Nobody touches anything yet."""
+    return Grip(
+        np.full(tips, -1, dtype=np.int64),
+        np.zeros((tips, 3)),
+        np.zeros(tips, dtype=np.int64),
+        np.zeros((tips, 3)),
+        np.zeros(tips),
+    )
+
+
+def check_radii(radii_m: Sequence[float] | None, model: Model) -> np.ndarray:
+    """Radii as an array; raises OptionError where one is not positive and finite."""
+    radii = np.atleast_1d(np.asarray([model.tip_radius_m] if radii_m is None else radii_m, dtype=float))
+    if radii.ndim != 1 or not len(radii) or not (np.isfinite(radii) & (radii > 0)).all():
+        raise OptionError(f"tip radii are {radii.tolist()}; each must be a finite number greater than 0 m")
+    return radii

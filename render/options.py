@@ -1,0 +1,45 @@
+"""What a person may tune in a renderer."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from mechanics.dent import dent_laws
+from mechanics.errors import OptionError
+from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class RenderOptions:
+    """Tuning of the renderers; defaults render the ideal model plus the effects that the model names."""
+
+    friction: float | None = option(
+        None,
+        "Coulomb friction coefficient; inf sticks; default: the model's friction_slip, else inf",
+        unit="1",
+    )
+    finite_strain: bool = option(
+        True, "use the finite-strain dent law (neo-Hookean) instead of the linear one"
+    )
+    effects: bool = option(True, "render the effects that the model names")
+    snap_to_touches: bool = option(
+        True, "let the contact surface pass through the touched points of the model's palpations"
+    )
+    surface_edge_m: float = option(2.5e-3, "edge of the contact surface's triangles", unit="m")
+    interpolation: str = option(
+        "rbf", "of 1D parameters over the surface", choices=("rbf", "nearest"), flag="--interpolation"
+    )
+
+    def __post_init__(self) -> None:
+        if self.friction is not None and (math.isnan(self.friction) or self.friction < 0):
+            raise OptionError(f"friction is {self.friction}; it must be 0 or greater (inf sticks)")
+        if not self.surface_edge_m > 0:
+            raise OptionError(f"surface_edge_m is {self.surface_edge_m}; it must be greater than 0 m")
+        if self.interpolation not in ("rbf", "nearest"):
+            raise OptionError(f"interpolation is '{self.interpolation}'; allowed are rbf, nearest")
+
+    @property
+    def dent_law(self) -> str:
+        """The dent law's name."""
+        return "neo-hookean" if self.finite_strain and "neo-hookean" in dent_laws() else "sphere"

@@ -1,0 +1,33 @@
+"""The renderers by name; one file each, one line here."""
+
+from __future__ import annotations
+
+import importlib
+
+from mechanics.errors import OptionError
+from mechanics.model import Model
+from mechanics.progress import Progress, silent
+from render.base import Renderer
+from render.options import RenderOptions
+
+_RENDERERS = {
+    "fem": "render.fem",
+    "kelvin-voigt": "render.kelvin_voigt",
+    "hunt-crossley": "render.hunt_crossley",
+    "hunt-crossley-undamped": "render.hunt_crossley_undamped",
+    "hunt-crossley-kh": "render.hunt_crossley_kh",
+}
+
+
+def names() -> tuple[str, ...]:
+    """The names that `create` takes."""
+    return tuple(_RENDERERS)
+
+
+def create(
+    name: str, model: Model, options: RenderOptions | None = None, progress: Progress = silent
+) -> Renderer:
+    """The renderer of that name for a model; raises OptionError for a name that is not there."""
+    if name not in _RENDERERS:
+        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(_RENDERERS)}")
+    return importlib.import_module(_RENDERERS[name]).create(model, options or RenderOptions(), progress)

@@ -1,0 +1,299 @@
+"""The contact surface: the model's surface, rounded between its nodes and cut fine enough to slide on
+unnoticed.
+
+A mesh of 10 mm facets would be felt as facets. Cubic patches through the nodes (PN triangles: Vlachos et al.,
+Curved PN Triangles, 2001) follow the shape between them; edges where normals jump stay edges, but the
+*contact normal* turns over a few millimetres there, as it does under a sphere that rolls over a soft edge, so
+that no force steps. Everything here is made once; the 1 kHz side reads flat arrays.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from mechanics.errors import MeshError
+from mechanics.tetmesh import TetMesh
+from render.bvh import Bvh, build_bvh
+
+CREASE_DEGREES = 35.0
+NORMAL_SMOOTHING_M = 1.5e-3
+
+
+class SurfaceArrays(NamedTuple):
+    """What the kernels read; v fine vertices, k fine triangles.
+
+    vertices, normals: (v, 3). triangles: (k, 3) outward. neighbours: (k, 3) triangle across edge i -> i+1, -1
+    none. free: (k,) 1 where the triangle may be touched, 0 on the base. bvh: over the triangles.
+    vertex_pseudo (v, 3), edge_pseudo (k, 3, 3): pseudonormals that tell inside from outside.
+    """
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    triangles: np.ndarray
+    neighbours: np.ndarray
+    free: np.ndarray
+    vertex_pseudo: np.ndarray
+    edge_pseudo: np.ndarray
+    bvh: Bvh
+
+
+@dataclass(frozen=True)
+class ContactSurface:
+    """Fine surface of a mesh. arrays: for kernels. nodes (v, 3), node_weights (v, 3): the mesh nodes whose
+    linear interpolation holds at a vertex; parents (k, 3): mesh nodes that interpolate over triangle k;
+    parent_weights (k, 3, 3): their weights at the triangle's corners."""
+
+    arrays: SurfaceArrays
+    nodes: np.ndarray
+    node_weights: np.ndarray
+    parents: np.ndarray
+    parent_weights: np.ndarray
+
+    @property
+    def edge_m(self) -> float:
+        """Median length of the fine edges, m."""
+        p = self.arrays.vertices[self.arrays.triangles]
+        return float(np.median(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)))
+
+
+def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_000) -> ContactSurface:
+    """Round and refine a mesh's boundary to about `edge_m`, with at most about `largest` triangles.
+
+    Raises MeshError where the boundary is not closed.
+    """
+    coarse = mesh.surface
+    corners = coarse[:, :3]
+    touchable = ~mesh.fixed[corners].all(axis=1)
+    edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]
+    longest = float(np.median(np.linalg.norm(edges, axis=2)))
+    parts = max(1, round(longest / edge_m))
+    while parts > 1 and len(corners) * parts**2 > largest:
+        parts -= 1
+    if mesh.order == 2:
+        parts = max(2, parts + parts % 2)
+    barycentric, cells = _lattice(parts)
+    corner_normals = _corner_normals(mesh.points, corners, touchable)
+    positions = _pn_patch(
+        mesh.points[corners], corner_normals, _flat_edges(corners, corner_normals), barycentric
+    )
+    index, count = _merged(corners, parts)
+    vertices = np.zeros((count, 3))
+    vertices[index] = positions
+    triangles = index[:, cells].reshape(-1, 3)
+    free = np.repeat(touchable, len(cells)).astype(np.int64)
+    parents, parent_weights = _parents(coarse, barycentric, cells)
+    nodes = np.zeros((count, 3), dtype=np.int64)
+    node_weights = np.zeros((count, 3))
+    for corner in range(3):
+        nodes[triangles[:, corner]] = parents
+        node_weights[triangles[:, corner]] = parent_weights[:, corner]
+    neighbours = _neighbours(triangles)
+    if (neighbours < 0).any():
+        raise MeshError("the mesh's boundary is not closed: mesh the surface again")
+    return ContactSurface(
+        with_vertices(vertices, triangles, neighbours, free), nodes, node_weights, parents, parent_weights
+    )
+
+
+def with_vertices(
+    vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, free: np.ndarray
+) -> SurfaceArrays:
+    """The kernels' arrays for these vertices: normals, pseudonormals and search tree."""
+    p = vertices[triangles]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    length = np.linalg.norm(area, axis=1, keepdims=True)
+    face = area / np.where(length > 0, length, 1.0)
+    edge_pseudo = face[:, None, :] + face[neighbours]
+    pseudo = np.zeros_like(vertices)
+    for c in range(3):
+        a = p[:, (c + 1) % 3] - p[:, c]
+        b = p[:, (c + 2) % 3] - p[:, c]
+        cosine = np.einsum("ij,ij->i", a, b) / np.maximum(
+            np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-300
+        )
+        np.add.at(pseudo, triangles[:, c], np.arccos(np.clip(cosine, -1, 1))[:, None] * face)
+    return SurfaceArrays(
+        vertices=np.ascontiguousarray(vertices),
+        normals=_smooth_normals(vertices, triangles, free, area),
+        triangles=np.ascontiguousarray(triangles, dtype=np.int64),
+        neighbours=neighbours,
+        free=free,
+        vertex_pseudo=pseudo,
+        edge_pseudo=np.ascontiguousarray(edge_pseudo),
+        bvh=build_bvh(p),
+    )
+
+
+def _smooth_normals(
+    vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray, area: np.ndarray
+) -> np.ndarray:
+    """Unit vertex normals of the touchable part, averaged along the surface over NORMAL_SMOOTHING_M."""
+    touch = triangles[free > 0]
+    normals = np.zeros_like(vertices)
+    for c in range(3):
+        np.add.at(normals, touch[:, c], area[free > 0])
+        np.add.at(normals, triangles[free == 0][:, c], 1e-9 * area[free == 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    pairs = np.vstack([touch[:, [0, 1]], touch[:, [1, 2]], touch[:, [2, 0]]])
+    edge = np.linalg.norm(vertices[pairs[:, 0]] - vertices[pairs[:, 1]], axis=1)
+    n = len(vertices)
+    links = sp.coo_matrix(
+        (np.ones(2 * len(pairs)), (pairs.ravel("F"), pairs[:, ::-1].ravel("F"))), shape=(n, n)
+    )
+    links = links.tocsr()
+    links.data[:] = 1.0
+    degree = np.asarray(links.sum(axis=1)).ravel()
+    # half a step towards the neighbours' mean spreads by a quarter of the squared edge in each direction
+    sweeps = max(1, round(NORMAL_SMOOTHING_M**2 / (0.25 * float(np.median(edge)) ** 2)))
+    for _ in range(sweeps):
+        mean = links @ normals / np.maximum(degree, 1)[:, None]
+        normals = np.where(degree[:, None] > 0, (normals + mean) / 2, normals)
+        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    return np.ascontiguousarray(normals)
+
+
+def _corner_normals(points: np.ndarray, triangles: np.ndarray, touchable: np.ndarray) -> np.ndarray:
+    """(k, 3, 3) unit normals of each corner, averaged over the faces joined to it without a crease."""
+    p = points[triangles]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    face = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
+    k = len(triangles)
+    neighbours = _neighbours(triangles)
+    rows, columns = [], []
+    for edge in range(3):
+        other = neighbours[:, edge]
+        smooth = (other >= 0) & (
+            np.einsum("ij,ij->i", face, face[other]) > np.cos(np.radians(CREASE_DEGREES))
+        )
+        smooth &= touchable == touchable[other]
+        here = np.flatnonzero(smooth)
+        for corner in (edge, (edge + 1) % 3):
+            node = triangles[here, corner]
+            match = (triangles[other[here]] == node[:, None]).argmax(axis=1)
+            rows.append(here * 3 + corner)
+            columns.append(other[here] * 3 + match)
+    r, c = np.concatenate(rows), np.concatenate(columns)
+    group = connected_components(
+        sp.coo_matrix((np.ones(len(r)), (r, c)), shape=(3 * k, 3 * k)), directed=False
+    )[1]
+    total = np.zeros((group.max() + 1, 3))
+    np.add.at(total, group, np.repeat(area, 3, axis=0))
+    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+    return total[group].reshape(k, 3, 3)
+
+
+def _neighbours(triangles: np.ndarray) -> np.ndarray:
+    """(k, 3) the triangle across the edge from corner i to corner i+1; -1 where there is none."""
+    k = len(triangles)
+    start = triangles.ravel()
+    end = np.roll(triangles, -1, axis=1).ravel()
+    n = int(triangles.max()) + 1
+    forward, backward = start * np.int64(n) + end, end * np.int64(n) + start
+    order = np.argsort(forward, kind="stable")
+    place = np.searchsorted(forward[order], backward)
+    place = np.minimum(place, len(order) - 1)
+    found = order[place]
+    return np.where(forward[found] == backward, found // 3, -1).reshape(k, 3)
+
+
+def _flat_edges(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
+    """(k, 3) edges whose two sides disagree on the normals: creases, which stay straight so that no gap
+    opens."""
+    neighbours = _neighbours(triangles)
+    flat = np.zeros(triangles.shape, dtype=bool)
+    for edge in range(3):
+        other = neighbours[:, edge]
+        for corner in (edge, (edge + 1) % 3):
+            match = (triangles[other] == triangles[:, corner][:, None]).argmax(axis=1)
+            differs = np.abs(normals[:, corner] - normals[other, match]).max(axis=1) > 1e-9
+            flat[:, edge] |= differs | (other < 0)
+    return flat
+
+
+def _pn_patch(p: np.ndarray, n: np.ndarray, flat: np.ndarray, barycentric: np.ndarray) -> np.ndarray:
+    """(k, q, 3) points of the cubic patches through corners p (k, 3, 3) with corner normals n."""
+
+    def control(i: int, j: int) -> np.ndarray:
+        edge = i if (i + 1) % 3 == j else j
+        along = p[:, j] - p[:, i]
+        lift = np.einsum("ij,ij->i", along, n[:, i])[:, None] * n[:, i]
+        return p[:, i] + (along - np.where(flat[:, edge, None], 0.0, lift)) / 3
+
+    b = {(i, j): control(i, j) for i in range(3) for j in range(3) if i != j}
+    mean = sum(b.values()) / 6
+    centre = mean + (mean - p.mean(axis=1)) / 2
+    u, v, w = barycentric.T
+    result = np.zeros((len(p), len(barycentric), 3))
+    for weight, value in (
+        (u**3, p[:, 0]),
+        (v**3, p[:, 1]),
+        (w**3, p[:, 2]),
+        (3 * u * u * v, b[0, 1]),
+        (3 * u * v * v, b[1, 0]),
+        (3 * v * v * w, b[1, 2]),
+        (3 * v * w * w, b[2, 1]),
+        (3 * w * w * u, b[2, 0]),
+        (3 * w * u * u, b[0, 2]),
+        (6 * u * v * w, centre),
+    ):
+        result += weight[None, :, None] * value[:, None, :]
+    return result
+
+
+def _lattice(parts: int) -> tuple[np.ndarray, np.ndarray]:
+    """Barycentric points (q, 3) of a triangle cut into parts^2, and its small triangles (parts^2, 3)."""
+    points = [(parts - i - j, i, j) for i in range(parts + 1) for j in range(parts + 1 - i)]
+    index = {point: k for k, point in enumerate(points)}
+    cells = []
+    for a, i, j in points:
+        if a >= 1:
+            cells.append([index[a, i, j], index[a - 1, i + 1, j], index[a - 1, i, j + 1]])
+        if a >= 1 and i >= 1:
+            cells.append([index[a, i, j], index[a - 1, i, j + 1], index[a, i - 1, j + 1]])
+    return np.array(points) / parts, np.array(cells)
+
+
+def _merged(triangles: np.ndarray, parts: int) -> tuple[np.ndarray, int]:
+    """(k, q) vertex numbers of the lattice points, shared along edges and corners; and how many there are."""
+    lattice = np.rint(_lattice(parts)[0] * parts).astype(np.int64)
+    k, q = len(triangles), len(lattice)
+    keys = np.zeros((k, q, 6), dtype=np.int64)
+    own = np.arange(k)
+    for column, count in enumerate(lattice):
+        on = np.flatnonzero(count)
+        if len(on) == 3:
+            keys[:, column, 0], keys[:, column, 1], keys[:, column, 2] = -1, own, column
+            continue
+        pairs = np.sort(triangles[:, on] * np.int64(parts + 1) + count[on], axis=1)
+        keys[:, column, : len(on)] = pairs
+        keys[:, column, 5] = len(on)
+    _, index = np.unique(keys.reshape(-1, 6), axis=0, return_inverse=True)
+    index = index.reshape(k, q)
+    return index, int(index.max()) + 1
+
+
+def _parents(coarse: np.ndarray, barycentric: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Mesh nodes (k, 3) and their weights at the corners (k, 3, 3) for each small triangle."""
+    if coarse.shape[1] == 3:
+        parents = np.repeat(coarse, len(cells), axis=0)
+        return parents, np.tile(barycentric[cells], (len(coarse), 1, 1))
+    # the four linear triangles of a quadratic one: three at the corners, one in the middle
+    nodes = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
+    local, weights = [], []
+    for cell in cells:
+        w = barycentric[cell]
+        middle = w.mean(axis=0)
+        part = int(middle.argmax()) if middle.max() > 0.5 else 3
+        if part < 3:
+            inner = 2 * w
+            inner[:, part] -= 1
+        else:  # opposite corners vanish on the middle triangle's nodes: 3 is edge 01, 4 is 12, 5 is 20
+            inner = (1 - 2 * w)[:, [2, 0, 1]]
+        local.append(nodes[part])
+        weights.append(inner)
+    return coarse[:, np.array(local)].reshape(-1, 3), np.tile(np.array(weights), (len(coarse), 1, 1))
