@@ -275,21 +275,24 @@ def write_recording(
     return path
 
 
-def dump_toml(table: Mapping[str, Any], prefix: str = "") -> str:
-    """A mapping of scalars, lists and nested mappings as TOML text (the standard library only reads TOML)."""
-    lines: list[str] = []
-    nested: list[tuple[str, Mapping[str, Any]]] = []
+def dump_toml(table: Mapping[str, Any]) -> str:
+    """A mapping of scalars, lists and nested mappings as TOML text (the standard library only reads TOML).
+
+    Values that are None are left out, since TOML has no such value.
+    """
+    return "\n\n".join(_toml_blocks(table, "")) + "\n"
+
+
+def _toml_blocks(table: Mapping[str, Any], name: str) -> list[str]:
+    lines = [f"[{name}]"] if name else []
+    blocks: list[str] = []
     for key, value in table.items():
         if isinstance(value, Mapping):
-            nested.append((key, value))
+            blocks += _toml_blocks(value, f"{name}.{_toml_key(key)}" if name else _toml_key(key))
         elif value is not None:
             lines.append(f"{_toml_key(key)} = {_toml_value(value)}")
-    for key, value in nested:
-        name = f"{prefix}.{_toml_key(key)}" if prefix else _toml_key(key)
-        body = dump_toml(value, name)
-        only_tables = value and all(isinstance(v, Mapping) for v in value.values())
-        lines.append(body if only_tables else f"\n[{name}]\n{body}")
-    return "\n".join(lines).rstrip("\n") + "\n"
+    bare = not name or (blocks and len(lines) == 1)
+    return blocks if bare and len(lines) <= bool(name) else ["\n".join(lines), *blocks]
 
 
 def _toml_key(key: str) -> str:
