@@ -1,0 +1,87 @@
+"""The main job on the embedded example, or on a recording of yours.
+
+Reconstructs it, precomputes, replays the recorded path, runs the 1 kHz loop against a simulated hand, diagnoses;
+then writes one self-contained HTML report and prints its path. Where there is a screen, the touch window opens.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from pathlib import Path
+
+from palpate.arguments import (
+    add_json,
+    add_options,
+    add_seed,
+    emit_json,
+    options_from,
+    progress_bar,
+    say,
+)
+from palpate.demo import DemoOptions, run_demo
+
+SUMMARY = "the main job on the embedded example; prints the report's path"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Where from, where to, and the options."""
+    parser.add_argument("recording", nargs="?", help="a recording (default: the embedded silicone cylinder)")
+    parser.add_argument(
+        "-o", "--output", default="palpate-demo", help="folder for model and report (default: %(default)s)"
+    )
+    parser.add_argument(
+        "--window",
+        action=argparse.BooleanOptionalAction,
+        default=None,
+        help="open the touch window at the end (default: where there is a screen and a terminal)",
+    )
+    add_options(parser, DemoOptions)
+    add_seed(parser)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Run the demo."""
+    from palpate.report.demo import write_report
+    from scenes.embedded import embedded_recording
+
+    folder = Path(arguments.output)
+    folder.mkdir(parents=True, exist_ok=True)
+    source = arguments.recording or embedded_recording()
+    result = run_demo(source, folder, options_from(arguments, DemoOptions), progress_bar, arguments.seed)
+    report = write_report(result, folder)
+    model = result.model
+    say(
+        arguments,
+        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa from {len(model.palpations)} presses",
+        f"rendered against measured force: {result.replay_rmse_n:.3f} N rms "
+        f"of {result.contact_force_rms_n:.3f} N rms",
+        str(result.servo),
+        f"report: {report.resolve()}",
+    )
+    emit_json(
+        {
+            "young_modulus_pa": model.young_modulus_pa,
+            "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
+            "replay_rmse_n": result.replay_rmse_n,
+            "servo": result.servo.as_dict(),
+            "seconds": result.seconds,
+            "report": str(report.resolve()),
+        },
+        arguments.json,
+    )
+    if arguments.window or (arguments.window is None and _has_screen()):
+        from palpate.cli import main
+
+        return main(["touch", str(folder / "model"), "--device", "mouse"])
+    return 0
+
+
+def _has_screen() -> bool:
+    if not sys.stdout.isatty():
+        return False
+    if sys.platform == "linux":
+        return bool(os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY"))
+    return True

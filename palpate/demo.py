@@ -1,0 +1,95 @@
+"""The main job in one go: reconstruct, precompute, replay, feel for ten seconds, diagnose; then a report."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.model import Model, write_model
+from mechanics.options import option
+from mechanics.progress import Progress
+from mechanics.recording import Recording, read_recording
+from palpate.servo.report import ServoReport
+from reconstruct.pipeline import Reconstruction
+
+
+@dataclass(frozen=True)
+class DemoOptions:
+    """What a person may want otherwise."""
+
+    seconds: float = option(10.0, "how long the 1 kHz loop runs against the simulated hand", unit="s")
+    renderer: str = option("fem", "which renderer serves the loop and the replay")
+    diagnosis: bool = option(True, "diagnose the gap too, in its fast form", flag="--diagnosis")
+
+
+@dataclass(frozen=True)
+class DemoResult:
+    """Everything that the report shows.
+
+    rendered_n: (n, 3) N, force on the tool along the recorded path. error: a line on it in words.
+    """
+
+    recording: Recording
+    reconstruction: Reconstruction
+    rendered_n: np.ndarray
+    replay_rmse_n: float
+    contact_force_rms_n: float
+    servo: ServoReport
+    diagnosis: object | None
+    seconds: dict[str, float]
+
+    @property
+    def model(self) -> Model:
+        """The reconstructed model."""
+        return self.reconstruction.model
+
+
+def run_demo(
+    source: Path | str,
+    folder: Path,
+    options: DemoOptions,
+    bar: Callable[[str], Progress],
+    seed: int = 0,
+) -> DemoResult:
+    """Do all of it; the model goes to `folder/model`. `bar(label)` makes a progress bar for a stage."""
+    import render
+    from mechanics.compliance import load_or_condense
+    from palpate.servo.headless import run_headless
+    from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+    from render.replay import replay, replay_error
+
+    seconds: dict[str, float] = {}
+
+    @contextmanager
+    def stage(label: str) -> Iterator[Progress]:
+        start = time.perf_counter()
+        with bar(label) as progress:
+            yield progress
+            progress("done", 1.0)
+        seconds[label] = time.perf_counter() - start
+
+    recording = read_recording(source)
+    with stage("reconstruct") as progress:
+        done = reconstruct_fully(recording, ReconstructOptions(seed=seed), progress)
+        path = write_model(folder / "model", done.model)
+        model = done.model.replaced(path=path)
+    with stage("precompute") as progress:
+        load_or_condense(model, progress=progress)
+        renderer = render.create(options.renderer, model, progress=progress)
+    with stage("replay") as progress:
+        rendered = replay(renderer, recording.t, recording.position, progress=progress)
+        error = replay_error(recording, model, rendered)
+    with stage("feel at 1 kHz") as progress:
+        servo = run_headless(model, options.renderer, seconds=options.seconds, seed=seed, progress=progress)
+    diagnosis = None
+    if options.diagnosis:
+        from diagnose.pipeline import DiagnoseOptions, diagnose
+
+        with stage("diagnose") as progress:
+            diagnosis = diagnose(recording, model, DiagnoseOptions(fast=True, seed=seed), progress)
+    return DemoResult(recording, done, rendered, error.rmse_n, error.force_rms_n, servo, diagnosis, seconds)

@@ -1,0 +1,101 @@
+"""Pictures of an object: its surface coloured by a value, contact points, base.
+
+Drawn with matplotlib, in parallel projection with hidden triangles left out, so that reports need no OpenGL,
+which a bare machine may lack.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.axes import Axes
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import Normalize, to_rgb
+
+from mechanics.model import Model
+
+PLAIN_COLOUR = "#ead7bf"
+TOUCH_COLOUR = "#c1121f"
+BASE_COLOUR = "#1d3557"
+
+
+def view_axes(up: np.ndarray, elevation_deg: float, azimuth_deg: float) -> np.ndarray:
+    """(3, 3) rows right, upward, towards the eye, for an eye at these angles about `up`."""
+    up = up / np.linalg.norm(up)
+    aside = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
+    aside /= np.linalg.norm(aside)
+    elevation, azimuth = np.radians([elevation_deg, azimuth_deg])
+    level = np.cos(azimuth) * aside + np.sin(azimuth) * np.cross(up, aside)
+    eye = np.cos(elevation) * level + np.sin(elevation) * up
+    right = np.cross(up, eye)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(eye, right), eye])
+
+
+def draw_object(
+    ax: Axes,
+    model: Model,
+    values: np.ndarray | None = None,
+    *,
+    label: str = "",
+    colour_map: str = "viridis",
+    limits: tuple[float, float] | None = None,
+    touches: np.ndarray | None = None,
+    show_base: bool = False,
+    elevation_deg: float = 25.0,
+    azimuth_deg: float = 35.0,
+) -> Axes:
+    """Draw the touchable surface and return `ax`.
+
+    values: (n,) one a mesh node, colours the surface, with a bar named `label`; limits: of the colours.
+    touches: (k, 3) m, points as dots, pale where hidden; show_base: the fixed corner nodes as dots.
+    """
+    mesh = model.mesh
+    view = view_axes(model.support_normal, elevation_deg, azimuth_deg)
+    seen = (mesh.points - mesh.points.mean(axis=0)) @ view.T * 1e3
+    triangles = mesh.touchable_surface[:, :3]
+    p = seen[triangles]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    front = normal[:, 2] > 0
+    order = np.flatnonzero(front)[np.argsort(p[front][:, :, 2].mean(axis=1))]
+    shade = 0.55 + 0.45 * np.clip(normal @ np.array([-0.35, 0.55, 0.76]), 0, 1)
+    if values is None:
+        colour = np.tile(to_rgb(PLAIN_COLOUR), (len(triangles), 1))
+    else:
+        at = np.asarray(values, dtype=float)[triangles].mean(axis=1)
+        scale = Normalize(*(limits or (float(np.nanmin(at)), float(np.nanmax(at)))))
+        colour = colormaps[colour_map](scale(at))[:, :3]
+        bar = ax.figure.colorbar(
+            _mappable(scale, colour_map), ax=ax, label=label, shrink=0.7, fraction=0.046, pad=0.02
+        )
+        bar.outline.set_visible(False)
+    colour = colour * shade[:, None]
+    edges = colour * 0.86 if values is None else colour
+    ax.add_collection(
+        PolyCollection(p[order][:, :, :2], facecolors=colour[order], edgecolors=edges[order], linewidths=0.5)
+    )
+    if show_base:
+        base = seen[: len(mesh.linear().points)][mesh.linear().fixed]
+        ax.scatter(base[:, 0], base[:, 1], s=16, color=BASE_COLOUR, label="fixed base", zorder=0.4)
+    if touches is not None and len(touches):
+        dots = (np.asarray(touches) - mesh.points.mean(axis=0)) @ view.T * 1e3
+        nearest = np.argmin(((dots[:, None] - p.mean(axis=1)[None]) ** 2).sum(axis=2), axis=1)
+        visible = normal[nearest, 2] > 0
+        ax.scatter(dots[~visible, 0], dots[~visible, 1], s=14, color=TOUCH_COLOUR, alpha=0.25, zorder=0.5)
+        ax.scatter(
+            dots[visible, 0], dots[visible, 1], s=26, color=TOUCH_COLOUR, label="contact points",
+            edgecolors="white", linewidths=0.6, zorder=3,
+        )  # fmt: skip
+    ax.set_aspect("equal")
+    ax.autoscale_view()
+    ax.set_axis_off()
+    return ax
+
+
+def _mappable(scale: Normalize, colour_map: str) -> Any:
+    from matplotlib.cm import ScalarMappable
+
+    return ScalarMappable(norm=scale, cmap=colour_map)
