@@ -1,12 +1,15 @@
 """The dent: laws of a rigid sphere pressed into an elastic half-space, normal force against indentation.
 
-Every law is a table over x = delta / R: force = E* R^2 c(x) x^1.5 and contact radius = R alpha(x) sqrt(x), with
-E* = E / (1 - nu^2). Hertz is c = 4/3, alpha = 1. One numba kernel reads them all, so a new law is a new table.
-The tangential stiffness of the stick is 8 G a / (2 - nu) (Mindlin), G = E / (2 (1 + nu)).
+Every law is a table over x = delta / R of three numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
+    normal force        E* R^2 c(x) x^1.5
+    contact radius      R alpha(x) x^0.5
+    sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau = alpha)
+Hertz is c = 4/3, alpha = tau = 1. One numba kernel reads them all, so a new law is a new table.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -16,13 +19,14 @@ from numba import njit
 
 from mechanics.errors import OptionError
 
-DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last c and alpha hold
+DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
 _STEPS = 600
 
 
 @dataclass(frozen=True)
 class DentLaw:
-    """A named law: table (n, 2) of c and alpha at x = 0 to DEPTH_LIMIT in equal steps; source in words."""
+    """A named law: table (n, 3) of c, alpha, tau at x = 0 to DEPTH_LIMIT in equal steps; its source in
+    words."""
 
     name: str
     table: np.ndarray
@@ -38,8 +42,16 @@ class DentLaw:
 
     def contact_radius(self, depth_m: np.ndarray, tip_radius_m: float) -> np.ndarray:
         """Radius of the contact circle (k,) m."""
-        depth = np.atleast_1d(np.asarray(depth_m, dtype=float))
-        return np.array([dent_force(self.table, d, tip_radius_m, 1.0)[2] for d in depth])
+        x = np.maximum(np.atleast_1d(np.asarray(depth_m, dtype=float)), 0.0) / tip_radius_m
+        return tip_radius_m * np.sqrt(x) * np.interp(x, grid(), self.table[:, 1])
+
+    def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
+        """The law with c and tau multiplied by factors, one or one a row of `grid()`."""
+        table = self.table.copy()
+        table[:, 0] *= c
+        table[:, 2] *= tau
+        table.setflags(write=False)
+        return DentLaw(name or self.name, table, self.source)
 
 
 @cache
@@ -64,36 +76,39 @@ def grid() -> np.ndarray:
 
 
 def _hertz() -> tuple[np.ndarray, str]:
-    return np.tile([4 / 3, 1.0], (_STEPS + 1, 1)), "Hertz 1882: paraboloid, a << R"
+    return np.tile([4 / 3, 1.0, 1.0], (_STEPS + 1, 1)), "Hertz 1882: paraboloid, a << R"
 
 
 def _sphere() -> tuple[np.ndarray, str]:
-    # parametrised by a/R < 1, dense where x grows without bound
+    # parametrised by a/R < 1, dense where the indentation grows without bound
     a = 1 - np.geomspace(1.0, 1e-5, 40001)[1:]
     log = np.log((1 + a) / (1 - a))
     depth = a * log / 2
     force = (a * a + 1) / 2 * log - a
     x = grid()
-    table = np.empty((len(x), 2))
-    table[:, 0] = np.interp(x, depth, force / depth**1.5)
-    table[:, 1] = np.interp(x, depth, a / np.sqrt(depth))
-    return table, "Sneddon 1965: exact profile of a sphere, frictionless"
+    c, alpha = (np.interp(x, depth, y) for y in (force / depth**1.5, a / np.sqrt(depth)))
+    return np.stack([c, alpha, alpha], axis=1), "Sneddon 1965: exact profile of a sphere, frictionless"
 
 
-def _neo_hookean() -> tuple[np.ndarray, str]:
-    from numpy import loadtxt
+def _tabulated(name: str) -> tuple[np.ndarray, str]:
+    path = Path(__file__).with_name(f"dent_{name.replace('-', '_')}.csv")
+    x, *columns = np.loadtxt(path, delimiter=",", unpack=True)
+    table = np.stack([np.interp(grid(), x, y) for y in columns], axis=1)
+    return table, f"axisymmetric finite elements, sticking sphere, nu = 0.49 ({path.name})"
 
-    x, c, alpha = loadtxt(Path(__file__).with_name("dent_neo_hookean.csv"), delimiter=",", unpack=True)
-    table = np.stack([np.interp(grid(), x, c), np.interp(grid(), x, alpha)], axis=1)
-    return table, "axisymmetric finite-strain solution, see docs/mechanics.md"
 
-
-_LAWS = {"hertz": _hertz, "sphere": _sphere, "neo-hookean": _neo_hookean}
+_LAWS: dict[str, Callable[[], tuple[np.ndarray, str]]] = {
+    "hertz": _hertz,
+    "sphere": _sphere,
+    "linear": lambda: _tabulated("linear"),
+    "neo-hookean": lambda: _tabulated("neo-hookean"),
+}
 
 
 @njit(cache=True, error_model="numpy")
-def dent_force(table, depth, radius, plane_strain_modulus):  # type: ignore[no-untyped-def]
-    """(force N, stiffness N/m, contact radius m) at an indentation, m; zeros where it is not positive."""
+def dent_force(table, depth, radius, plane_strain_modulus):
+    """(force N, stiffness N/m, stick radius R tau x^0.5 m) at an indentation, m; zeros where it is not
+    positive."""
     if not depth > 0.0:
         return 0.0, 0.0, 0.0
     x = depth / radius
@@ -103,16 +118,16 @@ def dent_force(table, depth, radius, plane_strain_modulus):  # type: ignore[no-u
     i = int(position)
     slope = 0.0
     if i >= last:
-        c, alpha = table[last, 0], table[last, 1]
+        c, tau = table[last, 0], table[last, 2]
     else:
         f = position - i
         slope = (table[i + 1, 0] - table[i, 0]) / step
         c = table[i, 0] + f * (table[i + 1, 0] - table[i, 0])
-        alpha = table[i, 1] + f * (table[i + 1, 1] - table[i, 1])
+        tau = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
     root = np.sqrt(x)
     force = plane_strain_modulus * radius * radius * c * x * root
     stiffness = plane_strain_modulus * radius * (1.5 * c * root + slope * x * root)
-    return force, stiffness, radius * alpha * root
+    return force, stiffness, radius * tau * root
 
 
 def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:

@@ -1,6 +1,6 @@
 """Small-strain isotropic elasticity on tetrahedra: the stiffness matrix for unit Young's modulus.
 
-Elements: linear (4 nodes, the paper's) and quadratic (10 nodes, straight sides). Integration is exact for both.
+Elements: linear (4 nodes, the paper's) and quadratic (10 nodes, straight sides); integration is exact.
 Degrees of freedom are ordered x, y, z node by node.
 """
 

@@ -11,7 +11,7 @@ from functools import cache
 import numpy as np
 import scipy.sparse as sp
 
-_SYMMETRIC_POSITIVE_DEFINITE = 2
+_DEFINITE, _INDEFINITE = 2, -2  # the library's names of real symmetric matrices
 
 
 @cache
@@ -39,9 +39,12 @@ class Pardiso:
     Raises ArithmeticError where the matrix is not positive definite.
     """
 
-    def __init__(self, matrix: sp.csr_matrix, schur: np.ndarray | None = None) -> None:
+    def __init__(
+        self, matrix: sp.csr_matrix, schur: np.ndarray | None = None, *, definite: bool = True
+    ) -> None:
         upper = sp.triu(matrix, format="csr")
         upper.sort_indices()
+        self._kind = _DEFINITE if definite else _INDEFINITE
         self.size = upper.shape[0]
         self._values = np.ascontiguousarray(upper.data, dtype=np.float64)
         self._rows = upper.indptr.astype(np.int32)
@@ -55,7 +58,7 @@ class Pardiso:
         self.schur: np.ndarray | None = None
         if schur is not None:
             self._perm[schur] = 1
-            self._iparm[35] = 2  # Schur complement, factors of the rest are kept
+            self._iparm[35] = 1  # only the Schur complement, no factors to solve with
             k = int(self._perm.sum())
             self.schur = np.zeros((k, k))
         self._call(12, np.zeros(1), np.zeros(1) if self.schur is None else self.schur, 0)
@@ -80,7 +83,7 @@ class Pardiso:
             pointer(self._handle),
             integer(1),
             integer(1),
-            integer(_SYMMETRIC_POSITIVE_DEFINITE),
+            integer(self._kind),
             integer(phase),
             integer(self.size),
             pointer(self._values),
@@ -96,6 +99,12 @@ class Pardiso:
         )
         if error.value:
             raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
+
+    def take_schur(self) -> np.ndarray:
+        """The Schur complement, (k, k); MKL's memory and this object's share in the array are let go."""
+        schur, self.schur = self.schur, None
+        self.free()
+        return schur
 
     def free(self) -> None:
         """Release the factor."""

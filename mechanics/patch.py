@@ -1,15 +1,17 @@
 """The smooth load patch of a tip: a Gaussian of width s on the surface, and the half-space under it.
 
-A point load on a solid is singular; spread over a Gaussian, load and mean displacement (under the same weight)
-are finite and meet mesh elements of the size of s without trouble. What the patch smears out, the local dent, is
-put back in closed form (mechanics.dent); hence the compliance of a half-space under the same patch is subtracted.
+A point load on a solid is singular; spread over a Gaussian, load and mean displacement (under the same
+weight) are finite and meet mesh elements of the size of s without trouble. What the patch smears out,
+the local
+dent, is put back in closed form (mechanics.dent); hence the compliance of a half-space under the same
+patch is
+subtracted.
 """
 
 from __future__ import annotations
 
-from functools import cached_property
-
 import numpy as np
+import scipy.sparse as sp
 
 from mechanics.errors import MeshError
 from mechanics.tetmesh import TetMesh
@@ -87,10 +89,17 @@ class PatchSampler:
             )
         return nodes, total / total_sum
 
-    @cached_property
-    def area(self) -> float:
-        """m^2, the touchable surface."""
-        return float(self._areas.sum())
+    def matrix(self, points: np.ndarray) -> sp.csr_matrix:
+        """(k, n) rows of patch weights over all nodes: the smoothing that turns nodal values into patch
+        means."""
+        rows, columns, values = [], [], []
+        for k, point in enumerate(points):
+            nodes, weights = self.weights(point)
+            rows.append(np.full(len(nodes), k))
+            columns.append(nodes)
+            values.append(weights)
+        entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+        return sp.csr_matrix(entries, shape=(len(points), len(self.mesh.points)))
 
 
 def _subdivided(parts: int) -> tuple[np.ndarray, np.ndarray]:
@@ -113,9 +122,10 @@ def _subdivided(parts: int) -> tuple[np.ndarray, np.ndarray]:
 def half_space_compliance(normal: np.ndarray, poisson_ratio: float, width_m: float) -> np.ndarray:
     """(3, 3) mean displacement a unit force of a half-space under a Gaussian patch, unit modulus, 1/m.
 
-    Load and mean share the weight exp(-r^2 / 2 s^2) / (2 pi s^2). Along the normal (Boussinesq)
-    (1 - nu^2) / (2 sqrt(pi) s); across it (Cerruti, averaged over directions) (1 + nu)(2 - nu) / (4 sqrt(pi) s);
-    the coupling of the two averages to zero.
+    Load and mean share the weight exp(-r^2 / 2 s^2) / (2 pi s^2).
+    Along the normal (Boussinesq): (1 - nu^2) / (2 sqrt(pi) s).
+    Across it (Cerruti, averaged over directions): (1 + nu)(2 - nu) / (4 sqrt(pi) s).
+    The coupling of the two averages to zero.
     """
     nu = poisson_ratio
     along = (1 - nu**2) / (2 * np.sqrt(np.pi) * width_m)

@@ -21,9 +21,11 @@ _BATCH = 16
 class TouchSites:
     """k touch sites of one object; device frame, SI units, unit modulus.
 
-    points, normals: (k, 3), surface points and outward unit normals. curvature: (k,) 1/m, mean of the principal
-    curvatures, positive where the object is convex. far: (k, 3, 3) far-field compliance, 1/m: the displacement
-    of the patch a unit force, less that of a half-space. patch_width_m, poisson_ratio: what they hold for.
+    points, normals: (k, 3), surface points and outward unit normals.
+    curvature: (k,) 1/m, mean of the principal curvatures, positive where the object is convex.
+    far: (k, 3, 3) far-field compliance, 1/m: displacement of the patch a unit force, less that of a
+    half-space.
+    patch_width_m, poisson_ratio: what they hold for.
     """
 
     points: np.ndarray
@@ -93,7 +95,7 @@ def touch_sites(
 
 
 def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """(k, 3, 3) mean displacement a unit force of each patch (nodes, weights), unit modulus, 1/m; symmetric."""
+    """(k, 3, 3) mean displacement a unit force of each patch (nodes, weights), unit modulus, 1/m."""
     forces = np.zeros((len(solver.mesh.points), 3, 3 * len(patches)))
     for k, (nodes, weights) in enumerate(patches):
         for axis in range(3):
@@ -109,10 +111,11 @@ def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndar
 def mean_curvature(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, *, reach_m: float | None = None
 ) -> np.ndarray:
-    """(k,) 1/m mean of the principal curvatures at surface points, convex positive: a paraboloid fitted to nodes.
+    """(k,) 1/m mean of the principal curvatures at surface points, convex positive.
 
-    Nodes within `reach_m` (None: 1.8 surface edges) whose triangles face the normal within 50 degrees take part;
-    near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
+    A paraboloid fitted to the nodes within `reach_m` (None: 1.8 surface edges) whose triangles face the
+    normal
+    within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
     """
     from mechanics.tetmesh import vertex_normals
 

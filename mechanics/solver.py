@@ -44,17 +44,22 @@ class Solver:
                 ).solve
         except (ArithmeticError, RuntimeError) as error:
             raise MeshError(
-                f"the stiffness cannot be factorised ({error}): fix at least three nodes that are not in line, "
-                "in every connected part of the mesh"
+                f"the stiffness cannot be factorised ({error}): fix at least three nodes that are not in "
+                "line, in every connected part of the mesh"
             ) from error
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
-        """Nodal displacements times the modulus, (n, 3) or (n, 3, r), m Pa, for forces of the same shape, N."""
+        """Nodal displacements times the modulus, m Pa; forces (n, 3) or (n, 3, r), N."""
         forces = np.asarray(forces, dtype=float)
         flat = forces.reshape(3 * len(self.mesh.points), -1)
         result = np.zeros_like(flat)
-        result[self.free] = self._solve(np.asfortranarray(flat[self.free])).reshape(len(self.free), -1)
+        result[self.free] = self.solve_free(flat[self.free]).reshape(len(self.free), -1)
         return result.reshape(forces.shape)
+
+    def solve_free(self, right: np.ndarray) -> np.ndarray:
+        """Solutions (f, r) for right-hand sides (f, r) over the free degrees of freedom (`.free`,
+        ascending)."""
+        return self._solve(np.asfortranarray(right, dtype=float))
 
 
 def free_dofs(mesh: TetMesh) -> np.ndarray:

@@ -2,9 +2,10 @@
 
 The displacement d of the tip since first touch is shared by the local dent and the give of the whole object,
     d = dent(F) + far F / E,
-with the normal dent after a law of mechanics.dent and a tangential stick: every ring of the contact circle holds
-the place where it first touched (method of dimensionality reduction with sticking springs, Popov & Hess 2015,
-equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go. Unilateral, no adhesion.
+with the normal dent after a law of mechanics.dent and a tangential stick: every ring of the contact circle
+holds the place where it first touched (method of dimensionality reduction with sticking springs, Popov & Hess
+2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go. Unilateral, no
+adhesion.
 
 The kernels are plain numba on arrays: 1 kHz rendering, replay and fits run the same ones. `state` is a float
 array of STATE_SIZE, zero before first touch; it holds the ring memory and the last dent.
@@ -20,11 +21,11 @@ from mechanics.sites import tangents
 
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
 STATE_SIZE = 4 + 3 * _RINGS
-"""state[0]: rings held; state[1]: dent along -n, m; state[2:4]: tangential dent, m; then (radius, cumulated origin)."""
+"""state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
 
 
 @njit(cache=True, error_model="numpy")
-def _origin_integral(state, a):  # type: ignore[no-untyped-def]
+def _origin_integral(state, a):
     """Integral over the radius 0..a of the tangential origin of each ring, for a within what is held."""
     count = int(state[0])
     low, high = 0, count - 1
@@ -45,7 +46,7 @@ def _origin_integral(state, a):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):  # type: ignore[no-untyped-def]
+def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     """Tangential force and dent for contact radius a: free = d_t - C_tn F_n, stick = k_t / a."""
     count = int(state[0])
     top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
@@ -69,7 +70,7 @@ def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):  # type: ignore
 
 
 @njit(cache=True, error_model="numpy")
-def _remember(state, a, du, dv, thin):  # type: ignore[no-untyped-def]
+def _remember(state, a, du, dv, thin):
     count = int(state[0])
     top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
     if a > top:
@@ -90,12 +91,13 @@ def _remember(state, a, du, dv, thin):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):  # type: ignore[no-untyped-def]
+def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
     """Advance one touch to displacement d: (f_u, f_v, f_n) on the tool, N, local frame (u, v, n).
 
-    state: (STATE_SIZE,), changed in place; all zero before first touch. d: (3,) m since first touch, local frame
-    (n outward: d[2] < 0 presses in). far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a
-    dent law. radius: effective, m. plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
+    state: (STATE_SIZE,), changed in place; all zero before first touch.
+    d: (3,) m since first touch, local frame (n outward: d[2] < 0 presses in).
+    far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective, m.
+    plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
     """
     press = -d[2]
     if not press > 0.0:
@@ -128,7 +130,7 @@ def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):  # ty
 
 
 @njit(cache=True, error_model="numpy")
-def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out):  # type: ignore[no-untyped-def]
+def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out):
     """Follow a path: d (n, 3) m and out (n, 3) N on the tool in the global frame; far (3, 3) m/N global."""
     local_far = frame @ far @ frame.T
     state = np.zeros(STATE_SIZE)
@@ -142,7 +144,7 @@ def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out): 
 
 
 @njit(cache=True, error_model="numpy")
-def _touch_paths(d, starts, frames, fars, table, radii, plane_strain_modulus, stick, out):  # type: ignore[no-untyped-def]
+def _touch_paths(d, starts, frames, fars, table, radii, plane_strain_modulus, stick, out):
     for k in range(len(starts) - 1):
         part = slice(starts[k], starts[k + 1])
         touch_path(d[part], frames[k], fars[k], table, radii[k], plane_strain_modulus, stick, out[part])
@@ -204,7 +206,7 @@ def touch_forces(
 ) -> np.ndarray:
     """Force on the tool (n, 3), N, of k touches whose paths follow one another.
 
-    displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (starts has k + 1 entries) and begins
+    displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (k + 1 entries) and begins
     untouched. normals: (k, 3). far: (k, 3, 3) 1/m, unit modulus. curvature: (k,) or one, 1/m.
     """
     table = (law if isinstance(law, DentLaw) else dent_law(law)).table

@@ -1,0 +1,156 @@
+"""The compliance of an object condensed on its touchable surface, for unit Young's modulus.
+
+`condense`: exact, every touchable degree of freedom against every other, from the Schur complement of
+the stiffness.
+`surface_compliance`: the same under the Gaussian patch of mechanics.patch at the surface's corners, what
+a servo
+interpolates; far smaller, and free of the singularity of point loads. `load_or_condense` keeps it with a
+MODEL.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as la
+
+from mechanics import pardiso
+from mechanics.elasticity import stiffness
+from mechanics.errors import MeshError
+from mechanics.model import Model
+from mechanics.progress import Progress, silent
+from mechanics.solver import Solver, free_dofs
+from mechanics.store import content_key, load_or_build
+from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
+from mechanics.tetmesh import TetMesh
+
+_COLUMNS = 96  # right-hand sides solved at once
+METHODS = ("schur", "columns")
+
+
+@dataclass(frozen=True)
+class Compliance:
+    """nodes: (t,) touchable nodes of the mesh. matrix: (3t, 3t) float64, symmetric positive definite, m
+    Pa / N.
+
+    matrix[3i + a, 3j + b]: displacement of node i along a for a unit force on node j along b, unit modulus.
+    """
+
+    nodes: np.ndarray
+    matrix: np.ndarray
+
+    @property
+    def float32_error(self) -> float:
+        """Greatest relative rounding of a block's norm where the matrix is stored as float32 (about 6e-8)."""
+        rounded = self.matrix.astype(np.float32)
+        t = len(self.nodes)
+        error = np.abs(rounded - self.matrix).reshape(t, 3, t, 3).max(axis=(1, 3))
+        size = np.abs(self.matrix).reshape(t, 3, t, 3).max(axis=(1, 3))
+        return float((error / size).max())
+
+
+def condense(
+    mesh: TetMesh,
+    poisson_ratio: float,
+    modulus_ratio: np.ndarray | None = None,
+    *,
+    method: str | None = None,
+    backend: str | None = None,
+    progress: Progress = silent,
+) -> Compliance:
+    """Condense the stiffness on the touchable nodes and invert it.
+
+    method: 'schur' (static condensation in MKL Pardiso, then one dense inverse), 'columns' (a solve a column,
+    in batches, with either backend), None for the best that is there. Raises MeshError where the mesh is not
+    held or has nothing to touch.
+    """
+    nodes = np.flatnonzero(mesh.touchable)
+    free = free_dofs(mesh)
+    wanted = (3 * nodes[:, None] + np.arange(3)).ravel()
+    place = np.searchsorted(free, wanted)
+    if not len(wanted) or place.max() >= len(free) or (free[place] != wanted).any():
+        raise MeshError("the mesh has no touchable node that is free to move")
+    if method is None:
+        method = "schur" if pardiso.available() and backend in (None, "pardiso") else "columns"
+    if method == "schur":
+        full = stiffness(mesh, poisson_ratio, modulus_ratio)
+        matrix = full[free][:, free].tocsr()
+        del full
+        progress("static condensation", 0.05)
+        try:
+            schur = pardiso.Pardiso(matrix, schur=place).take_schur()
+        except ArithmeticError as error:
+            raise MeshError(f"the stiffness cannot be condensed ({error}): is every part held?") from error
+        progress("dense inverse", 0.4)
+        result = inverse(schur)
+    else:
+        solver = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend)
+        result = np.empty((len(wanted), len(wanted)))
+        for start in range(0, len(wanted), _COLUMNS):
+            part = slice(start, min(start + _COLUMNS, len(wanted)))
+            loads = np.zeros((len(free), part.stop - part.start), order="F")
+            loads[place[part], np.arange(loads.shape[1])] = 1.0
+            result[part] = solver.solve_free(loads)[place].T
+            progress("compliance columns", part.stop / len(wanted))
+        _symmetrise(result)
+    progress("compliance", 1.0)
+    return Compliance(nodes, result)
+
+
+def inverse(matrix: np.ndarray) -> np.ndarray:
+    """Inverse of a symmetric positive definite matrix, in its own memory (the argument is overwritten)."""
+    factor, info = la.lapack.dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+    if info:
+        raise MeshError(f"the condensed stiffness is not positive definite (at row {info}): mesh again")
+    result, info = la.lapack.dpotri(factor, lower=1, overwrite_c=1)
+    if info:
+        raise MeshError(f"the condensed stiffness is singular (at row {info}): is every part held?")
+    result = result.T  # C order; the upper triangle holds the inverse
+    _mirror_upper(result)
+    return result
+
+
+def _mirror_upper(matrix: np.ndarray, block: int = 512) -> None:
+    n = len(matrix)
+    for i in range(0, n, block):
+        rows = slice(i, min(i + block, n))
+        corner = matrix[rows, rows]
+        corner[:] = np.triu(corner) + np.triu(corner, 1).T
+        matrix[rows.stop :, rows] = matrix[rows, rows.stop :].T
+
+
+def _symmetrise(matrix: np.ndarray, block: int = 512) -> None:
+    n = len(matrix)
+    for i in range(0, n, block):
+        rows = slice(i, min(i + block, n))
+        rest = slice(i, n)
+        mean = 0.5 * (matrix[rows, rest] + matrix[rest, rows].T)
+        matrix[rows, rest] = mean
+        matrix[rest, rows] = mean.T
+
+
+def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompliance:
+    """The servo's compliance of a model: from the cache in its folder, or computed and stored there.
+
+    The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model, a
+    damaged or a truncated file is rebuilt. A model that was never written, or a folder that cannot be
+    written,
+    is computed in memory.
+    """
+    key = content_key(
+        "surface compliance 1",
+        model.mesh.points,
+        model.mesh.tetrahedra,
+        model.mesh.fixed,
+        model.mesh.touchable,
+        model.poisson_ratio,
+        model.modulus_ratio,
+    )
+
+    def build() -> dict[str, np.ndarray]:
+        mesh = model.mesh.quadratic()
+        return surface_compliance(mesh, model.poisson_ratio, model.modulus_ratio, progress=progress).arrays()
+
+    path = None if model.path is None else model.path / f"compliance-{key[:16]}.bin"
+    return SurfaceCompliance.from_arrays(load_or_build(path, key, build))
