@@ -6,6 +6,7 @@ Tested against emulators built from published protocols; no hardware tried.
 from __future__ import annotations
 
 import time
+from contextlib import ExitStack
 from dataclasses import dataclass
 from typing import Any
 
@@ -58,13 +59,14 @@ class HaplyWire:
         self._clock = clock
         self._socket: Any = None
         self._events: Any = None
+        self._open = ExitStack()
 
     def connect(self) -> None:
         """Open both sockets, read the inventory, introduce ourselves."""
         client = _client()
         uri = self.options.uri
         try:
-            self._socket = client.connect(uri, compression=None, open_timeout=OPEN_S, close_timeout=0.2)
+            self._socket = self._enter(client, uri)
         except (OSError, TimeoutError, client_errors()) as error:
             raise DeviceError(_NO_SERVICE.format(uri=uri)) from error
         try:
@@ -91,14 +93,16 @@ class HaplyWire:
         self._next_events_s = 0.0
         self._connect_events(client)
 
+    def _enter(self, client: Any, uri: str) -> Any:
+        connection = client.connect(uri, compression=None, open_timeout=OPEN_S, close_timeout=0.2)
+        return self._open.enter_context(connection)
+
     def _connect_events(self, client: Any) -> None:
         self._events = None
         if not self.options.events_uri:
             return
         try:
-            self._events = client.connect(
-                self.options.events_uri, compression=None, open_timeout=OPEN_S, close_timeout=0.2
-            )
+            self._events = self._enter(client, self.options.events_uri)
         except (OSError, TimeoutError, client_errors()):
             pass  # older services have no event socket; a state's own status says the rest
 
@@ -154,12 +158,10 @@ class HaplyWire:
                     self._socket.send(codec.force(self.device_id, (0.0, 0.0, 0.0), self._key))
             except (*errors, AttributeError):
                 pass  # the service is gone: its commands are one-shot, so the device is idle already
-        for socket in (self._socket, self._events):
-            if socket is not None:
-                try:
-                    socket.close()
-                except errors:
-                    pass
+        try:
+            self._open.close()
+        except errors:
+            pass
         self._socket = self._events = None
 
 

@@ -23,7 +23,7 @@ from mechanics.state import TipState
 SPEC = DeviceSpec(
     name="mouse",
     title="mouse in the touch window",
-    workspace_radius_m=0.3,
+    workspace_radius_m=1.0,
     max_speed_m_per_s=1.0,
     buttons=3,
 )

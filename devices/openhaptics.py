@@ -133,7 +133,7 @@ class OpenHapticsWire:
         library.hdStartScheduler()
 
     def _turn(self, _: object) -> int:
-        """The library's 1 kHz callback. It must never raise: ctypes swallows that and the force would stay."""
+        """The library's 1 kHz callback. It must never raise: ctypes swallows that, the force stays."""
         library, handle = self._library, self._handle
         values = (c_double * 16)()
         buttons = c_int()

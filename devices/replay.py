@@ -15,7 +15,7 @@ from mechanics.recording import Recording, read_recording
 from mechanics.state import IDENTITY_QUATERNION, TipState
 
 SPEC = DeviceSpec(
-    name="replay", title="a recording, played back", workspace_radius_m=0.3, max_speed_m_per_s=2.0
+    name="replay", title="a recording, played back", workspace_radius_m=1.0, max_speed_m_per_s=2.0
 )
 
 

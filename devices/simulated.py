@@ -27,7 +27,7 @@ SPEC = DeviceSpec(
     max_stiffness_n_per_m=5000.0,
     max_damping_n_s_per_m=50.0,
     max_speed_m_per_s=2.0,
-    workspace_radius_m=0.3,
+    workspace_radius_m=1.0,
     buttons=1,
 )
 LONGEST_CATCH_UP_S = 0.1

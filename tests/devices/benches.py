@@ -1,0 +1,201 @@
+"""Every driver on a test bench: an emulator that moves it, feels its force, unplugs it and makes it hang."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+import subprocess
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from devices.base import PositionSource
+from devices.forcedimension import ForceDimensionOptions
+from devices.forcedimension import make as make_forcedimension
+from devices.haply import HaplyOptions
+from devices.haply import make as make_haply
+from devices.io_thread import ThreadedDevice
+from devices.openhaptics import OpenHapticsOptions
+from devices.openhaptics import make as make_openhaptics
+from devices.pid_ffb import PidOptions
+from devices.pid_ffb import make as make_pid
+from devices.simulated import SimulatedHand
+from devices.spacemouse import make as make_spacemouse
+
+from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit
+from .fake_inverse import FakeInverse
+
+STUBS = Path(__file__).parent / "vendor_stubs.c"
+
+
+def eventually(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
+    """Whether a condition comes true before a generous limit that only a broken driver meets."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        if condition():
+            return True
+        time.sleep(0.002)
+    return condition()
+
+
+class Bench:
+    """device; `axes`: which of x, y, z carry force."""
+
+    axes = "xyz"
+    device: PositionSource
+
+    def move(self, position_m: np.ndarray) -> None:
+        """Put the handle there (a rate device: deflect it that way)."""
+        raise NotImplementedError
+
+    def felt(self) -> np.ndarray:
+        """(3,) N that the hardware exerts now, device frame."""
+        raise NotImplementedError
+
+    def unplug(self) -> None:
+        raise NotImplementedError
+
+    def replug(self) -> None:
+        raise NotImplementedError
+
+    def hang(self, on: bool) -> None:
+        """The driver's blocking calls stop answering, or answer again."""
+
+    def close(self) -> None:
+        self.device.close()
+
+
+class SpaceMouseBench(Bench):
+    axes = ""
+
+    def __init__(self) -> None:
+        self.unit = SpaceMouseUnit()
+        self.device = make_spacemouse(hid=FakeHid(self.unit))
+
+    def move(self, position_m: np.ndarray) -> None:
+        x, y, z = (int(np.clip(v * 3500, -350, 350)) for v in position_m)
+        self.unit.deflect(x, -y, -z)
+
+    def felt(self) -> np.ndarray:
+        return np.zeros(3)
+
+    def unplug(self) -> None:
+        self.unit.unplug()
+
+    def replug(self) -> None:
+        self.unit.replug()
+
+    def hang(self, on: bool) -> None:
+        (self.unit.hang.set if on else self.unit.hang.clear)()
+
+
+class StickBench(SpaceMouseBench):
+    axes = "xy"
+
+    def __init__(self, **kind: object) -> None:
+        self.unit = StickUnit(**kind)
+        self.device = make_pid(PidOptions(full_scale_n=8.0, stroke_m=0.05), hid=FakeHid(self.unit))
+        self.axes = "xy"[: self.unit.axes]
+
+    def move(self, position_m: np.ndarray) -> None:
+        self.unit.move(position_m[0] / 0.05, -position_m[1] / 0.05)
+
+    def felt(self) -> np.ndarray:
+        x, y = self.unit.force_n()
+        return np.array([x, -y, 0.0])
+
+
+class HaplyBench(Bench):
+    def __init__(self, key: str = "vector") -> None:
+        self.key = key
+        self.service = FakeInverse(key)
+        state, events = self.ports = self.service.ports
+        self.device = make_haply(
+            HaplyOptions(uri=f"ws://localhost:{state}", events_uri=f"ws://localhost:{events}")
+        )
+        self.running = True
+
+    def move(self, position_m: np.ndarray) -> None:
+        self.service.position = [float(v) for v in position_m]
+
+    def felt(self) -> np.ndarray:
+        return np.array(self.service.force_n())
+
+    def unplug(self) -> None:
+        self.service.stop()
+        self.running = False
+
+    def replug(self) -> None:
+        self.service, self.running = FakeInverse(self.key, *self.ports), True
+
+    def hang(self, on: bool) -> None:
+        (self.service.silent.set if on else self.service.silent.clear)()
+
+    def close(self) -> None:
+        self.service.silent.clear()
+        self.device.close()
+        if self.running:
+            self.service.stop()
+
+
+class VendorBench(Bench):
+    """A vendor library compiled from the stubs."""
+
+    def __init__(self, folder: Path, kind: str, name: str = "omega.3") -> None:
+        compiler = shutil.which("cc")
+        if compiler is None:
+            pytest.skip("no C compiler to build the stand-in for the vendor's library")
+        stem = {"dhd": "dhd", "hd": "HD"}[kind]
+        library = folder / f"lib{stem}.so"
+        defines = ["-DSTUB_DHD", f'-DSTUB_NAME="{name}"'] if kind == "dhd" else []
+        command = [compiler, "-shared", "-fPIC", "-pthread", *defines, "-o", str(library), str(STUBS)]
+        subprocess.run(command, check=True)
+        self.library = ctypes.CDLL(str(library))
+        self.kind = kind
+        if kind == "dhd":
+            self.device = make_forcedimension(ForceDimensionOptions(folder=str(folder)))
+        else:
+            self.device = make_openhaptics(OpenHapticsOptions(folder=str(folder)))
+
+    def number(self, name: str) -> ctypes.c_int:
+        return ctypes.c_int.in_dll(self.library, f"stub_{name}")
+
+    def vector(self, name: str) -> ctypes.Array:
+        return (ctypes.c_double * 3).in_dll(self.library, f"stub_{name}")
+
+    def move(self, position_m: np.ndarray) -> None:
+        x, y, z = position_m
+        own = (-y, x, z) if self.kind == "dhd" else (1e3 * x, 1e3 * z, -1e3 * y)
+        self.vector("position")[:] = own
+
+    def felt(self) -> np.ndarray:
+        f = np.array(self.vector("force")[:])
+        on = self.number("force_on").value and self.number("plugged").value
+        own = np.array([f[1], -f[0], f[2]]) if self.kind == "dhd" else np.array([f[0], -f[2], f[1]])
+        return own if on else np.zeros(3)
+
+    def unplug(self) -> None:
+        self.number("plugged").value = 0
+
+    def replug(self) -> None:
+        self.number("plugged").value = 1
+
+    def hang(self, on: bool) -> None:
+        self.number("stalled").value = int(on)
+
+
+MAKERS: dict[str, Callable[[Path], Bench]] = {
+    "spacemouse": lambda folder: SpaceMouseBench(),
+    "pid-ffb": lambda folder: StickBench(),
+    "pid-ffb-wheel": lambda folder: StickBench(ids=OTHER_IDS, axes=1, control_bits=False),
+    "haply": lambda folder: HaplyBench("vector"),
+    "haply-older": lambda folder: HaplyBench("values"),
+    "forcedimension": lambda folder: VendorBench(folder, "dhd"),
+    "openhaptics": lambda folder: VendorBench(folder, "hd"),
+}
+FORCEFUL = [name for name in MAKERS if name != "spacemouse"]
+
+__all__ = ["FORCEFUL", "MAKERS", "Bench", "SimulatedHand", "ThreadedDevice", "eventually"]

@@ -1,0 +1,252 @@
+"""The simulated hand, the mouse's channel and the replay: devices without hardware."""
+
+from __future__ import annotations
+
+import pickle
+import threading
+
+import numpy as np
+import pytest
+
+from devices.base import ForceSink, PositionSource
+from devices.channel import PoseChannel
+from devices.impedance import HandImpedance
+from devices.intention import FreeExploration, Path, Rest, minimum_jerk
+from devices.mouse import WINDOW_SILENT_S, MouseDevice
+from devices.registry import DEVICES, DeviceChoice, find_devices, make_device
+from devices.replay import ReplayDevice, ReplayOptions
+from devices.simulated import SimulatedHand, SimulatedOptions
+from mechanics.errors import DeviceError
+from mechanics.recording import Recording
+
+STILL = SimulatedOptions(tremor_m=0.0)
+
+
+class Clock:
+    def __init__(self) -> None:
+        self.now = 5.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def run(hand: SimulatedHand, clock: Clock, seconds: float, force=lambda x: np.zeros(3)) -> list:
+    states = []
+    for _ in range(round(seconds * 1000)):
+        clock.now += 0.001
+        states.append(hand.read())
+        hand.send_force(force(states[-1].position_m))
+    return states
+
+
+def test_hand_yields_to_a_force_by_its_stiffness() -> None:
+    clock = Clock()
+    with SimulatedHand(STILL, Rest(), clock=clock) as hand:
+        hand.enable_force()
+        end = run(hand, clock, 3.0, lambda x: np.array([0.0, 0.0, 3.0]))[-1]
+    assert end.position_m == pytest.approx([0, 0, 3.0 / STILL.stiffness_n_per_m], rel=1e-6)
+
+
+def test_hand_swings_at_its_natural_frequency() -> None:
+    """Undamped, the exact step keeps energy and period: no numerical damping hides a loop's instability."""
+    impedance = HandImpedance(0.2, 0.0, 500.0)
+    x, v, rest = np.array([0.01, 0, 0]), np.zeros(3), np.zeros(3)
+    xs = []
+    for _ in range(10000):
+        x, v = impedance.step(x, v, rest, rest, np.zeros(3))
+        xs.append(x[0])
+    energy = 0.5 * 0.2 * v @ v + 0.5 * 500 * x @ x
+    assert energy == pytest.approx(0.5 * 500 * 1e-4, rel=1e-9)
+    crossings = np.flatnonzero(np.diff(np.sign(xs)) > 0)
+    period = np.diff(crossings).mean() * 1e-3
+    assert period == pytest.approx(2 * np.pi * np.sqrt(0.2 / 500), rel=1e-3)
+
+
+def test_free_mass_obeys_newton() -> None:
+    impedance = HandImpedance(0.5, 0.0, 0.0)
+    x, v = np.zeros(3), np.zeros(3)
+    for _ in range(1000):
+        x, v = impedance.step(x, v, np.zeros(3), np.zeros(3), np.array([1.0, 0, 0]))
+    assert v[0] == pytest.approx(2.0) and x[0] == pytest.approx(1.0, rel=1e-6)
+
+
+def test_force_only_after_enable_and_gone_after_disable() -> None:
+    clock = Clock()
+    with SimulatedHand(STILL, Rest(), clock=clock) as hand:
+        assert isinstance(hand, PositionSource) and isinstance(hand, ForceSink)
+        assert not np.any(run(hand, clock, 0.2, lambda x: np.ones(3))[-1].position_m)
+        hand.enable_force()
+        assert run(hand, clock, 0.2, lambda x: np.ones(3))[-1].position_m[0] > 0
+        hand.disable_force()
+        assert run(hand, clock, 3.0, lambda x: np.ones(3))[-1].position_m == pytest.approx(
+            np.zeros(3), abs=1e-9
+        )
+        hand.enable_force()
+        hand.send_force(np.full(3, np.nan))
+        clock.now += 0.01
+        assert np.isfinite(hand.read().position_m).all()
+
+
+def test_same_seed_same_session_bit_for_bit() -> None:
+    def session(seed: int) -> np.ndarray:
+        clock = Clock()
+        with SimulatedHand(clock=clock, seed=seed) as hand:
+            hand.enable_force()
+            push = lambda x: 300 * max(0.0, 0.06 - np.linalg.norm(x)) * x / np.linalg.norm(x)  # noqa: E731
+            return np.array([s.position_m for s in run(hand, clock, 5.0, push)])
+
+    assert (session(3) == session(3)).all()
+    assert not (session(3) == session(4)).all()
+
+
+def test_exploration_presses_to_the_force_it_means_and_comes_back() -> None:
+    clock = Clock()
+    explorer = FreeExploration(np.zeros(3), 0.1, target_force_n=1.0, seed=1)
+    forces = []
+
+    def ball(x: np.ndarray) -> np.ndarray:
+        force = 400 * max(0.0, 0.06 - np.linalg.norm(x)) * x / np.linalg.norm(x)
+        forces.append(np.linalg.norm(force))
+        return force
+
+    with SimulatedHand(STILL, explorer, clock=clock) as hand:
+        hand.enable_force()
+        states = run(hand, clock, 30.0, ball)
+    touching = np.array(forces) > 0
+    presses = np.flatnonzero(np.diff(touching.astype(int)) == 1)
+    assert len(presses) >= 4
+    assert 0.9 < max(forces) < 1.6
+    heights = [s.position_m[2] for s in states]
+    assert min(heights) > 0, "directions stay within the given spread of 'up'"
+
+
+def test_path_reaches_its_waypoints_without_a_jerk() -> None:
+    path = Path([0.0, 1.0, 2.0], [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]])
+    assert path.place(1.0, None, None) == pytest.approx([0.1, 0, 0])
+    assert path.place(9.0, None, None) == pytest.approx([0.1, 0.1, 0])
+    assert minimum_jerk(0.5) == pytest.approx(0.5)
+    steps = np.diff([path.place(t, None, None) for t in np.linspace(0, 2, 2001)], axis=0)
+    assert np.linalg.norm(steps, axis=1).max() == pytest.approx(1.875 * 0.1 / 1000, rel=1e-3)
+    with pytest.raises(DeviceError, match="increase"):
+        Path([0.0, 0.0], np.zeros((2, 3)))
+
+
+def test_a_pause_is_not_replayed() -> None:
+    clock = Clock()
+    with SimulatedHand(STILL, Path([0.0, 10.0], [[0, 0, 0], [1, 0, 0]], even=True), clock=clock) as hand:
+        clock.now += 0.5
+        late = hand.read()
+        clock.now += 5.0
+        later = hand.read()
+    assert later.position_m[0] - late.position_m[0] < 0.011
+    assert later.time_s == pytest.approx(clock.now)
+
+
+def test_channel_carries_the_newest_and_survives_torn_writes() -> None:
+    with_file = PoseChannel.create()
+    reader = PoseChannel(with_file.path)
+    assert reader.read() is None
+    with_file.write(1.0, (1, 2, 3), 5)
+    assert reader.read().position_m == (1.0, 2.0, 3.0) and reader.read().buttons == 5
+    with_file._memory[12:14] = b"xx"  # half of another record
+    assert reader.read().position_m == (1.0, 2.0, 3.0)
+    with_file.write(2.0, (4, 5, 6))
+    assert reader.read().sequence == 2
+    with_file.close()
+    assert not with_file.path.exists()
+    reader.close()
+
+
+def test_channel_never_mixes_records_under_load() -> None:
+    writer = PoseChannel.create()
+    reader = PoseChannel(writer.path)
+    stop = threading.Event()
+
+    def write() -> None:
+        k = 0
+        while not stop.is_set():
+            k += 1
+            writer.write(float(k), (k, k, k), k % 8)
+
+    thread = threading.Thread(target=write)
+    thread.start()
+    last = 0
+    for _ in range(20000):
+        pose = reader.read()
+        if pose is not None:
+            assert len({pose.time_s, *pose.position_m}) == 1 and pose.sequence >= last
+            last = pose.sequence
+    stop.set()
+    thread.join()
+    writer.close()
+    reader.close()
+
+
+def test_mouse_follows_smoothly_and_goes_stale_with_its_window() -> None:
+    clock = Clock()
+    channel = PoseChannel.create()
+    with MouseDevice(channel.path, clock=clock) as mouse:
+        assert not mouse.read().connected
+        channel.write(clock.now, (0, 0, 0))
+        assert mouse.read().connected
+        path = []
+        for k in range(400):
+            clock.now += 0.001
+            if k % 16 == 0:  # 60 frames a second
+                channel.write(clock.now, (0.02 if k > 100 else 0.0, 0, 0), 1)
+            path.append(mouse.read())
+        xs = np.array([s.position_m[0] for s in path])
+        assert xs[-1] == pytest.approx(0.02, abs=1e-4) and xs.max() <= 0.02 + 1e-9
+        assert np.abs(np.diff(xs)).max() < 0.001, "the tip does not jump with the frame"
+        assert mouse.pressed(0) and not mouse.pressed(1)
+        assert [s.sequence for s in path] == sorted({s.sequence for s in path})
+        clock.now += 2 * WINDOW_SILENT_S
+        assert not mouse.read().connected and clock.now - mouse.read().time_s > 0.02
+    channel.close()
+    with pytest.raises(DeviceError, match="window"):
+        MouseDevice(clock=clock).open()
+    with pytest.raises(DeviceError, match="gone"):
+        MouseDevice(channel.path, clock=clock).open()
+
+
+def _recording() -> Recording:
+    t = np.arange(200) * 1e-3
+    position = np.column_stack([0.1 * t, 0 * t, np.round(0.05 * t / 3e-5) * 3e-5])
+    return Recording(t + 7.0, position, np.zeros((200, 3)), 1000.0, 0.004)
+
+
+def test_replay_gives_the_sample_of_its_time() -> None:
+    clock, recording = Clock(), _recording()
+    with ReplayDevice(recording, clock=clock) as device:
+        for k in range(200):
+            state = device.read()
+            assert state.sequence == k and (state.position_m == recording.position[k]).all()
+            clock.now += 0.001
+        assert device.read().sequence == 199 and device.finished
+    middle = device.recording.t[100] - 7.0
+    device = ReplayDevice(recording, ReplayOptions(start_s=middle, loop=True), clock=clock)
+    with device:
+        assert device.read().sequence == 100
+        assert device.read().velocity_m_per_s == pytest.approx([0.1, 0, 0.05], abs=0.005)
+        last = -1
+        for _ in range(500):
+            sequence = device.read().sequence
+            assert sequence >= last
+            last = sequence
+            clock.now += 0.001
+        assert not device.finished
+    with pytest.raises(DeviceError, match="outside"):
+        ReplayDevice(recording, ReplayOptions(start_s=99.0))
+
+
+def test_registry() -> None:
+    with pytest.raises(DeviceError, match="allowed are mouse"):
+        make_device("dataglove")
+    choice = DeviceChoice("simulated", {"intention": Rest((0.0, 0.0, 0.1)), "seed": 2})
+    again = pickle.loads(pickle.dumps(choice))
+    with again.make() as device:
+        assert device.read().position_m[2] == pytest.approx(0.1, abs=1e-3)
+    found = find_devices()
+    assert {a.name for a in found} == set(DEVICES)
+    for line in found:
+        assert line.present or (line.why_not and line.remedy)
