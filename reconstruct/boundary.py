@@ -27,8 +27,8 @@ class Boundary:
 
     support_point, support_normal: (3,), the plane of the support's surface, its normal into the object.
     outline: (k, 3) dense points of the base's rim on the plane, in order along the path; the tip's radius is
-    taken off. outward: (k, 3) unit normals of the rim within the plane, out of the object. centres: (k, 3) where
-    the tip's centre was. points: (j, 3) P_B of the paper, farthest-point sample of the outline.
+    taken off. outward: (k, 3) unit normals of the rim within the plane, out of the object. centres: (k, 3)
+    where the tip's centre was. points: (j, 3) P_B of the paper, farthest-point sample of the outline.
     interval: sample indices (first, last) of phase I; flatness_m: rms of the path off the plane.
     """
 
@@ -53,7 +53,8 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 
 
 def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """(centre, unit normal, rms) of the plane through points (n, 3), robust (Tukey's biweight on distances)."""
+    """(centre, unit normal, rms) of the plane through points (n, 3), robust (Tukey's biweight on
+    distances)."""
     weight = np.ones(len(points))
     for _ in range(12):
         centre = np.average(points, axis=0, weights=weight)
@@ -66,7 +67,8 @@ def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
 
 
 def farthest_points(points: np.ndarray, spacing_m: float, start: int = 0) -> np.ndarray:
-    """Indices of a farthest-point sample: added until no point is further than `spacing_m` from the sample."""
+    """Indices of a farthest-point sample: added until no point is further than `spacing_m` from the
+    sample."""
     chosen = [start]
     distance = np.linalg.norm(points - points[start], axis=1)
     while distance.max() > spacing_m:
@@ -94,8 +96,8 @@ def find_interval(
         inside = [(a, b) for a, b in inside if _travel(position[a:b]) > 2 * tip_radius_m]
         if not inside:
             raise ContactError(
-                f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): trace "
-                "the object's base first, or give [object] model = PATH of a model whose base stands in"
+                f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): "
+                "trace the object's base first, or give [object] model = PATH of a model whose base stands in"
             )
         return inside[0][0], inside[-1][1]
     for a, b in found:
@@ -104,8 +106,9 @@ def find_interval(
         if fit_plane(position[a:b])[2] < 0.1 * tip_radius_m:
             return a, b
     raise ContactError(
-        "no boundary phase found: no contact slides further than 16 tip radii in one plane; trace the object's base "
-        "first, state [recording] boundary_phase, or give [object] model = PATH of a model whose base stands in"
+        "no boundary phase found: no contact slides further than 16 tip radii in one plane; trace "
+        "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a model whose base "
+        "stands in"
     )
 
 
@@ -145,8 +148,8 @@ def find_boundary(
     winding = _winding(smooth, normal)
     if abs(winding) < 0.8 * 2 * np.pi:
         raise ContactError(
-            f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least 288 are "
-            "needed: trace the whole base"
+            f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least "
+            "288 are needed: trace the whole base"
         )
     outward = np.cross(tangent, normal) * np.sign(winding)
     outline = smooth - tip_radius_m * outward
@@ -164,7 +167,8 @@ def find_boundary(
 
 
 def _resampled(path: np.ndarray, step_m: float) -> np.ndarray:
-    """The path at equal steps of its length; a step is taken only once the tip has moved so far (no jitter)."""
+    """The path at equal steps of its length; a step is taken only once the tip has moved so far (no
+    jitter)."""
     kept = [0]
     for i in range(0, len(path), 5):
         if np.linalg.norm(path[i] - path[kept[-1]]) >= step_m:
@@ -173,7 +177,8 @@ def _resampled(path: np.ndarray, step_m: float) -> np.ndarray:
 
 
 def _winding(path: np.ndarray, normal: np.ndarray) -> float:
-    """Angle (rad) by which the path turns round the middle of its extent, counter-clockwise about the normal."""
+    """Angle (rad) by which the path turns round the middle of its extent, counter-clockwise about the
+    normal."""
     middle = (path.max(axis=0) + path.min(axis=0)) / 2
     offset = path - middle
     a, b = offset[:-1], offset[1:]

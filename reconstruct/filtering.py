@@ -19,7 +19,8 @@ class FilterOptions:
 
 
 def low_pass(values: np.ndarray, sample_rate_hz: float, cutoff_hz: float) -> np.ndarray:
-    """Values (n,) or (n, k) without phase shift, -6 dB at the cut-off; unchanged where the cut-off is too high.
+    """Values (n,) or (n, k) without phase shift, -6 dB at the cut-off; unchanged where the cut-off is too
+    high.
 
     Raises OptionError where the cut-off is not positive.
     """
@@ -43,7 +44,8 @@ def noise_gain(sample_rate_hz: float, cutoff_hz: float) -> float:
 
 
 def white_noise_std(values: np.ndarray) -> float:
-    """Standard deviation of white noise an axis in (n, k) samples, from second differences (robust to presses)."""
+    """Standard deviation of white noise an axis in (n, k) samples, from second differences (robust to
+    presses)."""
     second = np.diff(np.atleast_2d(values.T).T, n=2, axis=0)
     mad = np.median(np.abs(second - np.median(second, axis=0)), axis=0)
     return float(np.median(1.4826 * mad / np.sqrt(6.0)))

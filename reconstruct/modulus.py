@@ -1,9 +1,11 @@
-"""The global modulus with a finite tip: all samples of all presses, weighted by noise and by what the law can claim.
+"""The global modulus with a finite tip: all samples of all presses, weighted by noise and by what the law can
+claim.
 
-For a given path the force of the touch law (mechanics.touch) is proportional to the modulus: f = e g(d), with d the
-tip's displacement since first touch and g the law for unit modulus. So each press gives its modulus by linear least
-squares, with its first touch u0 as a nuisance; the global modulus weights presses by their precision and by the
-spread between them, and its interval resamples sites (repeats at one place share that place's errors of shape).
+For a given path the force of the touch law (mechanics.touch) is proportional to the modulus: f = e g(d), with
+d the tip's displacement since first touch and g the law for unit modulus. So each press gives its modulus by
+linear least squares, with its first touch u0 as a nuisance; the global modulus weights presses by their
+precision and by the spread between them, and its interval resamples sites (repeats at one place share that
+place's errors of shape).
 """
 
 from __future__ import annotations
@@ -48,8 +50,8 @@ class ModulusOptions:
 class PressData:
     """Block means of all presses: displacement since first touch (n, 3) m, force on the tool (n, 3) N.
 
-    starts: (k + 1,) rows of each press. noise_n: standard deviation of a row an axis. onset_sd_m: (k,) prior of
-    the first touch along the normal.
+    starts: (k + 1,) rows of each press. noise_n: standard deviation of a row an axis. onset_sd_m: (k,) prior
+    of the first touch along the normal.
     """
 
     displacement: np.ndarray
@@ -66,7 +68,8 @@ class PressData:
 
 @dataclass(frozen=True)
 class LawFit:
-    """Each press fitted by one law up to one depth: modulus (k,) Pa, relative standard error, onset shift (k,) m.
+    """Each press fitted by one law up to one depth: modulus (k,) Pa, relative standard error, onset shift
+    (k,) m.
 
     rms_n: (k,) vector misfit in N. cost: sum of squared weighted residuals, comparable between laws.
     """
@@ -85,8 +88,8 @@ class LawFit:
 class ModulusFit:
     """The global modulus, its 95 % interval, every press's own, and how it was chosen.
 
-    weights: (k,) share of each press, 0 for those that the robust estimate leaves out. between: relative spread
-    between sites beyond the noise. shape_error: relative standard error from the shape's uncertainty.
+    weights: (k,) share of each press, 0 for those that the robust estimate leaves out. between: relative
+    spread between sites beyond the noise. shape_error: relative standard error from the shape's uncertainty.
     by_law: modulus and misfit a law; by_depth: (depth, modulus) for the chosen law.
     """
 
@@ -102,7 +105,8 @@ class ModulusFit:
 
 
 def press_data(exploration: Exploration, sites: TouchSites) -> PressData:
-    """Block means (4 ms) of every press from 30 ms before first touch to its end; site normals set the onset."""
+    """Block means (4 ms) of every press from 30 ms before first touch to its end; site normals set the
+    onset."""
     recording = exploration.recording
     force = recording.force_on_tool - exploration.free_air
     block = max(1, round(_BLOCK_S * recording.sample_rate_hz))
@@ -229,7 +233,8 @@ def site_labels(points: np.ndarray, size_m: float) -> np.ndarray:
 def bootstrap(
     fit: LawFit, site: np.ndarray, count: int, shape_covariance: np.ndarray | None, seed: int
 ) -> np.ndarray:
-    """(count,) ln of the global modulus over resampled sites, with draws of the shape's error where it is known."""
+    """(count,) ln of the global modulus over resampled sites, with draws of the shape's error where it is
+    known."""
     random = np.random.default_rng(seed)
     sites = site.max() + 1
     members = [np.flatnonzero(site == s) for s in range(sites)]

@@ -1,9 +1,9 @@
 """Uniaxial models of single presses: Kelvin-Voigt and Hunt-Crossley, equations (1) to (6) of the paper.
 
-f is the force on the object along -n (N), u the depth (m), v its rate (m/s). The paper's estimators are linear
-least squares, Hunt-Crossley's on logarithms (4), which weights the noisy start of a press most. The robust ones
-beside them keep every coefficient physical (k > 0, b >= 0, 0.5 <= r <= 3), weight samples equally in newtons and
-bound the pull of a bad sample.
+f is the force on the object along -n (N), u the depth (m), v its rate (m/s). The paper's estimators are
+linear least squares, Hunt-Crossley's on logarithms (4), which weights the noisy start of a press most. The
+robust ones beside them keep every coefficient physical (k > 0, b >= 0, 0.5 <= r <= 3), weight samples equally
+in newtons and bound the pull of a bad sample.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ class Press:
 class OneD:
     """Fitted parameters of one press (N/m, N s/m, N/m^r, N s/m^(r+1), 1) and how well they fit.
 
-    valid: whether |v| < 0.1 k_hc / b_hc held throughout (the condition of (4)); slow: the share of samples where
-    it did. rms_kv_n, rms_hc_n: misfit in N.
+    valid: whether |v| < 0.1 k_hc / b_hc held throughout (the condition of (4)); slow: the share of samples
+    where it did. rms_kv_n, rms_hc_n: misfit in N.
     """
 
     k_kv: float
@@ -58,7 +58,8 @@ def press_of(t: np.ndarray, depth: np.ndarray, push: np.ndarray, *, least_force_
 
 
 def fit_paper(presses: Sequence[Press]) -> list[OneD]:
-    """Equations (3), (4), (5), (6) as the paper fits them; k_h is (6) again at the mean exponent of all presses."""
+    """Equations (3), (4), (5), (6) as the paper fits them; k_h is (6) again at the mean exponent of all
+    presses."""
     fits = []
     for p in presses:
         if len(p.u) < 4:
@@ -121,7 +122,8 @@ def _padded(presses: Sequence[Press]) -> tuple[np.ndarray, np.ndarray, np.ndarra
 def _linear(
     u: np.ndarray, v: np.ndarray, f: np.ndarray, used: np.ndarray, r: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """k, b and cost for f = u^r (k + b v) when r is given; (p, n) samples, (p, 1) r. Three Huber re-weightings."""
+    """k, b and cost for f = u^r (k + b v) when r is given; (p, n) samples, (p, 1) r. Three Huber
+    re-weightings."""
     basis = np.where(used, np.exp(r * np.log(u)), 0.0)
     damped = basis * v
     weight = used.astype(float)
@@ -148,7 +150,8 @@ def _linear(
 def _exponent(
     u: np.ndarray, v: np.ndarray, f: np.ndarray, used: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """k, b and r of the least plain squared cost: r on a grid, refined twice, then once with Huber weights."""
+    """k, b and r of the least plain squared cost: r on a grid, refined twice, then once with Huber
+    weights."""
     presses = len(u)
     low, high = np.full(presses, EXPONENTS[0]), np.full(presses, EXPONENTS[1])
     log_u = np.where(used, np.log(u), 0.0)

@@ -1,7 +1,8 @@
 """First touch, estimated by fitting the contact law to the rise of the force.
 
-A threshold comes late: a 5 mm tip on 16 kPa pushes back with 4 mN at 0.15 mm. The law of a sphere on a body that
-gives as a whole, u - u0 = (F / h)^(2/3) + c F (Hertz and a linear far field), is fitted to free air and rise alike.
+A threshold comes late: a 5 mm tip on 16 kPa pushes back with 4 mN at 0.15 mm. The law of a sphere on a body
+that gives as a whole, u - u0 = (F / h)^(2/3) + c F (Hertz and a linear far field), is fitted to free air and
+rise alike.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ class Rise:
 def contact_law(u: np.ndarray, hertz: float, give: float) -> np.ndarray:
     """Force F (N) at travel u (m) with u = (F / h)^(2/3) + c F, zero for u <= 0.
 
-    hertz: h = 4/3 E* sqrt(R), N/m^1.5; give: c, m/N. With y = F^(1/3): c y^3 + h^(-2/3) y^2 = u, solved by Newton.
+    hertz: h = 4/3 E* sqrt(R), N/m^1.5; give: c, m/N. With y = F^(1/3): c y^3 + h^(-2/3) y^2 = u, solved by
+    Newton.
     """
     u = np.maximum(np.asarray(u, dtype=float), 0.0)
     dent = hertz ** (-2 / 3)
@@ -48,7 +50,8 @@ def fit_rise(
 ) -> Rise:
     """Fit the law to samples of one approach and rise: travel (n,) m into the object, force (n,) N along it.
 
-    guess_m: travel where a threshold saw the touch. hertz: held fixed where given. Robust (soft L1 at 3 sigma).
+    guess_m: travel where a threshold saw the touch. hertz: held fixed where given. Robust (soft L1 at 3
+    sigma).
     """
     top = float(force.max())
     reach = max(float(travel.max()) - guess_m, 1e-4)

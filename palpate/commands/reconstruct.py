@@ -8,11 +8,15 @@ from __future__ import annotations
 
 import argparse
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
-from mechanics.errors import ModelError, OptionError
+from mechanics.errors import ModelError
 from mechanics.model import write_model
 from mechanics.recording import read_recording
 from palpate.arguments import add_json, add_options, add_seed, emit_json, options_from, progress_bar, say
+
+if TYPE_CHECKING:
+    from reconstruct.pipeline import Reconstruction
 
 SUMMARY = "a recording becomes a model"
 
@@ -21,13 +25,19 @@ def _steps() -> dict[str, type]:
     from reconstruct.boundary import BoundaryOptions
     from reconstruct.contacts import ContactOptions
     from reconstruct.filtering import FilterOptions
+    from reconstruct.meshing import MeshingOptions
     from reconstruct.modulus import ModulusOptions
+    from reconstruct.modulus_paper import PaperOptions
+    from reconstruct.surface import SurfaceOptions
 
     return {
         "filter": FilterOptions,
         "boundary": BoundaryOptions,
         "contact": ContactOptions,
+        "surface": SurfaceOptions,
+        "meshing": MeshingOptions,
         "modulus": ModulusOptions,
+        "paper": PaperOptions,
     }
 
 
@@ -57,37 +67,63 @@ def run(arguments: argparse.Namespace) -> int:
         raise ModelError(f"'{output}' exists and is no MODEL folder: name another output")
     steps = {name: options_from(arguments, kind) for name, kind in _steps().items()}
     options = options_from(arguments, ReconstructOptions, seed=arguments.seed, **steps)
-    if not options.mesh_size_m > 0:
-        raise OptionError(f"--mesh-size is {options.mesh_size_m} m; it must be greater than 0")
     recording = read_recording(arguments.recording)
     with progress_bar("reconstruct") as progress:
         result = reconstruct_fully(recording, options, progress)
     write_model(output, result.model)
-    model, fit = result.model, result.modulus
+    say(arguments, *_words(result), f"written to {output}")
+    emit_json({"model": output, **_figures(result)}, arguments.json)
+    return 0
+
+
+def _words(result: Reconstruction) -> list[str]:
+    model, exploration, surface = result.model, result.exploration, result.surface
     low, high = model.young_modulus_ci95_pa
-    contacts = result.exploration.contacts
-    say(
-        arguments,
-        f"{recording.name}: {len(contacts)} palpations, {len(result.exploration.rejected)} contacts not used",
-        *(f"  at {t:.2f} s: {reason}" for t, reason in result.exploration.rejected),
-        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
-        f"  {fit.reason}; misfit of a press {float((fit.press.rms_n**2).mean() ** 0.5):.3f} N",
-        f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, l = {model.mesh_size_m * 1e3:g} mm",
-        f"written to {output}",
-    )
-    emit_json(
-        {
-            "model": output,
-            "young_modulus_pa": model.young_modulus_pa,
-            "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
-            "palpations": len(contacts),
-            "rejected": [{"t_s": t, "reason": reason} for t, reason in result.exploration.rejected],
-            "noise_n": result.exploration.noise_n,
-            "law": fit.press.law,
+    not_used = [*exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
+    lines = [
+        f"{exploration.recording.name}: {len(exploration.contacts)} palpations"
+        + (f", {len(not_used)} contacts not used:" if not_used else ""),
+        *(f"  at {t:.2f} s: {reason}" for t, reason in not_used),
+        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, "
+        f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
+    ]
+    if result.modulus:
+        misfit = float((result.modulus.press.rms_n**2).mean() ** 0.5)
+        lines.append(f"  {result.modulus.reason}; misfit of a press {misfit:.3f} N")
+    lines += [
+        f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
+        f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
+        f"l = {model.mesh_size_m * 1e3:g} mm",
+    ]
+    return lines
+
+
+def _figures(result: Reconstruction) -> dict[str, Any]:
+    model, exploration, fit = result.model, result.exploration, result.modulus
+    figures = {
+        "method": model.provenance["method"],
+        "young_modulus_pa": model.young_modulus_pa,
+        "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
+        "poisson_ratio": model.poisson_ratio,
+        "palpations": len(exploration.contacts),
+        "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
+        "noise_n": exploration.noise_n,
+        "surface": {
+            "method": result.surface.method,
+            "reason": result.surface.reason,
+            "volume_m3": result.surface.volume_m3,
+        },
+        "press_modulus_pa": result.press_modulus_pa,
+        "seconds": result.seconds,
+    }
+    if fit:
+        figures |= {
+            "dent_law": fit.press.law,
             "by_law": {k: {"young_modulus_pa": e, "misfit_n": m} for k, (e, m) in fit.by_law.items()},
             "by_depth": [{"depth_m": d, "young_modulus_pa": e} for d, e in fit.by_depth],
-            "seconds": result.seconds,
-        },
-        arguments.json,
-    )
-    return 0
+            "between_sites": fit.between,
+            "shape_error": fit.shape_error,
+        }
+    if result.paper_fit:
+        figures["not_used"] = [{"t_s": t, "reason": reason} for t, reason in result.paper_fit.not_used]
+    return figures

@@ -1,0 +1,50 @@
+"""The base of an earlier model, for recordings without phase I ([object] model = PATH)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.errors import ContactError
+from mechanics.model import Model
+from mechanics.sites import tangents
+from reconstruct.boundary import Boundary
+
+
+def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
+    """Support plane and base rim of a model whose fixed nodes lie on the support.
+
+    Raises ContactError where the base has too few nodes.
+    """
+    rim = _ordered_rim(model)
+    if len(rim) < 8:
+        raise ContactError(
+            f"the base of the model '{model.path}' has only {len(rim)} rim nodes; at least 8 are needed: "
+            "reconstruct that model with a finer --mesh-size"
+        )
+    n = model.support_normal
+    after, before = np.roll(rim, -1, axis=0), np.roll(rim, 1, axis=0)
+    outward = np.cross(after - before, n)
+    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    outward *= np.sign(np.sum(outward * (rim - rim.mean(axis=0))))
+    return Boundary(
+        support_point=model.support_point,
+        support_normal=n,
+        outline=rim,
+        outward=outward,
+        centres=rim + tip_radius_m * (outward + n),
+        points=rim,
+        interval=(0, 0),
+        flatness_m=0.0,
+    )
+
+
+def _ordered_rim(model: Model) -> np.ndarray:
+    """Fixed nodes that belong to a touchable triangle as well, in order round their middle."""
+    mesh = model.mesh
+    corners = np.unique(mesh.touchable_surface[:, :3])
+    rim = mesh.points[corners[mesh.fixed[corners]]]
+    if not len(rim):
+        return rim
+    u, v = tangents(model.support_normal)
+    offset = rim - rim.mean(axis=0)
+    return rim[np.argsort(np.arctan2(offset @ v, offset @ u))]

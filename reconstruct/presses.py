@@ -1,0 +1,138 @@
+"""One press of a recording: when it touched, where, and which way the surface faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.recording import Recording
+from reconstruct.onset import Rise, fit_rise
+
+_LEAD_S = 0.15
+_FIT_SAMPLES = 400
+
+
+@dataclass(frozen=True)
+class Contact:
+    """One press; device frame, SI.
+
+    start, peak, end: sample indices of first touch, greatest force, loss of touch (end exclusive).
+    centre: (3,)
+    tip's centre at first touch. point: (3,) surface point there. normal: (3,) outward, from the force.
+    depth_m:
+    greatest travel of the centre along -normal. peak_n: greatest force. onset_error_m: standard error of
+    the first
+    touch along the normal. law: the fitted rise, None in the paper's mode.
+    """
+
+    start: int
+    peak: int
+    end: int
+    t_onset: float
+    t_peak: float
+    centre: np.ndarray
+    point: np.ndarray
+    normal: np.ndarray
+    depth_m: float
+    peak_n: float
+    onset_error_m: float = 0.0
+    law: Rise | None = None
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What a press is read from: low-passed position and force (n, 3), its magnitude, noise N an axis,
+    raw force."""
+
+    recording: Recording
+    position: np.ndarray
+    force: np.ndarray
+    magnitude: np.ndarray
+    raw_force: np.ndarray
+    noise_n: float
+
+
+def paper_contact(signals: Signals, a: int, b: int) -> Contact | None:
+    """First touch where the force started to rise: back from the threshold while each sample is above
+    the last.
+
+    a, b: samples between which the force is above its lower threshold. The normal is the force's direction at
+    its peak.
+    """
+    magnitude = signals.magnitude
+    start = a
+    while start > 0 and magnitude[start - 1] < magnitude[start]:
+        start -= 1
+    peak = a + int(np.argmax(magnitude[a:b]))
+    return _contact(signals, start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
+
+
+def fitted_contact(signals: Signals, a: int, b: int) -> Contact | None:
+    """First touch by fitting the contact law to the approach and rise; None where the force has no direction.
+
+    a, b: samples between which the force is above its lower threshold.
+    """
+    peak = a + int(np.argmax(signals.magnitude[a:b]))
+    normal = initial_normal(signals, a, peak)
+    if normal is None or peak - a < 3:
+        return None
+    lead = max(0, a - int(_LEAD_S * signals.recording.sample_rate_hz))
+    travel = -(signals.position[lead : peak + 1] - signals.position[a]) @ normal
+    # only the approach itself: before it the hand may have come from anywhere
+    away = np.flatnonzero(travel[: a - lead] > 0.0005)
+    first = lead + (int(away[-1]) + 1 if len(away) else 0)
+    travel = travel[first - lead :]
+    push = signals.raw_force[first : peak + 1] @ normal
+    block = max(1, len(travel) // _FIT_SAMPLES)
+    rows = len(travel) // block
+    rise = fit_rise(
+        travel[-rows * block :].reshape(rows, block).mean(axis=1),
+        push[-rows * block :].reshape(rows, block).mean(axis=1),
+        signals.noise_n / np.sqrt(block),
+        guess_m=0.0,
+    )
+    touched = np.flatnonzero(travel >= rise.u0_m)
+    start = first + int(touched[0])
+    here = -(signals.position[start] - signals.position[a]) @ normal
+    centre = signals.position[start] - (rise.u0_m - here) * normal
+    contact = _contact(signals, start, peak, b, centre, normal, rise)
+    return contact if contact.depth_m > 0 else None
+
+
+def initial_normal(signals: Signals, a: int, peak: int) -> np.ndarray | None:
+    """Outward normal from the first force: its mean direction while it rises from 15 to 60 % of the peak."""
+    level = signals.magnitude[a : peak + 1] / signals.magnitude[peak]
+    chosen = (level > 0.15) & (level < 0.6)
+    if chosen.sum() < 3:
+        chosen = level > 0.1
+    direction = signals.force[a : peak + 1][chosen].sum(axis=0)
+    length = np.linalg.norm(direction)
+    return direction / length if length > 0 else None
+
+
+def _contact(
+    signals: Signals,
+    start: int,
+    peak: int,
+    end: int,
+    centre: np.ndarray,
+    normal: np.ndarray,
+    law: Rise | None = None,
+) -> Contact:
+    t, radius = signals.recording.t, signals.recording.tip_radius_m
+    depth = -(signals.position[start:end] - centre) @ normal
+    return Contact(
+        start=start,
+        peak=peak,
+        end=end,
+        t_onset=float(t[start]),
+        t_peak=float(t[peak]),
+        centre=centre,
+        point=centre - radius * normal,
+        normal=normal,
+        depth_m=float(depth.max()),
+        peak_n=float(signals.magnitude[peak]),
+        onset_error_m=law.u0_error_m if law else 0.0,
+        law=law,
+    )
