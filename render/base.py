@@ -53,6 +53,25 @@ class Renderer(ABC):
     def with_modulus(self, young_modulus_pa: float) -> Renderer:
         """The same renderer for another global Young's modulus, without any precomputation."""
 
+    def with_friction(self, friction: float) -> Renderer:
+        """The same renderer with another Coulomb coefficient (inf sticks; the 1D models know none)."""
+        if not friction >= 0:
+            raise OptionError(f"friction is {friction}; it must be 0 or greater (inf sticks)")
+        return self._with(friction=np.array([float(friction)]))
+
+    def with_series_compliance(self, compliance_m_per_n: float) -> Renderer:
+        """The same renderer felt through a spring of this compliance, m/N, at every tip (virtual
+        coupling)."""
+        if not (compliance_m_per_n >= 0 and np.isfinite(compliance_m_per_n)):
+            raise OptionError(f"series compliance is {compliance_m_per_n}; it must be 0 m/N or greater")
+        return self._with(series_compliance=np.array([float(compliance_m_per_n)]))
+
+    def _with(self, **changes: np.ndarray) -> Renderer:
+        copy = object.__new__(type(self))
+        copy.__dict__.update(self.__dict__)
+        copy.parameters = self.parameters._replace(**changes)
+        return copy
+
     @property
     @abstractmethod
     def surface(self) -> tuple[np.ndarray, np.ndarray]:

@@ -34,7 +34,7 @@ class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
     far: (v, 3, 3) 1/m. curvature: (v,) 1/m. parents: (k, 3) compliance nodes that interpolate over a
-    triangle, -1 where fixed; parent_weights (k, 3, 3). smoothed: (3n, 3n) 1/m. table: dent law.
+    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m. table: dent law.
     young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each.
     """
 
@@ -43,7 +43,7 @@ class FemParameters(NamedTuple):
     curvature: np.ndarray
     parents: np.ndarray
     parent_weights: np.ndarray
-    smoothed: np.ndarray
+    blocks: np.ndarray
     table: np.ndarray
     young_modulus_pa: np.ndarray
     poisson_ratio: np.ndarray
@@ -173,7 +173,7 @@ def _couple(p, state, i, m):
                 w = state.node_weights[i, a] * state.node_weights[j, b]
                 for r in range(3):
                     for c in range(3):
-                        block[r, c] += w * p.smoothed[3 * n[i, a] + r, 3 * n[j, b] + c]
+                        block[r, c] += w * p.blocks[n[i, a], n[j, b], r, c]
         for r in range(3):
             for c in range(3):
                 state.blocks[j, i, c, r] = block[r, c]

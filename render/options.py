@@ -19,8 +19,10 @@ class RenderOptions:
         "Coulomb friction coefficient; inf sticks; default: the model's friction_slip, else inf",
         unit="1",
     )
-    finite_strain: bool = option(
-        True, "use the finite-strain dent law (neo-Hookean) instead of the linear one"
+    dent_law: str | None = option(
+        None,
+        "law of the local dent: neo-hookean renders finite strain; default: the model's own",
+        choices=dent_laws(),
     )
     effects: bool = option(True, "render the effects that the model names")
     snap_to_touches: bool = option(
@@ -36,10 +38,7 @@ class RenderOptions:
             raise OptionError(f"friction is {self.friction}; it must be 0 or greater (inf sticks)")
         if not self.surface_edge_m > 0:
             raise OptionError(f"surface_edge_m is {self.surface_edge_m}; it must be greater than 0 m")
+        if self.dent_law is not None and self.dent_law not in dent_laws():
+            raise OptionError(f"dent_law is '{self.dent_law}'; allowed are {', '.join(dent_laws())}")
         if self.interpolation not in ("rbf", "nearest"):
             raise OptionError(f"interpolation is '{self.interpolation}'; allowed are rbf, nearest")
-
-    @property
-    def dent_law(self) -> str:
-        """The dent law's name."""
-        return "neo-hookean" if self.finite_strain and "neo-hookean" in dent_laws() else "sphere"

@@ -66,16 +66,13 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
 
     Raises MeshError where the boundary is not closed.
     """
-    coarse = mesh.surface
-    corners = coarse[:, :3]
+    corners = mesh.surface[:, :3]
     touchable = ~mesh.fixed[corners].all(axis=1)
     edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]
     longest = float(np.median(np.linalg.norm(edges, axis=2)))
     parts = max(1, round(longest / edge_m))
     while parts > 1 and len(corners) * parts**2 > largest:
         parts -= 1
-    if mesh.order == 2:
-        parts = max(2, parts + parts % 2)
     barycentric, cells = _lattice(parts)
     corner_normals = _corner_normals(mesh.points, corners, touchable)
     positions = _pn_patch(
@@ -86,7 +83,8 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     vertices[index] = positions
     triangles = index[:, cells].reshape(-1, 3)
     free = np.repeat(touchable, len(cells)).astype(np.int64)
-    parents, parent_weights = _parents(coarse, barycentric, cells)
+    parents = np.repeat(corners, len(cells), axis=0)
+    parent_weights = np.tile(barycentric[cells], (len(corners), 1, 1))
     nodes = np.zeros((count, 3), dtype=np.int64)
     node_weights = np.zeros((count, 3))
     for corner in range(3):
@@ -275,25 +273,3 @@ def _merged(triangles: np.ndarray, parts: int) -> tuple[np.ndarray, int]:
     _, index = np.unique(keys.reshape(-1, 6), axis=0, return_inverse=True)
     index = index.reshape(k, q)
     return index, int(index.max()) + 1
-
-
-def _parents(coarse: np.ndarray, barycentric: np.ndarray, cells: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Mesh nodes (k, 3) and their weights at the corners (k, 3, 3) for each small triangle."""
-    if coarse.shape[1] == 3:
-        parents = np.repeat(coarse, len(cells), axis=0)
-        return parents, np.tile(barycentric[cells], (len(coarse), 1, 1))
-    # the four linear triangles of a quadratic one: three at the corners, one in the middle
-    nodes = np.array([[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]])
-    local, weights = [], []
-    for cell in cells:
-        w = barycentric[cell]
-        middle = w.mean(axis=0)
-        part = int(middle.argmax()) if middle.max() > 0.5 else 3
-        if part < 3:
-            inner = 2 * w
-            inner[:, part] -= 1
-        else:  # opposite corners vanish on the middle triangle's nodes: 3 is edge 01, 4 is 12, 5 is 20
-            inner = (1 - 2 * w)[:, [2, 0, 1]]
-        local.append(nodes[part])
-        weights.append(inner)
-    return coarse[:, np.array(local)].reshape(-1, 3), np.tile(np.array(weights), (len(coarse), 1, 1))

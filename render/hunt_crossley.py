@@ -1,0 +1,17 @@
+"""Hunt-Crossley, eq. (2): f = k u^r + b u^r du/dt."""
+
+from __future__ import annotations
+
+from mechanics.model import Model
+from mechanics.progress import Progress, silent
+from render.one_d import Law, OneDRenderer, palpation_column
+from render.options import RenderOptions
+
+NAME = "hunt-crossley"
+
+
+def create(model: Model, options: RenderOptions, progress: Progress = silent) -> OneDRenderer:
+    """The registry's entry."""
+    k = palpation_column(model, "k_hc")
+    r = palpation_column(model, "r_hc")
+    return OneDRenderer(NAME, model, Law(k, palpation_column(model, "b_hc"), r, r), options)

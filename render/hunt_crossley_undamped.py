@@ -1,0 +1,19 @@
+"""Hunt-Crossley without damping, eq. (6): f = k u^r."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.model import Model
+from mechanics.progress import Progress, silent
+from render.one_d import Law, OneDRenderer, palpation_column
+from render.options import RenderOptions
+
+NAME = "hunt-crossley-undamped"
+
+
+def create(model: Model, options: RenderOptions, progress: Progress = silent) -> OneDRenderer:
+    """The registry's entry."""
+    k = palpation_column(model, "k_c")
+    r = palpation_column(model, "r_c")
+    return OneDRenderer(NAME, model, Law(k, np.zeros_like(k), r, np.zeros_like(k)), options)
