@@ -27,6 +27,7 @@ from mechanics.errors import OptionError
 from mechanics.options import option
 
 LONGEST_DELAY_TICKS = 64
+MOST_OWED_J = 2e-3
 
 
 @dataclass(frozen=True)
@@ -37,9 +38,19 @@ class PassivityOptions:
     allowance_j: float = option(2e-4, "energy that may be owed before the guard cuts in", unit="J")
     payback_s: float = option(0.005, "time over which owed energy is damped away", unit="s")
     velocity_time_s: float = option(0.002, "time constant of the velocity that damping uses", unit="s")
+    most_damping_n_s_per_m: float = option(10.0, "the damper's limit; the device's if lower", unit="N s/m")
+    least_mass_kg: float = option(0.05, "the least mass that the device moves", unit="kg")
+    forgiven_w: float = option(5e-5, "power at which spent allowance comes back", unit="W")
 
     def __post_init__(self) -> None:
-        for name in ("allowance_j", "payback_s", "velocity_time_s"):
+        for name in (
+            "allowance_j",
+            "payback_s",
+            "velocity_time_s",
+            "most_damping_n_s_per_m",
+            "least_mass_kg",
+            "forgiven_w",
+        ):
             value = getattr(self, name)
             if not (math.isfinite(value) and value > 0):
                 raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
@@ -53,6 +64,8 @@ class PassivityParameters(NamedTuple):
     payback_s: float
     velocity_time_s: float
     max_damping_n_s_per_m: float
+    least_mass_kg: float
+    forgiven_w: float
     delay_ticks: float
 
 
@@ -76,18 +89,22 @@ NET, OWED, DISSIPATED, LEAST, TOTAL = range(5)
 
 
 def passivity_parameters(
-    options: PassivityOptions, *, max_damping_n_s_per_m: float, delay_ticks: float = 0.0
+    options: PassivityOptions, *, max_damping_n_s_per_m: float, delay_ticks: float = 0.0, rate_hz: float = 1000.0
 ) -> PassivityParameters:
     """max_damping_n_s_per_m: what the device renders stably. delay_ticks: 0 where the force that a pose
     causes acts from the instant of that pose; raises OptionError beyond LONGEST_DELAY_TICKS - 2."""
     if not 0.0 <= delay_ticks <= LONGEST_DELAY_TICKS - 2:
         raise OptionError(f"delay_ticks is {delay_ticks}; allowed is 0 to {LONGEST_DELAY_TICKS - 2}")
+    # a sampled, delayed damper on a mass is itself stable only well below m / T
+    damping = min(max_damping_n_s_per_m, options.most_damping_n_s_per_m, 0.2 * options.least_mass_kg * rate_hz)
     return PassivityParameters(
         options.passivity,
         options.allowance_j,
         options.payback_s,
         options.velocity_time_s,
-        max_damping_n_s_per_m,
+        damping / (1.0 + 2.0 * delay_ticks),
+        options.least_mass_kg,
+        options.forgiven_w,
         delay_ticks,
     )
 
@@ -145,12 +162,15 @@ def passivity_before(parameters, state, wanted, position, fresh, dt_s):
         if force2 == 0.0 and touch2 == 0.0:
             # out of contact nothing is stored: what was dissipated is no licence for the next contact
             energies[NET] = min(energies[NET], 0.0)
+            energies[OWED] = 0.0
         if math.isfinite(position[0] + position[1] + position[2]):
             for i in range(3):
                 state.position[i] = position[i]
     else:
         for i in range(3):
             state.moved[i] = 0.0
+    if energies[NET] < 0.0:
+        energies[NET] = min(0.0, energies[NET] + parameters.forgiven_w * dt_s)
     energies[LEAST] = min(energies[LEAST], energies[TOTAL])
     for i in range(3):
         state.damping_force[i] = 0.0
@@ -175,18 +195,41 @@ def _control(parameters, state, wanted, dt_s):
             state.damping_force[i] = -damping * velocity[i]
             wanted[i] += state.damping_force[i]
         changed = True
-    speed = math.sqrt(speed2)
-    along = (wanted[0] * velocity[0] + wanted[1] * velocity[1] + wanted[2] * velocity[2]) / speed
-    horizon = speed * dt_s * (1.0 + parameters.delay_ticks)
-    affordable = max(0.0, energies[NET] + parameters.allowance_j) / horizon
-    if along > affordable:
+    _guard(parameters, state, wanted, math.sqrt(speed2), dt_s)
+    return changed or state.cut[0] > 0.0
+
+
+@njit(cache=True, nogil=True)
+def _guard(parameters, state, wanted, speed, dt_s):
+    """Cut what would give out more than the energy that is left; `state.cut` is the force taken, N."""
+    velocity, tick = state.velocity, state.ticks[0]
+    left = state.energies[NET] + parameters.allowance_j
+    # forces that are under way will still do their work
+    for j in range(int(math.ceil(parameters.delay_ticks))):
+        given = 0.0
         for i in range(3):
-            cut = (along - affordable) * velocity[i] / speed
-            state.damping_force[i] -= cut
-            wanted[i] -= cut
-        state.cut[0] += 1.0
-        changed = True
-    return changed
+            given += state.commanded[(tick - 1 - j) % LONGEST_DELAY_TICKS, i] * velocity[i] * dt_s
+        left -= max(given, 0.0)
+    along, size2 = 0.0, 0.0
+    for i in range(3):
+        along += wanted[i] * velocity[i] / speed
+        size2 += wanted[i] ** 2
+    # on the way the force itself speeds the mass up: F (v T + F T^2 / 2m) <= left
+    half = 0.5 * dt_s * dt_s / parameters.least_mass_kg
+    reach = speed * dt_s
+    affordable = 2.0 * max(left, 0.0) / (reach + math.sqrt(reach * reach + 4.0 * half * max(left, 0.0)))
+    scale = 1.0
+    if parameters.delay_ticks >= 0.5:
+        # what opposes the motion now may drive it when it arrives
+        scale = min(1.0, max(left, 0.0) / (0.5 * parameters.allowance_j))
+    state.cut[0] = 0.0
+    excess = max(0.0, scale * along - affordable)
+    if scale < 1.0 or excess > 0.0:
+        for i in range(3):
+            kept = scale * wanted[i] - excess * velocity[i] / speed
+            state.damping_force[i] += kept - wanted[i]
+            wanted[i] = kept
+        state.cut[0] = excess + (1.0 - scale) * math.sqrt(size2)
 
 
 @njit(cache=True, nogil=True)
@@ -204,5 +247,5 @@ def passivity_after(state, wanted, sent):
         energies[OWED] -= 0.5 * state.base[i] * moved
         energies[DISSIPATED] -= share * state.damping_force[i] * moved
         state.commanded[state.ticks[0] % LONGEST_DELAY_TICKS, i] = sent[i]
-    energies[OWED] = min(max(energies[OWED], -1e-5), 1e-1)
+    energies[OWED] = min(max(energies[OWED], -1e-5), MOST_OWED_J)
     state.ticks[0] += 1

@@ -12,7 +12,7 @@ import time
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import cfunc, njit, typeof, types
 
 from palpate.servo.clock import COMPILED, compiled_now_ns, compiled_sleep_until, sleep_until
 from palpate.servo.layout import DEADLINE, STATUS, STOP
@@ -24,7 +24,7 @@ SWAP = 7
 """Cell of `control` by which this process's own threads ask the loop to come back."""
 
 
-@njit(nogil=True)
+@njit(cache=True, nogil=True)
 def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
     """A whole tick with the renderer's kernel in its middle."""
     before(arrays)
@@ -44,7 +44,7 @@ def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
     )
 
 
-@njit(nogil=True)
+@njit(cache=True, nogil=True)
 def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
     """Tick until told to stop or swap; `wake` is a file descriptor told after each tick, -1 for none."""
     for _ in range(most_ticks):
@@ -60,10 +60,23 @@ def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
             _write(wake, arrays.word.ctypes, 8)
 
 
+def kernel_pointer(renderer: Any, state: Any) -> Any:
+    """The renderer's kernel as a typed function pointer.
+
+    Passing the compiled function itself would make the loop a new one in every process; behind a pointer it is
+    compiled once for each kind of renderer and kept on disk.
+    """
+    kernel = renderer.kernel
+    signature = types.void(typeof(renderer.parameters), typeof(state), types.float64[:, ::1])
+    fastmath = kernel.targetoptions.get("fastmath", False)
+    return cfunc(signature, cache=True, fastmath=fastmath)(kernel.py_func)
+
+
 class Program(NamedTuple):
-    """A renderer made ready: compiled, warmed up, with its state."""
+    """A renderer made ready: compiled, warmed up, with its state and its kernel's pointer."""
 
     renderer: Any
+    kernel: Any
     state: Any
     parameters: TickParameters
 
@@ -80,9 +93,10 @@ def make_program(
         state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
         warm_up(renderer, state)
         state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
+    kernel = kernel_pointer(renderer, state)
     if COMPILED:
-        compiled_loop(renderer.kernel, renderer.parameters, state, arrays, parameters, -1, 0)
-    return Program(renderer, state, parameters)
+        compiled_loop(kernel, renderer.parameters, state, arrays, parameters, -1, 0)
+    return Program(renderer, kernel, state, parameters)
 
 
 def warm_up(renderer: Any, state: Any, places: int = 100) -> None:
@@ -150,10 +164,10 @@ class ServoLoop:
                     self._program, self._pending = self._pending, None
                     self.arrays.control[SWAP] = 0
                     self._swapped.set()
-                renderer, state, parameters = self._program
+                renderer, kernel, state, parameters = self._program
                 if COMPILED:
                     compiled_loop(
-                        renderer.kernel,
+                        kernel,
                         renderer.parameters,
                         state,
                         self.arrays,
@@ -173,6 +187,6 @@ def portable_tick(program: Program, arrays: TickArrays) -> None:
     deadline = int(arrays.counts[DEADLINE])
     sleep_until(deadline)
     started = time.perf_counter_ns()
-    renderer, state, parameters = program
-    one_tick(renderer.kernel, renderer.parameters, state, arrays, parameters, started, deadline)
+    renderer, kernel, state, parameters = program
+    one_tick(kernel, renderer.parameters, state, arrays, parameters, started, deadline)
     account(arrays, parameters, deadline, started, time.perf_counter_ns())

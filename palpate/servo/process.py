@@ -103,6 +103,7 @@ class ServoProcess:
                 options.passivity,
                 max_damping_n_s_per_m=spec.max_damping_n_s_per_m,
                 delay_ticks=self._delay_ticks(),
+                rate_hz=options.rate_hz,
             ),
             self._support(model),
         )
