@@ -1,0 +1,72 @@
+"""What an effect is: a name, a domain, parameters with bounds, and the settings of the forward model it changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from diagnose.forward import Forward, Settings
+
+DOMAINS = ("object", "contact", "boundary", "instrument")
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One scalar that a fit moves: bounds, starts and step in the stated unit; `ideal` is its value without effect.
+
+    prior_std: width of a Gaussian pull towards `ideal` (None: only the bounds hold it).
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    ideal: float
+    starts: tuple[float, ...]
+    step: float
+    prior_std: float | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A departure from the ideal model.
+
+    change(settings, values, forward): sets what the forward model needs, in place. report(values, forward): the
+    contract's keys in SI units, device frame. needs: stages that must be computed first ('fields', 'poisson',
+    'base', 'unbonded'). candidates(forward): starts found from the data (list of value vectors) where a grid is
+    not enough. flexible: true where the fit has so many freedoms that it mimics others (it then pays for them).
+    """
+
+    name: str
+    domain: str
+    words: str
+    parameters: tuple[Parameter, ...]
+    change: Callable[[Settings, np.ndarray, Forward], None]
+    report: Callable[[np.ndarray, Forward], dict[str, Any]]
+    needs: tuple[str, ...] = ()
+    candidates: Callable[[Forward], list[np.ndarray]] | None = None
+    signature: str = ""
+    extra: dict[str, Any] = field(default_factory=dict)
+
+    @property
+    def ideal(self) -> np.ndarray:
+        """(k,) values at which the effect is absent."""
+        return np.array([p.ideal for p in self.parameters])
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest values, (k,) each."""
+        return np.array([p.low for p in self.parameters]), np.array([p.high for p in self.parameters])
+
+    def starts(self, forward: Forward) -> list[np.ndarray]:
+        """Start vectors of a fit."""
+        if self.candidates is not None:
+            return self.candidates(forward)
+        count = max(len(p.starts) for p in self.parameters)
+        return [
+            np.array([p.starts[min(i, len(p.starts) - 1)] for p in self.parameters]) for i in range(count)
+        ]

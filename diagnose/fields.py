@@ -1,0 +1,219 @@
+"""What spatial effects need of the object: each place's elastic energy element by element, and other far fields.
+
+The give of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that are stiffer
+by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on one array.
+A changed base or Poisson's ratio is a new factorisation, done once at a few values and interpolated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.forward import Forward, _places
+from mechanics.elasticity import element_stiffness
+from mechanics.patch import PatchSampler, half_space_compliance
+from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES, typical_edge
+from mechanics.solver import Solver
+from mechanics.tetmesh import TetMesh
+
+_CHUNK = 600
+
+
+@dataclass(frozen=True)
+class EnergyFields:
+    """energy: (q, m, 3, 3) of q places, local frames, unit modulus, 1/m. place: (p,) place of each press.
+
+    centroid: (m, 3) m, device frame. volume: (m,) m^3. height: (m,) m above the support; top: its greatest value.
+    depth: (m,) m, distance of the centroid to the touchable surface. half_space: (q, 3, 3) taken off the sum.
+    """
+
+    energy: np.ndarray
+    place: np.ndarray
+    centroid: np.ndarray
+    volume: np.ndarray
+    height: np.ndarray
+    depth: np.ndarray
+    half_space: np.ndarray
+    solution_base: np.ndarray
+
+
+def energy_fields(forward: Forward) -> EnergyFields:
+    """Energies of all places; kept in forward.stages['fields']."""
+    if "fields" in forward.stages:
+        return forward.stages["fields"]
+    t, model = forward.touches, forward.model
+    mesh = model.mesh.quadratic()
+    unique, first, inverse = _places(t)
+    solver = Solver(mesh, model.poisson_ratio)
+    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+    q = len(first)
+    forces = np.zeros((len(mesh.points), 3, 3 * q))
+    for k, press in enumerate(first):
+        nodes, weights = sampler.weights(t.point[press])
+        for axis in range(3):
+            forces[nodes, :, 3 * k + axis] = weights[:, None] * t.frame[press][axis]
+    u = solver.solve(forces)
+    m = len(mesh.tetrahedra)
+    energy = np.empty((q, m, 3, 3), dtype=np.float32)
+    for a in range(0, m, _CHUNK):
+        nodes = mesh.tetrahedra[a : a + _CHUNK]
+        stiff = element_stiffness(mesh.points[nodes[:, :4]], 2, model.poisson_ratio).reshape(
+            len(nodes), 30, 30
+        )
+        local = u[nodes].reshape(len(nodes), 30, 3 * q)
+        product = (stiff @ local).reshape(len(nodes), 30, q, 3)
+        energy[:, a : a + _CHUNK] = np.einsum(
+            "mxqi,mxqj->qmij", local.reshape(len(nodes), 30, q, 3), product, optimize=True
+        )
+    centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
+    height = (centroid - model.support_point) @ model.support_normal
+    from scipy.spatial import cKDTree
+
+    surface = sampler._positions.reshape(-1, 3)
+    depth = cKDTree(surface).query(centroid)[0]
+    half = np.array(
+        [half_space_compliance(np.array([1.0, 0, 0]), model.poisson_ratio, sampler.width_m) for _ in first]
+    )
+    fields = EnergyFields(energy, inverse.ravel(), centroid, mesh.volumes, height, depth, half, u[mesh.fixed])
+    forward.stages["fields"] = fields
+    return fields
+
+
+def far_with_weights(forward: Forward, softness: np.ndarray) -> np.ndarray:
+    """(p, 3, 3) far field with each element's share of the give multiplied by softness (m,) (1: unchanged)."""
+    fields = energy_fields(forward)
+    change = np.einsum("qmij,m->qij", fields.energy, (softness - 1).astype(np.float32), optimize=True)
+    return forward.far + change[fields.place]
+
+
+def far_at_poisson(
+    forward: Forward, nu: float, ratios: tuple[float, ...] = (0.30, 0.36, 0.42, 0.46, 0.49)
+) -> np.ndarray:
+    """(p, 3, 3) far field at another Poisson's ratio, interpolated between factorisations."""
+    table = forward.stages.get("poisson")
+    if table is None:
+        known = sorted({*ratios, forward.nu})
+        table = (np.array(known), np.array([_far(forward, forward.model.mesh.quadratic(), r) for r in known]))
+        forward.stages["poisson"] = table
+    return _interpolate(*table, nu)
+
+
+def far_on_springs(
+    forward: Forward, log_give: float, levels: tuple[float, ...] = (-3.0, -2.0, -1.0, 0.0)
+) -> np.ndarray:
+    """(p, 3, 3) far field on a base of springs that adds 10^log_give of the object's own base give.
+
+    The base reactions of each unit load on springs in parallel, k a unit of area: R^T R / (k a); unit-modulus
+    springs of stiffness 1 / (10^log_give * height) a unit of area.
+    """
+    table = forward.stages.get("springs")
+    if table is None:
+        added = _spring_give(forward)
+        table = added
+        forward.stages["springs"] = table
+    return forward.far + 10.0**log_give * table
+
+
+def _spring_give(forward: Forward) -> np.ndarray:
+    """(p, 3, 3) give of a uniform spring base under each place's reactions for springs of 1 / height a unit area."""
+    model = forward.model
+    mesh = model.mesh.quadratic()
+    t = forward.touches
+    unique, first, inverse = _places(t)
+    from mechanics.elasticity import stiffness
+
+    matrix = stiffness(mesh, model.poisson_ratio)
+    fields_u = _solutions(forward, mesh, model.poisson_ratio, first)
+    fixed = np.flatnonzero(mesh.fixed)
+    rows = (3 * fixed[:, None] + np.arange(3)).ravel()
+    reaction = (matrix[rows] @ fields_u.reshape(3 * len(mesh.points), -1)).reshape(len(fixed), 3, -1)
+    area = _base_area(mesh)[fixed]
+    height = float(((mesh.points - model.support_point) @ model.support_normal).max())
+    # consistent: nodal reactions become pressures that are smoothed over the base before they act on springs
+    give = np.empty((len(first), 3, 3))
+    ok = area > 0
+    for k in range(len(first)):
+        r = reaction[:, :, 3 * k : 3 * k + 3]
+        give[k] = np.einsum("nai,naj,n->ij", r[ok], r[ok], 1 / area[ok]) * height
+    return give[inverse.ravel()]
+
+
+def _base_area(mesh: TetMesh) -> np.ndarray:
+    area = np.zeros(len(mesh.points))
+    base = mesh.surface[mesh.fixed[mesh.surface[:, :3]].all(axis=1)]
+    p = mesh.points[base[:, :3]]
+    size = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+    for k in range(base.shape[1]):
+        np.add.at(area, base[:, k], size / base.shape[1])
+    return area
+
+
+def _solutions(forward: Forward, mesh: TetMesh, nu: float, first: np.ndarray) -> np.ndarray:
+    """(n, 3, 3 q) displacement for unit loads along the local axes of q places."""
+    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+    t = forward.touches
+    forces = np.zeros((len(mesh.points), 3, 3 * len(first)))
+    for k, press in enumerate(first):
+        nodes, weights = sampler.weights(t.point[press])
+        for axis in range(3):
+            forces[nodes, :, 3 * k + axis] = weights[:, None] * t.frame[press][axis]
+    return Solver(mesh, nu).solve(forces)
+
+
+def _far(forward: Forward, mesh: TetMesh, nu: float) -> np.ndarray:
+    """(p, 3, 3) local far field of a mesh whose nodes are the model's (its base may differ)."""
+    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+    t = forward.touches
+    unique, first, inverse = _places(t)
+    u = _solutions(forward, mesh, nu, first)
+    far = np.empty((len(first), 3, 3))
+    half = half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m)
+    for k, press in enumerate(first):
+        nodes, weights = sampler.weights(t.point[press])
+        mean = np.einsum("n,nar->ar", weights, u[nodes][:, :, 3 * k : 3 * k + 3])
+        block = t.frame[press] @ mean
+        far[k] = (block + block.T) / 2 - half
+    return far[inverse.ravel()]
+
+
+def far_partly_bonded(forward: Forward, fraction: float, angle: float) -> np.ndarray:
+    """(p, 3, 3) far field with only a share of the base bonded, the free part towards `angle` in the support plane.
+
+    Computed at 8 angles for half the base, interpolated by angle and linearly to none.
+    """
+    table = forward.stages.get("unbonded")
+    angles = np.linspace(0, 2 * np.pi, 9)
+    if table is None:
+        mesh = forward.model.mesh.quadratic()
+        across, along = support_axes(forward.model)
+        base = np.flatnonzero(mesh.fixed)
+        centre = mesh.points[base].mean(axis=0)
+        fars = []
+        for direction in angles[:-1]:
+            axis = np.cos(direction) * across + np.sin(direction) * along
+            free = (mesh.points[base] - centre) @ axis > 1e-9
+            fixed = mesh.fixed.copy()
+            fixed[base[free]] = False
+            touchable = mesh.touchable & ~fixed
+            fars.append(_far(forward, TetMesh(mesh.points, mesh.tetrahedra, fixed, touchable), forward.nu))
+        fars.append(fars[0])
+        table = np.array(fars)
+        forward.stages["unbonded"] = table
+    half = _interpolate(angles, table, angle % (2 * np.pi))
+    return forward.far + (half - forward.far) * (1 - fraction) / 0.5
+
+
+def support_axes(model) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
+    """Two unit vectors in the support plane."""
+    normal = model.support_normal / np.linalg.norm(model.support_normal)
+    across = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    return across, np.cross(normal, across)
+
+
+def _interpolate(x: np.ndarray, table: np.ndarray, value: float) -> np.ndarray:
+    i = int(np.clip(np.searchsorted(x, value) - 1, 0, len(x) - 2))
+    w = (value - x[i]) / (x[i + 1] - x[i])
+    return (1 - w) * table[i] + w * table[i + 1]

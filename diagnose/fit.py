@@ -1,0 +1,318 @@
+"""Fit the modulus and any effects together to whitened residuals: bounded Gauss-Newton from several starts."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.effects.base import Effect
+from diagnose.forward import Forward, Settings
+from diagnose.whiten import Whitener
+
+MODULUS_STEP = 0.01
+
+
+@dataclass(frozen=True)
+class Fit:
+    """The optimum of one set of effects.
+
+    values: log modulus, then each effect's parameters in order. loss: half the whitened sum of squares, prior
+    included. residual: (n, 3) N, measured less predicted. jacobian: (n, 3, k) of the prediction by the values.
+    gram, raw: (g, 1 + k, 1 + k) inner products of [residual, jacobian], whitened and plain.
+    """
+
+    effects: tuple[Effect, ...]
+    values: np.ndarray
+    loss: float
+    residual: np.ndarray
+    jacobian: np.ndarray
+    gram: np.ndarray
+    raw: np.ndarray
+    prior: np.ndarray
+    pull: np.ndarray
+    onset: np.ndarray
+
+    @property
+    def modulus(self) -> float:
+        """Pa."""
+        return float(np.exp(self.values[0]))
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the effects."""
+        return tuple(e.name for e in self.effects)
+
+    def of(self, name: str) -> np.ndarray:
+        """One effect's values."""
+        i = 1
+        for effect in self.effects:
+            k = len(effect.parameters)
+            if effect.name == name:
+                return self.values[i : i + k]
+            i += k
+        raise KeyError(name)
+
+
+def settings_of(
+    forward: Forward, effects: Sequence[Effect], values: np.ndarray, onset: np.ndarray | None = None
+) -> Settings:
+    """The forward model's settings for a vector of log modulus and effect parameters, first touches moved."""
+    settings = forward.ideal(float(np.exp(values[0])))
+    if onset is not None:
+        settings.onset = settings.onset + onset
+    i = 1
+    for effect in effects:
+        k = len(effect.parameters)
+        effect.change(settings, values[i : i + k], forward)
+        i += k
+    return settings
+
+
+def fit(
+    forward: Forward,
+    whitener: Whitener,
+    effects: Sequence[Effect],
+    *,
+    modulus: float,
+    start: np.ndarray | None = None,
+    weights: np.ndarray | None = None,
+    onset: np.ndarray | None = None,
+    iterations: int = 12,
+) -> Fit:
+    """Best values from all starts (`start`, full vector, or every effect's own). weights: (g,) 1 keeps a group."""
+    effects = tuple(effects)
+    if start is not None:
+        starts = [np.asarray(start, dtype=float)]
+    else:
+        starts = [np.array([np.log(modulus)])]
+        for effect in effects:
+            starts = [np.concatenate([s, own]) for s in starts for own in effect.starts(forward)]
+    descent = _Descent(forward, whitener, effects, weights)
+    onset = np.zeros(forward.touches.presses) if onset is None else onset
+    if len(starts) > 3:
+        scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
+        starts = [starts[i] for i in np.argsort(scored)[:3]]
+    best: Fit | None = None
+    for begin in starts:
+        candidate = descent.run(begin, onset, iterations)
+        if best is None or candidate.loss < best.loss:
+            best = candidate
+    assert best is not None
+    return best
+
+
+def _bounds(effects: tuple[Effect, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    low, high, step, prior, centre = [-np.inf], [np.inf], [MODULUS_STEP], [0.0], [0.0]
+    for effect in effects:
+        for p in effect.parameters:
+            low.append(p.low)
+            high.append(p.high)
+            step.append(p.step)
+            prior.append(0.0 if p.prior_std is None else 1 / p.prior_std**2)
+            centre.append(p.ideal)
+    return tuple(map(np.array, (low, high, step, prior, centre)))  # type: ignore[return-value]
+
+
+class _Descent:
+    """One bounded Gauss-Newton descent. First touches are refined beside it, press by press.
+
+    A late or early first touch is a nuisance that bends the force, so it is moved in the model itself; the linear
+    column that the whitener holds for it is added back, so that the loss stays the one with its Gaussian width.
+    """
+
+    def __init__(self, forward: Forward, whitener: Whitener, effects: tuple[Effect, ...], weights) -> None:  # type: ignore[no-untyped-def]
+        self.forward, self.whitener, self.effects, self.weights = forward, whitener, effects, weights
+        self.low, self.high, self.step, self.prior, self.centre = _bounds(effects)
+
+    def residual(self, values: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """(n, 3) N, measured less predicted."""
+        return self.forward.touches.f - self.forward.predict(
+            settings_of(self.forward, self.effects, values, onset)
+        )
+
+    def effective(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """The residual with the linear column of the moved first touches added back."""
+        return residual + self.whitener.onset_column * onset[self.forward.touches.press][:, None]
+
+    def loss(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> float:
+        """Half the whitened sum of squares, prior included."""
+        quadratic = self.whitener.gram(self.effective(residual, onset)[:, :, None])[:, 0, 0]
+        total = quadratic.sum() if self.weights is None else self.weights @ quadratic
+        return float(0.5 * (total + self.prior @ (values - self.centre) ** 2))
+
+    def jacobian(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """(n, 3, k) of the prediction, by forward differences."""
+        base = self.forward.touches.f - residual
+        columns = np.empty((*residual.shape, len(values)))
+        for i in range(len(values)):
+            moved = values.copy()
+            h = self.step[i] if values[i] + self.step[i] <= self.high[i] else -self.step[i]
+            moved[i] += h
+            predicted = self.forward.predict(settings_of(self.forward, self.effects, moved, onset))
+            columns[:, :, i] = (predicted - base) / h
+        return columns
+
+    def group_loss(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """(g,) half the whitened sum of squares of each group."""
+        return 0.5 * self.whitener.gram(self.effective(residual, onset)[:, :, None])[:, 0, 0]
+
+    def touched(
+        self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """First touches moved where that lowers the loss of their site; (onset, residual)."""
+        t = self.forward.touches
+        old = self.group_loss(residual, onset)
+        target = self.refined(values, residual, onset)
+        for share in (1.0, 0.4):
+            tried = onset + share * (target - onset)
+            new_residual = self.residual(values, tried)
+            better = self.group_loss(new_residual, tried) < old
+            accept = better[t.site]
+            if accept.any():
+                onset = np.where(accept, tried, onset)
+                rows = accept[t.press]
+                residual = np.where(rows[:, None], new_residual, residual)
+                old = self.group_loss(residual, onset)
+            if accept.all():
+                break
+        return onset, residual
+
+    def refined(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """One Gauss-Newton move of every first touch, beside a free factor on its press's force."""
+        t = self.forward.touches
+        h = 2e-5
+        predicted = t.f - residual
+        ahead = self.forward.predict(settings_of(self.forward, self.effects, values, onset + h))
+        slope = (ahead - predicted) / h
+        slope[~t.counted] = 0.0
+        keep = t.counted[:, None]
+        force = np.where(keep, predicted, 0.0)
+        press, p = t.press, t.presses
+
+        def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+            return np.bincount(press, weights=(a * b).sum(axis=1), minlength=p) / self.whitener.variance
+
+        ss = sums(slope, slope) + 1 / self.whitener.onset_sd**2
+        ff = sums(force, force) + 1 / self.whitener.stiffness_sd**2
+        sf = sums(slope, force)
+        rs = sums(slope, residual) - onset / self.whitener.onset_sd**2
+        rf = sums(force, residual)
+        move = (ff * rs - sf * rf) / np.maximum(ss * ff - sf * sf, 1e-12)
+        return np.clip(onset + np.clip(move, -4e-4, 4e-4), -2.5e-3, 2.5e-3)
+
+    def run(self, values: np.ndarray, onset: np.ndarray, iterations: int) -> Fit:
+        """Descend from `values`."""
+        values = np.clip(values, self.low, self.high)
+        residual = self.residual(values, onset)
+        loss = self.loss(values, residual, onset)
+        damping = 1e-4
+        for _ in range(iterations):
+            before = loss
+            onset, residual = self.touched(values, residual, onset)
+            loss = self.loss(values, residual, onset)
+            jacobian = self.jacobian(values, residual, onset)
+            shown = self.effective(residual, onset)
+            gram = self.whitener.gram(np.concatenate([shown[:, :, None], jacobian], axis=2))
+            total = gram.sum(axis=0) if self.weights is None else np.tensordot(self.weights, gram, 1)
+            hessian = total[1:, 1:] + np.diag(self.prior)
+            gradient = total[1:, 0] - self.prior * (values - self.centre)
+            for _ in range(5):
+                tried = self._moved(values, hessian, gradient, damping)
+                new_residual = self.residual(tried, onset)
+                new_loss = self.loss(tried, new_residual, onset)
+                if new_loss < loss:
+                    values, residual, loss = tried, new_residual, new_loss
+                    damping *= 0.2
+                    break
+                damping = max(damping * 10, 1e-3)
+            if before - loss < 0.05 + 1e-5 * loss:
+                break
+        jacobian = self.jacobian(values, residual, onset)
+        shown = np.concatenate([self.effective(residual, onset)[:, :, None], jacobian], axis=2)
+        plain = np.concatenate([residual[:, :, None], jacobian], axis=2)
+        return Fit(
+            self.effects, values, loss, residual, jacobian, self.whitener.gram(shown),
+            self.whitener.raw_gram(plain), self.prior, self.prior * (values - self.centre), onset,
+        )  # fmt: skip
+
+    def _moved(
+        self, values: np.ndarray, hessian: np.ndarray, gradient: np.ndarray, damping: float
+    ) -> np.ndarray:
+        scaled = hessian + damping * np.diag(np.maximum(np.diag(hessian), 1e-12))
+        held = np.zeros(len(values), dtype=bool)
+        move = np.zeros(len(values))
+        for _ in range(4):
+            free = ~held
+            move = np.zeros(len(values))
+            move[free] = np.linalg.solve(scaled[np.ix_(free, free)], gradient[free])
+            outside = ((move < 0) & (values <= self.low + 1e-12)) | (
+                (move > 0) & (values >= self.high - 1e-12)
+            )
+            if not (outside & free).any():
+                break
+            held |= outside
+        return np.clip(values + np.clip(move, -30 * self.step, 30 * self.step), self.low, self.high)
+
+
+def held_out(
+    found: Fit, limits: tuple[np.ndarray, np.ndarray] | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Leave one group out: (whitened loss, plain sum of squares N^2), (g,) each, of the group not fitted.
+
+    Linearised at the optimum of all: each group's share of the normal equations is taken out again.
+    """
+    gram, raw = found.gram, found.raw
+    low, high, *_ = _bounds(found.effects)
+    total = gram.sum(axis=0)
+    whitened = np.empty(len(gram))
+    plain = np.empty(len(gram))
+    at_bound = (found.values <= low + 1e-9) | (found.values >= high - 1e-9)
+    free = ~at_bound
+    free[0] = True
+    for g in range(len(gram)):
+        rest = total - gram[g]
+        hessian = (rest[1:, 1:] + np.diag(found.prior))[np.ix_(free, free)]
+        hessian = hessian + 1e-9 * np.diag(np.diag(hessian))
+        move = np.zeros(len(found.values))
+        move[free] = np.linalg.solve(hessian, (rest[1:, 0] - found.pull)[free])
+        move = np.clip(found.values + move, low, high) - found.values
+        coefficients = np.concatenate([[1.0], -move])
+        whitened[g] = 0.5 * coefficients @ gram[g] @ coefficients
+        plain[g] = coefficients @ raw[g] @ coefficients
+    return whitened, plain
+
+
+def first_touches(
+    forward: Forward, whitener: Whitener, modulus: float, reach_m: float = 2.4e-3
+) -> np.ndarray:
+    """(p,) m, how much earlier each press met the surface than its model says: a search over shifts.
+
+    Each press alone, with a free factor on its force, so that neither modulus nor shape decides it.
+    """
+    t = forward.touches
+    shifts = np.linspace(-reach_m, reach_m, 25)
+    cost = np.empty((len(shifts), t.presses))
+    measured = np.where(t.counted, t.f[:, 0], 0.0)
+    for i, shift in enumerate(shifts):
+        settings = forward.ideal(modulus)
+        settings.onset = settings.onset + shift
+        predicted = np.where(t.counted, forward.predict(settings)[:, 0], 0.0)
+
+        def sums(a: np.ndarray) -> np.ndarray:
+            return np.bincount(t.press, weights=a, minlength=t.presses)
+
+        pp, pf, ff = sums(predicted**2), sums(predicted * measured), sums(measured**2)
+        factor = np.clip(pf / np.maximum(pp, 1e-12), 0.5, 2.0)
+        error = ff - 2 * factor * pf + factor**2 * pp
+        cost[i] = (
+            error / (sums(t.counted.astype(float)) * whitener.variance) * 50
+            + (shift / (2 * whitener.onset_sd)) ** 2
+        )
+    best = np.argmin(cost, axis=0)
+    inner = np.clip(best, 1, len(shifts) - 2)
+    rows = np.arange(t.presses)
+    left, mid, right = cost[inner - 1, rows], cost[inner, rows], cost[inner + 1, rows]
+    curve = np.maximum(left - 2 * mid + right, 1e-12)
+    return shifts[inner] + np.clip(0.5 * (left - right) / curve, -0.5, 0.5) * (shifts[1] - shifts[0])

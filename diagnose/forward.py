@@ -1,0 +1,274 @@
+"""The forward model of a whole recording: settings (ideal until an effect changes them) to every press's force.
+
+The chain, in the order in which nature and instrument act: surface and handle -> tip path -> contact with the
+elastic object -> memory of the material -> adhesion -> what the force sensor reads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from diagnose import kernel
+from diagnose.touches import OUTSIDE, Touches
+from mechanics.dent import dent_law, dent_laws, effective_radius, grid
+from mechanics.model import Model
+from mechanics.sites import touch_sites
+
+
+STANDARD_GRAVITY = 9.80665
+
+
+@dataclass
+class Settings:
+    """What the forward model is told; the defaults are the ideal model.
+
+    modulus: Pa. finite_strain: 0 linear dent, 1 neo-Hookean. table_factor: (k,) factor on the dent's force law.
+    far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the tip over the global one.
+    onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,) factor. The rest by name.
+    """
+
+    modulus: float
+    nu: float
+    tip_radius: float
+    far: np.ndarray
+    dent_ratio: np.ndarray
+    onset: np.ndarray
+    stiffness: np.ndarray
+    finite_strain: float = 0.0
+    table_factor: np.ndarray | None = None
+    tool_give: float = 0.0
+    mu: float = -1.0
+    backlash: float = 0.0
+    g: np.ndarray | None = None
+    tau: np.ndarray | None = None
+    mullins: tuple[float, float] | None = None
+    adhesion: tuple[float, float] | None = None
+    delay: float = 0.0
+    gain: np.ndarray | None = None
+    bias: np.ndarray | None = None
+    drift: np.ndarray | None = None
+    inertia: float = 0.0
+    gravity: np.ndarray | None = None
+
+
+@dataclass
+class Forward:
+    """Touches with the site mechanics of a model; `predict(settings)` is the forward model.
+
+    far: (p, 3, 3) local frames, unit modulus, 1/m. curvature: (p,) 1/m. stages: what effects asked to compute.
+    """
+
+    touches: Touches
+    model: Model
+    far: np.ndarray
+    curvature: np.ndarray
+    nu: float
+    tip_radius: float
+    stages: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self._sphere = dent_law("sphere").table
+        self._deep = self._neo_hookean()
+        t = self.touches
+        self.clock = t.t - t.t[0]
+        self.acceleration = _acceleration(t)
+        self.dents = grid()
+        self.onset = np.zeros(t.presses)
+        self.centre = t.point.mean(axis=0)
+        self.height = float(
+            ((self.model.mesh.points - self.model.support_point) @ self.model.support_normal).max()
+        )
+
+    def _neo_hookean(self) -> np.ndarray:
+        if "neo-hookean" in dent_laws():
+            try:
+                return dent_law("neo-hookean").table
+            except OSError:
+                pass
+        return self._sphere
+
+    def ideal(self, modulus: float) -> Settings:
+        """Settings of the ideal model."""
+        p = self.touches.presses
+        return Settings(
+            modulus=modulus,
+            nu=self.nu,
+            tip_radius=self.tip_radius,
+            far=self.far,
+            dent_ratio=np.ones(p),
+            onset=self.onset.copy(),
+            stiffness=np.ones(p),
+        )
+
+    def predict(self, s: Settings, *, with_contact: bool = False) -> np.ndarray:
+        """(n, 3) N on the tool, local frames."""
+        t = self.touches
+        y = t.y.copy()
+        y[:, 0] += s.onset[t.press]
+        if s.backlash > 0:
+            played = np.empty_like(y)
+            kernel.play(t.start, y, s.backlash, played)
+            y = played
+        table = self._sphere
+        if s.finite_strain != 0:
+            table = table + s.finite_strain * (self._deep - table)
+        if s.table_factor is not None:
+            table = table.copy()
+            table[:, 0] = table[:, 0] * s.table_factor
+        radius = np.ascontiguousarray(
+            np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (t.presses,))
+        )
+        f = np.zeros_like(y)
+        contact = np.zeros(len(y))
+        modulus = s.modulus * s.stiffness
+        kernel.integrate(
+            t.start, y, np.arange(t.presses), s.far, radius, modulus * s.dent_ratio, modulus, s.nu, table,
+            s.tool_give, s.mu, f, contact,
+        )  # fmt: skip
+        if s.mullins is not None:
+            f = f * _mullins(t, y[:, 0], f[:, 0], *s.mullins)[:, None]
+        if s.g is not None and len(s.g):
+            slow = f.copy()
+            kernel.relax(t.start, t.t, f, np.asarray(s.g), np.asarray(s.tau), slow)
+            f = slow
+        if s.adhesion is not None:
+            f[:, 0] -= _pull(t, y[:, 0], *s.adhesion)
+        if s.delay != 0:
+            f = _shifted(t, f, s.delay)
+        f = self._read(s, f)
+        return (f, contact) if with_contact else f
+
+    def weight(self, mass_kg: float, share: float) -> np.ndarray:
+        """(n, 3) N, device frame: `share` of the tool's weight that a tare has not taken off, along the support.
+
+        With the tool's orientation recorded, a tare holds only at the orientation of the start: the rest turns.
+        """
+        t = self.touches
+        down = -self.model.support_normal / np.linalg.norm(self.model.support_normal)
+        weight = mass_kg * STANDARD_GRAVITY * down
+        if "quaternion" not in t.extra:
+            return np.broadcast_to(share * weight, t.f.shape)
+        from scipy.spatial.transform import Rotation
+
+        turn = Rotation.from_quat(t.extra["quaternion"], scalar_first=True)
+        tared = turn.apply(turn[0].inv().apply(weight))
+        return weight - (1 - share) * tared
+
+    def _read(self, s: Settings, f: np.ndarray) -> np.ndarray:
+        if s.gain is None and s.bias is None and s.drift is None and s.inertia == 0 and s.gravity is None:
+            return f
+        frame = self.touches.frame[self.touches.press]
+        device = np.einsum("nji,nj->ni", frame, f)
+        if s.inertia != 0:
+            device = device + s.inertia * self.acceleration
+        if s.gravity is not None:
+            device = device + s.gravity
+        if s.gain is not None:
+            device = device @ s.gain.T
+        if s.bias is not None:
+            device = device + s.bias
+        if s.drift is not None:
+            device = device + self.clock[:, None] * s.drift
+        return np.einsum("nij,nj->ni", frame, device)
+
+
+def build_forward(touches: Touches, model: Model, *, solver: Any = None) -> Forward:
+    """Solve the far field at every press's place (one factorisation, three solves a place)."""
+    mesh = model.mesh.quadratic()
+    ratio = model.modulus_ratio if np.ptp(model.modulus_ratio) > 0 else None
+    unique, first, inverse = _places(touches)
+    sites = touch_sites(
+        mesh, touches.point[first], touches.normal[first], model.poisson_ratio, ratio, solver=solver
+    )
+    frame = touches.frame
+    far = np.einsum("pij,pjk,plk->pil", frame, sites.far[inverse], frame)
+    return Forward(
+        touches,
+        model,
+        np.ascontiguousarray(far),
+        sites.curvature[inverse],
+        model.poisson_ratio,
+        model.tip_radius_m,
+    )
+
+
+def _places(touches: Touches, grain: float = 0.0008) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Presses of nearly the same place and normal share a solve."""
+    key = np.round(np.hstack([touches.point / grain, touches.normal / 0.05])).astype(int)
+    return np.unique(key, axis=0, return_index=True, return_inverse=True)
+
+
+def _acceleration(t: Touches) -> np.ndarray:
+    """(n, 3) m/s^2, device frame, from the thinned positions, smoothed over three steps."""
+    position = t.extra["position"]
+    out = np.zeros_like(position)
+    for a, b in zip(t.start[:-1], t.start[1:], strict=True):
+        x, clock = position[a:b], t.t[a:b]
+        step = np.median(np.diff(clock))
+        second = np.zeros_like(x)
+        second[2:-2] = (x[4:] - 2 * x[2:-2] + x[:-4]) / (4 * step * step)
+        out[a:b] = second
+    return out
+
+
+@njit(cache=True)
+def _shift_rows(start, t, f, delay, out):  # type: ignore[no-untyped-def]
+    for p in range(start.shape[0] - 1):
+        a, b = start[p], start[p + 1]
+        j = a
+        for i in range(a, b):
+            wanted = t[i] - delay
+            if wanted <= t[a]:
+                out[i] = f[a]
+                continue
+            if wanted >= t[b - 1]:
+                out[i] = f[b - 1]
+                continue
+            while j > a and t[j] > wanted:
+                j -= 1
+            while t[j + 1] < wanted:
+                j += 1
+            w = (wanted - t[j]) / (t[j + 1] - t[j])
+            out[i] = (1 - w) * f[j] + w * f[j + 1]
+
+
+def _shifted(t: Touches, f: np.ndarray, delay: float) -> np.ndarray:
+    out = np.empty_like(f)
+    _shift_rows(t.start, t.t, f, delay, out)
+    return out
+
+
+def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float) -> np.ndarray:
+    """Adhesive pull (n,), N: on the way out only, greatest where the surface is level again, zero at `reach`."""
+    out = np.zeros(len(depth))
+    for a, b in zip(t.start[:-1], t.start[1:], strict=True):
+        after = np.arange(b - a) > np.argmax(depth[a:b])
+        if depth[a:b].max() > 0:
+            out[a:b] = after * pull_off * np.clip(1 - np.abs(depth[a:b]) / reach, 0, None)
+    return out
+
+
+def _mullins(t: Touches, depth: np.ndarray, force: np.ndarray, r: float, m_rel: float) -> np.ndarray:
+    """Softening factor (n,): Ogden and Roxburgh's 1 - erf((W_max - W) / m) / r with W ~ depth^2.5 at the site."""
+    from scipy.special import erf
+
+    energy = np.clip(depth, 0, None) ** 2.5
+    greatest = energy.max() or 1.0
+    before = np.zeros(t.sites)
+    factor = np.ones(len(depth))
+    for p, (a, b) in enumerate(zip(t.start[:-1], t.start[1:], strict=True)):
+        if t.site[p] < 0:
+            continue
+        most = np.maximum(np.maximum.accumulate(energy[a:b]), before[t.site[p]])
+        factor[a:b] = 1 - erf((most - energy[a:b]) / (m_rel * greatest)) / r
+        before[t.site[p]] = most[-1]
+    return factor
+
+
+def in_contact(t: Touches) -> np.ndarray:
+    """(n,) bool: between first and last touch."""
+    return t.phase != OUTSIDE

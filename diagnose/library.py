@@ -1,0 +1,48 @@
+"""The library of effects: one file each in diagnose.effects, found by name."""
+
+from __future__ import annotations
+
+import importlib
+
+from diagnose.effects.base import Effect
+from mechanics.errors import OptionError
+
+NAMES = (
+    "finite_strain",
+    "strain_stiffening",
+    "viscoelasticity",
+    "mullins_softening",
+    "poisson_ratio",
+    "inclusion",
+    "modulus_gradient",
+    "skin_layer",
+    "surface_shape",
+    "unbonded_base",
+    "compliant_base",
+    "surface_offset",
+    "tip_radius",
+    "friction_slip",
+    "adhesion",
+    "tool_compliance",
+    "force_bias",
+    "force_drift",
+    "force_gain",
+    "tool_gravity_inertia",
+    "time_delay",
+    "backlash",
+)
+"""Every effect that can be named, the contract's order."""
+
+
+def effect(name: str) -> Effect:
+    """The effect of that name; raises OptionError for an unknown one."""
+    if name not in NAMES:
+        raise OptionError(f"'{name}' is no effect; allowed are {', '.join(NAMES)}")
+    return importlib.import_module(f"diagnose.effects.{name}").EFFECT
+
+
+def library(*, without: tuple[str, ...] = ()) -> tuple[Effect, ...]:
+    """All effects but those named."""
+    for name in without:
+        effect(name)
+    return tuple(effect(name) for name in NAMES if name not in without)

@@ -1,0 +1,140 @@
+"""The noise of a comparison: sensor noise, and what our own model gets wrong from press to press and site to site.
+
+A residual is weighed against the covariance sigma^2 I + N N^T of its site, N holding one column a nuisance:
+how the force would change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its
+normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space between
+them, against what an error of shape could do. Woodbury keeps it to small matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, cho_solve
+
+from diagnose.forward import Forward, Settings
+from diagnose.touches import Touches
+from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class NuisanceOptions:
+    """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
+
+    onset_m: float = option(0.2e-3, "error of first touch, each press", unit="m")
+    site_stiffness: float = option(0.03, "share by which a site's stiffness may be wrong (shape, mesh)")
+    press_stiffness: float = option(0.01, "share by which repeats at a site may differ")
+    tilt: float = option(0.03, "error of a site's normal", unit="rad")
+    stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
+    law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
+    floor_n: float = option(0.003, "error of the model that no name covers, each thinned component", unit="N")
+
+
+@dataclass
+class Block:
+    """One group's rows (flat indices of counted samples), its nuisance and the factor of I + N^T N / sigma^2."""
+
+    rows: np.ndarray
+    nuisance: np.ndarray
+    factor: tuple
+
+
+class Whitener:
+    """Weighs residuals and sensitivities (n, 3, k) group by group; groups are sites with their repeats."""
+
+    def __init__(
+        self,
+        forward: Forward,
+        settings: Settings,
+        options: NuisanceOptions,
+        site_sd: np.ndarray | None = None,
+    ) -> None:
+        self.touches = forward.touches
+        self.variance = self.touches.noise_n**2 + options.floor_n**2
+        self.blocks: list[Block] = []
+        columns = nuisance_columns(forward, settings, options, site_sd)
+        self.onset_sd = options.onset_m
+        self.onset_column = columns[0][1] / options.onset_m
+        self.stiffness_sd = options.site_stiffness
+        for rows, matrix in _by_site(self.touches, columns):
+            small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
+            self.blocks.append(Block(rows, matrix, cho_factor(small)))
+
+    @property
+    def groups(self) -> int:
+        """How many groups."""
+        return len(self.blocks)
+
+    def gram(self, x: np.ndarray) -> np.ndarray:
+        """(g, k, k) whitened inner products of the columns of x (n, 3, k) in each group."""
+        k = x.shape[2]
+        out = np.empty((self.groups, k, k))
+        for i, block in enumerate(self.blocks):
+            part = x[block.rows].reshape(-1, k)
+            side = block.nuisance.T @ part
+            out[i] = (part.T @ part - side.T @ cho_solve(block.factor, side) / self.variance) / self.variance
+        return out
+
+    def raw_gram(self, x: np.ndarray) -> np.ndarray:
+        """(g, k, k) plain inner products, N^2 where x is in N: for gaps."""
+        k = x.shape[2]
+        return np.array([x[b.rows].reshape(-1, k).T @ x[b.rows].reshape(-1, k) for b in self.blocks])
+
+    def counts(self) -> np.ndarray:
+        """(g,) thinned contact samples of each group."""
+        return np.array([len(b.rows) for b in self.blocks])
+
+    def cleaned(self, residual: np.ndarray) -> np.ndarray:
+        """(n, 3) the residual less the most likely nuisance: what no error of onset, site or stick explains."""
+        out = residual.copy()
+        for block in self.blocks:
+            part = residual[block.rows].reshape(-1)
+            weight = cho_solve(block.factor, block.nuisance.T @ part) / self.variance
+            out[block.rows] = (part - block.nuisance @ weight).reshape(-1, 3)
+        return out
+
+
+def nuisance_columns(
+    forward: Forward, settings: Settings, options: NuisanceOptions, site_sd: np.ndarray | None
+) -> list[tuple[str, np.ndarray]]:
+    """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance."""
+    t = forward.touches
+    f = forward.predict(settings)
+    moved = forward.ideal(settings.modulus)
+    moved.__dict__.update(settings.__dict__)
+    small = 2e-5
+    moved.onset = settings.onset + small
+    site_sd = np.full(t.presses, options.site_stiffness) if site_sd is None else site_sd
+    deepest = np.maximum(t.depth[t.press], 1e-4)
+    bend = np.clip(t.y[:, 0], 0, None) / deepest - 0.7
+    normal = f[:, 0]
+    zero = np.zeros_like(normal)
+    tangential = np.column_stack([zero, f[:, 1], f[:, 2]])
+    return [
+        ("press", (forward.predict(moved) - f) * (options.onset_m / small)),
+        ("site", f * site_sd[t.press][:, None]),
+        ("press", f * options.press_stiffness),
+        ("site", np.column_stack([zero, normal, zero]) * options.tilt),
+        ("site", np.column_stack([zero, zero, normal]) * options.tilt),
+        ("press", tangential * options.stick),
+        ("site", f * (bend * options.law)[:, None]),
+    ]
+
+
+def _by_site(t: Touches, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
+    result = []
+    site_of_row = t.site[t.press]
+    for site in range(t.sites):
+        rows = np.flatnonzero((site_of_row == site) & t.counted)
+        matrix = []
+        for level, column in columns:
+            part = column[rows]
+            if level == "site":
+                matrix.append(part.reshape(-1))
+                continue
+            for press in np.flatnonzero(t.site == site):
+                own = part * (t.press[rows] == press)[:, None]
+                matrix.append(own.reshape(-1))
+        result.append((rows, np.stack(matrix, axis=1)))
+    return result
