@@ -1,0 +1,185 @@
+"""A rigid sphere against quadratic faces: unilateral penalty contact that sticks, or slips by Coulomb's law.
+
+Contact is checked at seven points of each face (degree-5 rule, Radon 1948). A point that meets the sphere is
+anchored where it met it; a spring of stiffness `penalty` per area pulls it back to that place of the sphere.
+With friction the anchor slides when the tangential traction exceeds mu times the pressure (return mapping,
+Simo & Laursen 1992). Lengths mm, tractions in units of E, forces in E mm^2.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+PENALTY = 60.0
+"""Normal and tangential penalty stiffness, units of E per mm: 1/60 mm of overlap at a pressure of E."""
+
+_A, _B = (6 - np.sqrt(15)) / 21, (6 + np.sqrt(15)) / 21
+POINTS = np.array(
+    [
+        [1 / 3, 1 / 3],
+        [_A, _A],
+        [1 - 2 * _A, _A],
+        [_A, 1 - 2 * _A],
+        [_B, _B],
+        [1 - 2 * _B, _B],
+        [_B, 1 - 2 * _B],
+    ]
+)
+WEIGHTS = np.array([0.1125, *[(155 - np.sqrt(15)) / 2400] * 3, *[(155 + np.sqrt(15)) / 2400] * 3])
+"""Weights on the unit triangle (they sum to 1/2)."""
+
+
+def _shapes(r: np.ndarray, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    b = np.stack([1 - r - s, r, s], axis=1)
+    slope = np.array([[-1.0, -1], [1, 0], [0, 1]])
+    values = np.hstack(
+        [b * (2 * b - 1), 4 * np.stack([b[:, 0] * b[:, 1], b[:, 1] * b[:, 2], b[:, 2] * b[:, 0]], 1)]
+    )
+    corner = (4 * b - 1)[:, :, None] * slope
+    middle = [4 * (b[:, i, None] * slope[j] + b[:, j, None] * slope[i]) for i, j in ((0, 1), (1, 2), (2, 0))]
+    return values, np.concatenate([corner, np.stack(middle, axis=1)], axis=1)
+
+
+SHAPES, SLOPES = _shapes(POINTS[:, 0], POINTS[:, 1])
+
+
+class Grip:
+    """Contact state of every quadrature point at a converged load step: anchors relative to the sphere's centre."""
+
+    def __init__(self, points: int) -> None:
+        self.active = np.zeros(points, dtype=np.bool_)
+        self.anchor = np.zeros((points, 3))
+        self.relative = np.full((points, 3), 1e6)
+
+    def copy(self) -> Grip:
+        """An independent copy."""
+        twin = Grip(0)
+        twin.active, twin.anchor, twin.relative = self.active.copy(), self.anchor.copy(), self.relative.copy()
+        return twin
+
+
+class SphereContact:
+    """The faces (k, 6) that a sphere of `radius` mm may meet; friction None sticks, 0 slides freely."""
+
+    def __init__(self, points: np.ndarray, faces: np.ndarray, radius: float, friction: float | None) -> None:
+        self.points, self.faces, self.radius = points, faces, float(radius)
+        self.friction = -1.0 if friction is None else float(friction)
+        x = points[faces]
+        tangents = np.einsum("qad,fax->fqdx", SLOPES, x)
+        self.weights = np.linalg.norm(np.cross(tangents[:, :, 0], tangents[:, :, 1]), axis=2) * WEIGHTS
+
+    def start(self, centre: np.ndarray) -> Grip:
+        """Nothing touches yet; the sphere's centre is at `centre` mm."""
+        grip = Grip(self.weights.size)
+        x = np.einsum("qa,fax->fqx", SHAPES, self.points[self.faces]).reshape(-1, 3)
+        grip.relative = x - centre
+        return grip
+
+    def evaluate(
+        self, displacement: np.ndarray, centre: np.ndarray, old: Grip, tangent: bool, arrivals: bool = True
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Grip]:
+        """(face forces (k, 18) resisting, face stiffness (k, 18, 18) or empty, force on the sphere (3,), new grip).
+
+        arrivals: whether points that did not touch before may begin to.
+        """
+        count = len(self.faces)
+        forces = np.zeros((count, 18))
+        stiffness = np.zeros((count if tangent else 0, 18, 18))
+        new = Grip(self.weights.size)
+        total = _evaluate(
+            self.points, displacement, self.faces, self.weights, centre, self.radius, self.friction,
+            old.active, old.anchor, old.relative, new.active, new.anchor, new.relative,
+            tangent, arrivals, forces, stiffness,
+        )  # fmt: skip
+        return forces, stiffness, total, new
+
+
+@numba.njit(cache=True)
+def _meeting(before, after, radius):
+    """Where the segment of relative positions first meets the sphere; `after` lies inside."""
+    d = after - before
+    a = d[0] * d[0] + d[1] * d[1] + d[2] * d[2]
+    b = before[0] * d[0] + before[1] * d[1] + before[2] * d[2]
+    c = before[0] ** 2 + before[1] ** 2 + before[2] ** 2 - radius * radius
+    share = 1.0
+    if a > 1e-18 and c > 0.0 and b * b - a * c > 0.0:
+        share = (-b - np.sqrt(b * b - a * c)) / a
+    if share < 0.0 or share > 1.0:
+        share = 1.0
+    at = before + share * d
+    return at * (radius / np.sqrt(at[0] ** 2 + at[1] ** 2 + at[2] ** 2))
+
+
+@numba.njit(cache=True)
+def _evaluate(
+    points, u, faces, weights, centre, radius, friction,
+    old_active, old_anchor, old_relative, active, anchor, relative, tangent, arrivals, forces, stiffness,
+):  # fmt: skip
+    total = np.zeros(3)
+    block = np.empty((3, 3))
+    for f in range(len(faces)):
+        for q in range(7):
+            k = 7 * f + q
+            r = np.zeros(3)
+            for a in range(6):
+                node = faces[f, a]
+                for i in range(3):
+                    r[i] += SHAPES[q, a] * (points[node, i] + u[node, i])
+            r -= centre
+            relative[k] = r
+            distance = np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
+            fresh = not old_active[k]
+            if fresh and (distance >= radius or not arrivals):
+                continue
+            hold = old_anchor[k]
+            if fresh:
+                # a point slides freely in the load step in which it arrives, and is anchored where it met the
+                # sphere for the next: a trial anchor that follows the iterations would spoil Newton's
+                # convergence
+                hold = _meeting(old_relative[k], r, radius)
+            m = hold / radius if friction < 0.0 and not fresh else r / distance
+            along = m[0] * r[0] + m[1] * r[1] + m[2] * r[2]
+            overlap = radius - along
+            if overlap <= 0.0:
+                continue
+            active[k] = True
+            slip = r - hold
+            out = m[0] * slip[0] + m[1] * slip[1] + m[2] * slip[2]
+            slip -= out * m
+            size = np.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2)
+            grip = 0.0 if fresh else 1.0
+            sliding = friction >= 0.0 and size > friction * overlap and not fresh
+            if sliding:
+                grip = friction * overlap / max(size, 1e-12)
+            w = weights[f, q] * PENALTY
+            # traction that the sphere puts on the object, with the sign of an internal resistance
+            t = w * (-overlap * m + grip * slip)
+            for a in range(6):
+                for i in range(3):
+                    forces[f, 3 * a + i] += SHAPES[q, a] * t[i]
+            total += t
+            if sliding:
+                rest = r - grip * slip
+                anchor[k] = rest * (radius / np.sqrt(rest[0] ** 2 + rest[1] ** 2 + rest[2] ** 2))
+            else:
+                anchor[k] = hold
+            if tangent:
+                for i in range(3):
+                    for j in range(3):
+                        unit = 1.0 if i == j else 0.0
+                        side = unit - m[i] * m[j]
+                        value = m[i] * m[j] + grip * side
+                        if fresh:
+                            value -= overlap / distance * side
+                        if sliding and size > 1e-12:
+                            # the pressure's part of the sliding tangent is left out to keep it symmetric
+                            value -= grip * slip[i] * slip[j] / (size * size)
+                        block[i, j] = w * value
+                for a in range(6):
+                    for b in range(6):
+                        share = SHAPES[q, a] * SHAPES[q, b]
+                        for i in range(3):
+                            for j in range(3):
+                                stiffness[f, 3 * a + i, 3 * b + j] += share * block[i, j]
+    return total

@@ -1,0 +1,178 @@
+"""Force along a tip's path, solved once for a content and then kept: what seeds, moduli and timing share."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.files import atomic_file
+from mechanics.progress import Progress, silent
+from scenes.laboratory.mesh import cache_folder, coarse_mesh
+from scenes.laboratory.solver import LabError
+from scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
+from scenes.phantoms import Phantom
+
+LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.0])
+"""Load steps of a straight press, as shares of its greatest depth."""
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A solved path. travel: (k, 3) mm, the tip's centre since first touch; force: (k, 3) E mm^2, on the tip.
+
+    stiffness: (k, 3, 3) E mm, d(force on the tip)/d(tip position) with the contact as it is (negative
+    definite). times: (k,) s, for paths whose solid creeps, or None. energy: (k,) E mm^3.
+    """
+
+    travel: np.ndarray
+    force: np.ndarray
+    stiffness: np.ndarray
+    energy: np.ndarray
+    times: np.ndarray | None = None
+
+    @property
+    def length(self) -> np.ndarray:
+        """(k,) mm, path length up to each state."""
+        return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(self.travel, axis=0), axis=1))])
+
+
+@dataclass(frozen=True)
+class PathJob:
+    """One path to solve: point (3,) mm and unit normal (3,), object frame; travel (k, 3) mm from first touch."""
+
+    point: np.ndarray
+    normal: np.ndarray
+    travel: np.ndarray
+    times: np.ndarray | None = None
+
+    def key(self, shape: str, specimen: Specimen, fineness: Fineness) -> str:
+        """A content key of everything that the solved curve depends on."""
+        digest = hashlib.sha256(f"{shape} {specimen.key()} {fineness}".encode())
+        for array in (self.point, self.normal, self.travel, self.times):
+            if array is not None:
+                digest.update(np.round(np.asarray(array) * 1e4).astype(np.int64).tobytes())
+        return digest.hexdigest()[:32]
+
+
+def solve(
+    phantom: Phantom, specimen: Specimen, job: PathJob, fineness: Fineness, cache: Path | None = None
+) -> Curve:
+    """March the tip along the job's path. Raises LabError where a state finds no equilibrium."""
+    side = job.travel - np.outer(job.travel @ job.normal, job.normal)
+    problem = build(
+        phantom,
+        specimen,
+        job.point,
+        travel=float(np.linalg.norm(side, axis=1).max()),
+        fineness=fineness,
+        cache=cache,
+    )
+    start = job.point + specimen.tip_radius * job.normal
+    state = problem.rest(start + 1e-3 * job.normal)
+    count = len(job.travel)
+    force, energy = np.zeros((count, 3)), np.zeros(count)
+    stiffness = np.zeros((count, 3, 3))
+    for k in range(count):
+        if k == 0 and not job.travel[0].any():
+            continue
+        span = 0.0 if job.times is None else float(job.times[k] - job.times[k - 1])
+        state = problem.advance(state, start + job.travel[k], span)
+        force[k], energy[k] = state.force, state.energy
+        if np.linalg.norm(state.force) > 1e-6:
+            stiffness[k] = problem.tip_stiffness(state)
+    return Curve(job.travel, force, stiffness, energy, job.times)
+
+
+def _work(
+    phantom: Phantom, specimen: Specimen, job: PathJob, fineness: Fineness, cache: Path, path: Path
+) -> str | None:
+    try:
+        curve = solve(phantom, specimen, job, fineness, cache)
+    except LabError as error:
+        return str(error)
+    arrays = {
+        "travel": curve.travel,
+        "force": curve.force,
+        "stiffness": curve.stiffness,
+        "energy": curve.energy,
+    }
+    if curve.times is not None:
+        arrays["times"] = curve.times
+    with atomic_file(path) as temporary:
+        np.savez(temporary, **arrays)
+    return None
+
+
+def _load(path: Path) -> Curve | None:
+    try:
+        with np.load(path) as stored:
+            times = stored["times"] if "times" in stored else None
+            return Curve(stored["travel"], stored["force"], stored["stiffness"], stored["energy"], times)
+    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+        return None
+
+
+def curves(
+    phantom: Phantom,
+    specimen: Specimen,
+    jobs: Sequence[PathJob],
+    *,
+    fineness: Fineness | None = None,
+    workers: int | None = None,
+    cache: Path | None = None,
+    progress: Progress = silent,
+    label: str = "solving touches",
+) -> list[Curve]:
+    """Solve the jobs that are not in the cache, in parallel; an interrupted run goes on where it stopped.
+
+    workers: processes, by default one a core. Raises LabError naming the touches that found no equilibrium.
+    """
+    fineness = fineness or Fineness()
+    cache = cache or cache_folder()
+    shape = phantom_key(phantom)
+    paths = [cache / "curves" / shape / f"{job.key(shape, specimen, fineness)}.npz" for job in jobs]
+    found = [_load(path) for path in paths]
+    missing = [k for k, curve in enumerate(found) if curve is None]
+    if missing:
+        coarse_mesh(phantom, cache)
+        failures = []
+        workers = min(len(missing), workers or os.cpu_count() or 1)
+        progress(label, 0.0)
+        if workers == 1:
+            for done, k in enumerate(missing):
+                failures.append(_work(phantom, specimen, jobs[k], fineness, cache, paths[k]))
+                progress(label, (done + 1) / len(missing))
+        else:
+            with ProcessPoolExecutor(workers, get_context("spawn"), _single_threaded) as pool:
+                futures = [
+                    pool.submit(_work, phantom, specimen, jobs[k], fineness, cache, paths[k]) for k in missing
+                ]
+                for done, future in enumerate(as_completed(futures)):
+                    failures.append(future.result())
+                    progress(label, (done + 1) / len(missing))
+        failures = [failure for failure in failures if failure]
+        if failures:
+            raise LabError(
+                f"{len(failures)} of {len(jobs)} touches could not be solved; the first: {failures[0]}"
+            )
+        found = [_load(path) for path in paths]
+    return found
+
+
+def _single_threaded() -> None:
+    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
+        os.environ[name] = "1"
+
+
+def describe(specimen: Specimen) -> str:
+    """The specimen's fields as one line of JSON, for logs."""
+    return json.dumps({k: v for k, v in specimen.__dict__.items() if v}, default=str)

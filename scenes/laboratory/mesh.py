@@ -1,0 +1,214 @@
+"""Meshes of the laboratory: a coarse one of the whole object, and quadratic ones graded towards a touch. In mm."""
+
+from __future__ import annotations
+
+import contextlib
+import hashlib
+import os
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import MeshError
+from mechanics.files import atomic_file
+from scenes.laboratory.refine import boundary_faces, refine
+from scenes.laboratory.surface import Surface
+from scenes.phantoms import Phantom
+
+_EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
+EDGE_NODE = {tuple(e): 4 + k for k, e in enumerate(_EDGES.tolist())}
+"""Local number of the mid-edge node between two local corners."""
+
+COARSE_MM = 18.0
+"""Edge length of the coarse mesh."""
+
+
+def cache_folder() -> Path:
+    """Where solved curves and meshes are kept: PALPATE_CACHE, or the user's cache folder."""
+    root = os.environ.get("PALPATE_CACHE") or Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
+    return Path(root) / "palpate" / "laboratory"
+
+
+def surface_key(phantom: Phantom) -> str:
+    """A content key of the phantom's surface."""
+    digest = hashlib.sha256()
+    digest.update(np.round(phantom.vertices * 1e6).astype(np.int64).tobytes())
+    digest.update(phantom.faces.tobytes())
+    return digest.hexdigest()[:20]
+
+
+def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray, np.ndarray]:
+    """(points (n, 3) mm, tetrahedra (m, 4)) of the whole object; made once for a surface and then cached.
+
+    The mesher is not deterministic: whoever wants the same numbers again keeps the cache.
+    """
+    folder = (cache or cache_folder()) / "meshes"
+    path = folder / f"{surface_key(phantom)}-{COARSE_MM:g}.npz"
+    if path.is_file():
+        with np.load(path) as stored:
+            return stored["points"], stored["tetrahedra"]
+    import pytetwild
+    import pyvista
+
+    shell = pyvista.PolyData(
+        phantom.vertices * 1e3, np.column_stack([np.full(len(phantom.faces), 3), phantom.faces]).ravel()
+    )
+    wanted = shell.area / (0.433 * COARSE_MM**2)
+    if wanted < len(phantom.faces):
+        shell = shell.decimate(1 - wanted / len(phantom.faces))
+    # the mesher leaves a file of its own in the working directory
+    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+        points, tetrahedra = pytetwild.tetrahedralize(
+            np.asarray(shell.points, dtype=float),
+            shell.faces.reshape(-1, 4)[:, 1:].astype(np.int32),
+            edge_length_abs=COARSE_MM,
+            epsilon=2e-3,
+            num_threads=1,
+        )
+    tetrahedra = _outward(points, tetrahedra.astype(np.int64))
+    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+    points = _snap(points, tetrahedra, surface)
+    with atomic_file(path) as temporary:
+        np.savez(temporary, points=points, tetrahedra=tetrahedra)
+    return points, tetrahedra
+
+
+def _volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    a, b, c, d = (points[tetrahedra[:, k]] for k in range(4))
+    return np.einsum("ij,ij->i", b - a, np.cross(c - a, d - a)) / 6
+
+
+def _outward(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:
+    turned = _volumes(points, tetrahedra) < 0
+    tetrahedra[turned] = tetrahedra[turned][:, [0, 2, 1, 3]]
+    return tetrahedra
+
+
+def _snap(points: np.ndarray, tetrahedra: np.ndarray, surface: Surface) -> np.ndarray:
+    """Boundary nodes moved onto the surface, except where that would flatten a tetrahedron."""
+    shell = np.unique(boundary_faces(tetrahedra)[0])
+    before = _volumes(points, tetrahedra)
+    moved = points.copy()
+    moved[shell] = surface.nearest(points[shell])[0]
+    for _ in range(20):
+        bad = _volumes(moved, tetrahedra) < 0.3 * before
+        if not bad.any():
+            break
+        back = np.unique(tetrahedra[bad])
+        moved[back] = points[back]
+    return moved
+
+
+@dataclass(frozen=True)
+class QuadraticMesh:
+    """points (n, 3) mm; cells (m, 10): corners, then edges 01 02 03 12 13 23; fixed (n,) bool: nodes of the base.
+
+    faces (k, 6): boundary faces off the base, corners then edges 01 12 20; base (b, 6): faces on the support.
+    """
+
+    points: np.ndarray
+    cells: np.ndarray
+    fixed: np.ndarray
+    faces: np.ndarray
+    base: np.ndarray
+
+
+def quadratic(points: np.ndarray, tetrahedra: np.ndarray, surface: Surface | None) -> QuadraticMesh:
+    """Mid-edge nodes added; those of boundary edges lie on the true surface where the elements stay valid."""
+    n = len(points)
+    edges = np.sort(tetrahedra[:, _EDGES].reshape(-1, 2), axis=1)
+    unique, inverse = np.unique(edges, axis=0, return_inverse=True)
+    inverse = inverse.reshape(-1, 6)
+    straight = points[unique].mean(axis=1)
+    cells = np.hstack([tetrahedra, n + inverse])
+    shell, _ = boundary_faces(tetrahedra)
+    number = {tuple(e): n + k for k, e in enumerate(unique.tolist())}
+    mids = np.array(
+        [[number[tuple(sorted((f[i], f[(i + 1) % 3])))] for i in range(3)] for f in shell.tolist()]
+    )
+    everything = np.vstack([points, straight])
+    if surface is not None:
+        everything = _bend(everything, cells, np.unique(mids), unique, n, surface)
+    faces = np.hstack([shell, mids])
+    low = np.abs(everything[:, 2]) < 1e-3
+    on_base = low[faces].all(axis=1)
+    fixed = np.zeros(len(everything), dtype=bool)
+    fixed[np.unique(faces[on_base])] = True
+    if not fixed.any():
+        raise MeshError("no face lies on the support: the object must stand on z = 0 of its frame")
+    everything[fixed, 2] = 0.0
+    return QuadraticMesh(everything, cells, fixed, faces[~on_base], faces[on_base])
+
+
+def _bend(
+    points: np.ndarray, cells: np.ndarray, mids: np.ndarray, edges: np.ndarray, corners: int, surface: Surface
+) -> np.ndarray:
+    target, distance, _ = surface.nearest(points[mids])
+    ends = points[edges[mids - corners]]
+    length = np.linalg.norm(ends[:, 0] - ends[:, 1], axis=1)
+    # an edge that cuts across a rim is left straight
+    smooth = distance < 0.12 * length
+    bent = points.copy()
+    bent[mids[smooth]] = target[smooth]
+    for _ in range(10):
+        bad = _least_jacobian(bent, cells) < 0.2 * _least_jacobian(points, cells)
+        if not bad.any():
+            return bent
+        back = np.unique(cells[bad][:, 4:])
+        bent[back] = points[back]
+    return points
+
+
+def _least_jacobian(points: np.ndarray, cells: np.ndarray) -> np.ndarray:
+    gradients = np.array([shape_gradients(*b) for b in np.vstack([GAUSS, np.eye(4)[:, 1:]])])
+    jacobian = np.einsum("gax,eay->egxy", gradients, points[cells])
+    return np.linalg.det(jacobian).min(axis=1)
+
+
+GAUSS = np.full((4, 3), 0.1381966011250105)
+GAUSS[[1, 2, 3], [0, 1, 2]] = 0.5854101966249685
+"""Four-point rule on the unit tetrahedron, each of weight 1/24 (exact to degree 2)."""
+
+
+def shape_gradients(r: float, s: float, t: float) -> np.ndarray:
+    """(10, 3) gradients of the quadratic shape functions with respect to (r, s, t)."""
+    barycentric = np.array([1 - r - s - t, r, s, t])
+    slope = np.array([[-1.0, -1, -1], [1, 0, 0], [0, 1, 0], [0, 0, 1]])
+    corner = (4 * barycentric - 1)[:, None] * slope
+    middle = np.array([4 * (barycentric[i] * slope[j] + barycentric[j] * slope[i]) for i, j in _EDGES])
+    return np.vstack([corner, middle])
+
+
+def graded_mesh(
+    phantom: Phantom,
+    point: np.ndarray,
+    *,
+    finest: float = 1.5,
+    reach: float = 5.0,
+    growth: float = 0.45,
+    balls: tuple[tuple[np.ndarray, float], ...] = (),
+    cache: Path | None = None,
+) -> QuadraticMesh:
+    """A quadratic mesh that is `finest` mm within `reach` mm of `point` (mm) and grows from there.
+
+    balls: (centre, radius) mm of inclusions, which are resolved by elements of half their radius.
+    """
+    points, tetrahedra = coarse_mesh(phantom, cache)
+    surface = Surface(phantom.vertices * 1e3, phantom.faces)
+
+    def size(at: np.ndarray) -> np.ndarray:
+        distance = np.linalg.norm(at - point, axis=1)
+        wanted = finest + growth * np.maximum(distance - reach, 0.0)
+        for centre, radius in balls:
+            outside = np.maximum(np.linalg.norm(at - centre, axis=1) - radius, 0.0)
+            wanted = np.minimum(wanted, 0.6 * radius + 0.6 * outside)
+        return wanted * 1.35
+
+    def project(middles: np.ndarray, half: np.ndarray) -> np.ndarray:
+        target, distance, _ = surface.nearest(middles)
+        return np.where((distance < 0.25 * half)[:, None], target, middles)
+
+    points, tetrahedra = refine(points, tetrahedra, size, project)
+    return quadratic(points, tetrahedra, surface)
