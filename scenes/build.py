@@ -1,0 +1,159 @@
+"""A scene's object as a MODEL folder: meshed or reconstructed once, then kept.
+
+Meshing is not deterministic, and a model's compliance takes seconds: both are kept in a cache folder under a
+name made from everything that the model depends on.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import sys
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import ModelError, SceneError
+from mechanics.model import Model, read_model, write_model
+from mechanics.progress import Progress, silent
+from mechanics.recording import read_recording, recording_files
+from reconstruct.meshing import MeshingOptions, mesh_surface
+from reconstruct.pipeline import reconstruct
+from reconstruct.surface import Surface
+from scenes.embedded import embedded_names, embedded_recording
+from scenes.inclusions import modulus_ratio
+from scenes.phantoms import phantom
+from scenes.scene import Scene
+from scenes.virtual_presses import palpate_model
+
+VERSION = 2
+DEFAULT_TIP_RADIUS_M = 0.005
+
+
+def cache_folder() -> Path:
+    """Where models of scenes are kept: $PALPATE_CACHE, or the system's folder for caches."""
+    named = os.environ.get("PALPATE_CACHE")
+    if named:
+        return Path(named)
+    if sys.platform == "darwin":
+        return Path.home() / "Library" / "Caches" / "palpate"
+    if sys.platform == "win32":
+        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "palpate"
+    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "palpate"
+
+
+def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = None) -> Model:
+    """The scene's model, with a path; a MODEL folder about which the scene changes nothing is used itself."""
+    if scene.kind == "model" and _own(scene):
+        return read_model(scene.source)
+    path = (cache or cache_folder()) / "scenes" / f"{scene.name}-{_key(scene)}"
+    if (path / "model.toml").is_file():
+        try:
+            return read_model(path)
+        except ModelError:
+            pass  # damaged: built again below
+    model = _MAKERS[scene.kind](scene, progress)
+    try:
+        write_model(path, model)
+        return read_model(path)
+    except OSError as error:
+        raise SceneError(
+            f"'{path}' cannot be written ({error}): set PALPATE_CACHE to a folder of yours"
+        ) from error
+
+
+def _own(scene: Scene) -> bool:
+    changes = (scene.young_modulus_pa, scene.poisson_ratio, scene.tip_radius_m, scene.inclusions)
+    return all(change is None for change in changes)
+
+
+def _key(scene: Scene) -> str:
+    """A hash of what the model depends on: the description, and the content of the files that it names."""
+    content = asdict(scene)
+    for name in ("name", "title", "about", "mapper", "renderer", "beside", "colour", "friction"):
+        content.pop(name)
+    digest = hashlib.sha256(json.dumps([VERSION, content], sort_keys=True).encode())
+    for file in _files(scene):
+        digest.update(file.read_bytes())
+    return digest.hexdigest()[:12]
+
+
+def _files(scene: Scene) -> list[Path]:
+    if scene.kind == "recording":
+        return list(recording_files(_recording_path(scene)))
+    if scene.kind == "model":
+        return [Path(scene.source) / "model.toml", Path(scene.source) / "mesh.vtu"]
+    return [Path(scene.source)] if Path(scene.source).is_file() else []
+
+
+def _recording_path(scene: Scene) -> Path:
+    return embedded_recording(scene.source) if scene.source in embedded_names() else Path(scene.source)
+
+
+def _from_phantom(scene: Scene, progress: Progress) -> Model:
+    shape = phantom(scene.source)
+    surface = Surface(
+        vertices=shape.vertices,
+        triangles=shape.faces,
+        uncertainty_m=np.zeros(len(shape.vertices)),
+        support_point=np.zeros(3),
+        support_normal=np.array([0.0, 0.0, 1.0]),
+        method="known",
+        reason="the shape is given",
+    )
+    meshing = mesh_surface(
+        surface, MeshingOptions(mesh_size_m=scene.mesh_size_m), lambda s, f: progress(s, 0.4 * f)
+    )
+    regions = shape.regions if scene.inclusions is None else scene.inclusions
+    mesh = meshing.mesh.quadratic()
+    model = Model(
+        mesh=mesh,
+        young_modulus_pa=scene.young_modulus_pa or shape.young_modulus_pa,
+        poisson_ratio=shape.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
+        tip_radius_m=scene.tip_radius_m or DEFAULT_TIP_RADIUS_M,
+        mesh_size_m=scene.mesh_size_m,
+        support_point=np.zeros(3),
+        support_normal=np.array([0.0, 0.0, 1.0]),
+        modulus_ratio=modulus_ratio(mesh, regions),
+        effects={"finite_strain": {}} if scene.finite_strain else {},
+        provenance={"method": "scene", "phantom": shape.name, "shape": shape.shape},
+        extra={
+            "inclusions": {
+                r.name: {
+                    "centre_m": list(r.centre_m),
+                    "radius_m": r.radius_m,
+                    "modulus_ratio": r.modulus_ratio,
+                }
+                for r in regions
+            }
+        },
+    )
+    return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
+
+
+def _from_recording(scene: Scene, progress: Progress) -> Model:
+    return _changed(scene, reconstruct(read_recording(_recording_path(scene)), progress=progress))
+
+
+def _from_model(scene: Scene, progress: Progress) -> Model:
+    return _changed(scene, read_model(scene.source))
+
+
+def _changed(scene: Scene, model: Model) -> Model:
+    """What the scene says over what the model holds."""
+    changes: dict[str, object] = {"path": None}
+    if scene.young_modulus_pa is not None:
+        changes["young_modulus_pa"] = scene.young_modulus_pa
+        changes["young_modulus_ci95_pa"] = (float("nan"), float("nan"))
+    if scene.poisson_ratio is not None:
+        changes["poisson_ratio"] = scene.poisson_ratio
+    if scene.tip_radius_m is not None:
+        changes["tip_radius_m"] = scene.tip_radius_m
+    if scene.inclusions is not None:
+        changes["modulus_ratio"] = modulus_ratio(model.mesh, scene.inclusions)
+    return model.replaced(**changes)
+
+
+_MAKERS = {"phantom": _from_phantom, "recording": _from_recording, "model": _from_model}

@@ -1,0 +1,91 @@
+"""Palpations of a model that nobody palpated, so that 1D renderers have parameters to interpolate.
+
+Straight presses along the inward normal at spread places, force from the model itself (mechanics.touch), then
+the 1D models fitted to them as to recorded ones.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.errors import SceneError
+from mechanics.model import Model
+from mechanics.palpation import Palpation
+from mechanics.progress import Progress, silent
+from mechanics.sites import touch_sites
+from mechanics.touch import touch_forces
+from reconstruct.one_d import Press, fit_robust
+
+SITES = 32
+DEPTH_M = 0.005
+SPEED_M_PER_S = 0.02
+RATE_HZ = 500.0
+CLEARANCE_M = 0.008
+"""Least height of a place over the support: a tip must get there."""
+LEAST_FLATNESS = 0.9
+"""Cosine between a place's normal and those of its triangles: rims are not pressed."""
+
+
+def palpate_model(
+    model: Model, progress: Progress = silent, *, sites: int = SITES, depth_m: float = DEPTH_M
+) -> Model:
+    """The model with `palpations`: one press to `depth_m` at each of `sites` places."""
+    chosen = spread_places(model, sites)
+    points, normals = model.mesh.points[chosen], model.normals[chosen]
+    touched = touch_sites(
+        model.mesh, points, normals, model.poisson_ratio, model.modulus_ratio, progress=progress
+    )
+    samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))
+    ramp = np.arange(1, samples) * (depth_m / samples)
+    depth = np.concatenate([ramp, ramp[::-1]])
+    speed = np.concatenate([np.full(len(ramp), SPEED_M_PER_S), np.full(len(ramp), -SPEED_M_PER_S)])
+    paths = (-depth[None, :, None] * normals[:, None, :]).reshape(-1, 3)
+    forces = touch_forces(
+        paths,
+        np.arange(len(chosen) + 1) * len(depth),
+        touched.normals,
+        touched.far,
+        young_modulus_pa=model.young_modulus_pa,
+        poisson_ratio=model.poisson_ratio,
+        tip_radius_m=model.tip_radius_m,
+        curvature=touched.curvature,
+        law="neo-hookean" if "finite_strain" in model.effects else "linear",
+    ).reshape(len(chosen), -1, 3)
+    push = np.einsum("ijk,ik->ij", forces, touched.normals)
+    fits = fit_robust([Press(depth, speed, p) for p in push])
+    rows = [
+        Palpation(
+            *(0.0, depth_m / SPEED_M_PER_S, *point, *normal, depth_m),
+            *(fit.k_kv, fit.b_kv, fit.k_hc, fit.b_hc, fit.r_hc, fit.k_v, fit.k_c, fit.r_c, fit.k_h),
+            model.young_modulus_pa,
+        )
+        for point, normal, fit in zip(points.tolist(), touched.normals.tolist(), fits, strict=True)
+    ]
+    return model.replaced(palpations=tuple(rows))
+
+
+def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M) -> np.ndarray:
+    """(k,) touchable surface nodes, each farthest from those before; the first is the highest.
+
+    Rims, and places near the support where a tip would not fit, are left out.
+    """
+    mesh = model.mesh
+    height = (mesh.points - model.support_point) @ model.support_normal
+    triangles = mesh.touchable_surface[:, :3]
+    corners = np.unique(triangles)
+    flatness = np.ones(len(mesh.points))
+    p = mesh.points[triangles]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    cosine = np.einsum("tkx,tx->tk", model.normals[triangles], area / np.linalg.norm(area, axis=1)[:, None])
+    np.minimum.at(flatness, triangles, cosine)
+    able = corners[
+        mesh.touchable[corners] & (height[corners] > clearance_m) & (flatness[corners] > LEAST_FLATNESS)
+    ]
+    if not len(able):
+        raise SceneError("the object has no smooth place above the support to press: use a finer mesh_size_m")
+    chosen = [int(able[np.argmax(height[able])])]
+    distance = np.linalg.norm(mesh.points[able] - mesh.points[chosen[0]], axis=1)
+    while len(chosen) < min(count, len(able)):
+        chosen.append(int(able[np.argmax(distance)]))
+        distance = np.minimum(distance, np.linalg.norm(mesh.points[able] - mesh.points[chosen[-1]], axis=1))
+    return np.array(chosen)
