@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING
@@ -11,24 +12,31 @@ import numpy as np
 from mechanics.errors import SurfaceError
 from mechanics.options import option
 from mechanics.progress import Progress, silent
+from reconstruct.proximity import distance
+from reconstruct.shapes.candidates import FITTED, first_guesses
+from reconstruct.shapes.drawing import draw
 from reconstruct.shapes.evidence import Evidence
+from reconstruct.shapes.fit import Seen, fit
 from reconstruct.shapes.hull import hull_surface
+from reconstruct.shapes.kriging import Explained, explain
+from reconstruct.shapes.tangent import tangent_surface
 
 if TYPE_CHECKING:
     import trimesh
 
     from reconstruct.contacts import Exploration
 
-SURFACES = ("auto", "hull")
+SURFACES = ("auto", "hull", "tangent", *FITTED)
 
 
 @dataclass(frozen=True)
 class SurfaceOptions:
-    """Which surface."""
+    """Which surface, and how finely it is drawn."""
 
     surface: str = option(
         "auto", "shape of the object; auto weighs all by held-out touches", choices=SURFACES
     )
+    surface_spacing_m: float = option(0.003, "edge length of the surface's triangles", unit="m")
 
 
 @dataclass(frozen=True)
@@ -37,8 +45,10 @@ class Surface:
 
     vertices: (n, 3). triangles: (m, 3), outward by the right-hand rule, base included.
     uncertainty_m: (n,) standard deviation of the surface along its normal at each vertex.
-    support_point, support_normal: (3,). method: the shape's name; reason: why it was chosen, in words.
-    parameters: what the shape's fit found (lengths m). candidates: held-out error (m) of every shape that was tried.
+    support_point, support_normal: (3,). method: the shape's name, with '+' where a free field corrects it.
+    reason: why it was chosen, in words. parameters: what the shape's fit found (support frame). held_out_m: rms error
+    of touches that were held out, place by place, for every shape tried. bracket_m3: volumes of the hull of the touches
+    and of the tangent planes' intersection, between which a convex object's lies.
     """
 
     vertices: np.ndarray
@@ -48,8 +58,9 @@ class Surface:
     support_normal: np.ndarray
     method: str
     reason: str
-    parameters: dict[str, float] = field(default_factory=dict)
-    candidates: dict[str, float] = field(default_factory=dict)
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    held_out_m: Mapping[str, float] = field(default_factory=dict)
+    bracket_m3: tuple[float, float] = (float("nan"), float("nan"))
 
     def __post_init__(self) -> None:
         if not self.mesh.is_watertight:
@@ -61,7 +72,7 @@ class Surface:
 
     @cached_property
     def mesh(self) -> trimesh.Trimesh:
-        """The surface for trimesh (proximity, sampling), vertices in order."""
+        """The surface for trimesh (volume, sampling), vertices in order."""
         import trimesh
 
         return trimesh.Trimesh(self.vertices, self.triangles, process=False)
@@ -99,15 +110,125 @@ def reconstruct_surface(
     Raises SurfaceError where no closed surface can be made.
     """
     options = options or SurfaceOptions()
-    progress("surface", 0.0)
-    vertices, triangles = hull_surface(evidence)
+    bracket = bounds(evidence)
+    if options.surface in ("hull", "tangent"):
+        shells = {"hull": hull_surface, "tangent": tangent_surface}
+        vertices, triangles = shells[options.surface](evidence)
+        gap = _bracket_gap(evidence, vertices, options.surface)
+        return _surface(evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bracket)
+    tried = try_shapes(evidence, options.surface, progress)
+    best = max(tried, key=score)
+    vertices, triangles, deviation = draw(best, options.surface_spacing_m)
+    deviation = np.hypot(deviation, _spread(vertices, best, tried))
     progress("surface", 1.0)
+    return _surface(
+        evidence,
+        vertices,
+        triangles,
+        deviation,
+        best.name,
+        "asked for" if options.surface != "auto" else reason(best, tried),
+        {p.label: p.value for p in best.shape.parameters},
+        {e.name: held_out_error(e) for e in sorted(tried, key=score)},
+        bracket,
+    )
+
+
+def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = silent) -> list[Explained]:
+    """Every shape (or those named `which`), fitted, without and with a free residual field."""
+    seen = Seen.of(evidence)
+    guesses = [g for g in first_guesses(evidence, seen) if which in ("auto", g.name)]
+    if not guesses:
+        raise SurfaceError(f"the base outline does not allow a {which}: use --surface auto")
+    tried = []
+    for k, guess in enumerate(guesses):
+        shape, lean = fit(guess, seen)
+        plain, free = (explain(shape, seen, lean, free=free) for free in (False, True))
+        tried.append(plain)
+        # a free field follows systematic errors of the touches as well: it must predict places it has not seen
+        if held_out_error(free) < held_out_error(plain):
+            tried.append(free)
+        progress("surface", (k + 1) / (len(guesses) + 1))
+    return tried
+
+
+def held_out_error(explained: Explained) -> float:
+    """Root mean square error (m) of touches at held-out places."""
+    return float(np.sqrt(np.mean(explained.held_out[0] ** 2)))
+
+
+def score(explained: Explained) -> float:
+    """Log density of the held-out places less one for each idea: an idea must earn its keep."""
+    return float(explained.held_out[1].sum()) - explained.complexity
+
+
+def reason(best: Explained, tried: list[Explained]) -> str:
+    """Why this shape, in one sentence."""
+    error = 1e3 * held_out_error(best)
+    others = [e for e in tried if e.shape.name != best.shape.name]
+    text = f"predicts touches at places left out within {error:.2f} mm"
+    if others:
+        second = max(others, key=score)
+        error = 1e3 * held_out_error(second)
+        text += f" (next best, {second.name}: {error:.2f} mm)"
+    return text
+
+
+def bounds(evidence: Evidence) -> tuple[float, float]:
+    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or nan)."""
+    import trimesh
+
+    low = trimesh.Trimesh(*hull_surface(evidence), process=False).volume
+    try:
+        high = trimesh.Trimesh(*tangent_surface(evidence), process=False).volume
+    except SurfaceError:
+        high = float("nan")
+    return float(low), float(high)
+
+
+def _spread(vertices: np.ndarray, best: Explained, tried: list[Explained]) -> np.ndarray:
+    """(n,) m: how far the other shapes lie from this one, weighted by how well they predict."""
+    square = np.zeros(len(vertices))
+    total = 1.0
+    for other in tried:
+        weight = np.exp(score(other) - score(best))
+        if other is best or weight < 0.003:
+            continue
+        shell = draw(other, 0.005)[:2]
+        square += weight * distance(*shell, vertices) ** 2
+        total += weight
+    return np.sqrt(square / total)
+
+
+def _bracket_gap(evidence: Evidence, vertices: np.ndarray, which: str) -> np.ndarray:
+    """(n,) m: half the distance to the other bound, as a standard deviation of a bound."""
+    try:
+        other = tangent_surface(evidence) if which == "hull" else hull_surface(evidence)
+    except SurfaceError:
+        return np.full(len(vertices), 0.002)
+    return distance(*other, vertices) / 2
+
+
+def _surface(
+    evidence: Evidence,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    uncertainty: np.ndarray,
+    method: str,
+    why: str,
+    parameters: Mapping[str, float] | None = None,
+    held_out: Mapping[str, float] | None = None,
+    bracket: tuple[float, float] = (float("nan"), float("nan")),
+) -> Surface:
     return Surface(
         vertices=evidence.to_device(vertices),
         triangles=triangles,
-        uncertainty_m=np.full(len(vertices), 0.002),
+        uncertainty_m=uncertainty,
         support_point=evidence.origin,
         support_normal=evidence.axes[2],
-        method="hull",
-        reason="asked for" if options.surface == "hull" else "the only candidate",
+        method=method,
+        reason=why,
+        parameters=parameters or {},
+        held_out_m=held_out or {},
+        bracket_m3=bracket,
     )

@@ -1,0 +1,82 @@
+"""The part of a sphere or of an ellipsoid above the support."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reconstruct.shapes.base import Parameter, project, rings_to_mesh, values_of, with_values
+
+
+@dataclass(frozen=True)
+class Cap:
+    """Sphere: centre_x_m, centre_y_m, centre_z_m, radius_m. Ellipsoid: the three semi-axes and turn_rad instead."""
+
+    name: str
+    parameters: tuple[Parameter, ...]
+    complexity: int
+    faceted: bool = False
+
+    @classmethod
+    def sphere(cls, centre: np.ndarray, radius_m: float) -> Cap:
+        """A first guess."""
+        return cls("sphere", (*_centre(centre, radius_m), Parameter("radius_m", radius_m, 0.02, 0.003)), 1)
+
+    @classmethod
+    def ellipsoid(cls, centre: np.ndarray, axes_m: np.ndarray, turn_rad: float) -> Cap:
+        """A first guess: axes (3,), the third upright; turn about the upright."""
+        axes = [
+            Parameter(f"axis_{k}_m", float(a), 0.02, 0.003, 0.5) for k, a in zip("abc", axes_m, strict=True)
+        ]
+        return cls("ellipsoid", (*_centre(centre, axes_m[2]), *axes, Parameter("turn_rad", turn_rad, 0.5)), 2)
+
+    def with_values(self, values: np.ndarray) -> Cap:
+        return replace(self, parameters=with_values(self.parameters, values))
+
+    def _frame(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        values = values_of(self)
+        axes = np.full(3, values[3]) if self.name == "sphere" else values[3:6]
+        turn = 0.0 if self.name == "sphere" else values[6]
+        c, s = np.cos(turn), np.sin(turn)
+        return values[:3], axes, np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]])
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        centre, axes, turned = self._frame()
+        if self.name == "sphere":
+            return np.linalg.norm(points - centre, axis=1) - axes[0]
+
+        def implicit(at: np.ndarray) -> np.ndarray:
+            return np.linalg.norm((at - centre) @ turned.T / axes, axis=1) - 1
+
+        return project(implicit, points)
+
+    def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        centre, axes, turned = self._frame()
+        low = np.arcsin(np.clip(-centre[2] / axes[2], -0.999, 0.999))
+        size = axes.max()
+        latitude = np.linspace(
+            low, np.pi / 2, max(5, int(np.ceil((np.pi / 2 - low) * size / spacing_m))) + 1
+        )[:-1]
+        count = max(24, int(np.ceil(2 * np.pi * size / spacing_m)))
+        angle = 2 * np.pi * np.arange(count) / count
+        unit = np.stack(
+            [
+                np.cos(latitude)[:, None] * np.cos(angle),
+                np.cos(latitude)[:, None] * np.sin(angle),
+                np.broadcast_to(np.sin(latitude)[:, None], (len(latitude), count)),
+            ],
+            axis=2,
+        )
+        rings = centre + (unit * axes) @ turned
+        rings[0, :, 2] = 0.0
+        return rings_to_mesh(rings, centre + np.array([0, 0, axes[2]]))
+
+
+def _centre(centre: np.ndarray, size_m: float) -> tuple[Parameter, ...]:
+    spreads = (0.01, 0.01, 0.02)
+    bounds = ((-np.inf, np.inf), (-np.inf, np.inf), (-0.95 * size_m - 0.3, 0.9 * size_m))
+    return tuple(
+        Parameter(f"centre_{k}_m", float(c), s, *b)
+        for k, c, s, b in zip("xyz", centre, spreads, bounds, strict=True)
+    )

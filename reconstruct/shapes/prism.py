@@ -1,0 +1,127 @@
+"""A base outline drawn upwards to a flat top: cylinder, cone's frustum, block, L-shaped or free extrusion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from reconstruct.shapes.base import Parameter, rings_to_mesh, with_values
+from reconstruct.shapes.outline import Outline, corners, sides
+
+
+def _outline_parameters(outline: Outline) -> tuple[Parameter, ...]:
+    if outline.kind == "circle":
+        radius = float(np.linalg.norm(outline.vertices[0] - outline.centre))
+        x, y = outline.centre
+        return (
+            Parameter("centre_x_m", float(x), 0.01),
+            Parameter("centre_y_m", float(y), 0.01),
+            Parameter("radius_m", radius, 0.01, 0.002),
+        )
+    if outline.kind == "polygon":
+        angles, offsets = sides(outline.vertices)
+        turned = [Parameter(f"side_{k + 1}_rad", float(a), 0.05) for k, a in enumerate(angles)]
+        placed = [Parameter(f"side_{k + 1}_m", float(o), 0.01) for k, o in enumerate(offsets)]
+        return (*turned, *placed)
+    return (Parameter("grown_m", 0.0, 0.002, -0.006, 0.006),)
+
+
+def _outline_with(outline: Outline, values: np.ndarray) -> Outline:
+    if outline.kind == "circle":
+        angle = 2 * np.pi * np.arange(len(outline.vertices)) / len(outline.vertices)
+        rim = values[2] * np.column_stack([np.cos(angle), np.sin(angle)])
+        return Outline("circle", values[:2] + rim, values[:2].copy())
+    if outline.kind == "polygon":
+        half = len(values) // 2
+        return Outline("polygon", corners(values[:half], values[half:]), outline.centre)
+    return outline
+
+
+@dataclass(frozen=True)
+class Prism:
+    """Walls over an outline, all leaning inwards by one angle (the draft), and a plane top that may slope.
+
+    The parameters are the outline's, then height_m (at the outline's centre), then, if free: slope_x, slope_y
+    (rise over run) and draft_rad.
+    """
+
+    name: str
+    outline: Outline
+    parameters: tuple[Parameter, ...]
+    sloped: bool
+    drafted: bool
+    complexity: int
+    faceted: bool = True
+
+    @classmethod
+    def of(cls, outline: Outline, height_m: float, *, sloped: bool, drafted: bool) -> Prism:
+        """A first guess over an outline."""
+        found = [*_outline_parameters(outline), Parameter("height_m", height_m, 0.02, 0.002)]
+        if sloped:
+            found += [Parameter("slope_x", 0.0, 0.2, -1.5, 1.5), Parameter("slope_y", 0.0, 0.2, -1.5, 1.5)]
+        if drafted:
+            found.append(Parameter("draft_rad", 0.0, 0.15, -0.3, 0.9))
+        names = {"circle": "cylinder", "polygon": "block", "curve": "extrusion"}
+        complexity = {"circle": 1, "polygon": 1, "curve": 2}[outline.kind] + sloped + drafted
+        return cls(names[outline.kind], outline, tuple(found), sloped, drafted, complexity)
+
+    def with_values(self, values: np.ndarray) -> Prism:
+        return replace(self, parameters=with_values(self.parameters, values))
+
+    def _parts(self) -> tuple[Outline, float, np.ndarray, float]:
+        values = np.array([p.value for p in self.parameters])
+        extra = 1 + 2 * self.sloped + self.drafted
+        own, rest = values[:-extra], values[-extra:]
+        slope = rest[1:3] if self.sloped else np.zeros(2)
+        return (
+            _outline_with(self.outline, own),
+            float(rest[0]),
+            slope,
+            float(rest[-1]) if self.drafted else 0.0,
+        )
+
+    def distance(self, points: np.ndarray) -> np.ndarray:
+        outline, height, slope, draft = self._parts()
+        if outline.kind == "circle":
+            radius = np.linalg.norm(outline.vertices[0] - outline.centre)
+            flat = np.linalg.norm(points[:, :2] - outline.centre, axis=1) - radius
+        else:
+            flat = outline.distance(points[:, :2])
+        if outline.kind == "curve":
+            flat = flat - self.parameters[0].value
+        wall = flat * np.cos(draft) + points[:, 2] * np.sin(draft)
+        rise = points[:, 2] - height - (points[:, :2] - outline.centre) @ slope
+        top = rise / np.sqrt(1 + slope @ slope)
+        return np.hypot(np.maximum(wall, 0), np.maximum(top, 0)) + np.minimum(np.maximum(wall, top), 0)
+
+    def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        outline, height, slope, draft = self._parts()
+        if outline.kind == "curve":
+            outline = outline.grown(self.parameters[0].value)
+        rim, outward = outline.ring(spacing_m)
+        lean = _lean(outline, rim, outward) * np.tan(draft)
+        # up the wall p - z lean, until the top's plane: z = height + slope . (p - z lean - centre)
+        edge = (height + (rim - outline.centre) @ slope) / (1 + lean @ slope)
+        levels = np.linspace(0, 1, max(3, int(np.ceil(height / spacing_m)) + 1))
+        z = levels[:, None] * edge
+        wall = np.concatenate([rim - z[..., None] * lean, z[..., None]], axis=2)
+        inwards = np.linspace(1, 0, max(4, int(np.ceil(np.ptp(rim, axis=0).max() / 2 / spacing_m)) + 1))[1:-1]
+        flat = outline.centre + inwards[:, None, None] * (wall[-1, :, :2] - outline.centre)
+        roof = np.concatenate([flat, (height + (flat - outline.centre) @ slope)[..., None]], axis=2)
+        return rings_to_mesh(np.concatenate([wall, roof]), np.array([*outline.centre, height]))
+
+
+def _lean(outline: Outline, rim: np.ndarray, outward: np.ndarray) -> np.ndarray:
+    """(n, 2): how far the rim moves inwards a metre of height for a draft of 45 degrees; mitred at corners."""
+    if outline.kind != "polygon":
+        return outward
+    moved = outline.grown(-1e-4).vertices
+    start = outline.vertices
+    ends = np.roll(np.arange(len(start)), -1)
+    a, b = start, start[ends]
+    along = ((rim[:, None] - a) * (b - a)).sum(axis=2) / ((b - a) ** 2).sum(axis=1)
+    miss = np.linalg.norm(a + np.clip(along, 0, 1)[..., None] * (b - a) - rim[:, None], axis=2)
+    k = np.argmin(miss, axis=1)
+    share = np.clip(along[np.arange(len(rim)), k], 0, 1)[:, None]
+    return ((1 - share) * (start - moved)[k] + share * (start - moved)[ends[k]]) / 1e-4
