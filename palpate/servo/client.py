@@ -71,8 +71,6 @@ class Servo:
     @property
     def arrays(self) -> SharedArrays:
         """The shared block's arrays (palpate.servo.layout)."""
-        if self._block.arrays is None:
-            raise PalpateError("the servo is closed: start a new one")
         return self._block.arrays
 
     @property
@@ -110,7 +108,7 @@ class Servo:
         Raises the PalpateError that the servo process met.
         """
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "palpate.servo", self._block.name],
+            [sys.executable, "-m", "palpate.servo", self._block.path],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             # a Ctrl-C at the terminal is the parent's to handle
@@ -119,6 +117,7 @@ class Servo:
         threading.Thread(target=self._listen, daemon=True).start()
         self._send(self._job)
         ready = self._await("ready", progress, START_TIMEOUT_S)
+        self._block.forget()
         self._tip_radius_m = float(ready["tip_radius_m"])
         self._cpu_start_s = _cpu_time_s(self.process_id)
         self._started_s = time.perf_counter()
@@ -189,9 +188,8 @@ class Servo:
         process = self._process
         if process is None:
             return 0
-        if self._block.arrays is not None:
-            self._block.arrays.control[ENABLE] = 0
-            self._block.arrays.control[STOP] = 1
+        self.arrays.control[ENABLE] = 0
+        self.arrays.control[STOP] = 1
         try:
             process.wait(STOP_TIMEOUT_S)
         except subprocess.TimeoutExpired:
@@ -205,9 +203,9 @@ class Servo:
         return process.returncode
 
     def close(self) -> None:
-        """Stop, and give the shared memory back."""
+        """Stop, and remove what was made for the session; counters and ring stay readable."""
         self.stop()
-        self._block.close()
+        self._block.forget()
         if self._folder is not None:
             self._folder.close()
 

@@ -19,7 +19,7 @@ from devices.base import DeviceSpec
 from devices.impedance import HandImpedance
 from devices.safety import SafetyOptions, safety_parameters
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
-from palpate.servo.loop import make_program, one_tick
+from palpate.servo.loop import kept, make_program, one_tick
 from palpate.servo.source import no_support
 from palpate.servo.tick import (
     IN_CALIBRATED,
@@ -48,9 +48,9 @@ START_NS = 1_000_000_000
 
 @dataclass(frozen=True)
 class Loop:
-    """rate_hz of the ticks; quantisation_m of the device's positions (0: none); delay_s from a pose to its force.
+    """rate_hz of the ticks; quantisation_m of the positions (0: none); delay_s from a pose to its force.
 
-    known_delay: whether the passivity controller is told the delay. coupling: whether the virtual coupling acts.
+    known_delay: whether the passivity controller is told the delay. coupling: whether there is one.
     """
 
     rate_hz: float = 1000.0
@@ -62,9 +62,9 @@ class Loop:
 
 @dataclass(frozen=True)
 class ClosedLoopResult:
-    """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given to the hand so far.
+    """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given to the hand by then.
 
-    given_back_j: the greatest of work_j; damped_j: what the controller took; compliance_m_per_n: the coupling's.
+    damped_j: what the controller took; compliance_m_per_n: the coupling's.
     """
 
     position: np.ndarray
@@ -82,7 +82,7 @@ class ClosedLoopResult:
 
     @property
     def force_distortion(self) -> float:
-        """rms of what the controller and the filter changed over rms of the rendered force, after the ramp."""
+        """rms of what controller and filter changed over rms of the rendered force, after the ramp."""
         full = slice(len(self.command) // 4, None)
         rendered = np.sqrt((self.rendered[full] ** 2).sum(axis=1).mean())
         changed = np.sqrt(((self.command[full] - self.rendered[full]) ** 2).sum(axis=1).mean())
@@ -196,7 +196,7 @@ def closed_loop(
         hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m, period_ns * 1e-9 / SUBSTEPS
     )
     noise = tremor_m * np.random.default_rng(seed).standard_normal((n, 3))
-    _run(
+    kept(_run, renderer)(
         program.kernel,
         renderer.parameters,
         program.state,

@@ -7,8 +7,10 @@ read through palpate.servo.seqlock; the ring's rows are complete up to `ring_hea
 from __future__ import annotations
 
 import math
+import mmap
+import os
+import tempfile
 from dataclasses import dataclass
-from multiprocessing import shared_memory
 
 import numpy as np
 
@@ -89,7 +91,7 @@ def total_bytes() -> int:
     return sum(8 * math.prod(shape) for _, _, shape in _FIELDS)
 
 
-def views(buffer: memoryview | bytearray) -> SharedArrays:
+def views(buffer: mmap.mmap | bytearray) -> SharedArrays:
     """The named arrays in a block of `total_bytes()`."""
     arrays, offset = {}, 0
     for name, kind, shape in _FIELDS:
@@ -100,35 +102,35 @@ def views(buffer: memoryview | bytearray) -> SharedArrays:
 
 
 class SharedBlock:
-    """The block itself: made by the parent, attached by name in the servo; `close` gives it back."""
+    """The block: a file in memory, made by the parent, mapped by its path in the servo.
 
-    def __init__(self, name: str | None = None) -> None:
-        self.owner = name is None
-        if name is None:
-            self._memory = shared_memory.SharedMemory(create=True, size=total_bytes())
+    A plain mapped file instead of multiprocessing.shared_memory: its name can go as soon as both have it
+    (`forget`), so that nothing is left behind by whichever is killed, and arrays keep the memory alive.
+    """
+
+    def __init__(self, path: str | None = None) -> None:
+        self._owner = path is None
+        if path is None:
+            memory = "/dev/shm"
+            descriptor, path = tempfile.mkstemp(
+                prefix="palpate-servo-", dir=memory if os.access(memory, os.W_OK) else None
+            )
+            os.ftruncate(descriptor, total_bytes())
         else:
-            self._memory = shared_memory.SharedMemory(name=name)
-            # before Python 3.13 attaching registers the block with this process's tracker, which would
-            # remove it when this process ends
-            from multiprocessing import resource_tracker
-
-            resource_tracker.unregister(self._memory._name, "shared_memory")
-        self.arrays: SharedArrays | None = views(self._memory.buf)
-
-    @property
-    def name(self) -> str:
-        """What the servo attaches by."""
-        return self._memory.name
-
-    def close(self) -> None:
-        """Drop the views; the owner also removes the block."""
-        self.arrays = None
+            descriptor = os.open(path, os.O_RDWR)
         try:
-            self._memory.close()
-        except BufferError:
-            pass  # a view is still held by a caller: the pages go when it does
-        if self.owner:
+            self.arrays = views(mmap.mmap(descriptor, total_bytes()))
+        finally:
+            os.close(descriptor)
+        self.path = path
+
+    def forget(self) -> None:
+        """Remove the name (the owner's task); the memory goes with the last array. Harmless when repeated."""
+        if self._owner:
             try:
-                self._memory.unlink()
+                os.unlink(self.path)
             except FileNotFoundError:
                 pass
+            except PermissionError:
+                return  # Windows keeps the name of a mapped file; the next call may succeed
+            self._owner = False

@@ -24,7 +24,7 @@ SWAP = 7
 """Cell of `control` by which this process's own threads ask the loop to come back."""
 
 
-@njit(cache=True, nogil=True)
+@njit(inline="always", nogil=True)
 def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
     """A whole tick with the renderer's kernel in its middle."""
     before(arrays)
@@ -63,20 +63,21 @@ def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
 def kernel_pointer(renderer: Any, state: Any) -> Any:
     """The renderer's kernel as a typed function pointer.
 
-    Passing the compiled function itself would make the loop a new one in every process; behind a pointer it is
-    compiled once for each kind of renderer and kept on disk.
+    Passing the compiled function itself would make the loop a new one in every process; behind a pointer it
+    is compiled once for each kind of renderer and kept on disk.
     """
     kernel = renderer.kernel
     signature = types.void(typeof(renderer.parameters), typeof(state), types.float64[:, ::1])
     fastmath = kernel.targetoptions.get("fastmath", False)
-    return cfunc(signature, cache=True, fastmath=fastmath)(kernel.py_func)
+    return cfunc(signature, cache=_is_ours(renderer), fastmath=fastmath)(kernel.py_func)
 
 
 class Program(NamedTuple):
-    """A renderer made ready: compiled, warmed up, with its state and its kernel's pointer."""
+    """A renderer made ready: its kernel's pointer, the loop compiled for it, and its state."""
 
     renderer: Any
     kernel: Any
+    loop: Any
     state: Any
     parameters: TickParameters
 
@@ -94,9 +95,24 @@ def make_program(
         warm_up(renderer, state)
         state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
     kernel = kernel_pointer(renderer, state)
+    loop = None
     if COMPILED:
-        compiled_loop(kernel, renderer.parameters, state, arrays, parameters, -1, 0)
-    return Program(renderer, kernel, state, parameters)
+        loop = kept(compiled_loop, renderer)
+        loop(kernel, renderer.parameters, state, arrays, parameters, -1, 0)
+    return Program(renderer, kernel, loop, state, parameters)
+
+
+def _is_ours(renderer: Any) -> bool:
+    return type(renderer.parameters).__module__.split(".")[0] in ("render", "palpate")
+
+
+def kept(function: Any, renderer: Any) -> Any:
+    """A compiled function that takes this renderer, from disk where that is safe.
+
+    Numba's index of a function names the types of every call ever compiled, and cannot be read in a process
+    that cannot import one of them (a script's own renderer, say); such a renderer gets a fresh copy.
+    """
+    return function if _is_ours(renderer) else njit(nogil=True)(function.py_func)
 
 
 def warm_up(renderer: Any, state: Any, places: int = 100) -> None:
@@ -164,9 +180,9 @@ class ServoLoop:
                     self._program, self._pending = self._pending, None
                     self.arrays.control[SWAP] = 0
                     self._swapped.set()
-                renderer, kernel, state, parameters = self._program
                 if COMPILED:
-                    compiled_loop(
+                    renderer, kernel, loop, state, parameters = self._program
+                    loop(
                         kernel,
                         renderer.parameters,
                         state,
@@ -187,6 +203,25 @@ def portable_tick(program: Program, arrays: TickArrays) -> None:
     deadline = int(arrays.counts[DEADLINE])
     sleep_until(deadline)
     started = time.perf_counter_ns()
-    renderer, kernel, state, parameters = program
-    one_tick(kernel, renderer.parameters, state, arrays, parameters, started, deadline)
-    account(arrays, parameters, deadline, started, time.perf_counter_ns())
+    run_tick(program, arrays, started, deadline)
+    account(arrays, program.parameters, deadline, started, time.perf_counter_ns())
+
+
+def run_tick(program: Program, arrays: TickArrays, now_ns: int, deadline_ns: int) -> None:
+    """One tick at a time that is handed in: what the compiled loop does between two deadlines."""
+    renderer, state = program.renderer, program.state
+    before(arrays)
+    renderer.kernel(renderer.parameters, state, arrays.tips)
+    after(
+        arrays,
+        program.parameters,
+        state.forces,
+        state.points,
+        state.normals,
+        state.depths,
+        state.touching,
+        state.stiffness,
+        state.radii_m,
+        now_ns,
+        deadline_ns,
+    )

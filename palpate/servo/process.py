@@ -60,7 +60,6 @@ class ServoProcess:
         offsets = np.array(job.options.tip_offsets_m, dtype=float)
         if len(offsets) > MOST_TIPS:
             raise OptionError(f"{len(offsets)} tips were asked for; allowed are up to {MOST_TIPS}")
-        assert block.arrays is not None
         self._arrays = tick_arrays(block.arrays, offsets, np.zeros(3))
         self._source = job.source
         self._loop: ServoLoop | None = None
@@ -217,7 +216,6 @@ def main(argv: list[str]) -> int:
             pass  # the parent is gone; the loop is told by the end of its input
 
     block = SharedBlock(argv[1])
-    assert block.arrays is not None
     control = block.arrays.control
 
     def end(number: int, frame: Any) -> None:
