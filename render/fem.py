@@ -7,7 +7,6 @@ from collections.abc import Sequence
 import numpy as np
 
 from mechanics.compliance import load_or_condense
-from mechanics.dent import dent_law
 from mechanics.errors import OptionError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
@@ -15,7 +14,9 @@ from mechanics.surface_compliance import SurfaceCompliance
 from render.base import Renderer, check_radii
 from render.bvh import STACK, closest_triangle
 from render.drawing import draw_dent
-from render.fem_kernel import FemParameters, FemState, fem_step, new_fem_state
+from render.effects import effect_arrays, rendered_dent_law, rendered_friction
+from render.fem_kernel import fem_step
+from render.fem_state import FemParameters, FemState, new_fem_state
 from render.field import far_field
 from render.options import RenderOptions
 from render.snapping import touched_surface
@@ -42,7 +43,7 @@ class FemRenderer(Renderer):
         self.options = options or RenderOptions()
         self.compliance = compliance or load_or_condense(model, progress=progress)
         self.contact = touched_surface(model, self.options)
-        self.dent_law = self.options.dent_law or str(model.provenance.get("dent_law", "sphere"))
+        self.dent_law = rendered_dent_law(model, self.options)
         field = far_field(model.mesh, self.contact, self.compliance)
         number = np.full(len(model.mesh.points), len(self.compliance.nodes))
         number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
@@ -54,15 +55,16 @@ class FemRenderer(Renderer):
             parents=field.parents,
             parent_weights=self.contact.parent_weights,
             blocks=np.array(self.compliance.blocks),
-            table=np.array(dent_law(self.dent_law).table),
+            table=np.array(self.dent_law.table),
             young_modulus_pa=np.array([model.young_modulus_pa]),
             poisson_ratio=np.array([model.poisson_ratio]),
-            friction=np.array([_friction(model, self.options)]),
+            friction=np.array([rendered_friction(model, self.options)]),
             series_compliance=np.zeros(1),
+            effects=effect_arrays(model, self.options),
         )
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> FemState:
-        return new_fem_state(check_radii(radii_m, self.model), dt_s)
+        return new_fem_state(self.parameters, check_radii(radii_m, self.model), dt_s)
 
     def with_modulus(self, young_modulus_pa: float) -> FemRenderer:
         if not young_modulus_pa > 0:
@@ -97,14 +99,6 @@ class FemRenderer(Renderer):
         for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
             draw_dent(arrays.vertices, moved, point, normal, radius, depth)
         return moved
-
-
-def _friction(model: Model, options: RenderOptions) -> float:
-    if options.friction is not None:
-        return float(options.friction)
-    if options.effects and "friction_slip" in model.effects:
-        return float(model.effects["friction_slip"]["mu"])
-    return float("inf")
 
 
 def create(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:

@@ -89,14 +89,20 @@ NET, OWED, DISSIPATED, LEAST, TOTAL = range(5)
 
 
 def passivity_parameters(
-    options: PassivityOptions, *, max_damping_n_s_per_m: float, delay_ticks: float = 0.0, rate_hz: float = 1000.0
+    options: PassivityOptions,
+    *,
+    max_damping_n_s_per_m: float,
+    delay_ticks: float = 0.0,
+    rate_hz: float = 1000.0,
 ) -> PassivityParameters:
     """max_damping_n_s_per_m: what the device renders stably. delay_ticks: 0 where the force that a pose
     causes acts from the instant of that pose; raises OptionError beyond LONGEST_DELAY_TICKS - 2."""
     if not 0.0 <= delay_ticks <= LONGEST_DELAY_TICKS - 2:
         raise OptionError(f"delay_ticks is {delay_ticks}; allowed is 0 to {LONGEST_DELAY_TICKS - 2}")
     # a sampled, delayed damper on a mass is itself stable only well below m / T
-    damping = min(max_damping_n_s_per_m, options.most_damping_n_s_per_m, 0.2 * options.least_mass_kg * rate_hz)
+    damping = min(
+        max_damping_n_s_per_m, options.most_damping_n_s_per_m, 0.2 * options.least_mass_kg * rate_hz
+    )
     return PassivityParameters(
         options.passivity,
         options.allowance_j,
@@ -204,24 +210,24 @@ def _guard(parameters, state, wanted, speed, dt_s):
     """Cut what would give out more than the energy that is left; `state.cut` is the force taken, N."""
     velocity, tick = state.velocity, state.ticks[0]
     left = state.energies[NET] + parameters.allowance_j
-    # forces that are under way will still do their work
-    for j in range(int(math.ceil(parameters.delay_ticks))):
-        given = 0.0
-        for i in range(3):
-            given += state.commanded[(tick - 1 - j) % LONGEST_DELAY_TICKS, i] * velocity[i] * dt_s
-        left -= max(given, 0.0)
     along, size2 = 0.0, 0.0
     for i in range(3):
         along += wanted[i] * velocity[i] / speed
         size2 += wanted[i] ** 2
-    # on the way the force itself speeds the mass up: F (v T + F T^2 / 2m) <= left
-    half = 0.5 * dt_s * dt_s / parameters.least_mass_kg
+    size = math.sqrt(size2)
     reach = speed * dt_s
-    affordable = 2.0 * max(left, 0.0) / (reach + math.sqrt(reach * reach + 4.0 * half * max(left, 0.0)))
     scale = 1.0
     if parameters.delay_ticks >= 0.5:
-        # what opposes the motion now may drive it when it arrives
-        scale = min(1.0, max(left, 0.0) / (0.5 * parameters.allowance_j))
+        # what is under way, and what opposes the motion now, may drive it by the time that it acts
+        for j in range(int(math.ceil(parameters.delay_ticks))):
+            way2 = 0.0
+            for i in range(3):
+                way2 += state.commanded[(tick - 1 - j) % LONGEST_DELAY_TICKS, i] ** 2
+            left -= math.sqrt(way2) * reach
+        scale = min(1.0, max(left, 0.0) / (size * reach))
+    # on the way the force itself speeds the mass up: F (v T + F T^2 / 2m) <= left
+    half = 0.5 * dt_s * dt_s / parameters.least_mass_kg
+    affordable = 2.0 * max(left, 0.0) / (reach + math.sqrt(reach * reach + 4.0 * half * max(left, 0.0)))
     state.cut[0] = 0.0
     excess = max(0.0, scale * along - affordable)
     if scale < 1.0 or excess > 0.0:
@@ -229,7 +235,7 @@ def _guard(parameters, state, wanted, speed, dt_s):
             kept = scale * wanted[i] - excess * velocity[i] / speed
             state.damping_force[i] += kept - wanted[i]
             wanted[i] = kept
-        state.cut[0] = excess + (1.0 - scale) * math.sqrt(size2)
+        state.cut[0] = excess + (1.0 - scale) * size
 
 
 @njit(cache=True, nogil=True)

@@ -1,0 +1,105 @@
+"""The plain arrays of the finite-element renderer: what it reads, and what it keeps between ticks."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from mechanics.touch import STATE_SIZE
+from render.base import Grip, new_grip
+from render.bvh import STACK
+from render.effects import EffectArrays
+from render.surface import SurfaceArrays
+
+
+class FemParameters(NamedTuple):
+    """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
+
+    far: (v, 3, 3) 1/m. curvature: (v,) 1/m. parents: (k, 3) compliance nodes that interpolate over a
+    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m. table: dent law.
+    young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each.
+    """
+
+    surface: SurfaceArrays
+    far: np.ndarray
+    curvature: np.ndarray
+    parents: np.ndarray
+    parent_weights: np.ndarray
+    blocks: np.ndarray
+    table: np.ndarray
+    young_modulus_pa: np.ndarray
+    poisson_ratio: np.ndarray
+    friction: np.ndarray
+    series_compliance: np.ndarray
+    effects: EffectArrays
+
+
+class FemState(NamedTuple):
+    """render.base.State, and what the step keeps between ticks.
+
+    grip: where each tip is held. frames: (m, 3, 3) rows u, v, n. elastic: (m, 3) N, quasi-static forces on
+    the tools. memory: (m, STATE_SIZE) of the sticks. prony: (m, k, 3) N and before: (m, 3) N of
+    viscoelasticity. deepest: (m,) m of this touch. felt: (v,) greatest load of each fine vertex (Mullins).
+    blocks: (m, m, 3, 3) m/N between contacts. The others are scratch.
+    """
+
+    forces: np.ndarray
+    touching: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    depths: np.ndarray
+    stiffness: np.ndarray
+    radii_m: np.ndarray
+    dt_s: np.ndarray
+    grip: Grip
+    frames: np.ndarray
+    elastic: np.ndarray
+    prony: np.ndarray
+    before: np.ndarray
+    deepest: np.ndarray
+    felt: np.ndarray
+    memory: np.ndarray
+    blocks: np.ndarray
+    solution: np.ndarray
+    nodes: np.ndarray
+    node_weights: np.ndarray
+    fresh: np.ndarray
+    local_far: np.ndarray
+    radius: np.ndarray
+    curvature: np.ndarray
+    vectors: np.ndarray
+    stack: np.ndarray
+
+
+def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> FemState:
+    """A state of len(radii) tips in air."""
+    m = len(radii)
+    return FemState(
+        forces=np.zeros((m, 3)),
+        touching=np.zeros(m, dtype=np.int64),
+        points=np.zeros((m, 3)),
+        normals=np.zeros((m, 3)),
+        depths=np.zeros(m),
+        stiffness=np.zeros(m),
+        radii_m=radii.copy(),
+        dt_s=np.array([dt_s]),
+        grip=new_grip(m),
+        frames=np.zeros((m, 3, 3)),
+        elastic=np.zeros((m, 3)),
+        prony=np.zeros((m, len(parameters.effects.g), 3)),
+        before=np.zeros((m, 3)),
+        deepest=np.zeros(m),
+        felt=np.zeros(len(parameters.surface.vertices)),
+        memory=np.zeros((m, STATE_SIZE)),
+        blocks=np.zeros((m, m, 3, 3)),
+        solution=np.zeros((m, 8)),
+        nodes=np.zeros((m, 3), dtype=np.int64),
+        node_weights=np.zeros((m, 3)),
+        fresh=np.ones(m, dtype=np.int64),
+        local_far=np.zeros((m, 3, 3)),
+        radius=np.zeros(m),
+        curvature=np.zeros(m),
+        vectors=np.zeros((6, 3)),
+        stack=np.zeros(STACK, dtype=np.int64),
+    )
