@@ -44,6 +44,7 @@ class Renderer(ABC):
     model: Model
     parameters: Any
     kernel: Callable[[Any, Any, np.ndarray], None]
+    path_kernel: Callable[[Any, Any, np.ndarray, np.ndarray, np.ndarray], None]
 
     @abstractmethod
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> Any:
@@ -97,6 +98,15 @@ class Renderer(ABC):
         """
         self.kernel(self.parameters, state, tips)
         return state, state.forces
+
+    def follow(self, state: Any, path: np.ndarray, steps_s: np.ndarray) -> np.ndarray:
+        """Forces (n, m, 3) N on the tools along a path (n, m, 3) m of centres: `step` n times, in one call.
+
+        steps_s: (n,) s, the time that each step covers.
+        """
+        forces = np.zeros_like(path)
+        self.path_kernel(self.parameters, state, steps_s, path, forces)
+        return forces
 
     def displacement(self, state: Any) -> np.ndarray:
         """(n, 3) m, displacement of the surface's points in this state."""

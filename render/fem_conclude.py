@@ -7,8 +7,8 @@ from numba import njit
 from mechanics.effects.adhesion import adhesive_pull
 from mechanics.effects.mullins_softening import dent_energy, softening
 from mechanics.effects.viscoelasticity import prony_step
+from mechanics.touch import touch_remember
 from render.contact import foot, release
-from render.local import touch_remember
 
 
 @njit(cache=True, error_model="numpy")
@@ -29,7 +29,7 @@ def conclude(p, state, tips, i):
     grip, out, normal = state.grip, state.solution[i], state.normals[i]
     pressed = out[2] > 0.0
     if pressed:
-        touch_remember(state.memory[i], out[4], out[3], out[5], out[6], state.radius[i] / 64.0)
+        touch_remember(state.memory[i], out[3], out[4], out[5], out[6], state.radius[i])
         depth = state.radii_m[i]
         for k in range(3):
             depth -= normal[k] * (tips[i, k] - state.points[i, k])

@@ -69,3 +69,12 @@ def fem_step(p, state, tips):
     for i in range(m):
         if grip.triangle[i] >= 0:
             conclude(p, state, tips, i)
+
+
+@njit(cache=True, error_model="numpy")
+def fem_path(p, state, steps_s, path, forces):
+    """`fem_step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
+    for i in range(path.shape[0]):
+        state.dt_s[0] = steps_s[i]
+        fem_step(p, state, path[i])
+        forces[i] = state.forces

@@ -6,8 +6,8 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mechanics.touch import touch_solve
 from render.contact import place, turn_frame, walk
-from render.local import touch_solve
 
 SLIPS = 12
 

@@ -145,3 +145,12 @@ def one_d_step(p, state, tips):
         state.stiffness[i] = stiffness
         for c in range(3):
             state.forces[i, c] = force * normal[c] if force > 0.0 else 0.0
+
+
+@njit(cache=True, error_model="numpy")
+def one_d_path(p, state, steps_s, path, forces):
+    """`one_d_step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
+    for i in range(path.shape[0]):
+        state.dt_s[0] = steps_s[i]
+        one_d_step(p, state, path[i])
+        forces[i] = state.forces

@@ -39,15 +39,10 @@ def replay(
     forces = np.zeros_like(positions)
     state = renderer.start(None if tip_radius_m is None else [tip_radius_m])
     steps = np.diff(t, prepend=t[0] - 1e-3) if len(t) else t
-    tips = np.empty((1, 3))
-    kernel, parameters = renderer.kernel, renderer.parameters
-    for i in range(len(t)):
-        state.dt_s[0] = steps[i]
-        tips[0] = positions[i]
-        kernel(parameters, state, tips)
-        forces[i] = state.forces[0]
-        if i % _CHUNK == 0:
-            progress("replay", i / len(t))
+    for first in range(0, len(t), _CHUNK):
+        part = slice(first, first + _CHUNK)
+        forces[part] = renderer.follow(state, positions[part, None], steps[part])[:, 0]
+        progress("replay", min(first + _CHUNK, len(t)) / len(t))
     return forces
 
 

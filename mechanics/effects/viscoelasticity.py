@@ -22,8 +22,8 @@ def prony_series(keys: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
     tau = np.atleast_1d(np.asarray(keys["tau_s"], dtype=float))
     if g.shape != tau.shape or not (tau > 0).all() or not (g >= 0).all():
         raise ModelError(
-            f"viscoelasticity has g = {g.tolist()} and tau_s = {tau.tolist()}: as many of each, g at least 0, "
-            "tau_s greater than 0 s"
+            f"viscoelasticity has g = {g.tolist()} and tau_s = {tau.tolist()}: as many of each, g at least "
+            "0, tau_s greater than 0 s"
         )
     return g, tau
 
