@@ -139,7 +139,7 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
     is computed in memory.
     """
     key = content_key(
-        "surface compliance 1",
+        "surface compliance 2",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,
@@ -149,8 +149,8 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
     )
 
     def build() -> dict[str, np.ndarray]:
-        mesh = model.mesh.quadratic()
-        return surface_compliance(mesh, model.poisson_ratio, model.modulus_ratio, progress=progress).arrays()
+        made = surface_compliance(model.mesh, model.poisson_ratio, model.modulus_ratio, progress=progress)
+        return made.arrays()
 
     path = None if model.path is None else model.path / f"compliance-{key[:16]}.bin"
     return SurfaceCompliance.from_arrays(load_or_build(path, key, build))

@@ -10,10 +10,13 @@ import numpy as np
 from mechanics.errors import MeshError
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
+from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 
-PATCH_WIDTH_IN_MESH_SIZES = 0.8
+PATCH_WIDTH_IN_EDGES = 0.8
+PATCH_WIDTH_IN_MESH_SIZES = PATCH_WIDTH_IN_EDGES
+SURFACE_EDGE_M = 0.006
 _BATCH = 16
 
 
@@ -40,15 +43,34 @@ class TouchSites:
 
     def __post_init__(self) -> None:
         for name in ("points", "normals", "curvature", "far"):
-            array = np.ascontiguousarray(getattr(self, name), dtype=float)
+            array = np.array(
+                getattr(self, name), dtype=float, order="C"
+            )  # a copy: the caller's stays writable
             array.setflags(write=False)
             object.__setattr__(self, name, array)
 
 
-def typical_edge(mesh: TetMesh) -> float:
-    """Median edge length of the touchable surface, m."""
-    p = mesh.points[mesh.touchable_surface[:, :3]]
-    return float(np.median(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)))
+def touch_solver(
+    mesh: TetMesh,
+    poisson_ratio: float,
+    modulus_ratio: np.ndarray | None = None,
+    *,
+    surface_edge_m: float = SURFACE_EDGE_M,
+) -> Solver:
+    """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
+
+    A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
+    to 5 % too soft (docs/mechanics.md). Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
+    `mesh`.
+    """
+    fine, parent = refined_near_surface(mesh, surface_edge_m)
+    ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)[parent]
+    return Solver(fine.quadratic(), poisson_ratio, ratio)
+
+
+def patch_width(mesh: TetMesh) -> float:
+    """The width, m, of the narrowest patch that a quadratic mesh resolves: 0.8 edges of its surface."""
+    return PATCH_WIDTH_IN_EDGES * typical_edge(mesh)
 
 
 def touch_sites(
@@ -65,9 +87,10 @@ def touch_sites(
 ) -> TouchSites:
     """Far-field compliance at surface points (k, 3) m with outward normals (k, 3).
 
-    mesh: linear or quadratic (use quadratic: linear tetrahedra lock). patch_width_m: None takes 0.8 surface
-    edges. curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh. solver: reuse a
-    factorisation of the same mesh, Poisson's ratio and moduli. Raises MeshError for points off the surface.
+    mesh: linear or quadratic; modulus_ratio: (m,). patch_width_m: None takes `patch_width`.
+    curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh.
+    solver: a factorisation to reuse, whose own mesh then counts; None makes `touch_solver(mesh, ...)`.
+    Raises MeshError for points off the surface.
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
     normals = np.atleast_2d(np.asarray(normals, dtype=float))
@@ -77,9 +100,9 @@ def touch_sites(
             f"points {points.shape} and normals {normals.shape} must both be (k, 3), normals not 0"
         )
     normals = normals / length
-    width = patch_width_m or PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh)
-    solver = solver or Solver(mesh, poisson_ratio, modulus_ratio)
-    sampler = PatchSampler(mesh, width)
+    solver = solver or touch_solver(mesh, poisson_ratio, modulus_ratio)
+    width = patch_width_m or patch_width(solver.mesh)
+    sampler = PatchSampler(solver.mesh, width)
     far = np.empty((len(points), 3, 3))
     for start in range(0, len(points), _BATCH):
         batch = range(start, min(start + _BATCH, len(points)))
@@ -96,16 +119,21 @@ def touch_sites(
 
 def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """(k, 3, 3) mean displacement a unit force of each patch (nodes, weights), unit modulus, 1/m."""
-    forces = np.zeros((len(solver.mesh.points), 3, 3 * len(patches)))
-    for k, (nodes, weights) in enumerate(patches):
-        for axis in range(3):
-            forces[nodes, axis, 3 * k + axis] = weights
-    displacement = solver.solve(forces)
+    displacement = patch_solutions(solver, patches)
     result = np.empty((len(patches), 3, 3))
     for k, (nodes, weights) in enumerate(patches):
         block = np.einsum("n,nar->ar", weights, displacement[nodes][:, :, 3 * k : 3 * k + 3])
         result[k] = (block + block.T) / 2
     return result
+
+
+def patch_solutions(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """(n, 3, 3k) m Pa: displacement of all nodes for unit forces x, y, z on each patch (nodes, weights)."""
+    forces = np.zeros((len(solver.mesh.points), 3, 3 * len(patches)))
+    for k, (nodes, weights) in enumerate(patches):
+        for axis in range(3):
+            forces[nodes, axis, 3 * k + axis] = weights
+    return solver.solve(forces)
 
 
 def mean_curvature(

@@ -37,11 +37,11 @@ class Solver:
         self.matrix = full[self.free][:, self.free].tocsr()
         try:
             if self.backend == "pardiso":
-                self._solve = pardiso.Pardiso(self.matrix).solve
+                self._factor = pardiso.Pardiso(self.matrix)
             else:
-                self._solve = spla.splu(
+                self._factor = spla.splu(
                     self.matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True}
-                ).solve
+                )
         except (ArithmeticError, RuntimeError) as error:
             raise MeshError(
                 f"the stiffness cannot be factorised ({error}): fix at least three nodes that are not in "
@@ -56,10 +56,21 @@ class Solver:
         result[self.free] = self.solve_free(flat[self.free]).reshape(len(self.free), -1)
         return result.reshape(forces.shape)
 
+    def quadratic_forms(self, right: np.ndarray) -> np.ndarray:
+        """Nodal displacements times the modulus, m Pa; forces (n, 3) or (n, 3, r), N."""
+        f, r, c = right.shape
+        flat = np.asfortranarray(right.reshape(f, r * c))
+        if self.backend == "pardiso":
+            half = self._factor.half_solve(flat).reshape(f, r, c)
+            return np.einsum("fri,frj->rij", half, half, optimize=True)
+        solution = self.solve_free(flat).reshape(f, r, c)
+        result = np.einsum("fri,frj->rij", right, solution, optimize=True)
+        return 0.5 * (result + result.transpose(0, 2, 1))
+
     def solve_free(self, right: np.ndarray) -> np.ndarray:
         """Solutions (f, r) for right-hand sides (f, r) over the free degrees of freedom (`.free`,
         ascending)."""
-        return self._solve(np.asfortranarray(right, dtype=float))
+        return self._factor.solve(np.asfortranarray(right, dtype=float))
 
 
 def free_dofs(mesh: TetMesh) -> np.ndarray:

@@ -1,11 +1,8 @@
-"""The compliance that a servo interpolates: the give of the surface under a Gaussian patch, corner by corner.
+"""The compliance that a servo interpolates, for unit Young's modulus; two tables, since two things are asked.
 
-Entry (i, j) is the mean displacement under the patch at corner i for a unit force on the patch at corner
-j. Between
-corners it is interpolated with barycentric weights; what that flattens, the peak of the half-space under
-one's own
-patch, is known in closed form and is taken out at the corners and nowhere put back: the far field is
-what remains.
+How one place gives under its own touch (`own`): sharp near edges and the base, so it is computed with a patch
+as narrow as a contact, at the corners of a surface finer than the mesh's. How a touch moves the rest of the
+object (`blocks`): smooth, so a patch as wide as the mesh's own elements and the mesh's own corners serve.
 """
 
 from __future__ import annotations
@@ -14,26 +11,27 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 from numba import njit
-from scipy.special import ive
+from scipy.spatial import cKDTree
 
-from mechanics.patch import PatchSampler
+from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
-from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES, mean_curvature, typical_edge
+from mechanics.sites import mean_curvature, patch_width, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh, vertex_normals
 
-_CORNERS = 16  # patches solved at once
+_CORNERS = 32  # patches solved at once
 
 
 @dataclass(frozen=True)
 class SurfaceCompliance:
-    """Unit modulus, device frame, SI units; t corners of the touchable surface (the rim at the base
-    included).
+    """Device frame, SI units; the touchable surface with its rim at the base.
 
-    nodes: (t,) of the mesh. points, normals: (t, 3). curvature: (t,) 1/m, mean, convex positive.
-    triangles: (f, 3) into the corners, outward. blocks: (t, t, 3, 3) float32, 1/m, symmetric as a whole.
-    peaks: (f, 3) 1/m, the half-space's normal compliance between corners 01, 12, 20 of each triangle.
-    patch_width_m, poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its norm.
+    Coarse, t corners of the mesh: nodes (t,), points, normals (t, 3), curvature (t,) 1/m mean and convex
+    positive, triangles (f, 3) into them, blocks (t, t, 3, 3) float32, 1/m: displacement of the patch at i for
+    a unit force on the patch at j; symmetric as a whole. patch_width_m: (1,).
+    Fine, v corners: own_points, own_normals (v, 3), own_curvature (v,), own_triangles (g, 3) into them, own
+    (v, 3, 3), 1/m: displacement of the patch at i for a unit force on itself. own_width_m: (1,).
+    poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.
     """
 
     nodes: np.ndarray
@@ -42,8 +40,13 @@ class SurfaceCompliance:
     curvature: np.ndarray
     triangles: np.ndarray
     blocks: np.ndarray
-    peaks: np.ndarray
     patch_width_m: np.ndarray
+    own_points: np.ndarray
+    own_normals: np.ndarray
+    own_curvature: np.ndarray
+    own_triangles: np.ndarray
+    own: np.ndarray
+    own_width_m: np.ndarray
     poisson_ratio: np.ndarray
 
     def __post_init__(self) -> None:
@@ -59,34 +62,19 @@ class SurfaceCompliance:
         """The inverse of `arrays`."""
         return cls(**arrays)
 
-    @property
-    def own_peak(self) -> float:
-        """Normal compliance of a half-space under its own patch, 1/m: (1 - nu^2) / (2 sqrt(pi) s)."""
-        return float((1 - self.poisson_ratio[0] ** 2) / (2 * np.sqrt(np.pi) * self.patch_width_m[0]))
+    def far_at(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """(k, 3, 3) far-field compliance, 1/m, at surface points (k, 3) with normals (k, 3).
 
-    @property
-    def sideways_ratio(self) -> float:
-        """Tangential over normal compliance of a half-space: (2 - nu) / (2 (1 - nu))."""
-        return float((2 - self.poisson_ratio[0]) / (2 * (1 - self.poisson_ratio[0])))
-
-    def far(self, triangle: int, barycentric: np.ndarray, normal: np.ndarray) -> np.ndarray:
-        """(3, 3) far-field compliance 1/m at one point: what TouchSites.far holds for a site there."""
-        out = np.empty((3, 3))
-        far_block(
-            self.blocks,
-            self.triangles[triangle],
-            np.asarray(barycentric, dtype=float),
-            np.asarray(normal, dtype=float),
-            self.peaks[triangle],
-            self.own_peak,
-            self.sideways_ratio,
-            out,
-        )
-        return out
+        Interpolated in the nearest fine triangle; what TouchSites.far holds for a site there.
+        """
+        points, normals = np.atleast_2d(points), np.atleast_2d(normals)
+        triangle, weights = closest_on_triangles(points, self.own_points, self.own_triangles)
+        own = np.einsum("kc,kcab->kab", weights, self.own[self.own_triangles[triangle]])
+        nu, width = float(self.poisson_ratio[0]), float(self.own_width_m[0])
+        return own - np.array([half_space_compliance(n, nu, width) for n in normals])
 
     def displacement(self, triangle: int, barycentric: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(t, 3) m Pa: motion of all corners for a force (3,) N on the object at one point, times the
-        modulus."""
+        """(t, 3) m Pa: motion of all corners for a force (3,) N on the object, times the modulus."""
         corners = self.triangles[triangle]
         mixed = np.einsum("c,icab->iab", np.asarray(barycentric), self.blocks[:, corners].astype(float))
         return mixed @ np.asarray(force, dtype=float)
@@ -94,8 +82,7 @@ class SurfaceCompliance:
 
 @njit(cache=True, error_model="numpy")
 def between_block(blocks, corners_p, weights_p, corners_q, weights_q, out):
-    """out (3, 3) 1/m: displacement at p a unit force at q, interpolated; corners (3,), weights (3,)
-    barycentric."""
+    """out (3, 3) 1/m: displacement at p a unit force at q; corners (3,), weights (3,) barycentric."""
     out[:] = 0.0
     for i in range(3):
         for j in range(3):
@@ -106,36 +93,48 @@ def between_block(blocks, corners_p, weights_p, corners_q, weights_q, out):
                     out[a, b] += w * block[a, b]
 
 
-@njit(cache=True, error_model="numpy")
-def far_block(blocks, corners, weights, normal, peaks, own_peak, sideways_ratio, out):
-    """out (3, 3) 1/m: far-field compliance at one point; peaks (3,) of its triangle, normal (3,) unit."""
-    between_block(blocks, corners, weights, corners, weights, out)
-    peak = own_peak * (weights[0] ** 2 + weights[1] ** 2 + weights[2] ** 2)
-    peak += 2.0 * (
-        weights[0] * weights[1] * peaks[0]
-        + weights[1] * weights[2] * peaks[1]
-        + weights[2] * weights[0] * peaks[2]
-    )
-    for a in range(3):
-        out[a, a] -= peak * sideways_ratio
-        for b in range(3):
-            out[a, b] -= peak * (1.0 - sideways_ratio) * normal[a] * normal[b]
-    for a in range(3):
-        for b in range(a):
-            mean = 0.5 * (out[a, b] + out[b, a])
-            out[a, b] = mean
-            out[b, a] = mean
+def closest_on_triangles(
+    points: np.ndarray, corners: np.ndarray, triangles: np.ndarray, *, candidates: int = 24
+) -> tuple[np.ndarray, np.ndarray]:
+    """Nearest triangle (k,) and barycentric weights (k, 3) of the nearest point on it, for points (k, 3).
 
-
-def half_space_between(distance_m: np.ndarray, poisson_ratio: float, width_m: float) -> np.ndarray:
-    """Normal compliance 1/m between two Gaussian patches of a half-space, unit modulus, centres a
-    distance apart.
-
-    (1 - nu^2) / (2 sqrt(pi) s) exp(-q) I0(q) with q = r^2 / (8 s^2); (1 - nu^2) / (pi r) far away
-    (Boussinesq).
+    Among the triangles with the nearest centres; weights are not negative and sum to 1.
     """
-    q = np.asarray(distance_m) ** 2 / (8 * width_m**2)
-    return (1 - poisson_ratio**2) / (2 * np.sqrt(np.pi) * width_m) * ive(0, q)
+    p = corners[triangles]
+    count = min(candidates, len(triangles))
+    _, near = cKDTree(p.mean(axis=1)).query(points, k=count)
+    near = np.asarray(near).reshape(len(points), count)
+    best = np.full(len(points), np.inf)
+    chosen = np.zeros(len(points), dtype=np.int64)
+    weights = np.zeros((len(points), 3))
+    for k in range(count):
+        w = _closest_weights(points, p[near[:, k]])
+        distance = np.linalg.norm(np.einsum("kc,kcx->kx", w, p[near[:, k]]) - points, axis=1)
+        better = distance < best - 1e-12
+        best[better], chosen[better], weights[better] = distance[better], near[better, k], w[better]
+    return chosen, weights
+
+
+def _closest_weights(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(k, 3) barycentric weights of the point of each triangle (k, 3, 3) nearest to its point (k, 3)."""
+    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
+    u, v, w = b - a, c - a, points - a
+    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
+    wu, wv = (w * u).sum(1), (w * v).sum(1)
+    det = uu * vv - uv * uv
+    s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
+    weights = np.stack([1 - s - t, s, t], axis=1)
+    outside = (weights < 0).any(axis=1)
+    best = np.full(len(points), np.inf)
+    for i, j in ((0, 1), (1, 2), (2, 0)):
+        side = triangles[:, j] - triangles[:, i]
+        f = np.clip(((points - triangles[:, i]) * side).sum(1) / (side * side).sum(1), 0, 1)
+        distance = np.linalg.norm(points - triangles[:, i] - f[:, None] * side, axis=1)
+        use = outside & (distance < best)
+        best[use] = distance[use]
+        weights[use] = 0
+        weights[use, i], weights[use, j] = 1 - f[use], f[use]
+    return weights
 
 
 def surface_compliance(
@@ -143,51 +142,85 @@ def surface_compliance(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
-    patch_width_m: float | None = None,
-    solver: Solver | None = None,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
-    """Solve for a patch at every corner of the touchable surface. mesh: quadratic; width: None, 0.8 edges."""
-    triangles = mesh.touchable_surface[:, :3]
-    nodes, local = np.unique(triangles, return_inverse=True)
-    local = local.reshape(-1, 3)
-    points = mesh.points[nodes]
-    normals = vertex_normals(mesh.points, triangles)[nodes]
-    width = patch_width_m or PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh)
-    solver = solver or Solver(mesh, poisson_ratio, modulus_ratio)
-    sampler = PatchSampler(mesh, width)
-    average = sampler.matrix(points)
-    t = len(nodes)
-    blocks = np.empty((t, t, 3, 3), dtype=np.float32)
-    for start in range(0, t, _CORNERS):
-        part = slice(start, min(start + _CORNERS, t))
-        count = part.stop - start
-        loads = np.zeros((len(mesh.points), 3, count, 3))
-        dense = average[part].toarray().T
-        for axis in range(3):
-            loads[:, axis, :, axis] = dense
-        moved = solver.solve(loads.reshape(len(mesh.points), 3, 3 * count))
-        means = average @ moved.reshape(len(mesh.points), -1)
-        blocks[:, part] = means.reshape(t, 3, count, 3).transpose(0, 2, 1, 3)
-        progress("surface compliance", part.stop / t)
-    _symmetrise(blocks)
-    corners = points[local]
-    sides = np.linalg.norm(corners - np.roll(corners, -1, axis=1), axis=2)
+    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None."""
+    coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio)
+    nodes, triangles = _corners(coarse.mesh)
+    points = coarse.mesh.points[nodes]
+    width = patch_width(coarse.mesh)
+    blocks = _blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
+    curvature = mean_curvature(mesh, points, normals := _normals(coarse.mesh, nodes))
+    del coarse
+    fine = touch_solver(mesh, poisson_ratio, modulus_ratio)
+    own_nodes, own_triangles = _corners(fine.mesh)
+    own_points = fine.mesh.points[own_nodes]
+    own_normals = _normals(fine.mesh, own_nodes)
+    own_width = patch_width(fine.mesh)
+    own = _own(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f))
     return SurfaceCompliance(
         nodes=nodes,
         points=points,
         normals=normals,
-        curvature=mean_curvature(mesh, points, normals),
-        triangles=local,
+        curvature=curvature,
+        triangles=triangles,
         blocks=blocks,
-        peaks=half_space_between(sides, poisson_ratio, width),
         patch_width_m=np.array([width]),
-        poisson_ratio=np.array([poisson_ratio]),
+        own_points=own_points,
+        own_normals=own_normals,
+        own_curvature=mean_curvature(mesh, own_points, own_normals),
+        own_triangles=own_triangles,
+        own=own,
+        own_width_m=np.array([own_width]),
+        poisson_ratio=np.array([float(poisson_ratio)]),
     )
 
 
-def _symmetrise(blocks: np.ndarray) -> None:
-    for i in range(len(blocks)):
+def _corners(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
+    """Corner nodes (t,) of the touchable surface, and its triangles (f, 3) into them."""
+    nodes, local = np.unique(mesh.touchable_surface[:, :3], return_inverse=True)
+    return nodes, local.reshape(-1, 3)
+
+
+def _normals(mesh: TetMesh, nodes: np.ndarray) -> np.ndarray:
+    return vertex_normals(mesh.points, mesh.touchable_surface[:, :3])[nodes]
+
+
+def _blocks(solver: Solver, points: np.ndarray, width: float, tell) -> np.ndarray:  # type: ignore[no-untyped-def]
+    mesh = solver.mesh
+    average = PatchSampler(mesh, width).matrix(points)
+    t = len(points)
+    blocks = np.empty((t, t, 3, 3), dtype=np.float32)
+    for start in range(0, t, _CORNERS):
+        part = slice(start, min(start + _CORNERS, t))
+        count = part.stop - start
+        moved = solver.solve(_loads(average[part]).reshape(len(mesh.points), 3, 3 * count))
+        means = average @ moved.reshape(len(mesh.points), -1)
+        blocks[:, part] = means.reshape(t, 3, count, 3).transpose(0, 2, 1, 3)
+        tell(part.stop / t)
+    for i in range(t):
         mean = 0.5 * (blocks[i, i:] + blocks[i:, i].transpose(0, 2, 1))
         blocks[i, i:] = mean
         blocks[i:, i] = mean.transpose(0, 2, 1)
+    return blocks
+
+
+def _own(solver: Solver, points: np.ndarray, width: float, tell) -> np.ndarray:  # type: ignore[no-untyped-def]
+    average = PatchSampler(solver.mesh, width).matrix(points)
+    own = np.empty((len(points), 3, 3))
+    for start in range(0, len(points), _CORNERS):
+        part = slice(start, min(start + _CORNERS, len(points)))
+        count = part.stop - start
+        loads = _loads(average[part]).reshape(-1, count, 3)
+        own[part] = solver.quadratic_forms(loads[solver.free])
+        tell(part.stop / len(points))
+    return own
+
+
+def _loads(average) -> np.ndarray:  # type: ignore[no-untyped-def]
+    """(n, 3, k, 3) nodal forces of unit loads x, y, z on each of k patches, from weights (k, n)."""
+    dense = average.toarray().T
+    loads = np.zeros((len(dense), 3, dense.shape[1], 3))
+    for axis in range(3):
+        loads[:, axis, :, axis] = dense
+    return loads

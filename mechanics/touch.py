@@ -19,6 +19,7 @@ from numba import njit
 from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
 from mechanics.sites import tangents
 
+_STIFFEST = 0.8  # of a contact's own give, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
 STATE_SIZE = 4 + 3 * _RINGS
 """state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
@@ -62,7 +63,9 @@ def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     k = stick * reach
     bu = free_u + stick * (cuu * mu + cuv * mv)
     bv = free_v + stick * (cuv * mu + cvv * mv)
-    m00, m01, m11 = 1.0 + k * cuu, k * cuv, 1.0 + k * cvv
+    m00, m01, m11 = max(1.0 + k * cuu, 1.0 - _STIFFEST), k * cuv, max(1.0 + k * cvv, 1.0 - _STIFFEST)
+    if m01 * m01 > _STIFFEST * m00 * m11:
+        m01 = 0.0
     det = m00 * m11 - m01 * m01
     du = (m11 * bu - m01 * bv) / det
     dv = (m00 * bv - m01 * bu) / det
@@ -70,7 +73,13 @@ def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
 
 
 @njit(cache=True, error_model="numpy")
-def _remember(state, a, du, dv, thin):
+def touch_remember(state, dent, a, du, dv, radius):
+    """Write what touch_solve found into the memory; a dent of 0 forgets everything (the tip has let go)."""
+    if not dent > 0.0:
+        state[0] = state[1] = state[2] = state[3] = 0.0
+        return
+    state[1] = dent
+    thin = radius / 64.0
     count = int(state[0])
     top = state[4 + 3 * (count - 1)] if count > 0 else 0.0
     if a > top:
@@ -91,6 +100,44 @@ def _remember(state, a, du, dv, thin):
 
 
 @njit(cache=True, error_model="numpy")
+def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
+    """Force at displacement d without writing the memory: (f_u, f_v, f_n, dent, a, d_u, d_v, k_n).
+
+    Arguments as for touch_step. f: N on the tool, local frame. dent: m. a: stick radius, m. d_u, d_v:
+    tangential dent, m. k_n: slope of the normal force against pressing deeper, N/m. `touch_remember` takes
+    what it needs.
+    """
+    press = -d[2]
+    if not press > 0.0:
+        return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    cuu, cuv, cvv, cnn = far[0, 0], far[0, 1], far[1, 1], far[2, 2]
+    cun, cvn = far[0, 2], far[1, 2]
+    low, high = 0.0, np.inf
+    dent = state[1] if state[1] > 0.0 else 0.5 * press
+    tolerance = 1e-10 * radius
+    fn = fu = fv = a = du = dv = stiffness = give = 0.0
+    for _ in range(80):
+        fn, stiffness, a = dent_force(table, dent, radius, plane_strain_modulus)
+        # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
+        # that
+        give = max(cnn, -_STIFFEST / stiffness)
+        # on the object the normal force is -fn n; its far-field give appears in the tangential balance
+        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[0] + cun * fn, d[1] + cvn * fn)
+        excess = dent + give * fn - cun * fu - cvn * fv - press
+        if excess > 0.0:
+            high = dent
+        else:
+            low = dent
+        step = -excess / (1.0 + give * stiffness)
+        if abs(step) < tolerance:
+            break
+        dent += step
+        if not (low < dent < high):
+            dent = 0.5 * (low + high) if high < np.inf else 2.0 * low + tolerance
+    return -fu, -fv, fn, dent, a, du, dv, stiffness / (1.0 + give * stiffness)
+
+
+@njit(cache=True, error_model="numpy")
 def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
     """Advance one touch to displacement d: (f_u, f_v, f_n) on the tool, N, local frame (u, v, n).
 
@@ -99,34 +146,9 @@ def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
     far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective, m.
     plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
     """
-    press = -d[2]
-    if not press > 0.0:
-        state[0] = state[1] = state[2] = state[3] = 0.0
-        return 0.0, 0.0, 0.0
-    cuu, cuv, cvv, cnn = far[0, 0], far[0, 1], far[1, 1], far[2, 2]
-    cun, cvn = far[0, 2], far[1, 2]
-    low, high = 0.0, np.inf
-    dent = state[1] if state[1] > 0.0 else 0.5 * press
-    tolerance = 1e-10 * radius
-    fn = fu = fv = a = du = dv = 0.0
-    for _ in range(60):
-        fn, stiffness, a = dent_force(table, dent, radius, plane_strain_modulus)
-        # on the object the normal force is -fn n; its far-field give appears in the tangential balance
-        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[0] + cun * fn, d[1] + cvn * fn)
-        excess = dent + cnn * fn - cun * fu - cvn * fv - press
-        if excess > 0.0:
-            high = dent
-        else:
-            low = dent
-        step = -excess / (1.0 + cnn * stiffness)
-        if abs(step) < tolerance:
-            break
-        dent += step
-        if not (low < dent < high):
-            dent = 0.5 * (low + high) if high < np.inf else 2.0 * low + tolerance
-    _remember(state, a, du, dv, radius / 64.0)
-    state[1] = dent
-    return -fu, -fv, fn
+    fu, fv, fn, dent, a, du, dv, _ = touch_solve(state, d, far, table, radius, plane_strain_modulus, stick)
+    touch_remember(state, dent, a, du, dv, radius)
+    return fu, fv, fn
 
 
 @njit(cache=True, error_model="numpy")
