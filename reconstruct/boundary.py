@@ -107,8 +107,8 @@ def find_interval(
             return a, b
     raise ContactError(
         "no boundary phase found: no contact slides further than 16 tip radii in one plane; trace "
-        "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a model whose base "
-        "stands in"
+        "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
+        "model whose base stands in"
     )
 
 

@@ -93,8 +93,8 @@ def fit_paper_modulus(
         deepest = max(c.depth_m for c in exploration.contacts)
         raise ContactError(
             f"{len(used)} of {len(moved)} palpations reach the indentation of "
-            f"{options.indentation_m * 1e3:g} mm (the deepest {deepest * 1e3:.1f} mm); at least 2 are needed: "
-            "give a smaller --indentation"
+            f"{options.indentation_m * 1e3:g} mm (the deepest {deepest * 1e3:.1f} mm); at least 2 are "
+            "needed: give a smaller --indentation"
         )
     node = np.full(len(moved), -1)
     touchable = np.flatnonzero(mesh.touchable)

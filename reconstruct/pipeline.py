@@ -26,6 +26,7 @@ from reconstruct.meshing import Meshing, MeshingOptions, mesh_surface, uncertain
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, fit_paper, fit_robust
+from reconstruct.shape_error import compliance_covariance
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 from reconstruct.uniaxial import palpation_rows, profiles
 
@@ -121,7 +122,11 @@ def reconstruct_fully(
         )
         clock.lap("touch sites")
         progress("modulus", 0.8)
-        fit = fit_modulus(exploration, sites, options.modulus, seed=options.seed)
+        covariance = compliance_covariance(solver, sites, uncertainty_at(mesh, surface))
+        clock.lap("shape error")
+        fit = fit_modulus(
+            exploration, sites, options.modulus, compliance_covariance=covariance, seed=options.seed
+        )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
     clock.lap("modulus")
     progress("1D models", 0.95)

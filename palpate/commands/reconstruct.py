@@ -119,8 +119,10 @@ def _figures(result: Reconstruction) -> dict[str, Any]:
     if fit:
         figures |= {
             "dent_law": fit.press.law,
-            "by_law": {k: {"young_modulus_pa": e, "misfit_n": m} for k, (e, m) in fit.by_law.items()},
-            "by_depth": [{"depth_m": d, "young_modulus_pa": e} for d, e in fit.by_depth],
+            "by_law": {
+                k: {"young_modulus_pa": e, "misfit_n": m, "share": s} for k, (e, m, s) in fit.by_law.items()
+            },
+            "by_depth": [{"depth_m": d, "young_modulus_pa": e, "consistent": c} for d, e, c in fit.by_depth],
             "between_sites": fit.between,
             "shape_error": fit.shape_error,
         }

@@ -1,0 +1,164 @@
+"""Each press fitted by the touch law: its modulus in closed form, its first touch as a nuisance.
+
+For a given path the force of the touch law (mechanics.touch) is proportional to the modulus, f = e g(d), with
+d the tip's displacement since first touch and g the law for unit modulus; so e is linear least squares, and
+only the shift u0 of the first touch along the normal is searched (Gauss-Newton, all presses at once).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.sites import TouchSites
+from mechanics.touch import touch_forces
+from reconstruct.contacts import Exploration
+
+_BLOCK_S = 0.004
+_LEAD_S = 0.03
+_CORRELATED = 10  # rows of one press that a lasting error of the law binds together
+
+
+@dataclass(frozen=True)
+class PressData:
+    """Block means of all presses: displacement since first touch (n, 3) m, force on the tool (n, 3) N.
+
+    starts: (k + 1,) first row of each press. noise_n: standard deviation of a row an axis. onset_sd_m: (k,)
+    prior of the first touch along the normal.
+    """
+
+    displacement: np.ndarray
+    force: np.ndarray
+    starts: np.ndarray
+    noise_n: float
+    onset_sd_m: np.ndarray
+
+    @property
+    def press(self) -> np.ndarray:
+        """(n,) the press of each row."""
+        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
+
+
+@dataclass(frozen=True)
+class LawFit:
+    """Every press fitted by one law up to one depth.
+
+    modulus_pa: (k,). relative_error: (k,) standard error of ln e. onset_shift_m: (k,) first touch moves by
+    this along the outward normal. rms_n: (k,) vector misfit, N. cost: (k,) weighted squared residuals,
+    comparable between laws at the same depth. rows: (k,) rows used.
+    """
+
+    law: str
+    depth_m: float
+    modulus_pa: np.ndarray
+    relative_error: np.ndarray
+    onset_shift_m: np.ndarray
+    rms_n: np.ndarray
+    cost: np.ndarray
+    rows: np.ndarray
+
+
+def press_data(exploration: Exploration) -> PressData:
+    """Block means (4 ms) of every press from 30 ms before first touch to loss of touch, free-air force
+    off."""
+    recording = exploration.recording
+    force = recording.force_on_tool - exploration.free_air
+    block = max(1, round(_BLOCK_S * recording.sample_rate_hz))
+    lead = int(_LEAD_S * recording.sample_rate_hz)
+    moved, pushed, starts = [], [], [0]
+    for contact in exploration.contacts:
+        a, b = max(0, contact.start - lead), contact.end
+        rows = max(1, (b - a) // block)
+        size = min(block, b - a)
+        part = slice(a, a + rows * size)
+        moved.append(recording.position[part].reshape(rows, size, 3).mean(axis=1) - contact.centre)
+        pushed.append(force[part].reshape(rows, size, 3).mean(axis=1))
+        starts.append(starts[-1] + rows)
+    prior = np.array([2 * max(c.onset_error_m, 2e-5) for c in exploration.contacts])
+    return PressData(
+        np.vstack(moved), np.vstack(pushed), np.array(starts), exploration.noise_n / np.sqrt(block), prior
+    )
+
+
+def fit_law(
+    data: PressData,
+    sites: TouchSites,
+    tip_radius_m: float,
+    law: str,
+    depth_m: float,
+    law_error: float,
+    start: LawFit | None = None,
+) -> LawFit:
+    """Modulus and onset shift of every press from its samples shallower than `depth_m`.
+
+    start: an earlier fit whose onset shifts are a good guess. law_error: error of the law as a share of the
+    force; a sample's variance is noise^2 + (law_error |f|)^2.
+    """
+    press, k = data.press, len(sites)
+    normals = sites.normals[press]
+    used = -np.einsum("ij,ij->i", data.displacement, normals) < depth_m
+    squared_force = np.einsum("ij,ij->i", data.force, data.force)
+    weight = np.where(used, 1.0 / (data.noise_n**2 + law_error**2 * squared_force / 3), 0.0)
+
+    def unit(shift: np.ndarray) -> np.ndarray:
+        return touch_forces(
+            data.displacement + shift[press, None] * normals,
+            data.starts,
+            sites.normals,
+            sites.far,
+            young_modulus_pa=1.0,
+            poisson_ratio=sites.poisson_ratio,
+            tip_radius_m=tip_radius_m,
+            curvature=sites.curvature,
+            law=law,
+        )
+
+    def summed(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+        return np.bincount(press, weights=weight * np.einsum("ij,ij->i", a, b), minlength=k)
+
+    def modulus(g: np.ndarray) -> np.ndarray:
+        return summed(g, data.force) / np.maximum(summed(g, g), 1e-300)
+
+    step = 2e-5
+    shift = np.zeros(k) if start is None else start.onset_shift_m
+    g = unit(shift)
+    e = modulus(g)
+    for _ in range(6):
+        slope = e[press, None] * (unit(shift + step) - g) / step
+        residual = data.force - e[press, None] * g
+        a_ee, a_eu = summed(g, g), summed(g, slope)
+        a_uu = summed(slope, slope) + data.onset_sd_m**-2.0
+        y_e, y_u = summed(g, residual), summed(slope, residual) - shift * data.onset_sd_m**-2.0
+        det = np.maximum(a_ee * a_uu - a_eu**2, 1e-300)
+        change = np.clip((a_ee * y_u - a_eu * y_e) / det, -2e-4, 2e-4)
+        shift = np.clip(shift + change, -1e-3, 1e-3)
+        g = unit(shift)
+        e = modulus(g)
+        if np.abs(change).max() < 5e-6:
+            break
+    residual = data.force - e[press, None] * g
+    cost = summed(residual, residual)
+    rows = np.bincount(press, weights=used, minlength=k)
+    squared = np.bincount(press, weights=used * (residual**2).sum(axis=1), minlength=k)
+    scale = np.maximum(cost / np.maximum(3 * rows, 1), 1.0)
+    error = np.sqrt(_CORRELATED * scale * a_uu / det) / np.maximum(e, 1e-300)
+    return LawFit(law, depth_m, e, error, shift, np.sqrt(squared / np.maximum(rows, 1)), cost, rows)
+
+
+def far_sensitivity(
+    data: PressData, sites: TouchSites, fit: LawFit, tip_radius_m: float, law_error: float
+) -> np.ndarray:
+    """(k,) m: change of ln e of every press per unit of change of its far-field compliance along the normal,
+    1/m."""
+    step = 0.05 * np.abs(np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)) + 0.1
+    changed = TouchSites(
+        sites.points,
+        sites.normals,
+        sites.curvature,
+        sites.far + step[:, None, None] * np.einsum("ka,kb->kab", sites.normals, sites.normals),
+        sites.patch_width_m,
+        sites.poisson_ratio,
+    )
+    other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, fit)
+    return np.log(other.modulus_pa / fit.modulus_pa) / step
