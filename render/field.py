@@ -29,20 +29,10 @@ def far_field(mesh: TetMesh, surface: ContactSurface, compliance: SurfaceComplia
     number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
     number[compliance.nodes] = np.arange(len(compliance.nodes))
     parents = np.ascontiguousarray(number[surface.parents])
-    where = {tuple(sorted(t)): i for i, t in enumerate(compliance.triangles.tolist())}
-    far = np.zeros((len(arrays.vertices), 3, 3))
     touched = np.unique(arrays.triangles[arrays.free > 0])
+    points, normals = arrays.vertices[touched], arrays.normals[touched]
+    far = np.zeros((len(arrays.vertices), 3, 3))
+    far[touched] = compliance.far_at(points, normals)
     curvature = np.zeros(len(arrays.vertices))
-    curvature[touched] = mean_curvature(mesh, arrays.vertices[touched], arrays.normals[touched])
-    done = np.zeros(len(arrays.vertices), dtype=bool)
-    for k in np.flatnonzero(arrays.free):
-        for c in range(3):
-            vertex = arrays.triangles[k, c]
-            if done[vertex]:
-                continue
-            done[vertex] = True
-            triangle = where[tuple(sorted(parents[k].tolist()))]
-            order = [parents[k].tolist().index(n) for n in compliance.triangles[triangle].tolist()]
-            weights = surface.parent_weights[k, c][order]
-            far[vertex] = compliance.far(triangle, weights, arrays.normals[vertex])
+    curvature[touched] = mean_curvature(mesh, points, normals)
     return Field(far, curvature, parents)
