@@ -89,18 +89,18 @@ def fit_robust(presses: Sequence[Press]) -> list[OneD]:
     """The same models with bounded, robust estimators, all presses at once.
 
     For every exponent on a grid k and b follow in closed form (weighted least squares, b >= 0); the grid is
-    refined twice. Weights are Huber's at 2 robust standard deviations of each press's residual.
+    refined four times. Weights are Huber's at 2 robust standard deviations of each press's residual.
     """
     if not presses:
         return []
     u, v, f, used = _padded(presses)
-    one = np.ones((len(presses), 1))
-    k_kv, b_kv, _ = _linear(u, v, f, used, one)
-    k_v, _, _ = _linear(u, np.zeros_like(v), f, used, one)
+    still = np.zeros_like(v)
+    k_kv, b_kv = _linear(np.where(used, u, 0.0), v, f, used)
+    k_v, _ = _linear(np.where(used, u, 0.0), still, f, used)
     k_hc, b_hc, r_hc = _exponent(u, v, f, used)
-    k_c, _, r_c = _exponent(u, np.zeros_like(v), f, used)
+    k_c, _, r_c = _exponent(u, still, f, used)
     mean_r = float(np.mean(r_c[used.sum(axis=1) >= 4])) if (used.sum(axis=1) >= 4).any() else 1.0
-    k_h, _, _ = _linear(u, np.zeros_like(v), f, used, np.full((len(presses), 1), mean_r))
+    k_h, _ = _linear(np.where(used, u**mean_r, 0.0), still, f, used)
     return [
         _assembled(p, (k_kv[i], b_kv[i]), (k_hc[i], b_hc[i], r_hc[i]), k_v[i], (k_c[i], r_c[i]), k_h[i])
         if used[i].sum() >= 4
@@ -120,59 +120,53 @@ def _padded(presses: Sequence[Press]) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 
 def _linear(
-    u: np.ndarray, v: np.ndarray, f: np.ndarray, used: np.ndarray, r: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """k, b and cost for f = u^r (k + b v) when r is given; (p, n) samples, (p, 1) r. Three Huber
-    re-weightings."""
-    basis = np.where(used, np.exp(r * np.log(u)), 0.0)
-    damped = basis * v
+    basis: np.ndarray, damped: np.ndarray, f: np.ndarray, used: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """k and b >= 0, (p,), of f = k basis + b damped; (p, n) samples; Huber weights, four rounds."""
     weight = used.astype(float)
     for _ in range(4):
         a11, a12 = (weight * basis * basis).sum(1), (weight * basis * damped).sum(1)
         a22 = (weight * damped * damped).sum(1)
-        y1, y2 = (weight * basis * f).sum(1), (weight * damped * f).sum(1)
-        det = a11 * a22 - a12**2
-        both = det > 1e-12 * a11 * np.maximum(a22, 1e-300)
-        b = np.where(both, (a11 * y2 - a12 * y1) / np.where(both, det, 1.0), 0.0)
-        b = np.maximum(b, 0.0)
-        k = np.maximum((y1 - a12 * b) / np.maximum(a11, 1e-300), 1e-9)
-        residual = np.where(used, basis * k[:, None] + damped * b[:, None] - f, 0.0)
-        size = np.abs(residual)
-        scale = 1.4826 * np.array(
-            [np.median(s[m]) if m.any() else 1.0 for s, m in zip(size, used, strict=True)]
-        )
-        limit = _HUBER * np.maximum(scale, 1e-9)[:, None]
+        k, b = _solved(a11, a12, a22, (weight * basis * f).sum(1), (weight * damped * f).sum(1))
+        size = np.where(used, np.abs(basis * k[:, None] + damped * b[:, None] - f), np.nan)
+        empty = ~used.any(axis=1)
+        size[empty] = 0.0
+        limit = _HUBER * 1.4826 * np.maximum(np.nanmedian(size, axis=1), 1e-9)[:, None]
         weight = np.where(used, np.minimum(1.0, limit / np.maximum(size, 1e-12)), 0.0)
-    cost = np.where(size < limit, 0.5 * size**2, limit * (size - 0.5 * limit)).sum(1)
-    return k, b, cost
+    return k, b
+
+
+def _solved(
+    a11: np.ndarray, a12: np.ndarray, a22: np.ndarray, y1: np.ndarray, y2: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """k > 0 and b >= 0 of the normal equations, element by element."""
+    det = a11 * a22 - a12**2
+    both = det > 1e-12 * a11 * np.maximum(a22, 1e-300)
+    b = np.maximum(np.where(both, (a11 * y2 - a12 * y1) / np.where(both, det, 1.0), 0.0), 0.0)
+    return np.maximum((y1 - a12 * b) / np.maximum(a11, 1e-300), 1e-9), b
 
 
 def _exponent(
     u: np.ndarray, v: np.ndarray, f: np.ndarray, used: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """k, b and r of the least plain squared cost: r on a grid, refined twice, then once with Huber
+    """k, b and r, (p,): r of the least squared cost on a grid refined four times, then k and b with Huber
     weights."""
     presses = len(u)
     low, high = np.full(presses, EXPONENTS[0]), np.full(presses, EXPONENTS[1])
     log_u = np.where(used, np.log(u), 0.0)
-    r = np.ones(presses)
-    for _ in range(3):
+    for _ in range(5):
         grid = np.linspace(low, high, 9, axis=1)
         basis = np.exp(grid[:, :, None] * log_u[:, None, :]) * used[:, None, :]
         damped = basis * v[:, None, :]
         a11, a12, a22 = (basis**2).sum(2), (basis * damped).sum(2), (damped**2).sum(2)
         y1, y2 = (basis * f[:, None]).sum(2), (damped * f[:, None]).sum(2)
-        det = a11 * a22 - a12**2
-        both = det > 1e-12 * a11 * np.maximum(a22, 1e-300)
-        b = np.maximum(np.where(both, (a11 * y2 - a12 * y1) / np.where(both, det, 1.0), 0.0), 0.0)
-        k = np.maximum((y1 - a12 * b) / np.maximum(a11, 1e-300), 1e-9)
+        k, b = _solved(a11, a12, a22, y1, y2)
         cost = k**2 * a11 + 2 * k * b * a12 + b**2 * a22 - 2 * (k * y1 + b * y2)
-        best = np.argmin(cost, axis=1)
+        r = grid[np.arange(presses), np.argmin(cost, axis=1)]
         step = (high - low) / 8
-        r = grid[np.arange(presses), best]
-        low = np.maximum(r - step, EXPONENTS[0])
-        high = np.minimum(r + step, EXPONENTS[1])
-    k, b, _ = _linear(u, v, f, used, r[:, None])
+        low, high = np.maximum(r - step, EXPONENTS[0]), np.minimum(r + step, EXPONENTS[1])
+    basis = np.where(used, np.exp(r[:, None] * log_u), 0.0)
+    k, b = _linear(basis, basis * v, f, used)
     return k, b, r
 
 

@@ -1,0 +1,72 @@
+"""Phase I gives the support plane and the base, in any frame, stated or detected."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
+
+from mechanics.errors import ContactError
+from reconstruct.boundary import BoundaryOptions, farthest_points, fit_plane
+from reconstruct.contacts import explore
+
+
+@pytest.mark.parametrize("clockwise", [False, True])
+def test_support_and_outline_in_a_tilted_frame(clockwise):
+    recording, _ = explore_cylinder(clockwise=clockwise)
+    boundary = explore(recording).boundary
+    assert boundary.support_normal @ TILTED.rotation[:, 2] > np.cos(np.radians(0.1))
+    rim = TILTED.object(boundary.outline)
+    assert np.abs(rim[:, 2]).max() < 2e-5
+    assert np.abs(np.hypot(rim[:, 0], rim[:, 1]) - RADIUS).max() < 2e-4
+    outward = boundary.outward @ TILTED.rotation
+    assert (np.einsum("ij,ij->i", outward[:, :2], rim[:, :2]) > 0).all()
+
+
+def test_a_phase_that_is_not_stated_is_detected():
+    stated, _ = explore_cylinder()
+    silent = dataclasses.replace(stated, boundary_phase=None)
+    a, b = explore(stated).boundary, explore(silent).boundary
+    assert a.interval == b.interval
+    assert np.allclose(a.support_normal, b.support_normal)
+
+
+def test_contact_that_outlasts_the_stated_phase_belongs_to_it():
+    recording, _ = explore_cylinder()
+    start, end = recording.boundary_phase
+    early = dataclasses.replace(recording, boundary_phase=(start, end - 0.1))
+    assert explore(early).boundary.interval == explore(recording).boundary.interval
+
+
+def test_no_phase_is_an_error_that_names_the_remedies():
+    recording, _ = explore_cylinder(without_phase=True)
+    with pytest.raises(ContactError, match="trace .*base.*model = PATH"):
+        explore(recording)
+
+
+def test_half_a_turn_is_an_error():
+    recording, _ = explore_cylinder(turn=0.5)
+    with pytest.raises(ContactError, match="degrees round the object; at least 288"):
+        explore(recording)
+
+
+def test_the_sample_of_the_base_leaves_no_gap_above_the_threshold(cylinder):
+    boundary = explore(cylinder[0], boundary_options=BoundaryOptions(base_spacing_m=0.008)).boundary
+    gap = np.linalg.norm(boundary.outline[:, None] - boundary.points[None], axis=2).min(axis=1)
+    assert gap.max() <= 0.008
+    spacing = np.linalg.norm(boundary.points[:, None] - boundary.points[None], axis=2)
+    assert spacing[~np.eye(len(spacing), dtype=bool)].min() > 0.004
+
+
+def test_farthest_points_stops_at_the_threshold():
+    line = np.column_stack([np.linspace(0, 1, 101), np.zeros(101), np.zeros(101)])
+    assert len(farthest_points(line, 0.24)) == 5
+
+
+def test_the_plane_ignores_samples_far_off_it():
+    random = np.random.default_rng(0)
+    points = random.uniform(-0.05, 0.05, (400, 3)) * [1, 1, 0] + 1e-5 * random.standard_normal((400, 3))
+    points[:60, 2] += 0.01
+    _, normal, rms = fit_plane(points)
+    assert abs(normal[2]) > 1 - 1e-6
+    assert rms < 3e-5

@@ -1,0 +1,110 @@
+"""Palpations: all found, first touch to a fraction of a millimetre, what is no palpation named."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
+
+from mechanics.errors import ContactError, OptionError
+from reconstruct.contacts import ContactOptions, explore
+
+
+def distance_to_cylinder(points: np.ndarray) -> np.ndarray:
+    q = np.column_stack(
+        [np.hypot(points[:, 0], points[:, 1]) - RADIUS, abs(points[:, 2] - HEIGHT / 2) - HEIGHT / 2]
+    )
+    return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(axis=1), 0)
+
+
+def onset_errors(exploration) -> np.ndarray:
+    centres = TILTED.object(np.array([c.centre for c in exploration.contacts]))
+    return distance_to_cylinder(centres) - TIP
+
+
+def test_every_press_is_found_with_its_first_touch(cylinder):
+    recording, onsets = cylinder
+    exploration = explore(recording)
+    assert len(exploration.contacts) == len(onsets)
+    errors = onset_errors(exploration)
+    assert np.median(np.abs(errors)) < 1e-4
+    assert np.abs(errors).max() < 3e-4
+    times = np.array([c.t_onset for c in exploration.contacts])
+    assert np.abs(times - onsets).max() < 0.02
+
+
+def test_the_fitted_onset_beats_the_papers_threshold():
+    recording, _ = explore_cylinder(modulus=60e3, give=5e-4, seed=3)
+    fitted, backtracked = onset_errors(explore(recording)), onset_errors(explore(recording, method="paper"))
+    assert np.median(np.abs(fitted)) < 0.5 * np.median(np.abs(backtracked))
+
+
+def test_stated_errors_of_first_touch_are_of_the_size_of_the_true_ones():
+    ratios = []
+    for seed in range(3):
+        exploration = explore(explore_cylinder(seed=seed)[0])
+        ratios += list(onset_errors(exploration) / [c.onset_error_m for c in exploration.contacts])
+    assert 0.2 < np.sqrt(np.median(np.square(ratios))) < 2.5
+
+
+def test_normals_come_from_the_force(cylinder):
+    exploration = explore(cylinder[0])
+    radial = TILTED.object(exploration.points) * [1, 1, 0]
+    top = TILTED.object(exploration.points)[:, 2] > HEIGHT - 0.004
+    radial[top] = [0, 0, 1]
+    radial /= np.linalg.norm(radial, axis=1, keepdims=True)
+    cosine = np.einsum("ij,ij->i", exploration.normals @ TILTED.rotation, radial)
+    assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 3
+
+
+def test_bias_and_drift_of_the_sensor_are_followed():
+    recording, onsets = explore_cylinder(bias=(0.05, -0.03, 0.04), drift_n_per_s=0.002)
+    exploration = explore(recording)
+    assert len(exploration.contacts) == len(onsets)
+    assert np.median(np.abs(onset_errors(exploration))) < 2e-4
+    expected = np.array([0.05, -0.03, 0.04]) + np.outer(recording.t, [0, 0.002, 0])
+    after = recording.t > 7
+    assert np.abs(exploration.free_air - expected)[after].max() < 0.01
+
+
+def test_a_press_on_the_support_is_rejected_and_named():
+    recording, onsets = explore_cylinder(support_press=True)
+    exploration = explore(recording)
+    assert len(exploration.contacts) == len(onsets) - 1
+    assert any("support" in reason for _, reason in exploration.rejected)
+
+
+def test_the_papers_mode_names_presses_below_its_threshold():
+    recording, onsets = explore_cylinder(modulus=29e3, give=5e-4)
+    exploration = explore(recording, method="paper", contact_options=ContactOptions(least_palpations=1))
+    weak = [reason for _, reason in exploration.rejected if "below 1 N" in reason]
+    assert weak
+    assert len(weak) + len(exploration.contacts) == len(onsets)
+    assert len(explore(recording).contacts) == len(onsets)
+
+
+def test_no_contact_is_an_error():
+    recording, _ = explore_cylinder()
+    silent = dataclasses.replace(
+        recording, force_on_tool=0.012 * np.random.default_rng(0).standard_normal((len(recording.t), 3))
+    )
+    with pytest.raises(ContactError, match="no contact"):
+        explore(silent)
+
+
+def test_too_few_presses_is_an_error_that_says_how_many():
+    recording, _ = explore_cylinder()
+    short = recording.t < 12.5
+    cut = dataclasses.replace(
+        recording,
+        t=recording.t[short],
+        position=recording.position[short],
+        force_on_tool=recording.force_on_tool[short],
+    )
+    with pytest.raises(ContactError, match="at least 4 are needed"):
+        explore(cut)
+
+
+def test_a_threshold_that_is_not_positive_is_refused(cylinder):
+    with pytest.raises(OptionError, match="--contact-threshold"):
+        explore(cylinder[0], contact_options=ContactOptions(contact_threshold_n=-1.0))
