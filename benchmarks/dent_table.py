@@ -1,11 +1,10 @@
 """Recompute the tables of the finite-strain and the linear sticking dent (axisymmetric, offline).
 
 A rigid sphere of radius 1 is pressed into a half-space that sticks to it where it touches; ring after
-ring of the
-surface comes into contact, and the depth at which the next ring touches is found to rounding. Nine-node
-quadrilaterals, the volumetric part integrated at the four reduced points. `linear`: small strains, the
-contact
-followed on the displaced surface. `neo-hookean`: psi = mu/2 (I1 - 3 - 2 ln J) + lambda/2 (ln J)^2.
+ring of the surface comes into contact, and the depth at which the next ring touches is found to rounding.
+Nine-node quadrilaterals, the volumetric part integrated at the four reduced points. `linear`: small
+strains, the contact followed on the displaced surface. `neo-hookean`: psi = mu/2 (I1 - 3 - 2 ln J) +
+lambda/2 (ln J)^2. `--stiffening` g adds mu/2 g (I1 - 3)^2 (Yeoh, g = c20 / c10).
 """
 
 from __future__ import annotations
@@ -28,6 +27,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Law, resolution, where to write."""
     parser.add_argument("--law", choices=("neo-hookean", "linear"), default="neo-hookean")
     parser.add_argument("--poisson-ratio", type=float, default=0.49)
+    parser.add_argument(
+        "--stiffening", type=float, default=0.0, help="Yeoh's c20 / c10 of the neo-hookean law"
+    )
     parser.add_argument("--element", type=float, default=0.06, help="smallest element over the tip's radius")
     parser.add_argument("--until", type=float, default=2.0, help="greatest depth over the tip's radius")
     parser.add_argument("-o", "--output", help="CSV of depth / R, c and alpha (mechanics.dent)")
@@ -57,7 +59,9 @@ def lagrange(x: float) -> tuple[np.ndarray, np.ndarray]:
 class HalfSpace:
     """Axisymmetric body r >= 0, z <= 0 out to 400 radii, fixed there; displacements (n, 2)."""
 
-    def __init__(self, element: float, poisson_ratio: float, law: str, until: float) -> None:
+    def __init__(
+        self, element: float, poisson_ratio: float, law: str, until: float, stiffening: float = 0.0
+    ) -> None:
         r = graded(element, 1.0 + 0.35 * until, 1.18, 400.0)
         z = -graded(element, 0.5, 1.12, 400.0)
         r, z = _halved(r), _halved(z)
@@ -68,6 +72,7 @@ class HalfSpace:
         self.cells = corner[:, None] + np.array([a * nz + b for a in range(3) for b in range(3)])
         self.top = np.arange(nr) * nz
         self.law = law
+        self.stiffening = stiffening
         self.lam, self.mu = lame_parameters(1.0, poisson_ratio)
         n = len(self.points)
         fixed = np.zeros((n, 2), dtype=bool)
@@ -141,7 +146,11 @@ class HalfSpace:
                 cross[:, x, y] = g[:, 2 * i + c] * g[:, 2 * k + a]
         cross[:, 4, 4] = g[:, 4] ** 2
         if part == "shear":
-            return self.mu * (f - g), self.mu * (np.eye(5) + cross)
+            excess = (f * f).sum(axis=1) - 3  # I1 - 3
+            factor = (1 + 2 * self.stiffening * excess)[:, None]
+            steeper = 4 * self.stiffening * f[:, :, None] * f[:, None, :]
+            tangent = self.mu * (factor[:, :, None] * np.eye(5) + steeper + cross)
+            return self.mu * (factor * f - g), tangent
         log = np.log(j)[:, None]
         return self.lam * log * g, self.lam * (g[:, :, None] * g[:, None, :] - log[:, :, None] * cross)
 
@@ -195,7 +204,8 @@ class HalfSpace:
         g = np.stack([f[:, 3], -f[:, 1], -f[:, 2], f[:, 0]], axis=1) / plane[:, None]  # F^-T: rr, zr, rz, zz
         factor = self.mu if part == "shear" else -self.lam * np.log(plane * f[:, 4])
         if part == "shear":
-            result += self.mu * np.eye(4)
+            excess = (f * f).sum(axis=1) - 3
+            result += self.mu * (1 + 2 * self.stiffening * excess)[:, None, None] * np.eye(4)
         # G_iL G_kJ couples (r theta) or (z theta) with (theta R) or (theta Z)
         for a, i in ((0, 0), (1, 1)):
             for b, c in ((2, 0), (3, 1)):
@@ -275,13 +285,19 @@ class Press:
 
 
 def press_curve(
-    law: str, poisson_ratio: float, element: float, until: float, *, quiet: bool = True
+    law: str,
+    poisson_ratio: float,
+    element: float,
+    until: float,
+    *,
+    stiffening: float = 0.0,
+    quiet: bool = True,
 ) -> np.ndarray:
     """(k, 4): depth / R, force / (E* R^2), contact radius / R, sideways stiffness / (R 8 G / (2 - nu)).
 
     A row a ring of the surface, at the depth where it touches.
     """
-    body = HalfSpace(element, poisson_ratio, law, until)
+    body = HalfSpace(element, poisson_ratio, law, until, stiffening)
     press = Press(body)
     depth, rows, before = 0.0, [], 0.0
     stick = 4 / ((1 + poisson_ratio) * (2 - poisson_ratio))
@@ -306,8 +322,7 @@ def smooth_table(rows: np.ndarray) -> np.ndarray:
 
     Ring by ring the curve wavers by half a percent (a mid-side ring touches late). Its ratio to Sneddon's
     frictionless sphere is smooth and goes to 1 at no depth: a quartic in the square root of the depth is
-    fitted to
-    the corner rings, and held beyond the last one.
+    fitted to the corner rings, and held beyond the last one.
     """
     x, force, radius, sideways = rows[1::2][rows[1::2, 0] > 0.05].T
     sphere = dent_law("sphere").table
@@ -326,7 +341,12 @@ def smooth_table(rows: np.ndarray) -> np.ndarray:
 def run(arguments: argparse.Namespace) -> dict:
     """Press, print, and write the table."""
     rows = press_curve(
-        arguments.law, arguments.poisson_ratio, arguments.element, arguments.until, quiet=False
+        arguments.law,
+        arguments.poisson_ratio,
+        arguments.element,
+        arguments.until,
+        stiffening=arguments.stiffening,
+        quiet=False,
     )
     table = smooth_table(rows)
     if arguments.output:
@@ -337,8 +357,8 @@ def run(arguments: argparse.Namespace) -> dict:
 def write_table(path: Path, table: np.ndarray, arguments: argparse.Namespace) -> None:
     """Write the CSV that mechanics.dent reads, with its provenance in the header."""
     header = (
-        f"{arguments.law} half-space under a sticking sphere, Poisson's ratio {arguments.poisson_ratio}, "
-        f"pressed to {arguments.until} R,\nsmallest element {arguments.element} R; "
+        f"{arguments.law} (c20/c10 {arguments.stiffening}) half-space, sticking sphere, "
+        f"Poisson's ratio {arguments.poisson_ratio}, pressed to {arguments.until} R,\nsmallest element {arguments.element} R; "
         "made by 'palpate bench dent-table'\ndepth/R, c, alpha, tau"
     )
     with atomic_file(path) as temporary:

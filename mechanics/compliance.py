@@ -3,9 +3,8 @@
 `condense`: exact, every touchable degree of freedom against every other, from the Schur complement of
 the stiffness.
 `surface_compliance`: the same under the Gaussian patch of mechanics.patch at the surface's corners, what
-a servo
-interpolates; far smaller, and free of the singularity of point loads. `load_or_condense` keeps it with a
-MODEL.
+a servo interpolates; far smaller, and free of the singularity of point loads. `load_or_condense` keeps it
+with a MODEL.
 """
 
 from __future__ import annotations
@@ -61,9 +60,9 @@ def condense(
 ) -> Compliance:
     """Condense the stiffness on the touchable nodes and invert it.
 
-    method: 'schur' (static condensation in MKL Pardiso, then one dense inverse), 'columns' (a solve a column,
-    in batches, with either backend), None for the best that is there. Raises MeshError where the mesh is not
-    held or has nothing to touch.
+    method: 'schur' (static condensation in MKL Pardiso, then one dense inverse), 'columns' (a solve a
+    column, in batches, with either backend), None for the best that is there. Raises MeshError where the
+    mesh is not held or has nothing to touch.
     """
     nodes = np.flatnonzero(mesh.touchable)
     free = free_dofs(mesh)
@@ -133,10 +132,9 @@ def _symmetrise(matrix: np.ndarray, block: int = 512) -> None:
 def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompliance:
     """The servo's compliance of a model: from the cache in its folder, or computed and stored there.
 
-    The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model, a
-    damaged or a truncated file is rebuilt. A model that was never written, or a folder that cannot be
-    written,
-    is computed in memory.
+    The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
+    a damaged or a truncated file is rebuilt. A model that was never written, or a folder that cannot be
+    written, is computed in memory.
     """
     key = content_key(
         "surface compliance 2",

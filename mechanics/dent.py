@@ -3,7 +3,8 @@
 Every law is a table over x = delta / R of three numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
     normal force        E* R^2 c(x) x^1.5
     contact radius      R alpha(x) x^0.5
-    sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau = alpha)
+    sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau =
+    alpha)
 Hertz is c = 4/3, alpha = tau = 1. One numba kernel reads them all, so a new law is a new table.
 """
 

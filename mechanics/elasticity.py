@@ -55,8 +55,9 @@ def element_stiffness(
 ) -> np.ndarray:
     """Element matrices for unit Young's modulus: (m, k, 3, k, 3) with k = 4 or 10 nodes, in metres.
 
-    K[i, a, j, b] = integral of lambda B_ia B_jb + mu (B_ib B_ja + delta_ab B_i . B_j), B the shape gradients.
-    `mean_dilatation` replaces the divergence by its mean over the element (B-bar), which weakens locking.
+    K[i, a, j, b] = integral of lambda B_ia B_jb + mu (B_ib B_ja + delta_ab B_i . B_j), B the shape
+    gradients. `mean_dilatation` replaces the divergence by its mean over the element (B-bar), which
+    weakens locking.
     """
     lam, mu = lame_parameters(1.0, poisson_ratio)
     gradients, volumes = barycentric_gradients(corners)

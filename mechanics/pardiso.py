@@ -1,6 +1,8 @@
-"""MKL Pardiso for symmetric positive definite matrices: factor, solve, Schur complement. Absent where MKL is.
+"""MKL Pardiso for symmetric positive definite matrices: factor, solve, Schur complement. Absent where MKL
+is.
 
-Only this module speaks to the library; `available()` tells whether it is there (x86-64 wheels of pypardiso).
+Only this module speaks to the library; `available()` tells whether it is there (x86-64 wheels of
+pypardiso).
 """
 
 from __future__ import annotations
@@ -35,9 +37,9 @@ def available() -> bool:
 class Pardiso:
     """A factorisation of a symmetric positive definite matrix; frees MKL's memory when it dies.
 
-    matrix: (n, n) sparse, both triangles stored. With `schur` (indices of k unknowns) the factorisation stops
-    there and `.schur` is the dense (k, k) Schur complement on those unknowns, in ascending order of index.
-    Raises ArithmeticError where the matrix is not positive definite.
+    matrix: (n, n) sparse, both triangles stored. With `schur` (indices of k unknowns) the factorisation
+    stops there and `.schur` is the dense (k, k) Schur complement on those unknowns, in ascending order of
+    index. Raises ArithmeticError where the matrix is not positive definite.
     """
 
     def __init__(

@@ -2,10 +2,8 @@
 
 A point load on a solid is singular; spread over a Gaussian, load and mean displacement (under the same
 weight) are finite and meet mesh elements of the size of s without trouble. What the patch smears out,
-the local
-dent, is put back in closed form (mechanics.dent); hence the compliance of a half-space under the same
-patch is
-subtracted.
+the local dent, is put back in closed form (mechanics.dent); hence the compliance of a half-space under the
+same patch is subtracted.
 """
 
 from __future__ import annotations

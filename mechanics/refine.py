@@ -16,9 +16,9 @@ def typical_edge(mesh: TetMesh) -> float:
 def refined_near_surface(mesh: TetMesh, surface_edge_m: float) -> tuple[TetMesh, np.ndarray]:
     """(linear mesh, parent) with the touchable surface's median edge at most `surface_edge_m`, m.
 
-    Every edge longer than that with an end on the touchable surface is halved, as often as it takes. parent:
-    (m,) the tetrahedron of `mesh` that each new one lies in. Nodes of the linear mesh keep their place at the
-    front. Shape and base stay as they are: new nodes lie on straight edges.
+    Every edge longer than that with an end on the touchable surface is halved, as often as it takes.
+    parent: (m,) the tetrahedron of `mesh` that each new one lies in. Nodes of the linear mesh keep their
+    place at the front. Shape and base stay as they are: new nodes lie on straight edges.
     """
     mesh = mesh.linear()
     parent = np.arange(len(mesh.tetrahedra))

@@ -142,8 +142,7 @@ def mean_curvature(
     """(k,) 1/m mean of the principal curvatures at surface points, convex positive.
 
     A paraboloid fitted to the nodes within `reach_m` (None: 1.8 surface edges) whose triangles face the
-    normal
-    within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
+    normal within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
     """
     from mechanics.tetmesh import vertex_normals
 

@@ -1,10 +1,8 @@
 """Named arrays in one memory-mapped file: keyed by content, checksummed, written whole or not at all.
 
 Layout: 8 bytes magic, 8 bytes length of the JSON header (little endian), the header, then the arrays,
-each at a
-multiple of 64 bytes. The header holds the key, each array's type, shape and offset, and the SHA-256 of
-all that
-follows it.
+each at a multiple of 64 bytes. The header holds the key, each array's type, shape and offset, and the
+SHA-256 of all that follows it.
 """
 
 from __future__ import annotations
@@ -102,8 +100,7 @@ def load_or_build(
     possible.
 
     Two processes may build at once: each writes its own temporary file, and the last rename wins with
-    the same
-    content. Without a path, or in a folder that cannot be written, the arrays stay in memory.
+    the same content. Without a path, or in a folder that cannot be written, the arrays stay in memory.
     """
     if path is not None:
         try:

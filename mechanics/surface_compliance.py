@@ -1,7 +1,9 @@
-"""The compliance that a servo interpolates, for unit Young's modulus; two tables, since two things are asked.
+"""The compliance that a servo interpolates, for unit Young's modulus; two tables, since two things are
+asked.
 
-How one place gives under its own touch (`own`): sharp near edges and the base, so it is computed with a patch
-as narrow as a contact, at the corners of a surface finer than the mesh's. How a touch moves the rest of the
+How one place gives under its own touch (`own`): sharp near edges and the base, so it is computed with a
+patch as narrow as a contact, at the corners of a surface finer than the mesh's. How a touch moves the rest
+of the
 object (`blocks`): smooth, so a patch as wide as the mesh's own elements and the mesh's own corners serve.
 """
 
@@ -27,8 +29,8 @@ class SurfaceCompliance:
     """Device frame, SI units; the touchable surface with its rim at the base.
 
     Coarse, t corners of the mesh: nodes (t,), points, normals (t, 3), curvature (t,) 1/m mean and convex
-    positive, triangles (f, 3) into them, blocks (t, t, 3, 3) float32, 1/m: displacement of the patch at i for
-    a unit force on the patch at j; symmetric as a whole. patch_width_m: (1,).
+    positive, triangles (f, 3) into them, blocks (t, t, 3, 3) float32, 1/m: displacement of the patch at i
+    for a unit force on the patch at j; symmetric as a whole. patch_width_m: (1,).
     Fine, v corners: own_points, own_normals (v, 3), own_curvature (v,), own_triangles (g, 3) into them, own
     (v, 3, 3), 1/m: displacement of the patch at i for a unit force on itself. own_width_m: (1,).
     poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.

@@ -1,14 +1,15 @@
 """The force of a touch: a sphere that sticks to an elastic body, followed along the path of its centre.
 
-The displacement d of the tip since first touch is shared by the local dent and the give of the whole object,
+The displacement d of the tip since first touch is shared by the local dent and the give of the whole
+object,
     d = dent(F) + far F / E,
 with the normal dent after a law of mechanics.dent and a tangential stick: every ring of the contact circle
-holds the place where it first touched (method of dimensionality reduction with sticking springs, Popov & Hess
-2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go. Unilateral, no
-adhesion.
+holds the place where it first touched (method of dimensionality reduction with sticking springs, Popov &
+Hess 2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go.
+Unilateral, no adhesion.
 
-The kernels are plain numba on arrays: 1 kHz rendering, replay and fits run the same ones. `state` is a float
-array of STATE_SIZE, zero before first touch; it holds the ring memory and the last dent.
+The kernels are plain numba on arrays: 1 kHz rendering, replay and fits run the same ones. `state` is a
+float array of STATE_SIZE, zero before first touch; it holds the ring memory and the last dent.
 """
 
 from __future__ import annotations
@@ -143,7 +144,8 @@ def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
 
     state: (STATE_SIZE,), changed in place; all zero before first touch.
     d: (3,) m since first touch, local frame (n outward: d[2] < 0 presses in).
-    far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective, m.
+    far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective,
+    m.
     plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
     """
     fu, fv, fn, dent, a, du, dv, _ = touch_solve(state, d, far, table, radius, plane_strain_modulus, stick)
@@ -197,8 +199,8 @@ def touch_force(
 ) -> np.ndarray:
     """Force on the tool (n, 3), N, along the path of one touch; device frame.
 
-    displacement: (n, 3) m, the tip's centre less where it was at first touch, in order of time. normal: (3,)
-    outward. far: (3, 3) 1/m, unit modulus (TouchSites.far). curvature: 1/m, mean, convex positive.
+    displacement: (n, 3) m, the tip's centre less where it was at first touch, in order of time. normal:
+    (3,) outward. far: (3, 3) 1/m, unit modulus (TouchSites.far). curvature: 1/m, mean, convex positive.
     """
     starts = np.array([0, len(displacement)])
     return touch_forces(

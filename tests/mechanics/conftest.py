@@ -1,0 +1,16 @@
+"""Structured blocks for the mechanics tests."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import pytest
+
+from mechanics.box_mesh import box_mesh
+from mechanics.tetmesh import TetMesh
+
+
+@pytest.fixture(scope="session")
+def box() -> Callable[..., TetMesh]:
+    """The factory mechanics.box_mesh.box_mesh(cells, size, grade)."""
+    return box_mesh
