@@ -1,0 +1,206 @@
+"""Feel a model or scene at 1 kHz: in a window, or headless.
+
+MODEL_OR_SCENE is a MODEL folder, a scene (silicone-1, silicone-2, silicone-3, bean, nodule, your-recording,
+or a scene's .toml), a recording, or a phantom. In the window the mouse hovers over the object, the left
+button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+import time
+from contextlib import ExitStack
+from pathlib import Path
+
+import numpy as np
+
+from devices.channel import PoseChannel
+from devices.intention import Intention
+from devices.mapper import MapperOptions, Mapping
+from devices.registry import DEVICES, DeviceChoice
+from devices.simulated import SimulatedOptions
+from mechanics.errors import DeviceError, OptionError
+from mechanics.model import Model
+from palpate.arguments import (
+    add_json,
+    add_options,
+    add_seed,
+    emit_json,
+    finite,
+    options_from,
+    progress_bar,
+    say,
+)
+from palpate.servo import SafetyOptions, ServoOptions
+from palpate.window.session import TouchSession
+from render.registry import names
+from scenes.exploration import ExplorationOptions, explore
+from scenes.scene import Scene, load_scene
+
+SUMMARY = "feel a model or scene at 1 kHz"
+DEFAULT_SCENE = "silicone-2"
+POLL_S = 0.1
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """The scene, the device, the window, and every option of the parts."""
+    parser.add_argument(
+        "scene",
+        nargs="?",
+        default=DEFAULT_SCENE,
+        metavar="MODEL_OR_SCENE",
+        help=f"what to touch (default: {DEFAULT_SCENE})",
+    )
+    parser.add_argument(
+        "--device",
+        metavar="NAME",
+        help=f"one of {', '.join(DEVICES)} (default: mouse; headless: simulated)",
+    )
+    parser.add_argument("--headless", action="store_true", help="no window: all else is the same")
+    parser.add_argument(
+        "--seconds", type=finite, help="stop after this time [s] (default: when the window closes)"
+    )
+    parser.add_argument(
+        "--record", metavar="REC", type=Path, help="write the session as a recording (NAME.csv.gz)"
+    )
+    parser.add_argument("--replay", metavar="REC", help="the recording that the device 'replay' plays")
+    parser.add_argument(
+        "--renderer", metavar="NAME", help=f"one of {', '.join(names())} (default: the scene's)"
+    )
+    parser.add_argument("--beside", metavar="NAME", help="a second renderer, driven by the same tip; 'none'")
+    parser.add_argument(
+        "--screenshot", metavar="PNG", type=Path, help="save a picture of the window at its end"
+    )
+    add_options(parser, MapperOptions)
+    add_options(parser, ServoOptions, skip=("safety", "passivity", "tip_offsets_m"))
+    add_options(parser, SafetyOptions)
+    add_options(parser, SimulatedOptions)
+    add_options(parser, ExplorationOptions)
+    add_seed(parser)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Open, touch, close; prints what the servo did."""
+    scene = load_scene(arguments.scene)
+    name = arguments.device or ("simulated" if arguments.headless else "mouse")
+    _check(arguments, name)
+    with ExitStack() as stack:
+        bar = stack.enter_context(progress_bar("touch"))
+        model = scene.model(lambda stage, share: bar(stage, 0.5 * share))
+        channel = None
+        if name == "mouse":
+            channel = PoseChannel.create()
+            stack.callback(channel.close)
+        device, until = device_choice(arguments, name, model, channel)
+        session = stack.enter_context(
+            TouchSession(
+                model,
+                title=scene.title,
+                device=device,
+                renderer=arguments.renderer or scene.renderer,
+                beside=_beside(arguments, scene),
+                friction=scene.friction,
+                mapping=_mapping(arguments, name, scene, model),
+                options=options_from(arguments, ServoOptions, safety=options_from(arguments, SafetyOptions)),
+                recording=arguments.record,
+                pictures=not arguments.headless,
+            )
+        )
+        session.start(lambda stage, share: bar(stage, 0.5 + 0.5 * share))
+        bar.close()
+        session.enable()
+        seconds = arguments.seconds if arguments.seconds is not None else until
+        if arguments.headless:
+            _wait(session, seconds)
+        else:
+            from palpate.window.window import TouchWindow
+
+            TouchWindow(session, scene, channel).run(seconds, screenshot=arguments.screenshot)
+        report = session.report()
+    say(arguments, f"{scene.title}: {session.renderer_name}, {name}", str(report))
+    if arguments.record is not None:
+        say(arguments, f"recorded {arguments.record}")
+    emit_json({"scene": scene.name, "device": name, "servo": report.as_dict()}, arguments.json)
+    return 0
+
+
+def _check(arguments: argparse.Namespace, name: str) -> None:
+    for value, allowed, what in (
+        (name, tuple(DEVICES), "device"),
+        (arguments.renderer, names(), "renderer"),
+        (arguments.beside, (*names(), "none"), "renderer"),
+    ):
+        if value is not None and value not in allowed:
+            raise OptionError(f"'{value}' is no {what}; allowed are {', '.join(allowed)}")
+    if arguments.seconds is not None and not arguments.seconds > 0:
+        raise OptionError(f"--seconds is {arguments.seconds}; it must be greater than 0")
+    if name == "replay" and not arguments.replay:
+        raise OptionError("the device 'replay' plays a recording: name it with --replay REC")
+    if arguments.headless:
+        if name == "mouse":
+            raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
+    elif sys.platform.startswith("linux") and not (
+        os.environ.get("DISPLAY") or os.environ.get("WAYLAND_DISPLAY")
+    ):
+        raise DeviceError(
+            "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): use --headless, a desktop, or "
+            "'xvfb-run -s \"-screen 0 1280x800x24\" palpate touch ...'"
+        )
+
+
+def device_choice(
+    arguments: argparse.Namespace, name: str, model: Model, channel: PoseChannel | None
+) -> tuple[DeviceChoice, float | None]:
+    """The device for the servo process to make, and when it will have done (s), None for never."""
+    if name == "mouse":
+        return DeviceChoice(name, {"channel": str(channel.path)}), None
+    if name == "replay":
+        return DeviceChoice(name, {"recording": str(Path(arguments.replay).resolve())}), None
+    if name == "simulated":
+        options = options_from(arguments, SimulatedOptions)
+        path, _ = explore(
+            model,
+            options_from(arguments, ExplorationOptions),
+            hand_stiffness_n_per_m=options.stiffness_n_per_m,
+            seed=arguments.seed,
+        )
+        intention: Intention = path
+        keywords = {"options": options, "intention": intention, "seed": arguments.seed}
+        return DeviceChoice(name, keywords), path.duration_s + 2.0
+    return DeviceChoice(name), None
+
+
+def _beside(arguments: argparse.Namespace, scene: Scene) -> str:
+    if arguments.beside is not None:
+        return "" if arguments.beside == "none" else arguments.beside
+    return "" if arguments.headless else scene.beside
+
+
+def _mapping(arguments: argparse.Namespace, name: str, scene: Scene, model: Model) -> Mapping | None:
+    """None, the identity, for devices that live in the scene's frame already."""
+    if name in ("mouse", "simulated", "replay"):
+        return None
+    given = {f: getattr(arguments, f) for f in MapperOptions.__dataclass_fields__ if hasattr(arguments, f)}
+    options = MapperOptions(**{**vars(scene.mapper), **given})
+    top = ((model.mesh.points - model.support_point) @ model.support_normal).max()
+    base = model.mesh.points[model.mesh.fixed].mean(axis=0)
+    # the device's middle lies a finger's width over the object
+    centre = base + (top + 0.02) * np.asarray(model.support_normal)
+    return Mapping.from_options(options, centre_m=centre, rate=name == "spacemouse")
+
+
+def _wait(session: TouchSession, seconds: float | None) -> None:
+    """Collect frames until the time is up; without a time, until Ctrl-C."""
+    start = time.perf_counter()
+    with progress_bar("touching") as bar:
+        while session.servo.alive:
+            elapsed = time.perf_counter() - start
+            if seconds is not None:
+                if elapsed >= seconds:
+                    return
+                bar(f"{elapsed:.0f} of {seconds:.0f} s", elapsed / seconds)
+            session.frame()
+            time.sleep(POLL_S)
