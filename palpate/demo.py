@@ -31,7 +31,8 @@ class DemoOptions:
 class DemoResult:
     """Everything that the report shows.
 
-    rendered_n: (n, 3) N, force on the tool along the recorded path. error: a line on it in words.
+    rendered_n: (n, 3) N, force on the tool along the recorded path. replay_rmse_n, contact_force_rms_n: N,
+    rms of the error and of the measured force over the contact samples. seconds: wall time of each stage.
     """
 
     recording: Recording
@@ -61,7 +62,7 @@ def run_demo(
     from mechanics.compliance import load_or_condense
     from palpate.servo.headless import run_headless
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-    from render.replay import replay, replay_error
+    from render.replay import replay_recording, rms_n
 
     seconds: dict[str, float] = {}
 
@@ -82,8 +83,10 @@ def run_demo(
         load_or_condense(model, progress=progress)
         renderer = render.create(options.renderer, model, progress=progress)
     with stage("replay") as progress:
-        rendered = replay(renderer, recording.t, recording.position, progress=progress)
-        error = replay_error(recording, model, rendered)
+        rendered = replay_recording(renderer, recording, progress)
+        touching = contact_samples(done, recording)
+        error = rms_n((rendered - recording.force_on_tool)[touching])
+        whole = rms_n(recording.force_on_tool[touching])
     with stage("feel at 1 kHz") as progress:
         servo = run_headless(model, options.renderer, seconds=options.seconds, seed=seed, progress=progress)
     diagnosis = None
@@ -92,4 +95,13 @@ def run_demo(
 
         with stage("diagnose") as progress:
             diagnosis = diagnose(recording, model, DiagnoseOptions(fast=True, seed=seed), progress)
-    return DemoResult(recording, done, rendered, error.rmse_n, error.force_rms_n, servo, diagnosis, seconds)
+    return DemoResult(recording, done, rendered, error, whole, servo, diagnosis, seconds)
+
+
+def contact_samples(done: Reconstruction, recording: Recording, margin_s: float = 0.05) -> np.ndarray:
+    """(n,) bool: from first touch to loss of touch of every palpation, and `margin_s` before and after."""
+    mask = np.zeros(len(recording.t), dtype=bool)
+    for contact in done.exploration.contacts:
+        first, last = recording.t[contact.start] - margin_s, recording.t[contact.end - 1] + margin_s
+        mask |= (recording.t >= first) & (recording.t <= last)
+    return mask

@@ -1,7 +1,8 @@
 """The main job on the embedded example, or on a recording of yours.
 
-Reconstructs it, precomputes, replays the recorded path, runs the 1 kHz loop against a simulated hand, diagnoses;
-then writes one self-contained HTML report and prints its path. Where there is a screen, the touch window opens.
+Reconstructs it, precomputes, replays the recorded path, runs the 1 kHz loop against a simulated hand and
+diagnoses; then writes one self-contained HTML report and prints its path. Where there is a screen, the touch
+window opens at the end.
 """
 
 from __future__ import annotations

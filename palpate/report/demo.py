@@ -30,7 +30,7 @@ def force_over_time(ax: Axes, result: DemoResult) -> Axes:
     if last > first:
         ax.axvspan(recording.t[first], recording.t[last - 1], color="#f1e3cf", zorder=0, label="phase I")
     ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(recording.t[0], recording.t[-1]))
-    ax.legend(loc="upper left", frameon=False, ncols=3)
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=3)
     return ax
 
 
@@ -79,7 +79,7 @@ def figures(result: DemoResult) -> dict[str, Figure]:
     model = result.model
     touches = np.array([p.point for p in model.palpations])
     draw_object(axes[0], model, touches=touches, show_base=True)
-    axes[0].legend(loc="upper right", frameon=False, bbox_to_anchor=(1.15, 1.0))
+    axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
     if model.shape_uncertainty_m is not None:
         draw_object(axes[1], model, values=model.shape_uncertainty_m * 1e3, label="shape uncertainty [mm]")
     presses, axes = plt.subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True, layout="constrained")
