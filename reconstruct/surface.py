@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 SURFACES = ("auto", "hull", "tangent", *FITTED)
 
+_CORRECTED = 6
+"""So many of the best shapes are tried with a free residual field as well."""
+
 
 @dataclass(frozen=True)
 class SurfaceOptions:
@@ -142,13 +145,13 @@ def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = sil
         raise SurfaceError(f"the base outline does not allow a {which}: use --surface auto")
     tried = []
     for k, guess in enumerate(guesses):
-        shape, lean = fit(guess, seen)
-        plain, free = (explain(shape, seen, lean, free=free) for free in (False, True))
-        tried.append(plain)
+        tried.append(explain(*fit(guess, seen), seen, free=False))
+        progress("surface", (k + 1) / (len(guesses) + 3))
+    for plain in sorted(tried, key=score)[-_CORRECTED:]:
+        free = explain(plain.shape, plain.lean_m, seen, free=True)
         # a free field follows systematic errors of the touches as well: it must predict places it has not seen
         if held_out_error(free) < held_out_error(plain):
             tried.append(free)
-        progress("surface", (k + 1) / (len(guesses) + 1))
     return tried
 
 

@@ -3,19 +3,37 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.base import Shape
 from reconstruct.shapes.cap import Cap
 from reconstruct.shapes.cushion import Cushion
+from reconstruct.shapes.crown import Crown
+from reconstruct.shapes.dish import Dish
 from reconstruct.shapes.dome import Dome
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import Seen
-from reconstruct.shapes.outline import circle, polygon, seeing_centre, smooth_curve
+from reconstruct.shapes.outline import Outline, circle, polygon, seeing_centre, smooth_curve
+from reconstruct.shapes.polyhedron import Polyhedron
 from reconstruct.shapes.prism import Prism
 
-FITTED = ("cylinder", "block", "extrusion", "sphere", "ellipsoid", "dome", "cushion")
+FITTED = (
+    "cylinder",
+    "block",
+    "extrusion",
+    "sphere",
+    "ellipsoid",
+    "dome",
+    "cushion",
+    "crown",
+    "polyhedron",
+    "dish",
+)
 """Shapes with parameters, as `--surface` spells them."""
+
+_ROUND_M = 0.0015
+"""A rim further from a circle than this, as a standard deviation, carries no round shape."""
 
 
 def first_guesses(evidence: Evidence, seen: Seen) -> list[Shape]:
@@ -34,17 +52,41 @@ def first_guesses(evidence: Evidence, seen: Seen) -> list[Shape]:
     if not height > 0.001:
         raise SurfaceError("every touch is on the support: touch the object above its base")
     radius = float(np.linalg.norm(round_.vertices[0] - round_.centre))
+    outlines = [outline for outline in (straight, curve) if outline is not None]
     found: list[Shape] = []
-    for outline in (round_, straight, curve):
-        if outline is not None:
-            found.append(Prism.of(outline, height, sloped=False, drafted=False))
-            found.append(Prism.of(outline, height, sloped=True, drafted=True))
-    found.append(Cap.sphere(np.array([*round_.centre, height - radius]), radius))
-    long, short, turn = _extent(curve.vertices)
-    found.append(Cap.ellipsoid(np.array([*round_.centre, 0.0]), np.array([long, short, height]), turn))
+    if np.std(round_.distance(rim)) < _ROUND_M:
+        outlines.insert(0, round_)
+        found.append(Cap.sphere(np.array([*round_.centre, height - radius]), radius))
+    for outline in outlines:
+        found.append(Prism.of(outline, height, sloped=False, drafted=False))
+        found.append(Prism.of(outline, height, sloped=True, drafted=True))
+    if straight is None:
+        long, short, turn = _extent(curve.vertices)
+        found.append(Cap.ellipsoid(np.array([*round_.centre, 0.0]), np.array([long, short, height]), turn))
     found += [Dome.of(curve, height, exponent) for exponent in (2.0, 5.0)]
     found.append(Cushion.of(curve if straight is None else straight, height, 0.01))
-    return found
+    found += [Crown.of(outline, height) for outline in outlines]
+    if straight is not None:
+        faces = Polyhedron.of(straight, seen.centres, seen.normals, seen.tip_radius_m)
+        found += [] if faces is None else [faces]
+    return found + _dishes(seen, outlines)
+
+
+def _dishes(seen: Seen, outlines: list[Outline]) -> list[Shape]:
+    """Dished prisms, where a touch that faces up lies lower than the highest touch."""
+    feet = seen.centres - seen.tip_radius_m * seen.normals
+    widest = abs(float(outlines[0].distance(outlines[0].centre[None])[0]))
+    inner = outlines[0].distance(feet[:, :2]) < -0.3 * widest
+    top = inner & (seen.normals[:, 2] > 0.5)
+    if not top.any() or feet[top, 2].min() > feet[:, 2].max() - 0.004:
+        return []
+    places = np.array([seen.centres[seen.sites == k].mean(axis=0) for k in np.unique(seen.sites)])
+    spacing = float(np.median(cKDTree(places).query(places, k=2)[0][:, 1])) if len(places) > 2 else 0.02
+    bottom = feet[top][np.argmin(feet[top, 2])]
+    highest = int(np.argmax(feet[:, 2]))
+    # a level place that high is on the rim itself; else hands keep half a spacing away from it, on a wall that slopes
+    height = feet[highest, 2] + (0.0 if seen.normals[highest, 2] > 0.94 else 0.35 * spacing)
+    return [Dish.of(outline, float(height), bottom) for outline in outlines]
 
 
 def _extent(vertices: np.ndarray) -> tuple[float, float, float]:

@@ -150,7 +150,7 @@ _FIELD_M = (0.0003, 0.001, 0.003, 0.01)
 _LENGTH_M = (0.02, 0.04, 0.08)
 
 
-def explain(shape: Shape, seen: Seen, lean_m: float, *, free: bool) -> Explained:
+def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained:
     """The residual field of greatest likelihood; without one (free false) only the touches' error is sought."""
     start = Explained(shape, seen, lean_m, Law(0.0, 0.0, 0.03, _TOUCH_M[0]))
     shared = {name: getattr(start, name) for name in ("gap", "feet", "slopes")}

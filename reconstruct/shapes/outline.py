@@ -34,12 +34,16 @@ class Outline:
         """Signed distance (k,) of points (k, 2), negative inside."""
         if self.kind == "polygon":
             return polyline_distance(points, self.vertices)
+        if self.kind == "circle":
+            return np.linalg.norm(points - self.centre, axis=1) - np.linalg.norm(
+                self.vertices[0] - self.centre
+            )
         return self._distance_map(points)
 
     @cached_property
     def _distance_map(self) -> Callable[[np.ndarray], np.ndarray]:
         """The distance on a grid, splined: a curve of many short pieces is asked some hundred thousand times."""
-        step, margin = 0.0015, 0.02
+        step, margin = 0.002, 0.012
         low = self.vertices.min(axis=0) - margin
         count = np.ceil((self.vertices.max(axis=0) + margin - low) / step).astype(int) + 1
         axes = [low[k] + step * np.arange(count[k]) for k in (0, 1)]

@@ -83,17 +83,32 @@ class Prism:
 
     def distance(self, points: np.ndarray) -> np.ndarray:
         outline, height, slope, draft = self._parts()
-        if outline.kind == "circle":
-            radius = np.linalg.norm(outline.vertices[0] - outline.centre)
-            flat = np.linalg.norm(points[:, :2] - outline.centre, axis=1) - radius
-        else:
-            flat = outline.distance(points[:, :2])
-        if outline.kind == "curve":
-            flat = flat - self.parameters[0].value
+        flat = self.wall_distance(points)
         wall = flat * np.cos(draft) + points[:, 2] * np.sin(draft)
         rise = points[:, 2] - height - (points[:, :2] - outline.centre) @ slope
         top = rise / np.sqrt(1 + slope @ slope)
         return np.hypot(np.maximum(wall, 0), np.maximum(top, 0)) + np.minimum(np.maximum(wall, top), 0)
+
+    def wall_distance(self, points: np.ndarray) -> np.ndarray:
+        """(k,) m: horizontal distance of points (k, 3) from the base's outline, negative inside."""
+        outline = self._parts()[0]
+        if outline.kind == "circle":
+            radius = np.linalg.norm(outline.vertices[0] - outline.centre)
+            return np.linalg.norm(points[:, :2] - outline.centre, axis=1) - radius
+        flat = outline.distance(points[:, :2])
+        return flat - self.parameters[0].value if outline.kind == "curve" else flat
+
+    @property
+    def height(self) -> float:
+        """Of the top at the outline's centre, m."""
+        return self._parts()[1]
+
+    def rim(self, spacing_m: float) -> np.ndarray:
+        """(n, 2) the base's rim about `spacing_m` apart."""
+        outline = self._parts()[0]
+        if outline.kind == "curve":
+            outline = outline.grown(self.parameters[0].value)
+        return outline.ring(spacing_m)[0]
 
     def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
         outline, height, slope, draft = self._parts()
