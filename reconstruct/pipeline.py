@@ -15,8 +15,7 @@ from mechanics.model import Model, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
-from mechanics.sites import TouchSites, touch_sites
-from mechanics.solver import Solver
+from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import BoundaryOptions
 from reconstruct.casting import CastPoints, cast
 from reconstruct.contacts import ContactOptions, Exploration, explore
@@ -116,13 +115,14 @@ def reconstruct_fully(
         paper_fit = fit_paper_modulus(exploration, mesh, nu, options.paper, seed=options.seed)
         modulus, interval, each = paper_fit.modulus_pa, paper_fit.ci95_pa, paper_fit.press_modulus_pa
     else:
-        solver = Solver(mesh, nu)
+        solver = touch_solver(meshing.mesh, nu)
+        clock.lap("factorise")
         sites = touch_sites(
             mesh, where.points, where.normals, nu, solver=solver, progress=_part(progress, 0.5, 0.8)
         )
         clock.lap("touch sites")
         progress("modulus", 0.8)
-        covariance = compliance_covariance(solver, sites, uncertainty_at(mesh, surface))
+        covariance = compliance_covariance(solver, sites, uncertainty_at(solver.mesh, surface))
         clock.lap("shape error")
         fit = fit_modulus(
             exploration, sites, options.modulus, compliance_covariance=covariance, seed=options.seed

@@ -67,8 +67,10 @@ def press_data(exploration: Exploration) -> PressData:
     block = max(1, round(_BLOCK_S * recording.sample_rate_hz))
     lead = int(_LEAD_S * recording.sample_rate_hz)
     moved, pushed, starts = [], [], [0]
+    free = 0
     for contact in exploration.contacts:
-        a, b = max(0, contact.start - lead), contact.end
+        a, b = max(free, contact.start - lead), contact.end
+        free = b
         rows = max(1, (b - a) // block)
         size = min(block, b - a)
         part = slice(a, a + rows * size)

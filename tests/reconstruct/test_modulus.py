@@ -1,0 +1,166 @@
+"""The modulus with a finite tip: recovered, steady against bad presses, honest about its interval."""
+
+import numpy as np
+import pytest
+from boxes import box
+
+from mechanics.recording import Recording
+from mechanics.sites import TouchSites, touch_sites
+from mechanics.solver import Solver
+from mechanics.tetmesh import TetMesh
+from mechanics.touch import touch_forces
+from reconstruct.contacts import Exploration
+from reconstruct.modulus import ModulusOptions, combine, fit_modulus, site_labels
+from reconstruct.presses import Contact
+from reconstruct.shape_error import compliance_covariance
+
+E, NU, TIP = 20e3, 0.45, 0.005
+PLACES = [(x, y) for x in (-0.025, 0.0, 0.025) for y in (-0.025, 0.0, 0.025)]
+FAST = ModulusOptions(bootstraps=200)
+
+
+@pytest.fixture(scope="module")
+def block() -> tuple[Solver, TouchSites]:
+    mesh = box((0.08, 0.08, 0.04), (8, 8, 4)).quadratic()
+    solver = Solver(mesh, NU)
+    points = np.array([[x, y, 0.04] for x, y in PLACES])
+    normals = np.tile([0.0, 0.0, 1.0], (len(points), 1))
+    return solver, touch_sites(mesh, points, normals, NU, solver=solver, curvature=0.0)
+
+
+def exploration(
+    sites: TouchSites, *, law="neo-hookean", deep=0.006, noise=0.012, onset=5e-5, scale=None, seed=0
+) -> Exploration:
+    """Presses simulated by the touch law; each onset is wrong by about `onset`; scale: a factor a press."""
+    random = np.random.default_rng(seed)
+    travel = np.concatenate([np.linspace(-0.3, 1, 400), np.ones(100), np.linspace(1, -0.3, 300)]) * deep
+    paths, starts, contacts = [], [0], []
+    for i, (p, n) in enumerate(zip(sites.points, sites.normals, strict=True)):
+        wrong = onset * random.standard_normal()
+        path = -travel[:, None] * n + 0.1 * np.maximum(travel, 0)[:, None] * np.array([1.0, 0, 0])
+        paths.append(path)
+        first = i * len(travel)
+        touched, left = np.flatnonzero(travel > 0)[[0, -1]]
+        centre = p + (TIP + wrong) * n
+        contacts.append(
+            Contact(
+                start=first + touched, peak=first + 400, end=first + left, t_onset=0.0,
+                t_peak=0.0, centre=centre,
+                point=centre - TIP * n, normal=n, depth_m=deep, peak_n=1.0, onset_error_m=onset,
+            )
+        )  # fmt: skip
+        starts.append(starts[-1] + len(travel))
+    force = touch_forces(
+        np.vstack(paths), np.array(starts), sites.normals, sites.far, young_modulus_pa=E, poisson_ratio=NU,
+        tip_radius_m=TIP, curvature=sites.curvature, law=law,
+    )  # fmt: skip
+    each = np.repeat(np.ones(len(sites)) if scale is None else scale, len(travel))
+    force = force * each[:, None] + noise * random.standard_normal(force.shape)
+    position = np.vstack(
+        [path + p + TIP * n for path, p, n in zip(paths, sites.points, sites.normals, strict=True)]
+    )
+    recording = Recording(np.arange(len(force)) / 1000, position, force, 1000.0, TIP, poisson_ratio=NU)
+    zero = np.zeros_like(force)
+    return Exploration(recording, position, force, zero, noise, None, tuple(contacts), (), 0.1, "noise")
+
+
+def test_modulus_law_and_onset_are_recovered(block):
+    _, sites = block
+    for law in ("linear", "neo-hookean"):
+        fit = fit_modulus(exploration(sites, law=law), sites, FAST)
+        assert fit.modulus_pa == pytest.approx(E, rel=0.01)
+        assert fit.press.law == law
+        assert fit.ci95_pa[0] < E < fit.ci95_pa[1]
+        assert fit.ci95_pa[1] / fit.ci95_pa[0] < 1.08
+
+
+def test_a_wrong_first_touch_costs_little_because_it_is_fitted(block):
+    _, sites = block
+    good = fit_modulus(exploration(sites, onset=1e-6), sites)
+    shifted = exploration(sites, onset=1.5e-4, seed=2)
+    fit = fit_modulus(shifted, sites)
+    assert fit.modulus_pa == pytest.approx(good.modulus_pa, rel=0.01)
+    true_shift = [(sites.points[i, 2] + TIP - c.centre[2]) for i, c in enumerate(shifted.contacts)]
+    assert -fit.press.onset_shift_m == pytest.approx(np.array(true_shift), abs=6e-5)
+
+
+def test_bad_presses_are_left_out(block):
+    _, sites = block
+    scale = np.ones(len(sites))
+    scale[[2, 5]] = 2.5, 0.3
+    fit = fit_modulus(exploration(sites, scale=scale), sites)
+    assert fit.modulus_pa == pytest.approx(E, rel=0.02)
+    assert fit.weights[[2, 5]].max() < 1e-6
+    plain = np.exp(np.mean(np.log(fit.press.modulus_pa)))
+    assert abs(np.log(fit.modulus_pa / E)) < abs(np.log(plain / E))
+
+
+def test_depths_at_which_the_law_fails_are_left_out(block):
+    _, sites = block
+    stiffening = exploration(sites, deep=0.008)
+    depth = -(stiffening.recording.position - (sites.points[0] + [0, 0, TIP]))[:, 2]
+    factor = 1 + 0.5 * np.clip((depth - 0.004) / 0.004, 0, None)
+    recording = stiffening.recording
+    changed = Recording(
+        recording.t,
+        recording.position,
+        recording.force_on_tool * factor[:, None],
+        1000.0,
+        TIP,
+        poisson_ratio=NU,
+    )
+    object.__setattr__(stiffening, "recording", changed)
+    options = ModulusOptions(law="neo-hookean")
+    fit = fit_modulus(stiffening, sites, options)
+    assert fit.press.depth_m <= 0.005
+    assert fit.modulus_pa == pytest.approx(E, rel=0.015)
+    assert not fit.by_depth[-1][2]
+    whole = fit_modulus(stiffening, sites, ModulusOptions(law="neo-hookean", greatest_depth_m=0.01))
+    assert abs(whole.modulus_pa - E) > 2 * abs(fit.modulus_pa - E)
+
+
+def test_the_interval_covers_when_sites_scatter(block):
+    _, sites = block
+    random = np.random.default_rng(7)
+    covered = 0
+    runs = 24
+    for seed in range(runs):
+        scale = np.exp(0.05 * random.standard_normal(len(sites)))
+        fit = fit_modulus(
+            exploration(sites, scale=scale, seed=seed),
+            sites,
+            ModulusOptions(law="neo-hookean", greatest_depth_m=0.01, bootstraps=200),
+        )
+        covered += fit.ci95_pa[0] < E < fit.ci95_pa[1]
+    assert covered >= 0.8 * runs
+
+
+def test_repeats_at_one_site_do_not_outvote_the_others():
+    moduli = np.array([10e3, 10e3, 10e3, 12e3] + [12e3] * 20)
+    site = site_labels(np.array([[0, 0, 0], [0.03, 0, 0], [0.06, 0, 0]] + [[0.09, 0, 0]] * 21), 0.008)
+    assert site.max() == 3
+    modulus, weights, _ = combine(moduli, np.full(24, 1e-4), site)
+    assert weights[3:].sum() < 0.5
+    assert modulus < 11e3
+
+
+def test_shape_covariance_matches_a_changed_shape(block):
+    solver, sites = block
+    middle = TouchSites(
+        sites.points[[4]], sites.normals[[4]], sites.curvature[[4]], sites.far[[4]], sites.patch_width_m, NU
+    )
+    mesh = solver.mesh
+    side = mesh.touchable & np.isclose(np.abs(mesh.points[:, 0]), 0.04)
+    sd = np.where(side, 1e-3, 0.0)
+    predicted = np.sqrt(compliance_covariance(solver, middle, sd, correlation_m=10.0)[0, 0])
+    changes = []
+    for outward in (-5e-4, 5e-4):
+        points = mesh.points + np.where(side[:, None], np.sign(mesh.points[:, :1]) * [outward, 0, 0], 0.0)
+        corners = TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable).linear()
+        far = touch_sites(
+            corners, middle.points, middle.normals, NU, solver=Solver(corners.quadratic(), NU), curvature=0.0,
+            patch_width_m=middle.patch_width_m,
+        ).far  # fmt: skip
+        changes.append(far[0, 2, 2])
+    # triangles of the top beside the moved rim count for part of it as well
+    assert predicted == pytest.approx(abs(changes[1] - changes[0]), rel=0.3)
