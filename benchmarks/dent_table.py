@@ -357,9 +357,9 @@ def run(arguments: argparse.Namespace) -> dict:
 def write_table(path: Path, table: np.ndarray, arguments: argparse.Namespace) -> None:
     """Write the CSV that mechanics.dent reads, with its provenance in the header."""
     header = (
-        f"{arguments.law} (c20/c10 {arguments.stiffening}) half-space, sticking sphere, "
-        f"Poisson's ratio {arguments.poisson_ratio}, pressed to {arguments.until} R,\nsmallest element {arguments.element} R; "
-        "made by 'palpate bench dent-table'\ndepth/R, c, alpha, tau"
+        f"{arguments.law} (c20/c10 {arguments.stiffening}) half-space under a sticking sphere, "
+        f"Poisson's ratio {arguments.poisson_ratio},\npressed to {arguments.until} R, smallest element "
+        f"{arguments.element} R; made by 'palpate bench dent-table'\ndepth/R, c, alpha, tau"
     )
     with atomic_file(path) as temporary:
         np.savetxt(temporary, table, fmt="%.6f", delimiter=",", header=header)

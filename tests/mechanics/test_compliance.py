@@ -1,0 +1,105 @@
+"""Condensed compliance: equal to full solves, symmetric, positive definite; the servo's tables."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.compliance import condense
+from mechanics.errors import MeshError
+from mechanics.pardiso import available
+from mechanics.sites import touch_sites
+from mechanics.solver import Solver
+from mechanics.surface_compliance import between_block, closest_on_triangles, surface_compliance
+from mechanics.tetmesh import TetMesh
+
+WAYS = [("columns", "superlu")] + ([("schur", None), ("columns", "pardiso")] if available() else [])
+
+
+@pytest.mark.parametrize(("method", "backend"), WAYS)
+def test_condensed_equals_full_solves(box, method, backend):
+    mesh = box((3, 3, 2), (0.1, 0.1, 0.05)).quadratic()
+    ratio = np.random.default_rng(0).uniform(0.5, 6, len(mesh.tetrahedra))
+    compliance = condense(mesh, 0.49, ratio, method=method, backend=backend)
+    c = compliance.matrix
+    assert len(compliance.nodes) == mesh.touchable.sum()
+    assert np.abs(c - c.T).max() <= 1e-10 * np.abs(c).max()
+    assert np.linalg.eigvalsh(c).min() > 0
+    solver = Solver(mesh, 0.49, ratio, backend="superlu")
+    for column in (0, 40, len(c) - 1):
+        force = np.zeros_like(mesh.points)
+        force[compliance.nodes[column // 3], column % 3] = 1
+        u = solver.solve(force)[compliance.nodes].ravel()
+        assert np.abs(u - c[:, column]).max() < 1e-8 * np.abs(u).max()
+    assert compliance.float32_error < 1e-7
+
+
+def test_nothing_to_touch_or_nothing_held_is_refused(box):
+    mesh = box((2, 2, 2), (0.1, 0.1, 0.05))
+    nobody = np.zeros(len(mesh.points), dtype=bool)
+    with pytest.raises(MeshError, match="no touchable node"):
+        condense(TetMesh(mesh.points, mesh.tetrahedra, mesh.fixed, nobody), 0.4)
+    with pytest.raises(MeshError, match="rigid body"):
+        condense(TetMesh(mesh.points, mesh.tetrahedra, nobody, mesh.touchable), 0.4)
+    with pytest.raises(MeshError, match="rigid body"):
+        Solver(TetMesh(mesh.points, mesh.tetrahedra, nobody, mesh.touchable), 0.4)
+
+
+@pytest.mark.skipif(not available(), reason="needs both backends")
+def test_backends_agree(box):
+    mesh = box((3, 3, 2), (0.1, 0.1, 0.05)).quadratic()
+    force = np.random.default_rng(1).normal(size=(len(mesh.points), 3, 2))
+    one, other = (Solver(mesh, 0.49, backend=b).solve(force) for b in ("pardiso", "superlu"))
+    assert np.abs(one - other).max() < 1e-10 * np.abs(one).max()
+    loads = np.random.default_rng(2).normal(size=(3 * (~mesh.fixed).sum(), 4, 3))
+    forms = [Solver(mesh, 0.49, backend=b).quadratic_forms(loads) for b in ("pardiso", "superlu")]
+    assert forms[0] == pytest.approx(forms[1], rel=1e-9, abs=1e-9)
+
+
+@pytest.fixture(scope="module")
+def tables(box):
+    mesh = box((5, 5, 3), (0.05, 0.05, 0.03))
+    return mesh, surface_compliance(mesh, 0.45)
+
+
+def test_own_table_is_what_a_site_sees(tables):
+    mesh, surface = tables
+    pick = np.flatnonzero(surface.own_normals[:, 2] > 0.99)[::5]
+    sites = touch_sites(mesh, surface.own_points[pick], surface.own_normals[pick], 0.45, curvature=0.0)
+    there = surface.far_at(surface.own_points[pick], surface.own_normals[pick])
+    assert np.abs(there - sites.far).max() < 1e-6 * np.abs(surface.own).max()
+
+
+def test_own_table_between_corners_is_near_the_truth(tables):
+    mesh, surface = tables
+    points = np.array([[0.003, 0.004, 0.03], [-0.007, 0.002, 0.03], [0.025, 0.003, 0.016]])
+    normals = np.array([[0, 0, 1.0], [0, 0, 1.0], [1.0, 0, 0]])
+    sites = touch_sites(mesh, points, normals, 0.45, curvature=0.0)
+    error = np.abs(surface.far_at(points, normals) - sites.far).max()
+    assert error < 0.03 * np.abs(surface.own).max()
+
+
+def test_blocks_are_symmetric_positive_and_continuous(tables):
+    _, surface = tables
+    t = len(surface.nodes)
+    dense = surface.blocks.transpose(0, 2, 1, 3).reshape(3 * t, 3 * t).astype(float)
+    assert np.abs(dense - dense.T).max() < 1e-6 * np.abs(dense).max()
+    assert np.linalg.eigvalsh(dense).min() > -1e-6 * np.abs(dense).max()
+    one, other = surface.triangles[0], surface.triangles[7]
+    out, back = np.empty((3, 3)), np.empty((3, 3))
+    w, v = np.array([0.2, 0.3, 0.5]), np.array([0.6, 0.4, 0.0])
+    between_block(surface.blocks, one, w, other, v, out)
+    between_block(surface.blocks, other, v, one, w, back)
+    assert out == pytest.approx(back.T, rel=1e-5)
+    moved = surface.displacement(7, v, np.array([0.0, 0.0, 1.0]))
+    assert w @ moved[one] == pytest.approx(out[:, 2], rel=1e-4)
+
+
+def test_closest_point_on_triangles():
+    corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
+    triangles = np.array([[0, 1, 2], [1, 3, 2]])
+    points = np.array([[0.2, 0.2, 0.5], [0.9, 0.8, -0.1], [2.0, 0.5, 0.0], [-1.0, -1.0, 0.0]])
+    triangle, weights = closest_on_triangles(points, corners, triangles)
+    nearest = np.einsum("kc,kcx->kx", weights, corners[triangles[triangle]])
+    assert nearest == pytest.approx(np.array([[0.2, 0.2, 0], [0.9, 0.8, 0], [1, 0.5, 0], [0, 0, 0]]))
+    assert (weights >= 0).all()

@@ -1,0 +1,85 @@
+"""Dent laws: limits, source tables, and a fresh small finite-strain solution."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.dent import dent_force, dent_law, dent_laws, effective_radius
+from mechanics.errors import OptionError
+from mechanics.reference import (
+    bonded_punch_sideways_force,
+    flat_punch_force,
+    hertz_force,
+    plane_strain_modulus,
+    sphere_force,
+)
+
+E, NU, R = 29e3, 0.49, 5e-3
+
+
+@pytest.mark.parametrize("name", dent_laws())
+def test_every_law_is_hertz_when_shallow(name):
+    depth = np.array([1e-6])
+    assert dent_law(name).force(depth, E, NU, R) == pytest.approx(hertz_force(depth, R, E, NU), rel=5e-3)
+
+
+def test_sphere_table_is_sneddon():
+    a = np.linspace(0.3e-3, 4.8e-3, 12)
+    force, depth = sphere_force(a, R, E, NU)
+    law = dent_law("sphere")
+    assert law.force(depth, E, NU, R) == pytest.approx(force, rel=2e-4)
+    assert law.contact_radius(depth, R) == pytest.approx(a, rel=2e-4)
+
+
+@pytest.mark.parametrize("name", dent_laws())
+def test_stiffness_is_the_slope_of_the_force(name):
+    table = dent_law(name).table
+    for depth in (0.13e-3, 1.02e-3, 6.3e-3, 16e-3):
+        step = 1e-9
+        up, down = (dent_force(table, depth + s, R, E)[0] for s in (step, -step))
+        assert dent_force(table, depth, R, E)[1] == pytest.approx((up - down) / (2 * step), rel=1e-4)
+
+
+def test_nothing_without_a_dent():
+    assert dent_force(dent_law("sphere").table, -1e-3, R, E) == (0.0, 0.0, 0.0)
+    assert dent_force(dent_law("sphere").table, 0.0, R, E) == (0.0, 0.0, 0.0)
+
+
+def test_finite_strain_is_softer_down_and_stiffer_sideways():
+    linear, finite = dent_law("linear"), dent_law("neo-hookean")
+    depth = np.array([5e-3])
+    assert 0.94 < (finite.force(depth, E, NU, R) / linear.force(depth, E, NU, R))[0] < 0.98
+    sideways = [dent_force(law.table, 5e-3, R, E)[2] for law in (linear, finite)]
+    assert 1.15 < sideways[1] / sideways[0] < 1.3
+
+
+def test_unknown_law_lists_what_is_allowed():
+    with pytest.raises(OptionError, match="hertz, sphere, linear, neo-hookean"):
+        dent_law("rubber")
+
+
+def test_curvature_shrinks_or_widens_the_sphere():
+    assert effective_radius(5e-3, 0.0) == pytest.approx(5e-3)
+    assert effective_radius(5e-3, 200.0) == pytest.approx(2.5e-3)
+    assert effective_radius(5e-3, -1e4) == pytest.approx(20e-3)
+
+
+def test_axisymmetric_solution_meets_punches_and_the_tables():
+    """The tables' own solver, coarse: flat punches in closed form, then one short press of each law."""
+    pytest.importorskip("pypardiso")
+    from benchmarks.dent_table import HalfSpace, press_curve
+
+    body = HalfSpace(0.08, NU, "linear", 0.4)
+    stuck = body.top[:11]
+    inside, outside = body.points[body.top[10], 0], body.points[body.top[11], 0]
+    radius = 0.5 * (inside + outside)  # the edge of a held disc lies between its last ring and the next
+    sideways = body.tangential_stiffness(np.zeros_like(body.points), stuck)
+    assert sideways == pytest.approx(bonded_punch_sideways_force(1.0, radius, 1.0, NU), rel=0.03)
+    assert flat_punch_force(1.0, radius, 1.0, NU) == pytest.approx(2 * radius / (1 - NU**2))
+    for law in ("linear", "neo-hookean"):
+        rows = press_curve(law, NU, 0.15, 0.3)
+        x, force = rows[5, :2]
+        known = dent_force(dent_law(law).table, x, 1.0, 1.0)[0]
+        assert force == pytest.approx(known, rel=0.02)
+        assert plane_strain_modulus(1.0, NU) > 1

@@ -1,0 +1,106 @@
+"""Touch sites: Hertz on a large block whatever the mesh, refinement near the surface, curvature."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.errors import MeshError
+from mechanics.pardiso import available
+from mechanics.reference import hertz_force
+from mechanics.refine import refined_near_surface, typical_edge
+from mechanics.sites import mean_curvature, patch_width, touch_sites, touch_solver
+from mechanics.solver import Solver
+from mechanics.touch import touch_force
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
+def test_hertz_on_a_large_block_whatever_the_mesh(box):
+    """A sphere of 10 mm pressed 1 mm into a block of 400 mm on elements of 130, 80, 50 mm.
+
+    Within 3 % of Hertz (the block is finite: 1.4 % of it is real), and nearer and nearer to a finer mesh.
+    """
+    nu, modulus, depth, radius = 0.49, 20e3, 1e-3, 10e-3
+    known = hertz_force(depth, radius, modulus, nu)
+    point = np.array([[0.013, -0.008, 0.2]])
+    forces = []
+    for cells in (3, 5, 8, 10):
+        mesh = box((cells, cells, cells // 2 + 1), (0.4, 0.4, 0.2)).quadratic()
+        sites = touch_sites(mesh, point, UP[None], nu, solver=Solver(mesh, nu), curvature=0.0)
+        known_touch = {"young_modulus_pa": modulus, "poisson_ratio": nu, "tip_radius_m": radius}
+        path = np.array([[0, 0, -depth]])
+        forces.append(touch_force(path, UP, sites.far[0], law="hertz", **known_touch)[0, 2])
+    *coarse, reference = np.array(forces) / known
+    assert np.abs(np.array(forces) / known - 1).max() < 0.03
+    errors = np.abs(np.array(coarse) - reference)
+    assert errors[0] > errors[1] > errors[2], forces
+
+
+def test_sites_near_the_base_give_less(box):
+    mesh = box((6, 6, 4), (0.1, 0.1, 0.06))
+    points = np.array([[0.05, 0.0, z] for z in (0.01, 0.03, 0.05)])
+    normals = np.tile([1.0, 0, 0], (3, 1))
+    sites = touch_sites(mesh, points, normals, 0.49, solver=Solver(mesh.quadratic(), 0.49))
+    give = sites.far[:, 0, 0]
+    assert give[0] < give[1] < give[2]
+    assert np.array_equal(sites.far, sites.far.transpose(0, 2, 1))
+    assert np.abs(sites.curvature).max() < 1e-6
+
+
+def test_sites_leave_the_callers_arrays_writable(box):
+    mesh = box((4, 4, 2), (0.1, 0.1, 0.05))
+    points, normals = np.array([[0.0, 0, 0.05]]), np.array([[0.0, 0, 2.0]])
+    sites = touch_sites(mesh, points, normals, 0.3, solver=Solver(mesh.quadratic(), 0.3))
+    points[0, 0] = 1.0
+    assert sites.points[0, 0] == 0.0
+    assert sites.normals[0, 2] == 1.0
+    with pytest.raises(ValueError, match="read-only"):
+        sites.far[0] = 0
+    with pytest.raises(MeshError, match="normals not 0"):
+        touch_sites(mesh, points, normals * 0, 0.3)
+
+
+def test_refinement_keeps_shape_base_and_conformity(box):
+    mesh = box((5, 5, 4), (0.1, 0.1, 0.08))
+    fine, parent = refined_near_surface(mesh, 0.012)
+    assert typical_edge(fine) <= 0.012 < typical_edge(mesh)
+    assert fine.volumes.sum() == pytest.approx(mesh.volumes.sum(), rel=1e-12)
+    shares = np.bincount(parent, weights=fine.volumes, minlength=len(mesh.tetrahedra))
+    assert shares == pytest.approx(mesh.volumes, rel=1e-9)
+    edges = np.sort(fine.surface[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert (np.unique(edges, axis=0, return_counts=True)[1] == 2).all()  # closed: no hanging node
+    assert np.array_equal(np.flatnonzero(fine.fixed), np.flatnonzero(fine.points[:, 2] == 0))
+    on = np.zeros(len(fine.points), dtype=bool)
+    on[np.unique(fine.surface)] = True
+    assert np.array_equal(fine.touchable, on & ~fine.fixed)
+
+
+def test_a_mesh_that_is_fine_enough_is_left_alone(box):
+    mesh = box((4, 4, 2), (0.1, 0.1, 0.05))
+    same, parent = refined_near_surface(mesh, 1.0)
+    assert same is mesh
+    assert np.array_equal(parent, np.arange(len(mesh.tetrahedra)))
+
+
+def test_refined_elements_inherit_their_modulus(box):
+    mesh = box((3, 3, 2), (0.06, 0.06, 0.04))
+    ratio = np.random.default_rng(0).uniform(1, 5, len(mesh.tetrahedra))
+    point, normal = np.array([[0.0, 0.0, 0.04]]), UP[None]
+    plain = touch_sites(mesh, point, normal, 0.4).far[0, 2, 2]
+    stiff = touch_sites(mesh, point, normal, 0.4, ratio).far[0, 2, 2]
+    double = touch_sites(mesh, point, normal, 0.4, 2 * np.ones_like(ratio))
+    solver = touch_solver(mesh, 0.4)
+    known = plain + (1 - 0.4**2) / (2 * np.sqrt(np.pi) * patch_width(solver.mesh))
+    assert stiff < plain
+    assert double.far[0, 2, 2] == pytest.approx(plain - known / 2, rel=1e-9)
+
+
+def test_curvature_of_a_bent_surface(box):
+    mesh = box((12, 12, 3), (0.1, 0.1, 0.03))
+    points = mesh.points.copy()
+    points[:, 2] *= 1 - (points[:, 0] ** 2 / 0.1 + points[:, 1] ** 2 / 0.3) / (2 * 0.03)
+    bent = type(mesh)(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
+    found = mean_curvature(bent, np.array([[0.0, 0.0, 0.03]]), UP[None])[0]
+    assert found == pytest.approx(0.5 * (1 / 0.1 + 1 / 0.3), rel=0.05)

@@ -1,0 +1,134 @@
+"""The touch law: shared give, stick along a path, unilateral, no energy made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.dent import dent_law
+from mechanics.reference import bonded_punch_sideways_force, hertz_force
+from mechanics.touch import STATE_SIZE, moduli, site_frame, touch_force, touch_forces, touch_step
+
+E, NU, R = 29e3, 0.49, 5e-3
+UP = np.array([0.0, 0.0, 1.0])
+NONE = np.zeros((3, 3))
+KNOWN = {"young_modulus_pa": E, "poisson_ratio": NU, "tip_radius_m": R}
+
+
+def path(*corners, steps=200):
+    """Straight pieces between corners (k, 3)."""
+    pieces = [np.linspace(a, b, steps, endpoint=False) for a, b in zip(corners, corners[1:], strict=False)]
+    return np.vstack([*pieces, np.array(corners[-1:])])
+
+
+def test_rigid_far_field_leaves_the_dent_alone():
+    depth = np.linspace(0, 2e-3, 20)
+    force = touch_force(-depth[:, None] * UP, UP, NONE, law="hertz", **KNOWN)
+    assert force[:, 2] == pytest.approx(hertz_force(depth, R, E, NU), rel=1e-9)
+    assert np.abs(force[:, :2]).max() == 0
+
+
+def test_give_of_the_object_adds_to_the_dent():
+    far = np.diag([40.0, 40.0, 60.0])
+    depth = 3e-3
+    force = touch_force(np.array([[0, 0, -depth]]), UP, far, law="sphere", **KNOWN)[0, 2]
+    dent = depth - 60.0 / E * force
+    assert dent_law("sphere").force(np.array([dent]), E, NU, R)[0] == pytest.approx(force, rel=1e-8)
+
+
+def test_force_is_on_the_tool_and_turns_with_the_frame():
+    rng = np.random.default_rng(0)
+    turn, _ = np.linalg.qr(rng.normal(size=(3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    far = np.array([[30.0, 2.0, 1.0], [2.0, 35.0, -3.0], [1.0, -3.0, 60.0]])
+    d = path([0, 0, 0], [0.3e-3, 0, -3e-3], [1e-3, 0.5e-3, -2e-3])
+    plain = touch_force(d, UP, far, **KNOWN)
+    turned = touch_force(d @ turn.T, turn @ UP, turn @ far @ turn.T, **KNOWN)
+    assert plain[150, 2] > 0  # pushed out
+    assert turned @ turn == pytest.approx(plain, abs=1e-9)
+
+
+def test_no_touch_no_force_and_no_pull():
+    d = path([0, 0, 1e-3], [0, 0, -2e-3], [0, 0, 1e-3])
+    force = touch_force(d, UP, np.diag([30.0, 30.0, 50.0]), **KNOWN)
+    assert (force[d[:, 2] >= 0] == 0).all()
+    assert (force[:, 2] >= 0).all()
+
+
+def test_sideways_after_a_press_is_mindlins_stick():
+    press, shift = 1e-3, 1e-5
+    d = path([0, 0, 0], [0, 0, -press], [shift, 0, -press])
+    force = touch_force(d, UP, NONE, law="hertz", **KNOWN)
+    a = np.sqrt(R * press)
+    assert force[-1, 0] == pytest.approx(-bonded_punch_sideways_force(shift, a, E, NU), rel=1e-6)
+    assert force[-1, 2] == pytest.approx(force[200, 2])
+
+
+def test_oblique_press_has_less_shear_than_press_then_shift():
+    """Rings that touch later have been carried less: the exponent of a in the integral gives 2/3."""
+    end = [1e-4, 0, -1e-3]
+    oblique = touch_force(path([0, 0, 0], end, steps=4000), UP, NONE, law="hertz", **KNOWN)[-1, 0]
+    after = touch_force(path([0, 0, 0], [0, 0, -1e-3], end), UP, NONE, law="hertz", **KNOWN)[-1, 0]
+    assert oblique / after == pytest.approx(2 / 3, rel=0.01)
+
+
+def test_path_back_brings_everything_back():
+    far = np.diag([30.0, 30.0, 50.0])
+    there = [[0, 0, 0], [0, 0, -2e-3], [0.4e-3, -0.2e-3, -2e-3]]
+    d = path(*there, *there[-2::-1])
+    force = touch_force(d, UP, far, **KNOWN)
+    assert force[:401] == pytest.approx(force[::-1][:401], abs=2e-6)
+
+
+def test_a_closed_loop_makes_no_energy():
+    """Press, shift, lift half way, shift back: the work on the tool over a loop is not positive."""
+    far = np.diag([30.0, 30.0, 50.0])
+    corners = [[0, 0, 0], [0, 0, -3e-3], [1e-3, 0, -3e-3], [1e-3, 0, -1e-3], [0, 0, -1e-3], [0, 0, 0]]
+    for loop in (corners, corners[::-1]):
+        d = path(*loop, steps=2000)
+        force = touch_force(d, UP, far, **KNOWN)
+        work = (0.5 * (force[1:] + force[:-1]) * np.diff(d, axis=0)).sum()
+        stored = np.abs((force[1:] * np.diff(d, axis=0)).sum(axis=1)).sum()
+        assert work < 2e-3 * stored
+
+
+def test_the_sampling_of_a_path_hardly_matters():
+    far = np.diag([30.0, 30.0, 50.0])
+    corners = ([0, 0, 0], [0.5e-3, 0, -4e-3], [1e-3, 0.5e-3, -2e-3])
+    coarse = touch_force(path(*corners, steps=60), UP, far, **KNOWN)
+    fine = touch_force(path(*corners, steps=6000), UP, far, **KNOWN)[::100]
+    assert np.abs(coarse - fine).max() < 3e-3
+
+
+def test_many_touches_at_once_equal_one_by_one():
+    rng = np.random.default_rng(2)
+    paths = [path([0, 0, 0], -1e-3 * rng.uniform(0.5, 4, 3), steps=n) for n in (30, 70, 50)]
+    normals = np.array([UP, [1.0, 0, 0], [0, 0.6, 0.8]])
+    fars = np.array([np.eye(3) * k for k in (20.0, 50.0, -8.0)])
+    starts = np.concatenate([[0], np.cumsum([len(p) for p in paths])])
+    bent = np.array([0.0, 20.0, 10.0])
+    together = touch_forces(np.vstack(paths), starts, normals, fars, curvature=bent, **KNOWN)
+    for k, p in enumerate(paths):
+        alone = touch_force(p, normals[k], fars[k], curvature=bent[k], **KNOWN)
+        assert np.array_equal(together[starts[k] : starts[k + 1]], alone)
+
+
+@pytest.mark.parametrize("radius", [2e-3, 5e-3, 20e-3])
+def test_any_displacement_gives_a_finite_force(radius):
+    rng = np.random.default_rng(4)
+    table = dent_law("neo-hookean").table
+    plane_strain, stick = moduli(E, NU)
+    state = np.zeros(STATE_SIZE)
+    far = np.diag([-25.0, -25.0, -20.0]) / E  # a rigid support close below
+    for _ in range(3000):
+        d = rng.normal(scale=6e-3, size=3)
+        force = np.array(touch_step(state, d, far, table, radius, plane_strain, stick))
+        assert np.isfinite(force).all()
+        assert np.linalg.norm(force) < 1e3
+        assert force[2] >= 0
+
+
+def test_local_frame_is_right_handed():
+    frame = site_frame(np.array([0.0, 0.6, 0.8]))
+    assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-15)
+    assert np.linalg.det(frame) == pytest.approx(1.0)
