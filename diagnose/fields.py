@@ -95,25 +95,24 @@ def far_at_poisson(
     table = forward.stages.get("poisson")
     if table is None:
         known = sorted({*ratios, forward.nu})
-        table = (np.array(known), np.array([_far(forward, forward.model.mesh.quadratic(), r) for r in known]))
+        mesh = forward.model.mesh.quadratic()
+        fars = np.array([_far(forward, mesh, r) for r in known])
+        table = (np.array(known), fars - fars[known.index(forward.nu)])
         forward.stages["poisson"] = table
-    return _interpolate(*table, nu)
+    return forward.far + _interpolate(*table, nu)
 
 
-def far_on_springs(
-    forward: Forward, log_give: float, levels: tuple[float, ...] = (-3.0, -2.0, -1.0, 0.0)
-) -> np.ndarray:
-    """(p, 3, 3) far field on a base of springs that adds 10^log_give of the object's own base give.
+def far_on_springs(forward: Forward, share: float) -> np.ndarray:
+    """(p, 3, 3) far field on a base of springs that adds `share` of a base as soft as the object.
 
     The base reactions of each unit load on springs in parallel, k a unit of area: R^T R / (k a); unit-modulus
-    springs of stiffness 1 / (10^log_give * height) a unit of area.
+    springs of stiffness 1 / (share * height) a unit of area.
     """
     table = forward.stages.get("springs")
     if table is None:
-        added = _spring_give(forward)
-        table = added
+        table = _spring_give(forward)
         forward.stages["springs"] = table
-    return forward.far + 10.0**log_give * table
+    return forward.far + share * table
 
 
 def _spring_give(forward: Forward) -> np.ndarray:
@@ -179,7 +178,7 @@ def _far(forward: Forward, mesh: TetMesh, nu: float) -> np.ndarray:
 
 
 def far_partly_bonded(forward: Forward, fraction: float, angle: float) -> np.ndarray:
-    """(p, 3, 3) far field with only a share of the base bonded, the free part towards `angle` in the support plane.
+    """(p, 3, 3) far field (differences on the model's own mesh) with only a share of the base bonded, the free part towards `angle` in the support plane.
 
     Computed at 8 angles for half the base, interpolated by angle and linearly to none.
     """
@@ -191,18 +190,20 @@ def far_partly_bonded(forward: Forward, fraction: float, angle: float) -> np.nda
         base = np.flatnonzero(mesh.fixed)
         centre = mesh.points[base].mean(axis=0)
         fars = []
+        bonded = _far(forward, mesh, forward.nu)
         for direction in angles[:-1]:
             axis = np.cos(direction) * across + np.sin(direction) * along
             free = (mesh.points[base] - centre) @ axis > 1e-9
             fixed = mesh.fixed.copy()
             fixed[base[free]] = False
             touchable = mesh.touchable & ~fixed
-            fars.append(_far(forward, TetMesh(mesh.points, mesh.tetrahedra, fixed, touchable), forward.nu))
+            loose = TetMesh(mesh.points, mesh.tetrahedra, fixed, touchable)
+            fars.append(_far(forward, loose, forward.nu) - bonded)
         fars.append(fars[0])
         table = np.array(fars)
         forward.stages["unbonded"] = table
     half = _interpolate(angles, table, angle % (2 * np.pi))
-    return forward.far + (half - forward.far) * (1 - fraction) / 0.5
+    return forward.far + half * (1 - fraction) / 0.5
 
 
 def support_axes(model) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]

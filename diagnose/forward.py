@@ -14,7 +14,7 @@ from numba import njit
 
 from diagnose import kernel
 from diagnose.touches import OUTSIDE, Touches
-from mechanics.dent import dent_law, dent_laws, effective_radius, grid
+from mechanics.dent import dent_law, effective_radius, grid
 from mechanics.model import Model
 from mechanics.sites import touch_sites
 
@@ -71,8 +71,8 @@ class Forward:
     stages: dict[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        self._sphere = dent_law("sphere").table
-        self._deep = self._neo_hookean()
+        self._linear = dent_law("linear").table
+        self._deep = dent_law("neo-hookean").table
         t = self.touches
         self.clock = t.t - t.t[0]
         self.acceleration = _acceleration(t)
@@ -82,14 +82,6 @@ class Forward:
         self.height = float(
             ((self.model.mesh.points - self.model.support_point) @ self.model.support_normal).max()
         )
-
-    def _neo_hookean(self) -> np.ndarray:
-        if "neo-hookean" in dent_laws():
-            try:
-                return dent_law("neo-hookean").table
-            except OSError:
-                pass
-        return self._sphere
 
     def ideal(self, modulus: float) -> Settings:
         """Settings of the ideal model."""
@@ -104,7 +96,7 @@ class Forward:
             stiffness=np.ones(p),
         )
 
-    def predict(self, s: Settings, *, with_contact: bool = False) -> np.ndarray:
+    def predict(self, s: Settings) -> np.ndarray:
         """(n, 3) N on the tool, local frames."""
         t = self.touches
         y = t.y.copy()
@@ -113,7 +105,7 @@ class Forward:
             played = np.empty_like(y)
             kernel.play(t.start, y, s.backlash, played)
             y = played
-        table = self._sphere
+        table = self._linear
         if s.finite_strain != 0:
             table = table + s.finite_strain * (self._deep - table)
         if s.table_factor is not None:
@@ -123,24 +115,22 @@ class Forward:
             np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (t.presses,))
         )
         f = np.zeros_like(y)
-        contact = np.zeros(len(y))
         modulus = s.modulus * s.stiffness
         kernel.integrate(
-            t.start, y, np.arange(t.presses), s.far, radius, modulus * s.dent_ratio, modulus, s.nu, table,
-            s.tool_give, s.mu, f, contact,
-        )  # fmt: skip
+            t.start, y, s.far, radius, modulus * s.dent_ratio, modulus, s.nu, table, s.tool_give, s.mu, f
+        )
         if s.mullins is not None:
             f = f * _mullins(t, y[:, 0], f[:, 0], *s.mullins)[:, None]
         if s.g is not None and len(s.g):
             slow = f.copy()
             kernel.relax(t.start, t.t, f, np.asarray(s.g), np.asarray(s.tau), slow)
-            f = slow
+            # a surface that comes back more slowly than the tip leaves lets go of it: it cannot pull
+            f = np.where(slow[:, :1] > 0, slow, 0.0)
         if s.adhesion is not None:
             f[:, 0] -= _pull(t, y[:, 0], *s.adhesion)
         if s.delay != 0:
             f = _shifted(t, f, s.delay)
-        f = self._read(s, f)
-        return (f, contact) if with_contact else f
+        return self._read(s, f)
 
     def weight(self, mass_kg: float, share: float) -> np.ndarray:
         """(n, 3) N, device frame: `share` of the tool's weight that a tare has not taken off, along the support.

@@ -28,7 +28,7 @@ class NuisanceOptions:
     tilt: float = option(0.03, "error of a site's normal", unit="rad")
     stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
     law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
-    floor_n: float = option(0.003, "error of the model that no name covers, each thinned component", unit="N")
+    floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")
 
 
 @dataclass

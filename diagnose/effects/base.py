@@ -66,7 +66,8 @@ class Effect:
         """Start vectors of a fit."""
         if self.candidates is not None:
             return self.candidates(forward)
-        count = max(len(p.starts) for p in self.parameters)
+        count = max((len(p.starts) for p in self.parameters), default=1)
         return [
-            np.array([p.starts[min(i, len(p.starts) - 1)] for p in self.parameters]) for i in range(count)
+            np.array([p.starts[min(i, len(p.starts) - 1)] for p in self.parameters], dtype=float)
+            for i in range(count)
         ]

@@ -1,14 +1,12 @@
 """Compliant base: the support gives, springs under the whole base."""
 
-import numpy as np
-
 from diagnose.effects.base import Effect, Parameter
 from diagnose.fields import far_on_springs
 
 
 def _change(settings, values, forward):  # type: ignore[no-untyped-def]
     if values[0] > 0:
-        settings.far = settings.far - forward.far + far_on_springs(forward, np.log10(values[0]))
+        settings.far = settings.far - forward.far + far_on_springs(forward, values[0])
 
 
 def _report(values, forward):  # type: ignore[no-untyped-def]

@@ -1,17 +1,17 @@
 """Finite strain: a neo-Hookean solid instead of a linear one. It has no parameter: it grows with the depth."""
 
-from diagnose.effects.base import Effect, Parameter
+from diagnose.effects.base import Effect
 
 
 def _change(settings, values, forward):  # type: ignore[no-untyped-def]
-    settings.finite_strain = values[0]
+    settings.finite_strain = 1.0
 
 
 EFFECT = Effect(
     name="finite_strain",
     domain="object",
     words="the presses are so deep that small-strain elasticity no longer holds",
-    parameters=(Parameter("share", "1", 0.0, 2.0, 0.0, (1.0,), 0.05, 1.0),),
+    parameters=(),
     change=_change,
     report=lambda values, forward: {},
     signature="grows with depth over tip radius, not with rate",

@@ -1,0 +1,90 @@
+"""Free air: what the force sensor reads while nothing is touched settles bias, drift and the tool's own mass."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.touches import free_air
+from mechanics.model import Model
+from mechanics.recording import Recording
+
+BLOCK_S = 0.25
+MIN_BLOCKS = 8
+
+
+@dataclass(frozen=True)
+class FreeAir:
+    """Block means of free-air samples. t: (b,) s. force: (b, 3) N. noise_n: std of one component of one block.
+
+    acceleration, inertia_force: (m, 3) m/s^2 and N, smoothed free-air samples where the hand accelerates.
+    bias_n: (3,) mean; bias_se_n its standard error. rate_n_per_s, rate_se: (3,) drift. mass_kg, mass_se_kg:
+    of force against acceleration. seconds: of free air.
+    """
+
+    t: np.ndarray
+    force: np.ndarray
+    noise_n: float
+    seconds: float
+    bias_n: np.ndarray
+    bias_se_n: float
+    rate_n_per_s: np.ndarray
+    rate_se_n_per_s: float
+    mass_kg: float
+    mass_se_kg: float
+
+
+def free_air_of(recording: Recording, model: Model, noise_n: float) -> FreeAir | None:
+    """Analyse free air; None with less than two seconds of it."""
+    free = free_air(recording, model)
+    rate = recording.sample_rate_hz
+    if free.sum() < 2 * rate:
+        return None
+    t, force = recording.t, recording.force_on_tool
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
+    size = max(1, round(BLOCK_S * rate))
+    times, means = [], []
+    for a, b in zip(edges[::2], edges[1::2], strict=True):
+        for i in range(a, b - size + 1, size):
+            times.append(t[i : i + size].mean())
+            means.append(force[i : i + size].mean(axis=0))
+    if len(times) < MIN_BLOCKS:
+        return None
+    times, means = np.array(times), np.array(means)
+    clock = times - times.mean()
+    rate_fit = clock @ means / (clock @ clock)
+    left = means - means.mean(axis=0) - np.outer(clock, rate_fit)
+    noise = max(float(np.sqrt((left**2).sum() / (3 * (len(times) - 2)))), noise_n / np.sqrt(size))
+    mass, mass_se = _mass(recording, free, noise_n)
+    return FreeAir(
+        times, means, noise, float(free.sum() / rate), means.mean(axis=0), noise / np.sqrt(len(times)), rate_fit,
+        noise / np.sqrt(clock @ clock), mass, mass_se,
+    )  # fmt: skip
+
+
+def _mass(
+    recording: Recording, free: np.ndarray, noise_n: float, width_s: float = 0.05
+) -> tuple[float, float]:
+    """Mass whose inertia the free-air force shows, kg, and its standard error: force = -m a over 50 ms fits."""
+    rate = recording.sample_rate_hz
+    width = max(5, round(width_s * rate) | 1)
+    half = width // 2
+    offsets = (np.arange(width) - half) / rate
+    columns = np.stack([np.ones(width), offsets, offsets**2 / 2], axis=1)
+    second = np.linalg.pinv(columns)[2]
+    inner = np.flatnonzero(np.convolve(free, np.ones(width), mode="same") > width - 0.5)[::width]
+    inner = inner[(inner > half) & (inner < len(free) - half)]
+    if len(inner) < 20:
+        return 0.0, float("inf")
+    windows = inner[:, None] + np.arange(-half, half + 1)
+    acceleration = np.einsum("wkc,k->wc", recording.position[windows], second)
+    force = recording.force_on_tool[windows].mean(axis=1)
+    acceleration = acceleration - acceleration.mean(axis=0)
+    force = force - force.mean(axis=0)
+    power = (acceleration**2).sum()
+    if power <= 0:
+        return 0.0, float("inf")
+    mass = -float((force * acceleration).sum() / power)
+    left = force + mass * acceleration
+    return mass, float(np.sqrt((left**2).mean() / power))

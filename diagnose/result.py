@@ -1,0 +1,123 @@
+"""A diagnosis: the three answers with their uncertainty, as the contract's JSON and as objects for the report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagnose.attribution import Attribution
+from diagnose.freeair import FreeAir
+from diagnose.forward import Forward
+from diagnose.where import Where
+
+KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
+
+
+@dataclass(frozen=True)
+class EffectEntry:
+    """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters."""
+
+    name: str
+    domain: str
+    probability: float
+    gap_after_n: float
+    gap_closed: float | None
+    gap_closed_ci95: tuple[float, float] | None
+    parameters: dict[str, Any]
+    gain: float = 0.0
+
+
+@dataclass(frozen=True)
+class NextTouch:
+    """The press that would best separate `separates`."""
+
+    x: float
+    y: float
+    z: float
+    direction: tuple[float, float, float]
+    depth_m: float
+    speed_m_per_s: float
+    hold_s: float
+    separates: tuple[str, ...]
+    why: str
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What `palpate diagnose` answers. Gaps: N, rms of the force 3-vector over held-out contact samples.
+
+    errors_n: our own errors, N rms: sensor, repeatability, shape, numerical. reasons: the verdict in words.
+    """
+
+    noise_n: float
+    gap_before_n: float
+    gap_after_n: float
+    gap_closed: float | None
+    gap_closed_ci95: tuple[float, float] | None
+    kind: str
+    effects: tuple[str, ...]
+    candidates: tuple[str, ...]
+    where: Where
+    entries: tuple[EffectEntry, ...]
+    young_modulus_pa: float
+    next_touch: NextTouch | None
+    errors_n: dict[str, float]
+    reasons: tuple[str, ...]
+    confusable: tuple[tuple[str, str, float], ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+    forward: Forward | None = None
+    attribution: Attribution | None = None
+    free_air: FreeAir | None = None
+    residual_before: np.ndarray | None = None
+    residual_after: np.ndarray | None = None
+    left_out: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, and some more."""
+        return {
+            "noise_n": self.noise_n,
+            "gap_before_n": self.gap_before_n,
+            "gap_after_n": self.gap_after_n,
+            "gap_closed": self.gap_closed,
+            "gap_closed_ci95": None if self.gap_closed_ci95 is None else list(self.gap_closed_ci95),
+            "verdict": {
+                "kind": self.kind,
+                "effects": list(self.effects),
+                "candidates": list(self.candidates),
+            },
+            "where": {
+                "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
+                "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
+            },
+            "effects": [
+                {
+                    "name": e.name,
+                    "domain": e.domain,
+                    "probability": e.probability,
+                    "gap_after_n": e.gap_after_n,
+                    "gap_closed": e.gap_closed,
+                    "gap_closed_ci95": None if e.gap_closed_ci95 is None else list(e.gap_closed_ci95),
+                    "parameters": e.parameters,
+                }
+                for e in self.entries
+            ],
+            "young_modulus_pa": self.young_modulus_pa,
+            "next_touch": None
+            if self.next_touch is None
+            else {
+                **{k: getattr(self.next_touch, k) for k in ("x", "y", "z")},
+                "direction": list(self.next_touch.direction),
+                "depth_m": self.next_touch.depth_m,
+                "speed_m_per_s": self.next_touch.speed_m_per_s,
+                "hold_s": self.next_touch.hold_s,
+                "separates": list(self.next_touch.separates),
+                "why": self.next_touch.why,
+            },
+            "errors_n": dict(self.errors_n),
+            "reasons": list(self.reasons),
+            "confusable": [{"pair": [a, b], "cosine": c} for a, b, c in self.confusable],
+            "seconds": dict(self.seconds),
+            "left_out": list(self.left_out),
+        }

@@ -1,0 +1,108 @@
+"""Effects settled from free air before any press is looked at: bias, drift, the tool's own mass.
+
+Their readings are taken off the forces, so that the search for other effects starts from clean ones.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.forward import STANDARD_GRAVITY, Forward
+from diagnose.freeair import FreeAir
+from diagnose.result import EffectEntry
+
+Z = 6.0
+LEAST_BIAS_N = 0.008
+LEAST_MASS_KG = 0.003
+
+
+@dataclass(frozen=True)
+class Settled:
+    """names: asserted, strongest first. residual: (n, 3) N, local: what was taken off the forces. reasons: words."""
+
+    names: tuple[str, ...]
+    parameters: dict[str, dict]
+    parts: dict[str, np.ndarray]
+    residual: np.ndarray
+    reasons: tuple[str, ...]
+
+    def plain(self, whitener, candidate) -> np.ndarray:  # type: ignore[no-untyped-def]
+        """(g,) N^2: what putting the readings back adds to a candidate's plain sums of squares."""
+        if not self.names:
+            return np.zeros(whitener.groups)
+        r = candidate.found.residual
+        both = np.stack([r, self.residual], axis=2)
+        gram = whitener.raw_gram(both)
+        return gram[:, 1, 1] + 2 * gram[:, 0, 1]
+
+    def entries(self, before, candidate, counts, noise, added, rng):  # type: ignore[no-untyped-def]
+        """The effects' lines."""
+        from diagnose.pipeline import _closed, _gap
+
+        result = []
+        for name in self.names:
+            after = candidate.plain
+            closed, interval = _closed(before, after, counts, noise, added, rng, 100)
+            result.append(
+                EffectEntry(
+                    name, "instrument", 0.97, _gap(after, counts, added), closed, interval, self.parameters[name], 1e3
+                )
+            )  # fmt: skip
+        return result
+
+
+def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settled:
+    """Decide the free-air effects and take them off forward.touches.f."""
+    t = forward.touches
+    nothing = np.zeros_like(t.f)
+    if free is None:
+        return Settled((), {}, {}, nothing, ())
+    duration = np.ptp(t.t) + 1e-9
+    parts: dict[str, np.ndarray] = {}
+    parameters: dict[str, dict] = {}
+    reasons = []
+    level, level_se = free.bias_n.copy(), free.bias_se_n
+    drift = np.abs(free.rate_n_per_s).max()
+    if drift > Z * free.rate_se_n_per_s and drift * duration / np.sqrt(12) > LEAST_BIAS_N / 2:
+        if "force_drift" not in excluded:
+            # a drifting zero was zero when the recording began
+            parts["force_drift"] = t.t[:, None] * free.rate_n_per_s
+            parameters["force_drift"] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
+            reasons.append(f"in free air the force drifts by {drift * duration:.3f} N over the presses")
+            middle = free.t.mean()
+            level = level - middle * free.rate_n_per_s
+            level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
+    heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
+    if heavy and "tool_gravity_inertia" not in excluded:
+        weight = (
+            -forward.model.support_normal / np.linalg.norm(forward.model.support_normal) * STANDARD_GRAVITY
+        )
+        untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
+        part = -free.mass_kg * forward.acceleration
+        if untared:
+            part = part + free.mass_kg * weight
+            level = level - free.mass_kg * weight
+        parts["tool_gravity_inertia"] = part
+        parameters["tool_gravity_inertia"] = {"mass_kg": free.mass_kg, "tared": not untared}
+        reasons.append(
+            f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
+        )
+    if (
+        np.abs(level).max() > Z * level_se
+        and np.linalg.norm(level) > LEAST_BIAS_N
+        and "force_bias" not in excluded
+    ):
+        parts["force_bias"] = np.broadcast_to(level, t.f.shape).copy()
+        parameters["force_bias"] = {"bias_n": level.tolist()}
+        reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
+    if not parts:
+        return Settled((), {}, {}, nothing, ())
+    frame = t.frame[t.press]
+    local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
+    taken = sum(local.values())
+    forward.touches = dataclasses.replace(t, f=t.f - taken)
+    order = sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum()))
+    return Settled(tuple(order), parameters, local, taken, tuple(reasons))

@@ -1,0 +1,56 @@
+"""Shape as a cause: how far each site's stiffness may be off, and whether sites differ by more than that."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from diagnose.fit import Fit
+from diagnose.touches import Touches
+from diagnose.whiten import NuisanceOptions
+from mechanics.model import Model
+
+SHARE_PER_HEIGHT = 2.5
+"""Relative stiffness error a unit of surface error over the object's height (edges near a press count double)."""
+
+
+def site_stiffness_sd(touches: Touches, model: Model, options: NuisanceOptions) -> np.ndarray:
+    """(p,) share by which a press's stiffness may be wrong: mesh and law, and the surface's own uncertainty."""
+    if model.shape_uncertainty_m is None:
+        return np.full(touches.presses, options.site_stiffness)
+    surface = np.flatnonzero(model.mesh.touchable)
+    height = np.ptp((model.mesh.points - model.support_point) @ model.support_normal)
+    tree = cKDTree(model.mesh.points[surface])
+    near = tree.query_ball_point(touches.point, 0.35 * height)
+    spread = np.array(
+        [np.sqrt(np.mean(model.shape_uncertainty_m[surface[i]] ** 2)) if len(i) else 0.0 for i in near]
+    )
+    return np.sqrt(options.site_stiffness**2 + (SHARE_PER_HEIGHT * spread / height) ** 2)
+
+
+def site_factors(found: Fit, touches: Touches) -> tuple[np.ndarray, np.ndarray]:
+    """(s,) factor by which each site is stiffer than predicted, and its standard error (repeats and noise)."""
+    factor, error = np.ones(touches.sites), np.ones(touches.sites)
+    predicted = touches.f - found.residual
+    for site in range(touches.sites):
+        rows = (touches.site[touches.press] == site) & touches.counted
+        f, r = predicted[rows].ravel(), found.residual[rows].ravel()
+        power = max(f @ f, 1e-12)
+        factor[site] = 1 + f @ r / power
+        error[site] = np.sqrt(touches.noise_n**2 / power + 0.01**2)
+    return factor, error
+
+
+def heterogeneity(factor: np.ndarray, error: np.ndarray, prior: np.ndarray) -> tuple[float, float]:
+    """(gain in log likelihood, spread) of letting sites differ by more than their prior (s,) allows."""
+    log = np.log(np.clip(factor, 0.2, 5))
+    log = log - np.median(log)
+
+    def likelihood(extra: float) -> float:
+        variance = prior**2 + error**2 + extra**2
+        return float(-0.5 * (log**2 / variance + np.log(variance)).sum())
+
+    grid = np.concatenate([[0.0], np.geomspace(0.005, 1.0, 60)])
+    values = [likelihood(x) for x in grid]
+    best = int(np.argmax(values))
+    return values[best] - values[0], float(grid[best])
