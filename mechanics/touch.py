@@ -112,9 +112,10 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
     if not press > 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     cuu, cuv, cvv, cnn = far[0, 0], far[0, 1], far[1, 1], far[2, 2]
-    cun, cvn = far[0, 2], far[1, 2]
-    low, high = 0.0, np.inf
-    dent = state[1] if state[1] > 0.0 else 0.5 * press
+    # no dent is deeper than what a stiffening support (1 / (1 - _STIFFEST)) makes of the whole displacement:
+    # a tip that is dragged far while it sticks must not run away
+    low, high = 0.0, (press + np.sqrt(d[0] * d[0] + d[1] * d[1])) / (1.0 - _STIFFEST)
+    dent = state[1] if 0.0 < state[1] < high else 0.5 * press
     tolerance = 1e-10 * radius
     fn = fu = fv = a = du = dv = stiffness = give = 0.0
     for _ in range(80):
@@ -122,6 +123,13 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
         give = max(cnn, -_STIFFEST / stiffness)
+        # near an edge the coupling may exceed what keeps the joint give positive definite
+        cun, cvn = far[0, 2], far[1, 2]
+        couple = cun * cun + cvn * cvn
+        least = (1.0 / stiffness + give) * (1.0 / (stick * a) + max(min(cuu, cvv), -_STIFFEST / (stick * a)))
+        if couple > _STIFFEST * least:
+            cun *= np.sqrt(_STIFFEST * least / couple)
+            cvn *= np.sqrt(_STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field give appears in the tangential balance
         fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[0] + cun * fn, d[1] + cvn * fn)
         excess = dent + give * fn - cun * fu - cvn * fv - press
@@ -134,7 +142,7 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
             break
         dent += step
         if not (low < dent < high):
-            dent = 0.5 * (low + high) if high < np.inf else 2.0 * low + tolerance
+            dent = 0.5 * (low + high)
     return -fu, -fv, fn, dent, a, du, dv, stiffness / (1.0 + give * stiffness)
 
 
