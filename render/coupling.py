@@ -22,7 +22,7 @@ def stable_stiffness_n_per_m(
     max_stiffness_n_per_m: float, rate_hz: float = 1000.0, delay_ticks: float = 0.0
 ) -> float:
     """What a device that renders `max_stiffness_n_per_m` at 1 kHz renders at this rate and delay."""
-    return max_stiffness_n_per_m * min(1.0, rate_hz / 1000.0) / (1.0 + 2.0 * delay_ticks)
+    return max_stiffness_n_per_m * min(1.0, rate_hz / 1000.0) / (1.0 + 2.0 * delay_ticks) ** 1.5
 
 
 def series_compliance_m_per_n(stiffest_n_per_m: float, limit_n_per_m: float) -> float:

@@ -31,6 +31,11 @@ RENDERED = (
 """Effects that a step renders by a law of its own."""
 
 
+STICKING = 1.0
+"""Enough for every press of a hand to stick, as the ideal tip does; a tip that is dragged along slides all
+the same, where one that stuck for good would stretch the surface without bound."""
+
+
 class EffectArrays(NamedTuple):
     """For the kernel. g, tau_s: (k,) Prony. mullins: (2,) r, m; r = 0: none. adhesion: (2,) pull-off N, range
     m.
@@ -93,14 +98,14 @@ def rendered_dent_law(model: Model, options: RenderOptions) -> DentLaw:
 
 
 def rendered_friction(model: Model, options: RenderOptions) -> float:
-    """Coulomb's coefficient: the options', the model's friction_slip, or inf (the ideal tip sticks)."""
+    """Coulomb's coefficient: the options', the model's friction_slip, or STICKING."""
     if options.friction is not None:
         return float(options.friction)
     if options.effects and "friction_slip" in model.effects:
         mu = float(model.effects["friction_slip"]["mu"])
         _check(mu >= 0, "friction_slip", "mu at least 0")
         return mu
-    return float("inf")
+    return STICKING
 
 
 def _check(good: bool, name: str, allowed: str) -> None:

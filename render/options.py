@@ -16,7 +16,7 @@ class RenderOptions:
 
     friction: float | None = option(
         None,
-        "Coulomb friction coefficient; inf sticks; default: the model's friction_slip, else inf",
+        "Coulomb friction coefficient; inf always sticks; default: the model's friction_slip, else 1",
         unit="1",
     )
     dent_law: str | None = option(

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from mechanics.errors import OptionError
+from mechanics.files import atomic_file
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
@@ -51,6 +53,13 @@ def replay_recording(renderer: Renderer, recording: Recording, progress: Progres
     return replay(
         renderer, recording.t, recording.position, tip_radius_m=recording.tip_radius_m, progress=progress
     )
+
+
+def write_forces(path: Path | str, t: np.ndarray, forces: np.ndarray) -> None:
+    """Write `t,fx,fy,fz`: s, and N on the tool."""
+    with atomic_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        table = np.column_stack([t, forces])
+        np.savetxt(file, table, fmt="%.10g", delimiter=",", header="t,fx,fy,fz", comments="")
 
 
 def rms_n(forces: np.ndarray) -> float:

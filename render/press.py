@@ -1,0 +1,167 @@
+"""One scripted press, headless: the force response of a model at one place.
+
+The tip starts in the air, moves along a straight line at constant speed, goes in by the depth asked for, may
+hold, and comes back the same way. Sampled at the rate of the servo; no clock, no randomness.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import OptionError, RecordingError
+from mechanics.files import atomic_file
+from render.base import Renderer
+from render.bvh import STACK, closest_triangle
+from render.contact import foot
+from render.surface import SurfaceArrays
+
+COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
+_MARCH = 400
+
+
+@dataclass(frozen=True)
+class Curve:
+    """A force response: t (n,) s, position (n, 3) m of the tip's centre, depth (n,) m, force (n, 3) N on the
+    tool.
+
+    normal: (3,) outward at first touch, or None for a curve that was read. Depth is travel along -n since
+    first touch, 0 before it.
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    depth: np.ndarray
+    force: np.ndarray
+    normal: np.ndarray | None = None
+
+    @property
+    def peak_force_n(self) -> float:
+        """Greatest length of the force, N."""
+        return float(np.linalg.norm(self.force, axis=1).max())
+
+    def force_at(self, depth_m: float) -> np.ndarray:
+        """(3,) N, on the way in, at a depth; raises OptionError beyond the deepest."""
+        last = int(np.argmax(self.depth)) + 1
+        if not 0 <= depth_m <= self.depth[:last].max():
+            raise OptionError(f"depth {depth_m} m is not on the curve: 0 to {self.depth[:last].max():.6g} m")
+        return np.array([np.interp(depth_m, self.depth[:last], f) for f in self.force[:last].T])
+
+
+def press(
+    renderer: Renderer,
+    at: np.ndarray,
+    direction: np.ndarray,
+    depth_m: float,
+    speed_m_per_s: float,
+    *,
+    hold_s: float = 0.0,
+    approach_m: float = 2e-3,
+    rate_hz: float = 1000.0,
+    tip_radius_m: float | None = None,
+) -> Curve:
+    """Press along `direction` (3,) with the tip's centre aimed at the point `at` (3,) m, device frame.
+
+    depth_m: of the tip's centre along -n after first touch. Raises OptionError where the line misses the
+    object, enters it through its base, or grazes it (more than 80 degrees off the normal).
+    """
+    at, direction = np.asarray(at, dtype=float), np.asarray(direction, dtype=float)
+    length = float(np.linalg.norm(direction))
+    if not length > 0 or not np.isfinite(at).all() or not np.isfinite(length):
+        raise OptionError(f"direction is {direction.tolist()}; it must be a finite vector that is not 0")
+    for value, name in ((depth_m, "depth"), (speed_m_per_s, "speed"), (rate_hz, "rate")):
+        if not (np.isfinite(value) and value > 0):
+            raise OptionError(f"{name} is {value}; it must be greater than 0")
+    if hold_s < 0 or approach_m <= 0:
+        raise OptionError(f"hold is {hold_s} s and approach {approach_m} m: at least 0 s and more than 0 m")
+    direction = direction / length
+    radius = renderer.model.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
+    touch, normal = first_touch(renderer.parameters.surface, at, direction, radius)
+    steepness = -float(normal @ direction)
+    if steepness < np.cos(np.radians(80)):
+        raise OptionError(
+            f"the press runs along the surface, normal {np.round(normal, 3).tolist()}: turn --direction into it"
+        )
+    travel = approach_m + depth_m / steepness
+    times = np.array([0.0, travel, travel, 2 * travel]) / speed_m_per_s + np.array([0.0, 0.0, hold_s, hold_s])
+    t = np.arange(0.0, times[-1] + 0.5 / rate_hz, 1.0 / rate_hz)
+    along = np.interp(t, times, [-approach_m, travel - approach_m, travel - approach_m, -approach_m])
+    position = touch + along[:, None] * direction
+    state = renderer.start([radius], dt_s=1.0 / rate_hz)
+    force = renderer.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), 1.0 / rate_hz))
+    return Curve(t, position, np.maximum(along * steepness, 0.0), force[:, 0], normal)
+
+
+def first_touch(
+    surface: SurfaceArrays, at: np.ndarray, direction: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Centre (3,) m of a sphere that comes along `direction` (3, unit) through `at` when it first touches,
+    and the outward normal (3,) there. Raises OptionError where the line misses or first meets the base."""
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+    reach = float(np.linalg.norm(high - low)) + radius + float(np.linalg.norm(at - (low + high) / 2))
+    weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+    point, normal, move = np.zeros(3), np.zeros(3), np.zeros(3)
+    along = -reach
+    for _ in range(_MARCH):
+        centre = at + along * direction
+        triangle, distance = closest_triangle(
+            surface.bvh, surface.vertices, surface.triangles, centre, np.inf, weights, stack
+        )
+        gap = distance - radius
+        if gap <= 1e-9:
+            if surface.free[triangle] == 0:
+                break
+            triangle, height = foot(surface, triangle, weights, centre, point, normal, move)
+            gap = height - radius
+            if gap <= 1e-9:
+                return centre, normal
+        along += max(gap, 1e-9)
+        if along > reach:
+            break
+    raise OptionError(
+        f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does "
+        f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to {np.round(high, 4).tolist()} m)"
+    )
+
+
+def write_curve(path: Path | str, curve: Curve) -> None:
+    """Write `t,x,y,z,depth,fx,fy,fz` (s, m, m, N)."""
+    table = np.column_stack([curve.t, curve.position, curve.depth, curve.force])
+    with atomic_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+        np.savetxt(file, table, fmt="%.10g", delimiter=",", header=",".join(COLUMNS), comments="")
+
+
+def read_curve(path: Path | str) -> Curve:
+    """Read what `write_curve` wrote; raises RecordingError where a column is missing or no number."""
+    try:
+        with open(path, newline="", encoding="utf-8") as file:
+            rows = list(csv.DictReader(file))
+        missing = [c for c in COLUMNS if not rows or c not in rows[0]]
+        if missing:
+            raise RecordingError(
+                f"'{path}' lacks the columns {', '.join(missing)}: needed are {', '.join(COLUMNS)}"
+            )
+        table = np.array([[float(row[c]) for c in COLUMNS] for row in rows])
+    except OSError as error:
+        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
+    except (TypeError, ValueError) as error:
+        raise RecordingError(f"'{path}' has a value that is no number: {error}") from error
+    return Curve(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5:8])
+
+
+def greatest_difference(curve: Curve, expected: Curve) -> tuple[float, float]:
+    """(N, s): the longest difference of the force vectors, and when; the expected curve is read at curve.t.
+
+    Where one lasts longer than the other, the rest counts in full against zero force.
+    """
+    t = np.union1d(curve.t, expected.t)
+
+    def at(c: Curve) -> np.ndarray:
+        return np.column_stack([np.interp(t, c.t, f, left=0.0, right=0.0) for f in c.force.T])
+
+    difference = np.linalg.norm(at(curve) - at(expected), axis=1)
+    worst = int(np.argmax(difference))
+    return float(difference[worst]), float(t[worst])
