@@ -9,6 +9,7 @@ with a MODEL.
 
 from __future__ import annotations
 
+import dataclasses
 from dataclasses import dataclass
 
 import numpy as np
@@ -21,6 +22,7 @@ from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver, free_dofs
 from mechanics.store import content_key, load_or_build
+from mechanics.support import support_of
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 
@@ -133,9 +135,12 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
     """The servo's compliance of a model: from the cache in its folder, or computed and stored there.
 
     The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
-    a damaged or a truncated file is rebuilt. A model that was never written, or a folder that cannot be
-    written, is computed in memory.
+    a damaged or a truncated file is rebuilt. Of the model's effects those of the base count
+    (mechanics.support). A model that was never written, or a folder that cannot be written, is computed in
+    memory.
     """
+    support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
+    held = () if support is None else dataclasses.astuple(support)
     key = content_key(
         "surface compliance 2",
         model.mesh.points,
@@ -144,10 +149,13 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
         model.mesh.touchable,
         model.poisson_ratio,
         model.modulus_ratio,
+        *held,
     )
 
     def build() -> dict[str, np.ndarray]:
-        made = surface_compliance(model.mesh, model.poisson_ratio, model.modulus_ratio, progress=progress)
+        made = surface_compliance(
+            model.mesh, model.poisson_ratio, model.modulus_ratio, support=support, progress=progress
+        )
         return made.arrays()
 
     path = None if model.path is None else model.path / f"compliance-{key[:16]}.bin"

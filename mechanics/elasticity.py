@@ -119,6 +119,20 @@ def stiffness(
     return sp.bsr_matrix((blocks, columns, indptr), shape=(3 * n, 3 * n)).tocsr()
 
 
+def triangle_mass(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Integrals of the products of shape functions over straight triangles: (k, 3, 3) or (k, 6, 6), m^2."""
+    p = points[triangles[:, :3]]
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+    if triangles.shape[1] == 3:
+        unit = (np.ones((3, 3)) + np.eye(3)) / 12
+    else:
+        corner = 6 * np.eye(3) - (1 - np.eye(3))
+        mixed = np.array([[0, -4, 0], [0, 0, -4], [-4, 0, 0]])  # a corner and the middle of the side opposite
+        middle = 16 * (np.ones((3, 3)) + np.eye(3))
+        unit = np.block([[corner, mixed], [mixed.T, middle]]) / 180
+    return area[:, None, None] * unit
+
+
 def strain(mesh: TetMesh, displacement: np.ndarray) -> np.ndarray:
     """Small strain at each element's centroid: (m, 3, 3), from nodal displacements (n, 3) m."""
     gradients, _ = barycentric_gradients(mesh.points[mesh.tetrahedra[:, :4]])

@@ -12,6 +12,7 @@ from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.solver import Solver
+from mechanics.support import Support
 from mechanics.tetmesh import TetMesh
 
 PATCH_WIDTH_IN_EDGES = 0.8
@@ -56,6 +57,7 @@ def touch_solver(
     modulus_ratio: np.ndarray | None = None,
     *,
     surface_edge_m: float = SURFACE_EDGE_M,
+    support: Support | None = None,
 ) -> Solver:
     """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
 
@@ -65,7 +67,7 @@ def touch_solver(
     """
     fine, parent = refined_near_surface(mesh, surface_edge_m)
     ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)[parent]
-    return Solver(fine.quadratic(), poisson_ratio, ratio)
+    return Solver(fine.quadratic(), poisson_ratio, ratio, support=support)
 
 
 def patch_width(mesh: TetMesh) -> float:

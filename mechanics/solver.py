@@ -8,6 +8,7 @@ import scipy.sparse.linalg as spla
 from mechanics import pardiso
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError
+from mechanics.support import Support
 from mechanics.tetmesh import TetMesh
 
 BACKENDS = ("pardiso", "superlu")
@@ -17,7 +18,8 @@ class Solver:
     """Displacements for nodal forces on a mesh with a fixed base, for unit Young's modulus.
 
     modulus_ratio: (m,) or None. backend: 'pardiso', 'superlu' or None for the best that is there.
-    The factorisation is done in the constructor. Raises MeshError where nothing is fixed (rigid motion).
+    support: how the base is held; None: bonded. The factorisation is done in the constructor. Raises
+    MeshError where nothing is fixed (rigid motion).
     """
 
     def __init__(
@@ -28,12 +30,15 @@ class Solver:
         *,
         backend: str | None = None,
         mean_dilatation: bool = False,
+        support: Support | None = None,
     ) -> None:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
         self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
-        self.free = free_dofs(mesh)
+        self.free = free_dofs(mesh, support)
         full = stiffness(mesh, poisson_ratio, modulus_ratio, mean_dilatation=mean_dilatation)
+        if support is not None and support.springs is not None:
+            full = (full + support.stiffness(mesh)).tocsr()
         self.matrix = full[self.free][:, self.free].tocsr()
         try:
             if self.backend == "pardiso":
@@ -73,11 +78,12 @@ class Solver:
         return self._factor.solve(np.asfortranarray(right, dtype=float))
 
 
-def free_dofs(mesh: TetMesh) -> np.ndarray:
+def free_dofs(mesh: TetMesh, support: Support | None = None) -> np.ndarray:
     """Indices of the degrees of freedom that are not fixed and belong to some element."""
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.tetrahedra.ravel()] = True
     if mesh.fixed[used].sum() < 3:
         raise MeshError("fewer than 3 nodes are fixed: the object would move as a rigid body")
-    nodes = np.flatnonzero(used & ~mesh.fixed)
+    held = mesh.fixed if support is None else support.held_nodes(mesh)
+    nodes = np.flatnonzero(used & ~held)
     return (3 * nodes[:, None] + np.arange(3)).ravel()

@@ -19,6 +19,7 @@ from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.sites import mean_curvature, patch_width, touch_solver
 from mechanics.solver import Solver
+from mechanics.support import Support
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 _CORNERS = 32  # patches solved at once
@@ -144,17 +145,18 @@ def surface_compliance(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
+    support: Support | None = None,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
-    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None."""
-    coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio)
+    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None; support: None, bonded."""
+    coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=support)
     nodes, triangles = _corners(coarse.mesh)
     points = coarse.mesh.points[nodes]
     width = patch_width(coarse.mesh)
     blocks = _blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
     curvature = mean_curvature(mesh, points, normals := _normals(coarse.mesh, nodes))
     del coarse
-    fine = touch_solver(mesh, poisson_ratio, modulus_ratio)
+    fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support)
     own_nodes, own_triangles = _corners(fine.mesh)
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)

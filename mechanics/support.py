@@ -1,0 +1,96 @@
+"""How the base is held: bonded (the ideal model), bonded in part, or on springs.
+
+Which triangles are the base is the mesh's business (TetMesh.fixed); this says what they feel.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+
+from mechanics.elasticity import triangle_mass
+from mechanics.errors import OptionError
+from mechanics.tetmesh import TetMesh
+
+
+@dataclass(frozen=True)
+class Support:
+    """normal: (3,) unit, out of the support into the object.
+
+    springs: (normal, tangential) stiffness a unit of area over Young's modulus, 1/m; None: rigid.
+    bonded_fraction: share of the base's area that is held; the rest, towards `direction` (3,), may lift
+    and slip.
+    """
+
+    normal: np.ndarray
+    springs: tuple[float, float] | None = None
+    bonded_fraction: float = 1.0
+    direction: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if not 0 < self.bonded_fraction <= 1:
+            raise OptionError(f"bonded_fraction is {self.bonded_fraction}; it must lie in (0, 1]")
+        if self.bonded_fraction < 1 and self.direction is None:
+            raise OptionError("a base that is bonded in part needs the direction of its free part")
+        if self.springs is not None and not min(self.springs) > 0:
+            raise OptionError(f"base springs are {self.springs} 1/m; both must be greater than 0")
+
+    def held_triangles(self, mesh: TetMesh) -> np.ndarray:
+        """The base triangles (k, 3 or 6) that are held."""
+        base = base_triangles(mesh)
+        if self.bonded_fraction >= 1:
+            return base
+        p = mesh.points[base[:, :3]]
+        area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        order = np.argsort(p.mean(axis=1) @ np.asarray(self.direction), kind="stable")
+        share = np.cumsum(area[order]) / area.sum()
+        return base[order[share <= self.bonded_fraction + 1e-9]]
+
+    def held_nodes(self, mesh: TetMesh) -> np.ndarray:
+        """(n,) bool: nodes without any motion."""
+        held = np.zeros(len(mesh.points), dtype=bool)
+        if self.springs is None:
+            held[np.unique(self.held_triangles(mesh))] = True
+        return held
+
+    def stiffness(self, mesh: TetMesh) -> sp.csr_matrix | None:
+        """What the springs add to the stiffness for unit modulus, (3n, 3n) m, or None."""
+        if self.springs is None:
+            return None
+        nn = np.outer(self.normal, self.normal)
+        per_area = self.springs[0] * nn + self.springs[1] * (np.eye(3) - nn)
+        triangles = self.held_triangles(mesh)
+        mass = triangle_mass(mesh.points, triangles)
+        k = triangles.shape[1]
+        rows = np.repeat(triangles, k, axis=1).ravel()
+        columns = np.tile(triangles, (1, k)).ravel()
+        nodal = sp.csr_matrix((mass.ravel(), (rows, columns)), shape=(len(mesh.points),) * 2)
+        return sp.kron(nodal, per_area, format="csr")
+
+
+def base_triangles(mesh: TetMesh) -> np.ndarray:
+    """(k, 3 or 6): the boundary triangles all of whose corners are fixed."""
+    return mesh.surface[mesh.fixed[mesh.surface[:, :3]].all(axis=1)]
+
+
+def support_of(
+    effects: Mapping[str, Mapping[str, Any]], normal: np.ndarray, young_modulus_pa: float
+) -> Support | None:
+    """The support that a model's effects describe (compliant_base, unbonded_base); None where it is bonded."""
+    springs, fraction, direction = None, 1.0, None
+    if "compliant_base" in effects:
+        keys = effects["compliant_base"]
+        springs = tuple(
+            float(keys[k]) / young_modulus_pa for k in ("k_normal_pa_per_m", "k_tangential_pa_per_m")
+        )
+    if "unbonded_base" in effects:
+        keys = effects["unbonded_base"]
+        fraction = float(keys["bonded_fraction"])
+        direction = np.asarray(keys["direction"], dtype=float)
+    if springs is None and fraction >= 1:
+        return None
+    return Support(np.asarray(normal, dtype=float), springs, fraction, direction)
