@@ -52,6 +52,12 @@ class Grip:
         self.anchor = np.zeros((points, 3))
         self.relative = np.full((points, 3), 1e6)
 
+    def let_go(self, new: Grip) -> bool:
+        """Release the points held here that pull in `new`; they may still be pressed, but slide. Whether any were."""
+        pulling = self.active & ~new.active
+        self.active = self.active & ~pulling
+        return bool(pulling.any())
+
     def copy(self) -> Grip:
         """An independent copy."""
         twin = Grip(0)
@@ -141,9 +147,10 @@ def _evaluate(
             m = hold / radius if friction < 0.0 and not fresh else r / distance
             along = m[0] * r[0] + m[1] * r[1] + m[2] * r[2]
             overlap = radius - along
-            if overlap <= 0.0:
+            # a held point may pull while Newton iterates: the solver lets go of it once the rest has settled
+            if overlap <= 0.0 and (fresh or friction >= 0.0):
                 continue
-            active[k] = True
+            active[k] = overlap > 0.0
             slip = r - hold
             out = m[0] * slip[0] + m[1] * slip[1] + m[2] * slip[2]
             slip -= out * m

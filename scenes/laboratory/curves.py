@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import hashlib
-import json
 import os
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass
 from multiprocessing import get_context
@@ -64,51 +63,60 @@ class PathJob:
 
 
 def solve(
-    phantom: Phantom, specimen: Specimen, job: PathJob, fineness: Fineness, cache: Path | None = None
-) -> Curve:
-    """March the tip along the job's path. Raises LabError where a state finds no equilibrium."""
-    side = job.travel - np.outer(job.travel @ job.normal, job.normal)
+    phantom: Phantom,
+    specimen: Specimen,
+    jobs: Sequence[PathJob],
+    fineness: Fineness,
+    cache: Path | None = None,
+) -> Iterator[Curve]:
+    """March the tip along each job's path from an untouched solid; the jobs share one place and one mesh.
+
+    Raises LabError where a state finds no equilibrium.
+    """
+    place = jobs[0].point
+    sideways = [job.travel - np.outer(job.travel @ job.normal, job.normal) for job in jobs]
     problem = build(
         phantom,
         specimen,
-        job.point,
-        travel=float(np.linalg.norm(side, axis=1).max()),
+        place,
+        travel=max(float(np.linalg.norm(side, axis=1).max()) for side in sideways),
         fineness=fineness,
         cache=cache,
     )
-    start = job.point + specimen.tip_radius * job.normal
-    state = problem.rest(start + 1e-3 * job.normal)
-    count = len(job.travel)
-    force, energy = np.zeros((count, 3)), np.zeros(count)
-    stiffness = np.zeros((count, 3, 3))
-    for k in range(count):
-        if k == 0 and not job.travel[0].any():
-            continue
-        span = 0.0 if job.times is None else float(job.times[k] - job.times[k - 1])
-        state = problem.advance(state, start + job.travel[k], span)
-        force[k], energy[k] = state.force, state.energy
-        if np.linalg.norm(state.force) > 1e-6:
-            stiffness[k] = problem.tip_stiffness(state)
-    return Curve(job.travel, force, stiffness, energy, job.times)
+    for job in jobs:
+        start = place + specimen.tip_radius * job.normal
+        state = problem.rest(start + 1e-3 * job.normal)
+        count = len(job.travel)
+        force, energy = np.zeros((count, 3)), np.zeros(count)
+        stiffness = np.zeros((count, 3, 3))
+        for k in range(count):
+            if k == 0 and not job.travel[0].any():
+                continue
+            span = 0.0 if job.times is None else float(job.times[k] - job.times[k - 1])
+            state = problem.advance(state, start + job.travel[k], span)
+            force[k], energy[k] = state.force, state.energy
+            if np.linalg.norm(state.force) > 1e-6:
+                stiffness[k] = problem.tip_stiffness(state)
+        yield Curve(job.travel, force, stiffness, energy, job.times)
 
 
 def _work(
-    phantom: Phantom, specimen: Specimen, job: PathJob, fineness: Fineness, cache: Path, path: Path
+    phantom: Phantom,
+    specimen: Specimen,
+    jobs: Sequence[PathJob],
+    fineness: Fineness,
+    cache: Path,
+    paths: Sequence[Path],
 ) -> str | None:
     try:
-        curve = solve(phantom, specimen, job, fineness, cache)
+        for curve, path in zip(solve(phantom, specimen, jobs, fineness, cache), paths, strict=True):
+            arrays = {k: getattr(curve, k) for k in ("travel", "force", "stiffness", "energy")}
+            if curve.times is not None:
+                arrays["times"] = curve.times
+            with atomic_file(path) as temporary:
+                np.savez(temporary, **arrays)
     except LabError as error:
         return str(error)
-    arrays = {
-        "travel": curve.travel,
-        "force": curve.force,
-        "stiffness": curve.stiffness,
-        "energy": curve.energy,
-    }
-    if curve.times is not None:
-        arrays["times"] = curve.times
-    with atomic_file(path) as temporary:
-        np.savez(temporary, **arrays)
     return None
 
 
@@ -145,24 +153,30 @@ def curves(
     if missing:
         coarse_mesh(phantom, cache)
         failures = []
-        workers = min(len(missing), workers or os.cpu_count() or 1)
+        places: dict[bytes, list[int]] = {}
+        for k in missing:
+            places.setdefault(jobs[k].point.tobytes(), []).append(k)
+        groups = list(places.values())
+        workers = min(len(groups), workers or os.cpu_count() or 1)
         progress(label, 0.0)
+        tasks = [
+            (phantom, specimen, [jobs[k] for k in group], fineness, cache, [paths[k] for k in group])
+            for group in groups
+        ]
         if workers == 1:
-            for done, k in enumerate(missing):
-                failures.append(_work(phantom, specimen, jobs[k], fineness, cache, paths[k]))
-                progress(label, (done + 1) / len(missing))
+            for done, task in enumerate(tasks):
+                failures.append(_work(*task))
+                progress(label, (done + 1) / len(tasks))
         else:
             with ProcessPoolExecutor(workers, get_context("spawn"), _single_threaded) as pool:
-                futures = [
-                    pool.submit(_work, phantom, specimen, jobs[k], fineness, cache, paths[k]) for k in missing
-                ]
+                futures = [pool.submit(_work, *task) for task in tasks]
                 for done, future in enumerate(as_completed(futures)):
                     failures.append(future.result())
-                    progress(label, (done + 1) / len(missing))
+                    progress(label, (done + 1) / len(tasks))
         failures = [failure for failure in failures if failure]
         if failures:
             raise LabError(
-                f"{len(failures)} of {len(jobs)} touches could not be solved; the first: {failures[0]}"
+                f"{len(failures)} of {len(groups)} places could not be solved; the first: {failures[0]}"
             )
         found = [_load(path) for path in paths]
     return found
@@ -171,8 +185,3 @@ def curves(
 def _single_threaded() -> None:
     for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
         os.environ[name] = "1"
-
-
-def describe(specimen: Specimen) -> str:
-    """The specimen's fields as one line of JSON, for logs."""
-    return json.dumps({k: v for k, v in specimen.__dict__.items() if v}, default=str)

@@ -48,7 +48,7 @@ class LinearProblem:
             unit = np.zeros((size, min(64, len(held) - start)))
             unit[held[start : start + unit.shape[1]], np.arange(unit.shape[1])] = 1.0
             compliance[:, start : start + unit.shape[1]] = factor.solve(unit)[held]
-        self._stiffness = np.linalg.inv((compliance + compliance.T) / 2)
+        self._compliance = (compliance + compliance.T) / 2
         inside = (local[contact.faces] >= 0).all(axis=1)
         self._contact = SphereContact(
             mesh.points[nodes],
@@ -84,33 +84,47 @@ class LinearProblem:
         return self.advance(middle, centre, step_s, depth + 1)
 
     def _newton(self, state: LinearState, centre: np.ndarray) -> LinearState | None:
+        """u + C f(u) = 0, where the contact's forces f live on the few nodes that touch."""
         u = state.displacement
-        arrivals = not state.grip.active.any()
-        for iteration in range(25):
-            forces, face_k, force, grip = self._contact.evaluate(u, centre, state.grip, True, arrivals)
-            inner = self._stiffness @ u.ravel()
-            r = inner + np.bincount(self._dofs.ravel(), forces.ravel(), minlength=u.size)
-            if np.linalg.norm(r) < 1e-6 * max(np.abs(forces).sum(), 1e-3) and arrivals and iteration:
-                return LinearState(u, centre, force, grip, 0.5 * float(u.ravel() @ inner))
+        held = state.grip.copy()
+        arrivals = not held.active.any()
+        for iteration in range(60):
+            forces, face_k, force, grip = self._contact.evaluate(u, centre, held, True, arrivals)
+            load = np.bincount(self._dofs.ravel(), forces.ravel(), minlength=u.size)
+            given = self._compliance @ load
+            r = u.ravel() + given
+            if np.linalg.norm(r) < 1e-7 * max(np.linalg.norm(given), 1e-3) and arrivals and iteration:
+                if held.let_go(grip):
+                    continue
+                return LinearState(u, centre, force, grip, 0.5 * float(load @ given))
             arrivals = True
-            step = -np.linalg.solve(self._tangent(face_k), r)
-            u = u + step.reshape(-1, 3) * min(1.0, 5.0 / np.abs(step).max())
+            on, stiffness = self._touching(face_k)
+            if len(on):
+                inner = np.eye(len(on)) + self._compliance[np.ix_(on, on)] @ stiffness
+                r = r + self._compliance[:, on] @ (stiffness @ np.linalg.solve(inner, -r[on]))
+            # points that arrive and leave in turn are calmed by shorter steps
+            calm = 1.0 if iteration < 25 else 0.5
+            u = u - r.reshape(-1, 3) * min(calm, 5.0 / max(np.abs(r).max(), 1e-12))
         return None
 
-    def _tangent(self, face_k: np.ndarray) -> np.ndarray:
-        matrix = self._stiffness.copy()
-        np.add.at(matrix, (self._dofs[:, :, None], self._dofs[:, None, :]), face_k)
-        return matrix
+    def _touching(self, face_k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(degrees of freedom of the faces that touch, the contact's stiffness among them)."""
+        faces = np.flatnonzero(np.abs(face_k).max(axis=(1, 2)) > 0)
+        on, local = np.unique(self._dofs[faces], return_inverse=True)
+        local = local.reshape(-1, 18)
+        matrix = np.zeros((len(on), len(on)))
+        np.add.at(matrix, (local[:, :, None], local[:, None, :]), face_k[faces])
+        return on, matrix
 
     def tip_stiffness(self, state: LinearState) -> np.ndarray:
         """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative."""
         _, face_k, _, _ = self._contact.evaluate(state.displacement, state.centre, state.grip, True)
-        units = np.tile(np.eye(3), (6, 1))
-        per_face = face_k @ units
-        coupling = np.zeros((state.displacement.size, 3))
-        np.add.at(coupling, self._dofs.ravel(), per_face.reshape(-1, 3))
-        own = np.einsum("ai,faj->ij", units, per_face)
-        return -(own - coupling.T @ np.linalg.solve(self._tangent(face_k), coupling))
+        on, stiffness = self._touching(face_k)
+        unit = np.tile(np.eye(3), (len(on) // 3, 1))
+        coupling = stiffness @ unit
+        inner = np.eye(len(on)) + self._compliance[np.ix_(on, on)] @ stiffness
+        moved = np.linalg.solve(inner, self._compliance[np.ix_(on, on)] @ coupling)
+        return -(unit.T @ coupling - coupling.T @ moved)
 
 
 class LinearState:

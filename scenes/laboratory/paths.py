@@ -18,8 +18,8 @@ from scenes.phantoms import Phantom
 UNLOADING = np.array([0.93, 0.82, 0.68, 0.52, 0.36, 0.22, 0.12, 0.05, 0.0])
 """States of the way out, as shares of the depth; contact may be lost before."""
 
-BEYOND_MM = 0.4
-"""The way out of a solved path ends this far above the place of first touch."""
+BEYOND_MM, BEYOND_DRAG_MM = (0.4,), (0.4, 1.0, 1.8, 3.0)
+"""States of the way out above the place of first touch: a surface that was dragged along follows the tip for a while."""
 
 WAY_IN, SIDEWAYS, WAY_OUT = 0, 1, 2
 """Legs of a touch."""
@@ -51,6 +51,9 @@ class Leg:
             inside = np.minimum(positive, self._high)
             force = force * inside[:, None] ** 1.5
             stiffness = stiffness * np.sqrt(inside)[:, None]
+        else:
+            gone = s < self._low
+            force, stiffness = np.where(gone[:, None], 0.0, force), np.where(gone[:, None], 0.0, stiffness)
         return force, stiffness.reshape(-1, 3, 3)
 
 
@@ -80,7 +83,8 @@ def _in_and_out(touch: Touch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         travel.append(travel[0][-1] + steps[:, None] * touch.side / distance)
         leg.append(np.full(len(steps), SIDEWAYS))
         s.append(steps)
-    out = np.append(UNLOADING * touch.depth, -BEYOND_MM)
+    beyond = BEYOND_DRAG_MM if distance > 0 else BEYOND_MM
+    out = np.concatenate([UNLOADING * touch.depth, -np.array(beyond)])
     travel.append(out[:, None] * touch.direction + touch.side)
     leg.append(np.full(len(out), WAY_OUT))
     s.append(out)

@@ -167,5 +167,5 @@ def _touch(
         tilt = np.radians(rng.uniform(15, 32))
         direction = -np.cos(tilt) * normal + np.sin(tilt) * across
     if kind == "drag":
-        side = round(rng.uniform(2.5, 4.5) * 2) / 2 * across
+        side = round(rng.uniform(1.75, 3.5) * 4) / 4 * across
     return Touch(site, point, normal, kind, float(depth), direction, side, repeat)

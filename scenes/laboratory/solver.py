@@ -151,10 +151,11 @@ class Problem:
         contact = self.contact
         u = state.displacement if guess is None else guess
         # without a guess the points already held carry the object along before new ones may arrive
-        arrivals = guess is not None or not state.grip.active.any()
+        held = state.grip.copy()
+        arrivals = guess is not None or not held.active.any()
         last, cut = u, 1.0
         step = np.zeros_like(u)
-        for iteration in range(30):
+        for iteration in range(40):
             cell_f, cell_k, energy, history = self._evaluate(u, state.history, step_s)
             if not np.isfinite(energy):
                 # an element turned inside out: take less of the last step
@@ -163,11 +164,11 @@ class Problem:
                     return None
                 u = last + cut * step
                 continue
-            face_f, face_k, force, grip = contact.evaluate(u, centre, state.grip, True, arrivals)
+            face_f, face_k, force, grip = contact.evaluate(u, centre, held, True, arrivals)
             r = self._residual(cell_f, face_f, u)
             norm = np.linalg.norm(r)
             scale = max(np.abs(face_f).sum(), 1e-3)
-            if norm < self.tolerance * scale and arrivals and iteration > 0:
+            if norm < self.tolerance * scale and arrivals and iteration > 0 and not held.let_go(grip):
                 return State(u, centre.copy(), force, energy, history, grip, None, iteration)
             arrivals = True
             self._factor.refresh(self._assemble(cell_k, face_k, u))

@@ -106,7 +106,7 @@ def build(
     _place(solid, specimen, phantom)
     near = (
         np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - point, axis=1)
-        < 2.4 * specimen.tip_radius + travel
+        < 2.0 * specimen.tip_radius + travel
     )
     contact = SphereContact(mesh.points, mesh.faces[near], specimen.tip_radius, specimen.friction)
     free, springs, floor = _support(mesh, specimen)

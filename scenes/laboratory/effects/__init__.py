@@ -1,0 +1,25 @@
+"""Every effect that the laboratory can write, by the names of the contract and some that it does not have."""
+
+from __future__ import annotations
+
+from mechanics.errors import OptionError
+from scenes.laboratory.effects import contact, instrument, solid
+from scenes.laboratory.effects.base import Bench, Effect, Readings
+
+REGISTRY: dict[str, Effect] = {
+    effect.name: effect
+    for effect in (*solid.EFFECTS, *contact.EFFECTS, *instrument.EFFECTS, *contact.UNNAMED)
+}
+"""Effects by name; the order is the order in which they act."""
+
+UNNAMED = tuple(effect.name for effect in contact.UNNAMED)
+
+
+def effect(name: str) -> Effect:
+    """The effect of that name; raises OptionError with the allowed names."""
+    if name not in REGISTRY:
+        raise OptionError(f"effect '{name}' is unknown; allowed are {', '.join(REGISTRY)}")
+    return REGISTRY[name]
+
+
+__all__ = ["REGISTRY", "UNNAMED", "Bench", "Effect", "Readings", "effect"]

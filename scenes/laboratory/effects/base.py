@@ -1,0 +1,66 @@
+"""What an effect of the laboratory is: a name, the meaning of its strength, and the places where it acts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from scenes.laboratory.motion import Motion
+from scenes.laboratory.presses import Touch
+from scenes.laboratory.specimen import Specimen
+from scenes.phantoms import Phantom
+
+Parameters = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What an effect may look at to choose its parameters: the ideal object, the touches, and its own chance."""
+
+    phantom: Phantom
+    modulus_pa: float
+    tip_radius_m: float
+    touches: tuple[Touch, ...]
+    rng: np.random.Generator
+
+
+@dataclass(frozen=True)
+class Readings:
+    """Samples as instruments see them, device frame, SI: t (n,), position (n, 3), force on the tool (n, 3),
+    axes (n, 3, 3): tool frame to device frame. second: (n,) bool, phase II.
+    """
+
+    t: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    axes: np.ndarray
+    second: np.ndarray
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One departure from the ideal model.
+
+    parameters(strength, bench): the keys of the contract, SI. in_solid(specimen, parameters): solved in the solid.
+    on_force(force, motion, normals, parameters): acts on the elastic force (n, 3) N, object frame. on_readings(
+    readings, parameters): acts in the instrument. on_shape(phantom, parameters): changes the object's surface.
+    needs_finite: whether it has no meaning at small strains.
+    """
+
+    name: str
+    domain: str
+    parameters: Callable[[float, Bench], dict[str, Any]]
+    in_solid: Callable[[Specimen, Parameters], Specimen] | None = None
+    on_force: Callable[[np.ndarray, Motion, np.ndarray, Parameters], np.ndarray] | None = None
+    on_readings: Callable[[Readings, Parameters], Readings] | None = None
+    on_shape: Callable[[Phantom, Parameters], Phantom] | None = None
+    needs_finite: bool = False
+
+
+def unit(rng: np.random.Generator) -> np.ndarray:
+    """A random unit vector."""
+    v = rng.normal(size=3)
+    return v / np.linalg.norm(v)

@@ -1,0 +1,338 @@
+"""A whole recording: phantom, effects and a hand in; samples and the truth about them out."""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.errors import OptionError
+from mechanics.options import option
+from mechanics.progress import Progress, silent
+from mechanics.recording import Recording
+from scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
+from scenes.laboratory.effects.solid import scaled
+from scenes.laboratory.force import elastic_force
+from scenes.laboratory.frame import axes_of, quaternions, random_frame
+from scenes.laboratory.hand import HandOptions, band_noise
+from scenes.laboratory.motion import Motion, motion
+from scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
+from scenes.laboratory.presses import PROTOCOLS, Touch, press_set
+from scenes.laboratory.specimen import Fineness, Specimen
+from scenes.laboratory.tracing import RATE_HZ, trace
+from scenes.phantoms import Phantom
+
+
+@dataclass(frozen=True)
+class SimulateOptions:
+    """What a person may choose about a simulated exploration."""
+
+    young_modulus_pa: float | None = option(
+        None, "Young's modulus of the matrix", unit="Pa", flag="--modulus"
+    )
+    protocol: str = option("ordinary", "how much is touched", choices=tuple(PROTOCOLS))
+    presses: int = option(0, "number of the press set: which places, how deep, in which order")
+    tip_radius_m: float = option(0.005, "radius of the spherical tip", unit="m", flag="--tip-radius")
+    force_noise_std_n: float = option(0.012, "sensor noise, standard deviation per axis", unit="N")
+    coloured_share: float = option(0.15, "share of the noise's power below 10 Hz, 0 to 1")
+    position_resolution_m: float = option(3.0e-5, "step of the position reading", unit="m")
+    frame: bool = option(False, "turn and shift the device frame at random (else the object's frame)")
+    finest_mm: float = option(3.0, "longest edge of the solid's elements next to the touch", unit="mm")
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device frame."""
+
+    recording: Recording
+    truth: Mapping[str, Any]
+    clean_n: np.ndarray
+    touches: tuple[Touch, ...] = field(default=())
+
+
+def simulate(
+    phantom: Phantom,
+    effects: Mapping[str, float] | None = None,
+    options: SimulateOptions | None = None,
+    *,
+    hand: HandOptions | None = None,
+    seed: int = 0,
+    sizes: bool = True,
+    workers: int | None = None,
+    cache: Path | None = None,
+    progress: Progress = silent,
+) -> Simulation:
+    """Explore `phantom` with `effects` (name: strength, see INTERFACE of the docs) and write down what is read.
+
+    The ideal model has no effect: linear elastic, bonded, sticking, exact but for noise. Regions of the phantom count
+    as the effect `inclusion`. seed: timing, straying, tracing and noise; the press set has its own number, so that
+    solved curves are shared. sizes: also solve without each effect, to state its size. Raises OptionError, LabError.
+    """
+    options = options or SimulateOptions()
+    hand = hand or HandOptions()
+    strengths = {name: float(value) for name, value in (effects or {}).items() if float(value) != 0}
+    for name, value in strengths.items():
+        effect(name)
+        if not (np.isfinite(value) and 0 < value <= 16):
+            raise OptionError(
+                f"effect '{name}' has strength {value}; it must be greater than 0 and at most 16"
+            )
+    if any(effect(name).needs_finite for name in strengths):
+        strengths.setdefault("finite_strain", 1.0)
+    modulus = options.young_modulus_pa or phantom.young_modulus_pa
+    plain = replace(phantom, regions=())
+    touches = tuple(press_set(plain, options.protocol, options.presses))
+    parameters = _parameters(plain, strengths, modulus, options, touches)
+    session = _Session(phantom, modulus, options, hand, touches, parameters, seed, workers, cache, progress)
+    present = tuple(parameters)
+    whole, clean = session.run(present)
+    truth = _truth(session, present, clean, whole, sizes, strengths)
+    return Simulation(session.recording(whole, clean, truth), truth, clean, touches)
+
+
+def _parameters(
+    phantom: Phantom,
+    strengths: Mapping[str, float],
+    modulus: float,
+    options: SimulateOptions,
+    touches: Sequence[Touch],
+) -> dict[str, dict[str, Any]]:
+    out = {}
+    for name in sorted(strengths, key=list(REGISTRY).index):
+        rng = np.random.default_rng([options.presses, zlib.crc32(name.encode())])
+        bench = Bench(phantom, modulus, options.tip_radius_m, tuple(touches), rng)
+        out[name] = effect(name).parameters(strengths[name], bench)
+    return out
+
+
+class _Session:
+    """One hand on one object; runs the same exploration with any subset of its effects."""
+
+    def __init__(
+        self,
+        phantom: Phantom,
+        modulus: float,
+        options: SimulateOptions,
+        hand: HandOptions,
+        touches: tuple[Touch, ...],
+        parameters: Mapping[str, Mapping[str, Any]],
+        seed: int,
+        workers: int | None,
+        cache: Path | None,
+        progress: Progress,
+    ) -> None:
+        self.phantom, self.modulus, self.options, self.hand = phantom, modulus, options, hand
+        self.touches, self.parameters, self.seed = touches, parameters, seed
+        self._keywords = {"workers": workers, "cache": cache, "progress": progress}
+        self.rotation, self.shift = np.eye(3), np.zeros(3)
+        if options.frame:
+            self.rotation, self.shift = random_frame(seed, 1e3 * phantom.height_m)
+
+    def _rng(self, what: str) -> np.random.Generator:
+        return np.random.default_rng([self.seed, zlib.crc32(what.encode())])
+
+    def specimen(self, present: Sequence[str], regions: bool) -> Specimen:
+        """The solid with the effects `present`, and with the phantom's own regions or without."""
+        balls = tuple(
+            (*(1e3 * x for x in r.centre_m), 1e3 * r.radius_m, r.modulus_ratio) for r in self.phantom.regions
+        )
+        specimen = Specimen(
+            poisson_ratio=self.phantom.poisson_ratio,
+            tip_radius=round(1e3 * self.options.tip_radius_m, 6),
+            balls=balls if regions else (),
+        )
+        for name in present:
+            change = effect(name).in_solid
+            if change is not None:
+                specimen = change(specimen, scaled(name, self.parameters[name], self.modulus))
+        return specimen
+
+    def forces(self, present: Sequence[str], regions: bool) -> list[TouchForce]:
+        """Solved touches with the effects `present`."""
+        phantom = replace(self.phantom, regions=())
+        for name in present:
+            change = effect(name).on_shape
+            if change is not None:
+                phantom = change(phantom, self.parameters[name])
+        inside = [name for name in present if effect(name).in_solid or effect(name).on_shape]
+        label = "solving " + (" + ".join(inside) if inside else "the ideal object")
+        fineness = Fineness(finest=self.options.finest_mm)
+        specimen = self.specimen(present, regions)
+        return touch_forces(phantom, specimen, self.touches, fineness=fineness, label=label, **self._keywords)
+
+    def motion(self, radius: float) -> Motion:
+        """The same hand's way every time."""
+        rng = self._rng("trace")
+        traced = trace(self.phantom, self.hand, radius, self.modulus, rng)
+        return motion(self.phantom, self.touches, traced, self.hand, radius, self._rng("motion"))
+
+    def run(
+        self, present: Sequence[str], regions: bool = True, moved: np.ndarray | None = None
+    ) -> tuple[Readings, np.ndarray]:
+        """(readings, their force without noise), device frame, SI, with the effects `present`.
+
+        moved: (n, 3) mm, object frame: the tip goes this much aside of the hand's way.
+        """
+        specimen = self.specimen(present, regions)
+        # the hand is the same whatever is left out: its tip has the radius that it really has
+        way = self.motion(self.specimen(tuple(self.parameters), regions).tip_radius)
+        if moved is not None:
+            way = _aside(way, moved, self.touches)
+        force = elastic_force(way, self.forces(present, regions), self.modulus)
+        normals = self._normals(way)
+        if specimen.friction is not None:
+            force = _capped(force, specimen.friction, normals)
+        for name in present:
+            act = effect(name).on_force
+            if act is not None:
+                force = act(force, way, normals, self.parameters[name])
+        turn = self.rotation
+        readings = Readings(
+            way.t,
+            1e-3 * (way.position @ turn.T) + self.shift,
+            (force + way.trace_force) @ turn.T,
+            turn @ axes_of(way.axis),
+            way.t > way.phase[1] + 0.05,
+        )
+        for name in present:
+            act = effect(name).on_readings
+            if act is not None:
+                readings = act(readings, self.parameters[name])
+        self.way = way
+        return readings, readings.force
+
+    def _normals(self, way: Motion) -> np.ndarray:
+        normals = np.zeros_like(way.position)
+        inside = way.touch >= 0
+        normals[inside] = np.array([t.normal for t in self.touches])[way.touch[inside]]
+        return normals
+
+    def recording(self, readings: Readings, clean: np.ndarray, truth: Mapping[str, Any]) -> Recording:
+        """Noise added, positions quantised."""
+        options, rng = self.options, self._rng("noise")
+        n = len(readings.t)
+        white = rng.normal(size=(n, 3)) * np.sqrt(1 - options.coloured_share)
+        slow = np.column_stack([band_noise(n, RATE_HZ, 0.3, 10.0, rng) for _ in range(3)])
+        noise = options.force_noise_std_n * (white + np.sqrt(options.coloured_share) * slow)
+        step = options.position_resolution_m
+        position = np.round(readings.position / step) * step if step > 0 else readings.position
+        return Recording(
+            t=readings.t,
+            position=position,
+            force_on_tool=clean + noise,
+            sample_rate_hz=RATE_HZ,
+            tip_radius_m=options.tip_radius_m,
+            quaternion=quaternions(readings.axes),
+            boundary_phase=(round(self.way.phase[0], 2), round(self.way.phase[1], 2)),
+            force_noise_std_n=options.force_noise_std_n,
+            position_resolution_m=step,
+            object_name=self.phantom.name,
+            poisson_ratio=self.phantom.poisson_ratio,
+            truth=dict(truth),
+        )
+
+
+def _aside(way: Motion, moved: np.ndarray, touches: Sequence[Touch]) -> Motion:
+    """The way of a tip that is displaced by `moved` (n, 3) mm: along each touch's path, and sideways of it."""
+    s, stray = way.s.copy(), way.stray.copy()
+    for number, touch in enumerate(touches):
+        rows = way.touch == number
+        direction = np.repeat(touch.direction[None], rows.sum(), axis=0)
+        distance = np.linalg.norm(touch.side)
+        if distance > 0:
+            direction[way.leg[rows] == SIDEWAYS] = touch.side / distance
+        along = (moved[rows] * direction).sum(axis=1)
+        s[rows] += along
+        stray[rows] += moved[rows] - along[:, None] * direction
+    return replace(way, position=way.position + moved, s=s, stray=stray)
+
+
+def _capped(force: np.ndarray, mu: float, normals: np.ndarray) -> np.ndarray:
+    """Straying cannot drag along more than friction holds; the solved path itself obeys it already."""
+    along = (force * normals).sum(axis=1)
+    side = force - along[:, None] * normals
+    size = np.linalg.norm(side, axis=1)
+    # on a curved or sloping place the pressure itself has a part sideways
+    most = (mu + 0.35) * np.maximum(along, 0.0)
+    factor = np.where(size > most, most / np.maximum(size, 1e-12), 1.0)
+    return along[:, None] * normals + factor[:, None] * side
+
+
+def _truth(
+    session: _Session,
+    present: Sequence[str],
+    clean: np.ndarray,
+    whole: Readings,
+    sizes: bool,
+    strengths: Mapping[str, float],
+) -> dict[str, Any]:
+    mask = contact_samples(session.way)
+    noise = session.options.force_noise_std_n
+    truth: dict[str, Any] = {
+        "young_modulus_pa": float(session.modulus),
+        "shape": session.phantom.shape,
+        "effects": [],
+        "noise_rms_n": float(noise),
+        "force_rms_in_contact_n": _rms(clean[mask]),
+        "contact_samples": int(mask.sum()),
+        "simulator": "palpate virtual laboratory",
+        "press_set": session.options.presses,
+        "protocol": session.options.protocol,
+        "device_from_object_rotation": session.rotation.round(9).tolist(),
+        "device_from_object_shift_mm": (1e3 * session.shift).round(6).tolist(),
+        "strengths": dict(strengths),
+        "parameters": {name: dict(p) for name, p in session.parameters.items() if p},
+    }
+    names = list(present) + (["regions"] if session.phantom.regions else [])
+    if session.phantom.regions:
+        truth["regions"] = {
+            r.name: {"centre_m": list(r.centre_m), "radius_m": r.radius_m, "modulus_ratio": r.modulus_ratio}
+            for r in session.phantom.regions
+        }
+    if not sizes:
+        truth["effects"] = ["inclusion" if name == "regions" else name for name in names]
+        return truth
+    truth["sizes"] = {}
+    for name in names:
+        rest = [other for other in present if other != name]
+        readings, without = session.run(rest, regions=name != "regions")
+        moved = 1e3 * (whole.position - readings.position) @ session.rotation
+        if np.abs(moved).max() > 1e-6:
+            # what the ideal object would answer where the instrument says that the tip is
+            _, without = session.run(rest, moved=moved)
+        label = "inclusion" if name == "regions" else name
+        truth["sizes"][label] = size_of(clean[mask], without[mask])
+    session.run(present)
+    ranked = sorted(truth["sizes"], key=lambda n: -truth["sizes"][n]["rms_n"])
+    truth["effects"] = [name for name in ranked if truth["sizes"][name]["rms_n"] > noise]
+    if truth["effects"]:
+        truth["dominant_effect"] = truth["effects"][0]
+    return truth
+
+
+def contact_samples(way: Motion) -> np.ndarray:
+    """(n,) bool: from first touch to the loss of touch of every palpation, and 50 ms before and after."""
+    inside = (way.touch >= 0) & ((way.s > 0) | (way.leg == 1))
+    width = int(0.05 * RATE_HZ)
+    count = np.concatenate([[0], np.cumsum(inside)])
+    at = np.arange(len(inside))
+    low, high = np.maximum(at - width, 0), np.minimum(at + width + 1, len(inside))
+    return count[high] - count[low] > 0
+
+
+def size_of(with_effect: np.ndarray, without: np.ndarray) -> dict[str, float]:
+    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor on `without`."""
+    scale = float((with_effect * without).sum() / max((without * without).sum(), 1e-300))
+    return {
+        "rms_n": _rms(with_effect - without),
+        "rms_after_best_scale_n": _rms(with_effect - scale * without),
+        "best_scale": scale,
+    }
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).sum(axis=1).mean())) if len(values) else 0.0
