@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import theilslopes
 
 from mechanics.options import option
 from mechanics.sites import TouchSites
@@ -20,6 +21,7 @@ from reconstruct.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LAWS = ("linear", "neo-hookean", "sphere", "hertz")
 AUTO_LAWS = ("linear", "neo-hookean")
+_AGREE = 0.005  # relative
 _RANGES_M = (0.002, 0.003, 0.004, 0.005, 0.006, 0.007)
 
 
@@ -84,6 +86,7 @@ def fit_modulus(
     radius = exploration.recording.tip_radius_m
     data = press_data(exploration)
     site = site_labels(sites.points, options.site_m)
+    along = np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)
     deepest = float(max(c.depth_m for c in exploration.contacts)) + 1e-3
 
     def fitted(law: str, depth: float, start: LawFit | None = None) -> LawFit:
@@ -98,7 +101,7 @@ def fit_modulus(
         ladder = [whole[0]]
         for depth in reversed([r for r in _RANGES_M if r < deepest - 1.5e-3]):
             ladder.append(fitted(whole[0].law, depth, ladder[-1]))
-        limit, depths = _greatest_consistent(ladder[::-1], site)
+        limit, depths = _greatest_consistent(ladder[::-1], site, along)
     fits = [fitted(f.law, limit, f) for f in whole]
     shape = None
     if compliance_covariance is not None:
@@ -167,27 +170,43 @@ def site_labels(points: np.ndarray, size_m: float) -> np.ndarray:
 
 
 def _greatest_consistent(
-    ladder: list[LawFit], site: np.ndarray
+    ladder: list[LawFit], site: np.ndarray, far: np.ndarray
 ) -> tuple[float, list[tuple[float, float, bool]]]:
-    """Greatest depth whose moduli agree, press by press, with those of every smaller depth (after Lepski).
+    """Greatest depth whose moduli agree, site by site, with those of every smaller depth (after Lepski).
 
-    They disagree where the mean difference exceeds two of its standard errors and 0.5 % of the modulus.
+    far: (k,) far-field compliance along the normal, 1/m. Two depths disagree where the mean of ln(deep /
+    shallow), or its trend with the far-field compliance (which a law that fails for the whole body's give
+    brings about), exceeds two of its standard errors and half a percent.
     """
     chosen, rows = ladder[0], []
     broken = False
     for i, deep in enumerate(ladder):
-        for shallow in ladder[:i]:
-            difference = np.log(deep.modulus_pa / shallow.modulus_pa)
-            both = np.isfinite(difference) & (shallow.rows > 10) & (deep.rows > shallow.rows)
-            if both.sum() < 4:
-                continue
-            means = np.array([np.median(difference[both & (site == s)]) for s in np.unique(site[both])])
-            error = 1.4826 * np.median(np.abs(means - np.median(means))) * 1.25 / np.sqrt(len(means))
-            broken |= abs(np.median(means)) > max(2 * error, 0.005)
+        broken |= any(_disagree(deep, shallow, site, far) for shallow in ladder[:i])
         rows.append((deep.depth_m, combine(deep.modulus_pa, deep.relative_error, site)[0], not broken))
         if not broken:
             chosen = deep
     return chosen.depth_m, rows
+
+
+def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) -> bool:
+    difference = np.log(np.maximum(deep.modulus_pa, 1e-9) / np.maximum(shallow.modulus_pa, 1e-9))
+    both = (shallow.rows > 10) & (deep.rows > shallow.rows) & (np.abs(difference) < 1)
+    labels = np.unique(site[both])
+    if len(labels) < 4:
+        return False
+    mean = np.array([np.median(difference[both & (site == s)]) for s in labels])
+    give = np.array([np.median(far[both & (site == s)]) for s in labels])
+    middle = np.median(mean)
+    error = 1.25 * 1.4826 * np.median(np.abs(mean - middle)) / np.sqrt(len(mean))
+    if abs(middle) > max(2 * error, _AGREE):
+        return True
+    if len(labels) < 8 or np.ptp(give) <= 0:
+        return False
+    # the trend over the sites' whole range, Theil-Sen, with the error of a least-squares line of that scatter
+    slope, intercept, _, _ = theilslopes(mean, give)
+    scatter = 1.4826 * np.median(np.abs(mean - intercept - slope * give))
+    spread = np.ptp(give) / (np.sqrt(len(give)) * np.std(give))
+    return bool(abs(slope) * np.ptp(give) > max(2 * scatter * spread, _AGREE))
 
 
 def _bootstrap(

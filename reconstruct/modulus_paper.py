@@ -96,11 +96,7 @@ def fit_paper_modulus(
             f"{options.indentation_m * 1e3:g} mm (the deepest {deepest * 1e3:.1f} mm); at least 2 are "
             "needed: give a smaller --indentation"
         )
-    node = np.full(len(moved), -1)
-    touchable = np.flatnonzero(mesh.touchable)
-    for i in used:
-        gap = np.linalg.norm(mesh.points[touchable] - exploration.contacts[i].point, axis=1)
-        node[i] = touchable[np.argmin(gap)]
+    node = np.where(np.isfinite(moved[:, 0]), nearest_nodes(mesh, exploration.points), -1)
     solver = Solver(mesh, poisson_ratio)
     loads = np.zeros((len(mesh.points), 3, len(used)))
     loads[node[used], :, np.arange(len(used))] = pushed[used]
@@ -124,6 +120,14 @@ def fit_paper_modulus(
         reaction_error=float((balance / np.linalg.norm(pushed[used], axis=1)).max()),
         not_used=tuple(shallow),
     )
+
+
+def nearest_nodes(mesh: TetMesh, points: np.ndarray) -> np.ndarray:
+    """(k,) the touchable node nearest to each of the points (k, 3): contacts cast onto the mesh (section
+    2.2)."""
+    touchable = np.flatnonzero(mesh.touchable)
+    gap = np.linalg.norm(points[:, None] - mesh.points[touchable][None], axis=2)
+    return touchable[np.argmin(gap, axis=1)]
 
 
 def least_squares_modulus(predicted: np.ndarray, measured: np.ndarray) -> float:

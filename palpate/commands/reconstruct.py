@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import ModelError
-from mechanics.model import write_model
+from mechanics.model import read_model, write_model
 from mechanics.recording import read_recording
 from palpate.arguments import add_json, add_options, add_seed, emit_json, options_from, progress_bar, say
 
@@ -47,6 +47,18 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
     parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
     parser.add_argument("-o", "--output", metavar="MODEL", required=True, help="folder of the model to write")
+    parser.add_argument(
+        "--report",
+        metavar="HTML",
+        help="write the paper's figures and table, remade; PNGs into HTML's folder",
+    )
+    parser.add_argument(
+        "--beside",
+        metavar="MODEL",
+        action="append",
+        default=[],
+        help="with --report: another model to draw beside (repeatable)",
+    )
     add_options(parser, ReconstructOptions, skip=("seed",))
     for kind in _steps().values():
         add_options(parser, kind)
@@ -67,10 +79,15 @@ def run(arguments: argparse.Namespace) -> int:
         raise ModelError(f"'{output}' exists and is no MODEL folder: name another output")
     steps = {name: options_from(arguments, kind) for name, kind in _steps().items()}
     options = options_from(arguments, ReconstructOptions, seed=arguments.seed, **steps)
+    beside = {Path(name).name: read_model(name) for name in arguments.beside}
     recording = read_recording(arguments.recording)
     with progress_bar("reconstruct") as progress:
         result = reconstruct_fully(recording, options, progress)
     write_model(output, result.model)
+    if arguments.report:
+        from palpate.report.reconstruction import write_report
+
+        say(arguments, f"report: {write_report(arguments.report, result, beside)}")
     say(arguments, *_words(result), f"written to {output}")
     emit_json({"model": output, **_figures(result)}, arguments.json)
     return 0

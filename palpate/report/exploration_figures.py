@@ -1,0 +1,124 @@
+"""Figures 2 and 3 of the paper, remade: contacts over time, geometry, force profiles, 1D parameters."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from palpate.report.object3d import draw_object, view_axes
+from reconstruct.contacts import Exploration
+from reconstruct.modulus_paper import nearest_nodes
+from reconstruct.pipeline import Reconstruction
+from reconstruct.uniaxial import profiles
+
+FORCE_COLOUR, TOUCH_COLOUR, PEAK_COLOUR, PHASE_COLOUR = "#457b9d", "#1d3557", "#c1121f", "#f1e3cf"
+
+
+def force_over_time(ax: Axes, exploration: Exploration) -> Axes:
+    """Figure 2: force magnitude (N) over time (s), first touches (o), peaks (+), phase I shaded."""
+    t = exploration.recording.t
+    force = np.linalg.norm(exploration.force, axis=1)
+    starts = np.array([c.start for c in exploration.contacts])
+    peaks = np.array([c.peak for c in exploration.contacts])
+    ax.plot(t, force, lw=0.7, color=FORCE_COLOUR)
+    ax.plot(t[starts], force[starts], "o", ms=4, mfc="none", color=TOUCH_COLOUR, label="first touch")
+    ax.plot(t[peaks], force[peaks], "+", ms=7, color=PEAK_COLOUR, label="peak")
+    first, last = exploration.boundary.interval
+    if last > first:
+        ax.axvspan(t[first], t[last - 1], color=PHASE_COLOUR, zorder=0, label="phase I")
+    ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(t[0], t[-1]))
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=3)
+    return ax
+
+
+def touched_points(ax: Axes, exploration: Exploration) -> Axes:
+    """Figure 3(a): first touches (+), base outline, its farthest-point sample (o); parallel projection,
+    mm."""
+    boundary = exploration.boundary
+    view = view_axes(boundary.support_normal, 22.0, 35.0)
+
+    def seen(points: np.ndarray) -> np.ndarray:
+        return (points - boundary.support_point) @ view.T * 1e3
+
+    rim, sample, touches = seen(boundary.outline), seen(boundary.points), seen(exploration.points)
+    ax.plot(rim[:, 0], rim[:, 1], lw=1, color=FORCE_COLOUR, label="base outline")
+    ax.plot(sample[:, 0], sample[:, 1], "o", ms=4, mfc="none", color=TOUCH_COLOUR, label="sample of the base")
+    ax.plot(touches[:, 0], touches[:, 1], "+", ms=8, color=PEAK_COLOUR, label="first touches")
+    ax.set_aspect("equal")
+    ax.set_axis_off()
+    ax.legend(loc="upper center", bbox_to_anchor=(0.5, 0.04), frameon=False, ncols=3, fontsize=8)
+    return ax
+
+
+def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
+    """Figure 3(b): surface of the mesh, fixed base nodes, and the node nearest to each contact, numbered."""
+    model = result.model
+    draw_object(ax, model, show_base=True, elevation_deg=22.0)
+    view = view_axes(model.support_normal, 22.0, 35.0)
+    corners = model.mesh.linear()
+    node = nearest_nodes(corners, result.exploration.points)
+    seen = (corners.points[node] - model.mesh.points.mean(axis=0)) @ view.T * 1e3
+    facing = np.array([p.normal for p in model.palpations]) @ view[2] > 0
+    for i in np.flatnonzero(facing):
+        ax.plot(*seen[i, :2], "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
+        ax.text(*seen[i, :2], str(i + 1), ha="center", va="center", fontsize=5.5)
+    return ax
+
+
+def force_profiles(ax: Axes, result: Reconstruction) -> Axes:
+    """Figure 3(c): force on the object along -n (N) over depth (mm), coloured by height above the support."""
+    exploration = result.exploration
+    height = exploration.boundary.height(result.cast.points)
+    normals = np.array([p.normal for p in result.model.palpations])
+    scale = plt.Normalize(0, 1e3 * height.max())
+    for h, press in zip(height, profiles(exploration, normals), strict=True):
+        ax.plot(press.u * 1e3, press.f, lw=0.8, color=plt.cm.viridis(scale(1e3 * h)))
+    bar = ax.figure.colorbar(plt.cm.ScalarMappable(scale, "viridis"), ax=ax, label="height [mm]")
+    bar.outline.set_visible(False)
+    ax.set(xlabel="depth [mm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
+    return ax
+
+
+def damped_parameters(axes: np.ndarray, result: Reconstruction) -> np.ndarray:
+    """Figure 3(d): distributions of the Kelvin-Voigt and Hunt-Crossley parameters."""
+    columns = [
+        ("k_kv", "$k_{KV}$ [N/m]"),
+        ("b_kv", "$b_{KV}$ [N s/m]"),
+        ("k_hc", "$k_{HC}$ [N/m$^r$]"),
+        ("b_hc", "$b_{HC}$ [N s/m$^{r+1}$]"),
+        ("r_hc", "$r$"),
+    ]
+    for ax, (name, label) in zip(axes, columns, strict=True):
+        spread(ax, [np.array([getattr(p, name) for p in result.model.palpations])], [""])
+        ax.set_title(label, fontsize=10)
+    return axes
+
+
+def spread(ax: Axes, samples: list[np.ndarray], names: list[str], stars: list[float] | None = None) -> Axes:
+    """A box and every value of each sample; stars: one marked value a sample."""
+    samples = [s[np.isfinite(s)] for s in samples]
+    ax.boxplot(samples, widths=0.5, showfliers=False, medianprops={"color": PEAK_COLOUR})
+    for i, sample in enumerate(samples):
+        aside = np.linspace(-0.14, 0.14, len(sample))
+        ax.plot(i + 1 + aside, sample, ".", ms=4, color=FORCE_COLOUR, alpha=0.7)
+    for i, star in enumerate(stars or []):
+        ax.plot(i + 1, star, "*", ms=13, color=TOUCH_COLOUR)
+    ax.set_xticks(range(1, len(samples) + 1), names)
+    return ax
+
+
+def exploration_figures(result: Reconstruction) -> dict[str, Figure]:
+    """`figure-2` and `figure-3`, by file name."""
+    over_time, ax = plt.subplots(figsize=(10, 3.2))
+    force_over_time(ax, result.exploration)
+    geometry, axes = plt.subplots(1, 3, figsize=(13.5, 4))
+    touched_points(axes[0], result.exploration)
+    meshed_object(axes[1], result)
+    force_profiles(axes[2], result)
+    for ax, name in zip(axes, "abc", strict=True):
+        ax.set_title(f"({name})", loc="left", fontsize=10)
+    damped, small = plt.subplots(1, 5, figsize=(13.5, 2.8), layout="constrained")
+    damped_parameters(small, result)
+    return {"figure-2": over_time, "figure-3abc": geometry, "figure-3d": damped}

@@ -1,0 +1,163 @@
+"""Figures 4, 5 and 6 of the paper, remade: parameters of single presses and where on the object they hold."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from scipy.interpolate import RBFInterpolator
+from scipy.stats import pearsonr, spearmanr
+
+from mechanics.model import Model
+from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, spread
+from palpate.report.object3d import draw_object
+from reconstruct.modulus import ModulusFit
+
+SIDE = 0.3  # |n . support normal| below this: a press on the side
+
+
+@dataclass(frozen=True)
+class Trend:
+    """Correlation of a parameter with height over the presses on the side."""
+
+    name: str
+    pearson: float
+    pearson_p: float
+    spearman: float
+    spearman_p: float
+    presses: int
+
+
+def column(model: Model, name: str) -> np.ndarray:
+    """(k,) one column of the palpations."""
+    return np.array([getattr(p, name) for p in model.palpations], dtype=float)
+
+
+def heights(model: Model) -> np.ndarray:
+    """(k,) m, heights of the contacts above the support."""
+    points = np.array([p.point for p in model.palpations])
+    return (points - model.support_point) @ model.support_normal
+
+
+def on_side(model: Model) -> np.ndarray:
+    """(k,) bool, presses whose normal is within 17 degrees of the support plane."""
+    normals = np.array([p.normal for p in model.palpations])
+    return np.abs(normals @ model.support_normal) < SIDE
+
+
+def height_trends(model: Model) -> list[Trend]:
+    """Correlations of k_v, k_h and e with height on the side; empty with fewer than 5 presses there."""
+    side, height = on_side(model), heights(model)
+    trends = []
+    for name in ("k_v", "k_h", "e_pa"):
+        values = column(model, name)
+        used = side & np.isfinite(values)
+        if used.sum() >= 5:
+            r, p = pearsonr(height[used], values[used])
+            s, q = spearmanr(height[used], values[used])
+            trends.append(Trend(name, float(r), float(p), float(s), float(q), int(used.sum())))
+    return trends
+
+
+def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
+    """(n,) values of single presses spread over the nodes by radial basis functions (thin plate, smoothed).
+
+    Repeats at one place are averaged by the smoothing; the result is kept within the range of the values.
+    """
+    points = np.array([p.point for p in model.palpations])
+    used = np.isfinite(values)
+    scale = np.linalg.norm(np.ptp(points, axis=0))
+    centre, size = np.median(values[used]), max(float(np.std(values[used])), 1e-12)
+    smooth = RBFInterpolator(points[used] / scale, (values[used] - centre) / size, smoothing=1e-2)
+    field = centre + size * smooth(model.mesh.points / scale)
+    return np.clip(field, values[used].min(), values[used].max())
+
+
+def undamped_figure(models: dict[str, Model]) -> Figure:
+    """Figure 4: k_V; k_C and r; k_H, one box a sample."""
+    figure, axes = plt.subplots(1, 4, figsize=(13, 3.4), layout="constrained")
+    labels = ("$k_V$ [N/m]", "$k_C$ [N/m$^r$]", "$r$", "$k_H$ [N/m$^r$]")
+    for ax, name, label, letter in zip(
+        axes, ("k_v", "k_c", "r_c", "k_h"), labels, ("a", "b", "b", "c"), strict=True
+    ):
+        spread(ax, [column(m, name) for m in models.values()], list(models))
+        ax.set_ylabel(label)
+        ax.set_title(f"({letter})", loc="left", fontsize=10)
+        ax.tick_params(axis="x", labelrotation=20, labelsize=8)
+    return figure
+
+
+def spatial_figure(model: Model) -> Figure:
+    """Figure 5: k_V over the surface from the side and from above; k_V, k_H and e over height on the side."""
+    figure, axes = plt.subplots(2, 3, figsize=(13, 7.6), layout="constrained")
+    field = over_surface(model, column(model, "k_v"))
+    points = np.array([p.point for p in model.palpations])
+    for ax, elevation, title in zip(axes[0], (8.0, 89.0, 30.0), ("side", "top", "oblique"), strict=True):
+        draw_object(ax, model, field, label="$k_V$ [N/m]", elevation_deg=elevation, touches=points)
+        ax.set_title(f"$k_V$, {title}", fontsize=10)
+    trends = {t.name: t for t in height_trends(model)}
+    side, height = on_side(model), heights(model) * 1e3
+    for ax, name, label, factor in zip(
+        axes[1],
+        ("k_v", "k_h", "e_pa"),
+        ("$k_V$ [N/m]", "$k_H$ [N/m$^r$]", "e [kPa]"),
+        (1, 1, 1e-3),
+        strict=True,
+    ):
+        value = column(model, name) * factor
+        ax.plot(height[side], value[side], "o", ms=4, color=FORCE_COLOUR)
+        ax.set(xlabel="height above the support [mm]", ylabel=label)
+        if side.any():
+            ax.set_ylim(0, 1.3 * np.nanmax(value[side]))
+        if name in trends:
+            ax.set_title(f"r = {trends[name].pearson:+.2f} (p = {trends[name].pearson_p:.2g})", fontsize=10)
+    axes[1, 2].axhline(model.young_modulus_pa / 1e3, color=PEAK_COLOUR, lw=1)
+    return figure
+
+
+def moduli_figure(models: dict[str, Model], model: Model) -> Figure:
+    """Figure 6: (a) moduli of single presses, * the global one; (b) their distribution over the surface."""
+    figure, axes = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
+    stars = [m.young_modulus_pa / 1e3 for m in models.values()]
+    spread(axes[0], [column(m, "e_pa") / 1e3 for m in models.values()], list(models), stars)
+    axes[0].set(ylabel="Young's modulus [kPa]", ylim=(0, None))
+    axes[0].tick_params(axis="x", labelrotation=15)
+    axes[0].set_title("(a)", loc="left", fontsize=10)
+    each = column(model, "e_pa")
+    touched = np.array([p.point for p, e in zip(model.palpations, each, strict=True) if np.isfinite(e)])
+    around = (0.75 * np.nanmedian(each) / 1e3, 1.25 * np.nanmedian(each) / 1e3)
+    draw_object(
+        axes[1], model, over_surface(model, each) / 1e3, label="e of single presses [kPa]", limits=around,
+        touches=touched,
+    )  # fmt: skip
+    axes[1].set_title("(b)", loc="left", fontsize=10)
+    return figure
+
+
+def depth_figure(fit: ModulusFit) -> Figure:
+    """The global modulus over the greatest depth of the samples used, with the interval of the one chosen."""
+    figure, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
+    depth = np.array([row[0] for row in fit.by_depth]) * 1e3
+    value = np.array([row[1] for row in fit.by_depth]) / 1e3
+    agrees = np.array([row[2] for row in fit.by_depth])
+    ax.axhspan(*(np.array(fit.ci95_pa) / 1e3), color="#f1e3cf", label="95 % interval")
+    ax.plot(depth, value, "-", lw=1, color=FORCE_COLOUR)
+    ax.plot(depth[agrees], value[agrees], "o", color=FORCE_COLOUR, label="agrees with shallower samples")
+    if (~agrees).any():
+        ax.plot(depth[~agrees], value[~agrees], "o", mfc="white", color=FORCE_COLOUR, label="does not")
+    ax.plot(fit.press.depth_m * 1e3, fit.modulus_pa / 1e3, "*", ms=13, color=PEAK_COLOUR, label="chosen")
+    ax.set(xlabel="samples up to depth [mm]", ylabel="modulus [kPa]")
+    ax.legend(frameon=False, fontsize=8)
+    return figure
+
+
+def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, word: str = "bound") -> Axes:
+    """Histogram of a mesh quality with its bound."""
+    ax.hist(values, bins=40, color=FORCE_COLOUR)
+    ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
+    ax.set(xlabel=label, ylabel="count")
+    ax.legend(frameon=False, fontsize=8)
+    return ax

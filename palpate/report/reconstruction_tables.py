@@ -1,0 +1,106 @@
+"""Tables of a reconstruction's report: Table 1 of the paper, estimators of the 1D models, the point load's
+mesh."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from mechanics.model import Model
+from mechanics.patch import PatchSampler
+from mechanics.refine import refined_near_surface, typical_edge
+from mechanics.sites import patch_compliance, patch_width
+from mechanics.solver import Solver
+from palpate.report.modulus_figures import column
+from reconstruct.modulus_paper import nearest_nodes
+from reconstruct.one_d import OneD, fit_paper, fit_robust
+from reconstruct.pipeline import Reconstruction
+from reconstruct.uniaxial import profiles
+
+PAPER_TABLE = (
+    ("paper #1", "cylinder, radius 40 mm, height 80 mm", 29.0, 28.73),
+    ("paper #2", "block, 105 x 105 x 47 mm", 16.0, 10.73),
+    ("paper #3", "near half-sphere, radius 60 mm, height 55 mm", 16.0, 11.31),
+)
+"""Table 1 of the paper: sample, geometry, known and estimated modulus in kPa."""
+
+PAPER_SECONDS = {"contacts": 10.0, "1D models": 0.5, "modulus": 3.0, "whole": 45.0}
+"""The paper's own times, section 3, s (upper bounds)."""
+
+
+def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows of Table 1: the paper's samples, then ours, with the known modulus where it is
+    stated."""
+    header = [
+        "sample",
+        "geometry",
+        "known e [kPa]",
+        "estimated e [kPa]",
+        "95 % interval",
+        "single presses [kPa]",
+    ]
+    rows: list[list[Any]] = [[*row, "", ""] for row in PAPER_TABLE]
+    truth = result.exploration.recording.truth or {}
+    for name, model in {result.exploration.recording.name: result.model, **beside}.items():
+        mine = model is result.model
+        known = truth.get("young_modulus_pa", float("nan")) / 1e3 if mine else float("nan")
+        each = column(model, "e_pa") / 1e3
+        low, high = np.array(model.young_modulus_ci95_pa) / 1e3
+        rows.append([
+            name, str(truth.get("shape", "")) if mine else "", known, model.young_modulus_pa / 1e3,
+            f"{low:.2f} to {high:.2f}", f"{np.nanmin(each):.1f} to {np.nanmax(each):.1f}",
+        ])  # fmt: skip
+    return header, rows
+
+
+def one_d_comparison(result: Reconstruction) -> tuple[list[str], list[list[Any]]]:
+    """Header and rows: the paper's estimators beside the bounded, robust ones; medians over the
+    palpations."""
+    normals = np.array([p.normal for p in result.model.palpations])
+    presses = profiles(result.exploration, normals)
+    rows = []
+    for name, fits in (("paper, (3) to (6)", fit_paper(presses)), ("bounded, robust", fit_robust(presses))):
+        median = _medians(fits)
+        negative = 100 * float(np.mean([f.b_hc < 0 for f in fits]))
+        slow = 100 * float(np.mean([f.valid for f in fits]))
+        rows.append([name, *median, f"{negative:.0f} %", f"{slow:.0f} %"])
+    header = [
+        "estimator", "k_KV", "b_KV", "k_HC", "b_HC", "r", "misfit KV [N]", "misfit HC [N]", "b_HC < 0",
+        "|v| < 0.1 k/b throughout",
+    ]  # fmt: skip
+    return header, rows
+
+
+def _medians(fits: list[OneD]) -> list[float]:
+    names = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "rms_kv_n", "rms_hc_n")
+    return [float(np.nanmedian([getattr(f, n) for f in fits])) for n in names]
+
+
+def point_load_rows(result: Reconstruction) -> list[list[Any]]:
+    """Displacement of the loaded node per newton (mm/N) for linear tetrahedra refined near the surface, and
+    of a load spread over a patch on quadratic ones: the first depends on the mesh, the second does not (NaN:
+    not computed).
+
+    The load is along the normal at the contact that is furthest from the base; patch of 8 mm width
+    throughout.
+    """
+    model = result.model
+    palpation = max(model.palpations, key=lambda p: np.dot(p.point, model.support_normal))
+    point, normal = np.array(palpation.point), np.array(palpation.normal)
+    rows = []
+    width = patch_width(result.meshing.mesh)
+    scale = 1e3 / model.young_modulus_pa
+    for edge, with_patch in ((1.0, True), (0.6 * model.mesh_size_m, True), (0.3 * model.mesh_size_m, False)):
+        mesh, _ = refined_near_surface(result.meshing.mesh.linear(), edge)
+        node = nearest_nodes(mesh, point[None])[0]
+        load = np.zeros((len(mesh.points), 3))
+        load[node] = normal
+        linear = Solver(mesh, model.poisson_ratio).solve(load)[node] @ normal
+        patch = float("nan")
+        if with_patch:
+            quadratic = Solver(mesh.quadratic(), model.poisson_ratio)
+            weights = PatchSampler(quadratic.mesh, width).weights(point)
+            patch = normal @ patch_compliance(quadratic, [weights])[0] @ normal
+        rows.append([typical_edge(mesh) * 1e3, len(mesh.points), linear * scale, patch * scale])
+    return rows
