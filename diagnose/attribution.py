@@ -1,4 +1,5 @@
-"""Which effect: every one is fitted, judged on sites that it has not seen, and combined where two are needed."""
+"""Which effect: every one is fitted, judged on sites that it has not seen, and combined where two are
+needed."""
 
 from __future__ import annotations
 
@@ -40,6 +41,9 @@ class AttributionOptions:
     spatial_gain: float = option(120.0, "the same for effects that live in a few places, penalised in sample")
     z: float = option(2.5, "least gain over its own standard error across sites")
     size_n: float = option(0.009, "least size of an effect: rms change of force after the refit", unit="N")
+    toward: float = option(
+        0.3, "least share of an effect's own size by which it lowers the plain gap in sample"
+    )
     rival_share: float = option(
         0.12, "a rival within this share of the winner's gain counts as not told apart"
     )
@@ -49,7 +53,8 @@ class AttributionOptions:
 
 @dataclass(frozen=True)
 class Candidate:
-    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the base."""
+    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
+    base."""
 
     found: Fit
     held: np.ndarray
@@ -68,6 +73,7 @@ class Score:
 
     gain: log likelihood, deflated by its own lack of fit. z: gain over its standard error across sites.
     size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
+    toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
     """
 
     name: str
@@ -75,6 +81,7 @@ class Score:
     z: float
     size_n: float
     closes: float
+    toward: float
     per_group: np.ndarray
     candidate: Candidate
 
@@ -83,7 +90,8 @@ class Score:
 class Attribution:
     """The search's outcome. base: what effects were added to (finite strain in it where the data prefer it).
 
-    ideal: linear elasticity alone. chosen: names, strongest first. scores: of every single effect on the base.
+    ideal: linear elasticity alone. chosen: names, strongest first. scores: of every single effect on the
+    base.
     final: the chosen set. rivals: names not told apart from a chosen one. path: what each step looked like.
     """
 
@@ -154,18 +162,20 @@ class Search:
         """Compare two candidates."""
         extra = len(new.found.values) - len(old.found.values)
         over = max(1.0, new.chi)
+        per_group = old.held - new.held
+        gain = float(per_group.sum())
         if name in SPATIAL:
+            # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
             gain = old.found.loss - new.found.loss - 4.0 * extra
-        else:
-            per_group = old.held - new.held
-            gain = float(per_group.sum())
         z = per_group.sum() / (per_group.std() * np.sqrt(len(per_group)) + 1e-9)
         counted = self.forward.touches.counted
         change = (new.found.residual - old.found.residual)[counted]
         size = float(np.sqrt((change**2).sum(axis=1).mean()))
         closes = float((old.plain.sum() - new.plain.sum()) / counted.sum())
-        return Score(name, float(gain / over), float(z), size, closes, per_group / over, new)
+        squares = [(c.found.residual[counted] ** 2).sum(axis=1).mean() for c in (old, new)]
+        toward = float((squares[0] - squares[1]) / max(size**2, 1e-12))
+        return Score(name, float(gain / over), float(z), size, closes, toward, per_group / over, new)
 
     def passes(self, score: Score) -> bool:
         """Whether a score names its effect."""
@@ -173,8 +183,9 @@ class Search:
         if score.size_n < o.size_n:
             return False
         if score.name in SPATIAL:
-            return score.gain > o.spatial_gain and score.closes > -(score.size_n**2)
-        return score.gain > o.gain and score.z > o.z and score.closes > 0
+            held = score.closes > 0 or (score.name == "inclusion" and score.closes > -0.3 * score.size_n**2)
+            return score.gain > o.spatial_gain and score.toward > o.toward and held
+        return score.gain > o.gain and score.z > o.z and score.closes > 0 and score.toward > o.toward
 
 
 def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:
@@ -222,7 +233,8 @@ def _without_idle(search: Search, base: Candidate, chosen: list[str], current: C
 
 
 def _rivals(search: Search, steps: list[dict[str, Score]], chosen: list[str]) -> tuple[str, ...]:
-    """Effects whose single gain comes so close to the first choice's that the sites do not tell them apart."""
+    """Effects whose single gain comes so close to the first choice's that the sites do not tell them
+    apart."""
     if not chosen or not steps:
         return ()
     first = steps[0][chosen[0]] if chosen[0] in steps[0] else None
@@ -231,6 +243,8 @@ def _rivals(search: Search, steps: list[dict[str, Score]], chosen: list[str]) ->
     found = []
     for score in steps[0].values():
         if score.name in chosen or score.gain <= 0.3 * search.options.gain:
+            continue
+        if score.toward < search.options.toward or (score.closes < 0 and score.name != "inclusion"):
             continue
         behind = first.gain - score.gain
         difference = first.per_group - score.per_group

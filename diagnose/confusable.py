@@ -1,7 +1,7 @@
-"""Which effects look alike on these touches: angles between whitened sensitivities, and the touch that parts them."""
+"""Which effects look alike on these touches: angles between whitened sensitivities, and the touch that parts
+them."""
 
 from __future__ import annotations
-
 
 import numpy as np
 
@@ -19,7 +19,8 @@ def patterns(search: Search, base: Candidate, candidates: dict[str, Candidate]) 
 
 
 def alike(search: Search, base: Candidate, candidates: dict[str, Candidate]) -> list[tuple[str, str, float]]:
-    """Pairs whose best-fit patterns point the same way once modulus and nuisance are taken out, closest first."""
+    """Pairs whose best-fit patterns point the same way once modulus and nuisance are taken out, closest
+    first."""
     names = list(candidates)
     if len(names) < 2:
         return []

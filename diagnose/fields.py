@@ -1,6 +1,8 @@
-"""What spatial effects need of the object: each place's elastic energy element by element, and other far fields.
+"""What spatial effects need of the object: each place's elastic energy element by element, and other far
+fields.
 
-The give of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that are stiffer
+The give of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that are
+stiffer
 by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on one array.
 A changed base or Poisson's ratio is a new factorisation, done once at a few values and interpolated.
 """
@@ -25,7 +27,8 @@ _CHUNK = 600
 class EnergyFields:
     """energy: (q, m, 3, 3) of q places, local frames, unit modulus, 1/m. place: (p,) place of each press.
 
-    centroid: (m, 3) m, device frame. volume: (m,) m^3. height: (m,) m above the support; top: its greatest value.
+    centroid: (m, 3) m, device frame. volume: (m,) m^3. height: (m,) m above the support; top: its greatest
+    value.
     depth: (m,) m, distance of the centroid to the touchable surface. half_space: (q, 3, 3) taken off the sum.
     """
 
@@ -82,7 +85,8 @@ def energy_fields(forward: Forward) -> EnergyFields:
 
 
 def far_with_weights(forward: Forward, softness: np.ndarray) -> np.ndarray:
-    """(p, 3, 3) far field with each element's share of the give multiplied by softness (m,) (1: unchanged)."""
+    """(p, 3, 3) far field with each element's share of the give multiplied by softness (m,) (1:
+    unchanged)."""
     fields = energy_fields(forward)
     change = np.einsum("qmij,m->qij", fields.energy, (softness - 1).astype(np.float32), optimize=True)
     return forward.far + change[fields.place]
@@ -116,7 +120,8 @@ def far_on_springs(forward: Forward, share: float) -> np.ndarray:
 
 
 def _spring_give(forward: Forward) -> np.ndarray:
-    """(p, 3, 3) give of a uniform spring base under each place's reactions for springs of 1 / height a unit area."""
+    """(p, 3, 3) give of a uniform spring base under each place's reactions for springs of 1 / height a unit
+    area."""
     model = forward.model
     mesh = model.mesh.quadratic()
     t = forward.touches
@@ -178,7 +183,8 @@ def _far(forward: Forward, mesh: TetMesh, nu: float) -> np.ndarray:
 
 
 def far_partly_bonded(forward: Forward, fraction: float, angle: float) -> np.ndarray:
-    """(p, 3, 3) far field (differences on the model's own mesh) with only a share of the base bonded, the free part towards `angle` in the support plane.
+    """(p, 3, 3) far field (differences on the model's own mesh) with only a share of the base bonded, the
+    free part towards `angle` in the support plane.
 
     Computed at 8 angles for half the base, interpolated by angle and linearly to none.
     """

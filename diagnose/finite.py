@@ -1,4 +1,5 @@
-"""How large finite strain must be here: known physics without a parameter, so its size follows from the depth."""
+"""How large finite strain must be here: known physics without a parameter, so its size follows from the
+depth."""
 
 from __future__ import annotations
 

@@ -1,4 +1,5 @@
-"""Fit the modulus and any effects together to whitened residuals: bounded Gauss-Newton from several starts."""
+"""Fit the modulus and any effects together to whitened residuals: bounded Gauss-Newton from several
+starts."""
 
 from __future__ import annotations
 
@@ -19,7 +20,8 @@ class Fit:
     """The optimum of one set of effects.
 
     values: log modulus, then each effect's parameters in order. loss: half the whitened sum of squares, prior
-    included. residual: (n, 3) N, measured less predicted. jacobian: (n, 3, k) of the prediction by the values.
+    included. residual: (n, 3) N, measured less predicted. jacobian: (n, 3, k) of the prediction by the
+    values.
     gram, raw: (g, 1 + k, 1 + k) inner products of [residual, jacobian], whitened and plain.
     """
 
@@ -81,7 +83,8 @@ def fit(
     onset: np.ndarray | None = None,
     iterations: int = 12,
 ) -> Fit:
-    """Best values from all starts (`start`, full vector, or every effect's own). weights: (g,) 1 keeps a group."""
+    """Best values from all starts (`start`, full vector, or every effect's own). weights: (g,) 1 keeps a
+    group."""
     effects = tuple(effects)
     if start is not None:
         starts = [np.asarray(start, dtype=float)]
@@ -118,8 +121,10 @@ def _bounds(effects: tuple[Effect, ...]) -> tuple[np.ndarray, np.ndarray, np.nda
 class _Descent:
     """One bounded Gauss-Newton descent. First touches are refined beside it, press by press.
 
-    A late or early first touch is a nuisance that bends the force, so it is moved in the model itself; the linear
-    column that the whitener holds for it is added back, so that the loss stays the one with its Gaussian width.
+    A late or early first touch is a nuisance that bends the force, so it is moved in the model itself; the
+    linear
+    column that the whitener holds for it is added back, so that the loss stays the one with its Gaussian
+    width.
     """
 
     def __init__(self, forward: Forward, whitener: Whitener, effects: tuple[Effect, ...], weights) -> None:  # type: ignore[no-untyped-def]

@@ -1,4 +1,5 @@
-"""The forward model of a whole recording: settings (ideal until an effect changes them) to every press's force.
+"""The forward model of a whole recording: settings (ideal until an effect changes them) to every press's
+force.
 
 The chain, in the order in which nature and instrument act: surface and handle -> tip path -> contact with the
 elastic object -> memory of the material -> adhesion -> what the force sensor reads.
@@ -18,7 +19,6 @@ from mechanics.dent import dent_law, effective_radius, grid
 from mechanics.model import Model
 from mechanics.sites import touch_sites
 
-
 STANDARD_GRAVITY = 9.80665
 
 
@@ -26,7 +26,8 @@ STANDARD_GRAVITY = 9.80665
 class Settings:
     """What the forward model is told; the defaults are the ideal model.
 
-    modulus: Pa. finite_strain: 0 linear dent, 1 neo-Hookean. table_factor: (k,) factor on the dent's force law.
+    modulus: Pa. finite_strain: 0 linear dent, 1 neo-Hookean. table_factor: (k,) factor on the dent's force
+    law.
     far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the tip over the global one.
     onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,) factor. The rest by name.
     """
@@ -59,7 +60,8 @@ class Settings:
 class Forward:
     """Touches with the site mechanics of a model; `predict(settings)` is the forward model.
 
-    far: (p, 3, 3) local frames, unit modulus, 1/m. curvature: (p,) 1/m. stages: what effects asked to compute.
+    far: (p, 3, 3) local frames, unit modulus, 1/m. curvature: (p,) 1/m. stages: what effects asked to
+    compute.
     """
 
     touches: Touches
@@ -133,9 +135,11 @@ class Forward:
         return self._read(s, f)
 
     def weight(self, mass_kg: float, share: float) -> np.ndarray:
-        """(n, 3) N, device frame: `share` of the tool's weight that a tare has not taken off, along the support.
+        """(n, 3) N, device frame: `share` of the tool's weight that a tare has not taken off, along the
+        support.
 
-        With the tool's orientation recorded, a tare holds only at the orientation of the start: the rest turns.
+        With the tool's orientation recorded, a tare holds only at the orientation of the start: the rest
+        turns.
         """
         t = self.touches
         down = -self.model.support_normal / np.linalg.norm(self.model.support_normal)
@@ -233,7 +237,8 @@ def _shifted(t: Touches, f: np.ndarray, delay: float) -> np.ndarray:
 
 
 def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float) -> np.ndarray:
-    """Adhesive pull (n,), N: on the way out only, greatest where the surface is level again, zero at `reach`."""
+    """Adhesive pull (n,), N: on the way out only, greatest where the surface is level again, zero at
+    `reach`."""
     out = np.zeros(len(depth))
     for a, b in zip(t.start[:-1], t.start[1:], strict=True):
         after = np.arange(b - a) > np.argmax(depth[a:b])
@@ -243,7 +248,8 @@ def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float) -> np.nd
 
 
 def _mullins(t: Touches, depth: np.ndarray, force: np.ndarray, r: float, m_rel: float) -> np.ndarray:
-    """Softening factor (n,): Ogden and Roxburgh's 1 - erf((W_max - W) / m) / r with W ~ depth^2.5 at the site."""
+    """Softening factor (n,): Ogden and Roxburgh's 1 - erf((W_max - W) / m) / r with W ~ depth^2.5 at the
+    site."""
     from scipy.special import erf
 
     energy = np.clip(depth, 0, None) ** 2.5

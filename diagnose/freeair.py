@@ -1,4 +1,5 @@
-"""Free air: what the force sensor reads while nothing is touched settles bias, drift and the tool's own mass."""
+"""Free air: what the force sensor reads while nothing is touched settles bias, drift and the tool's own
+mass."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ MIN_BLOCKS = 8
 
 @dataclass(frozen=True)
 class FreeAir:
-    """Block means of free-air samples. t: (b,) s. force: (b, 3) N. noise_n: std of one component of one block.
+    """Block means of free-air samples. t: (b,) s. force: (b, 3) N. noise_n: std of one component of one
+    block.
 
     acceleration, inertia_force: (m, 3) m/s^2 and N, smoothed free-air samples where the hand accelerates.
     bias_n: (3,) mean; bias_se_n its standard error. rate_n_per_s, rate_se: (3,) drift. mass_kg, mass_se_kg:
@@ -58,15 +60,24 @@ def free_air_of(recording: Recording, model: Model, noise_n: float) -> FreeAir |
     noise = max(float(np.sqrt((left**2).sum() / (3 * (len(times) - 2)))), noise_n / np.sqrt(size))
     mass, mass_se = _mass(recording, free, noise_n)
     return FreeAir(
-        times, means, noise, float(free.sum() / rate), means.mean(axis=0), noise / np.sqrt(len(times)), rate_fit,
-        noise / np.sqrt(clock @ clock), mass, mass_se,
-    )  # fmt: skip
+        t=times,
+        force=means,
+        noise_n=noise,
+        seconds=float(free.sum() / rate),
+        bias_n=means.mean(axis=0),
+        bias_se_n=noise / np.sqrt(len(times)),
+        rate_n_per_s=rate_fit,
+        rate_se_n_per_s=noise / np.sqrt(clock @ clock),
+        mass_kg=mass,
+        mass_se_kg=mass_se,
+    )
 
 
 def _mass(
     recording: Recording, free: np.ndarray, noise_n: float, width_s: float = 0.05
 ) -> tuple[float, float]:
-    """Mass whose inertia the free-air force shows, kg, and its standard error: force = -m a over 50 ms fits."""
+    """Mass whose inertia the free-air force shows, kg, and its standard error: force = -m a over 50 ms
+    fits."""
     rate = recording.sample_rate_hz
     width = max(5, round(width_s * rate) | 1)
     half = width // 2

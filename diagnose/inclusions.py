@@ -1,4 +1,5 @@
-"""Where a lump could be: balls on a grid inside the object, ranked by how well they explain the sites' stiffness."""
+"""Where a lump could be: balls on a grid inside the object, ranked by how well they explain the sites'
+stiffness."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ RADII_M = (0.006, 0.010, 0.015)
 def inclusion_starts(forward: Forward, base: Fit, site_sd: np.ndarray, most: int = 6) -> list[np.ndarray]:
     """Start vectors (centre, radius, log ratio) for a fit; also kept in forward.stages['inclusion_starts'].
 
-    First order: the share of each place's give that lies in the ball, times how its force answers to its give,
+    First order: the share of each place's give that lies in the ball, times how its force answers to its
+    give,
     against each press's factor on the force, weighted by noise and shape prior, with a free common factor.
     """
     fields = energy_fields(forward)

@@ -1,8 +1,12 @@
-"""The press integrator: from a tip path to the force on the tool, at one site, with the contact effects in it.
+"""The press integrator: from a tip path to the force on the tool, at one site, with the contact effects in
+it.
 
-Local frame of a site: axis 0 is the outward normal, axes 1 and 2 are tangents. `y` is how far the tip's centre
-has gone INTO the object since first touch (y[0] is the depth), `f` the force on the tool, so that pressing gives
-f[0] > 0. The touch itself is mechanics.touch, so that what is fitted is what is rendered; here slip is added, as
+Local frame of a site: axis 0 is the outward normal, axes 1 and 2 are tangents. `y` is how far the tip's
+centre
+has gone INTO the object since first touch (y[0] is the depth), `f` the force on the tool, so that pressing
+gives
+f[0] > 0. The touch itself is mechanics.touch, so that what is fitted is what is rendered; here slip is added,
+as
 the renderer does it: where the tangential force exceeds mu F the anchor walks until it does not.
 """
 
@@ -19,7 +23,8 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_give, mu, ou
     """Force on the tool along every press.
 
     start: (p + 1,) first sample of each press. y: (n, 3) m. far: (p, 3, 3) unit modulus, 1/m.
-    radius: (p,) m, of tip and surface together. e_dent, e_far: (p,) Pa, modulus under the tip and of the whole.
+    radius: (p,) m, of tip and surface together. e_dent, e_far: (p,) Pa, modulus under the tip and of the
+    whole.
     table: of a dent law. tool_give: 1 / k of a spring in series, m/N. mu: friction; negative: the tip sticks.
     Writes out: (n, 3) N.
     """

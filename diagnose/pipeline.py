@@ -60,7 +60,8 @@ def diagnose(
     nuisance: NuisanceOptions | None = None,
     attribution: AttributionOptions | None = None,
 ) -> Diagnosis:
-    """Diagnose the gap between a recording and its model. Raises DiagnosisError where the data cannot carry it."""
+    """Diagnose the gap between a recording and its model. Raises DiagnosisError where the data cannot carry
+    it."""
     options = options or DiagnoseOptions()
     nuisance = nuisance or NuisanceOptions()
     rules = attribution or AttributionOptions(most=1 if options.fast else 3)
@@ -236,11 +237,16 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
         values = found.final.found.of(name) if name in found.chosen else score.candidate.found.of(name)
         entries.append(
             EffectEntry(
-                name, effect(name).domain, _probability(score, search, best, name in found.chosen),
-                _gap(score.candidate.plain, counts, added), closed, interval, effect(name).report(values, forward),
+                name,
+                effect(name).domain,
+                _probability(score, search, best, name in found.chosen),
+                _gap(score.candidate.plain, counts, added),
+                closed,
+                interval,
+                effect(name).report(values, forward),
                 score.gain,
             )
-        )  # fmt: skip
+        )
     if "finite_strain" in found.base.found.names or "finite_strain" in names:
         deep = search.judge([search.finite_strain])
         closed, interval = _closed(
@@ -275,7 +281,8 @@ def _probability(score: Score, search: Search, best: float, chosen: bool) -> flo
 
 
 def _errors(forward: Forward, found: Attribution, site_sd: np.ndarray, noise: float) -> dict[str, float]:
-    """Our own errors in newtons rms: sensor noise, repeatability of sites, shape, and the rest of the model."""
+    """Our own errors in newtons rms: sensor noise, repeatability of sites, shape, and the rest of the
+    model."""
     t = forward.touches
     rms = float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
     factors = []

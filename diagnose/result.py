@@ -1,4 +1,5 @@
-"""A diagnosis: the three answers with their uncertainty, as the contract's JSON and as objects for the report."""
+"""A diagnosis: the three answers with their uncertainty, as the contract's JSON and as objects for the
+report."""
 
 from __future__ import annotations
 
@@ -8,9 +9,23 @@ from typing import Any
 import numpy as np
 
 from diagnose.attribution import Attribution
-from diagnose.freeair import FreeAir
 from diagnose.forward import Forward
+from diagnose.freeair import FreeAir
 from diagnose.where import Where
+
+_SENTENCES = {
+    "none": "the gap is noise; no effect is missing",
+    "effect": "{effects} explains the gap",
+    "ambiguous": "{effects} explains the gap best, but these touches cannot rule out {candidates}",
+    "unknown": "there is a gap, and no effect known here explains it",
+    "effect+unknown": "{effects} explains part of the gap; something unknown remains",
+}
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    words = [n.replace("_", " ") for n in names]
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
 
 KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
 
@@ -73,6 +88,35 @@ class Diagnosis:
     residual_before: np.ndarray | None = None
     residual_after: np.ndarray | None = None
     left_out: tuple[str, ...] = ()
+
+    @property
+    def summary(self) -> str:
+        """The verdict in one sentence."""
+        return _SENTENCES[self.kind].format(
+            effects=_listed(self.effects), candidates=_listed(self.candidates)
+        )
+
+    def words(self) -> list[str]:
+        """The three answers, a line each, for a terminal."""
+        near = min(self.where.axes, key=lambda a: (a.p, -a.share))
+        lines = [
+            f"verdict: {self.summary}",
+            f"where: gap {self.gap_before_n:.4f} N (noise {self.noise_n:.4f} N); it follows {near.axis} most "
+            f"(share {near.share:.0%}, p = {near.p:.2g})",
+            *(f"which: {e.name} {e.parameters or ''}" for e in self.entries if e.name in self.effects),
+        ]
+        if self.gap_closed is not None and self.gap_closed_ci95 is not None:
+            low, high = self.gap_closed_ci95
+            lines.append(
+                f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N on places not fitted, "
+                f"{self.gap_closed:.0%} closed (95 % interval {low:.0%} to {high:.0%})"
+            )
+        lines += [f"  {reason}" for reason in self.reasons]
+        if self.next_touch is not None and self.candidates:
+            lines.append(f"next touch: {self.next_touch.why}")
+        if self.left_out:
+            lines.append(f"--fast left out: {', '.join(self.left_out)}")
+        return lines
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""

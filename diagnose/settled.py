@@ -21,7 +21,8 @@ LEAST_MASS_KG = 0.003
 
 @dataclass(frozen=True)
 class Settled:
-    """names: asserted, strongest first. residual: (n, 3) N, local: what was taken off the forces. reasons: words."""
+    """names: asserted, strongest first. residual: (n, 3) N, local: what was taken off the forces. reasons:
+    words."""
 
     names: tuple[str, ...]
     parameters: dict[str, dict]
@@ -46,11 +47,9 @@ class Settled:
         for name in self.names:
             after = candidate.plain
             closed, interval = _closed(before, after, counts, noise, added, rng, 100)
-            result.append(
-                EffectEntry(
-                    name, "instrument", 0.97, _gap(after, counts, added), closed, interval, self.parameters[name], 1e3
-                )
-            )  # fmt: skip
+            gap = _gap(after, counts, added)
+            keys = self.parameters[name]
+            result.append(EffectEntry(name, "instrument", 0.97, gap, closed, interval, keys, 1e3))
         return result
 
 

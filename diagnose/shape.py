@@ -11,11 +11,13 @@ from diagnose.whiten import NuisanceOptions
 from mechanics.model import Model
 
 SHARE_PER_HEIGHT = 2.5
-"""Relative stiffness error a unit of surface error over the object's height (edges near a press count double)."""
+"""Relative stiffness error a unit of surface error over the object's height (edges near a press count
+double)."""
 
 
 def site_stiffness_sd(touches: Touches, model: Model, options: NuisanceOptions) -> np.ndarray:
-    """(p,) share by which a press's stiffness may be wrong: mesh and law, and the surface's own uncertainty."""
+    """(p,) share by which a press's stiffness may be wrong: mesh and law, and the surface's own
+    uncertainty."""
     if model.shape_uncertainty_m is None:
         return np.full(touches.presses, options.site_stiffness)
     surface = np.flatnonzero(model.mesh.touchable)
@@ -29,7 +31,8 @@ def site_stiffness_sd(touches: Touches, model: Model, options: NuisanceOptions) 
 
 
 def site_factors(found: Fit, touches: Touches) -> tuple[np.ndarray, np.ndarray]:
-    """(s,) factor by which each site is stiffer than predicted, and its standard error (repeats and noise)."""
+    """(s,) factor by which each site is stiffer than predicted, and its standard error (repeats and
+    noise)."""
     factor, error = np.ones(touches.sites), np.ones(touches.sites)
     predicted = touches.f - found.residual
     for site in range(touches.sites):

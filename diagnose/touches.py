@@ -1,6 +1,7 @@
 """The data of a diagnosis: every press of a recording, thinned to 100 Hz, in the local frame of its site.
 
-Thinning by block means keeps the noise white and turns the 30 um steps of a device's encoder into a fine scale.
+Thinning by block means keeps the noise white and turns the 30 um steps of a device's encoder into a fine
+scale.
 """
 
 from __future__ import annotations
@@ -30,14 +31,17 @@ PHASES = ("loading", "hold", "unloading", "outside")
 
 @dataclass(frozen=True)
 class Touches:
-    """p presses at s sites, n thinned samples; local frame (normal, tangent, tangent), into the object positive.
+    """p presses at s sites, n thinned samples; local frame (normal, tangent, tangent), into the object
+    positive.
 
-    start: (p + 1,) rows of each press. t: (n,) s. y: (n, 3) m, travel of the tip's centre into the object since
+    start: (p + 1,) rows of each press. t: (n,) s. y: (n, 3) m, travel of the tip's centre into the object
+    since
     the surface. f: (n, 3) N on the tool (pressing: f[:, 0] > 0). counted: (n,) bool, contact samples.
     phase: (n,) LOADING, HOLDING, UNLOADING or OUTSIDE. noise_n: std of one thinned force component.
     point, normal: (p, 3) device frame. frame: (p, 3, 3) rows normal, tangent, tangent. site: (p,) its site.
     onset_s: (p,) first touch. repeat: (p,) how many earlier presses its site has had. samples_per_step: raw
-    samples in a thinned one. raw_noise_n: std of one raw force component in free air. free: what free air tells.
+    samples in a thinned one. raw_noise_n: std of one raw force component in free air. free: what free air
+    tells.
     """
 
     start: np.ndarray
@@ -168,7 +172,7 @@ def touches_of(recording: Recording, model: Model, *, step_s: float = STEP_S) ->
     site = _sites(point, np.array(normals))
     if site.max() < 3:
         raise DiagnosisError(
-            f"the palpations are at {site.max() + 1} places only; a diagnosis holds places out and needs 4 or more"
+            f"the palpations are at {site.max() + 1} places only; a diagnosis needs 4 or more"
         )
     repeat = np.array([int((site[:i] == site[i]).sum()) for i in range(len(site))])
     return Touches(
@@ -192,7 +196,8 @@ def touches_of(recording: Recording, model: Model, *, step_s: float = STEP_S) ->
 
 
 def free_air(recording: Recording, model: Model) -> np.ndarray:
-    """(n,) bool: phase-II samples well away from any touch (0.15 s from every press, force within the noise)."""
+    """(n,) bool: phase-II samples well away from any touch (0.15 s from every press, force within the
+    noise)."""
     t = recording.t
     free = np.ones(len(t), dtype=bool)
     begin = recording.boundary_phase[1] + 0.5 if recording.boundary_phase else 0.0

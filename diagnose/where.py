@@ -1,4 +1,5 @@
-"""Where the gap is: shares along each axis, family-wise p values by sign flips of whole sites, worst places."""
+"""Where the gap is: shares along each axis, family-wise p values by sign flips of whole sites, worst
+places."""
 
 from __future__ import annotations
 

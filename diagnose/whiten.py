@@ -1,8 +1,10 @@
-"""The noise of a comparison: sensor noise, and what our own model gets wrong from press to press and site to site.
+"""The noise of a comparison: sensor noise, and what our own model gets wrong from press to press and site to
+site.
 
 A residual is weighed against the covariance sigma^2 I + N N^T of its site, N holding one column a nuisance:
 how the force would change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its
-normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space between
+normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space
+between
 them, against what an error of shape could do. Woodbury keeps it to small matrices.
 """
 
@@ -33,7 +35,8 @@ class NuisanceOptions:
 
 @dataclass
 class Block:
-    """One group's rows (flat indices of counted samples), its nuisance and the factor of I + N^T N / sigma^2."""
+    """One group's rows (flat indices of counted samples), its nuisance and the factor of I + N^T N /
+    sigma^2."""
 
     rows: np.ndarray
     nuisance: np.ndarray
@@ -86,7 +89,8 @@ class Whitener:
         return np.array([len(b.rows) for b in self.blocks])
 
     def cleaned(self, residual: np.ndarray) -> np.ndarray:
-        """(n, 3) the residual less the most likely nuisance: what no error of onset, site or stick explains."""
+        """(n, 3) the residual less the most likely nuisance: what no error of onset, site or stick
+        explains."""
         out = residual.copy()
         for block in self.blocks:
             part = residual[block.rows].reshape(-1)

@@ -1,4 +1,5 @@
-"""Backlash: the tip follows the handle only once the play is taken up. A loop of constant width, whatever the rate."""
+"""Backlash: the tip follows the handle only once the play is taken up. A loop of constant width, whatever the
+rate."""
 
 from diagnose.effects.base import Effect, Parameter
 

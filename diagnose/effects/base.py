@@ -1,4 +1,5 @@
-"""What an effect is: a name, a domain, parameters with bounds, and the settings of the forward model it changes."""
+"""What an effect is: a name, a domain, parameters with bounds, and the settings of the forward model it
+changes."""
 
 from __future__ import annotations
 
@@ -16,7 +17,8 @@ DOMAINS = ("object", "contact", "boundary", "instrument")
 
 @dataclass(frozen=True)
 class Parameter:
-    """One scalar that a fit moves: bounds, starts and step in the stated unit; `ideal` is its value without effect.
+    """One scalar that a fit moves: bounds, starts and step in the stated unit; `ideal` is its value without
+    effect.
 
     prior_std: width of a Gaussian pull towards `ideal` (None: only the bounds hold it).
     """
@@ -35,10 +37,13 @@ class Parameter:
 class Effect:
     """A departure from the ideal model.
 
-    change(settings, values, forward): sets what the forward model needs, in place. report(values, forward): the
+    change(settings, values, forward): sets what the forward model needs, in place. report(values, forward):
+    the
     contract's keys in SI units, device frame. needs: stages that must be computed first ('fields', 'poisson',
-    'base', 'unbonded'). candidates(forward): starts found from the data (list of value vectors) where a grid is
-    not enough. flexible: true where the fit has so many freedoms that it mimics others (it then pays for them).
+    'base', 'unbonded'). candidates(forward): starts found from the data (list of value vectors) where a grid
+    is
+    not enough. flexible: true where the fit has so many freedoms that it mimics others (it then pays for
+    them).
     """
 
     name: str

@@ -1,4 +1,5 @@
-"""Finite strain: a neo-Hookean solid instead of a linear one. It has no parameter: it grows with the depth."""
+"""Finite strain: a neo-Hookean solid instead of a linear one. It has no parameter: it grows with the
+depth."""
 
 from diagnose.effects.base import Effect
 

@@ -1,4 +1,5 @@
-"""Mullins softening: below the greatest load that a place has felt, it is softer (Ogden and Roxburgh 1999)."""
+"""Mullins softening: below the greatest load that a place has felt, it is softer (Ogden and Roxburgh
+1999)."""
 
 from diagnose.effects.base import Effect, Parameter
 

@@ -7,7 +7,8 @@ FORCE_PER_C20 = 0.55
 
 
 def factor(dents, c20_over_c10):  # type: ignore[no-untyped-def]
-    """Factor on the dent's force law at indentations in tip radii: strain under a sphere goes with sqrt(depth)."""
+    """Factor on the dent's force law at indentations in tip radii: strain under a sphere goes with
+    sqrt(depth)."""
     return 1 + FORCE_PER_C20 * c20_over_c10 * dents
 
 

@@ -1,6 +1,8 @@
-"""Surface shape: the reconstructed surface is wrong where nobody touched, so places are too stiff or too soft.
+"""Surface shape: the reconstructed surface is wrong where nobody touched, so places are too stiff or too
+soft.
 
-No few numbers describe it: one factor a site, pulled to 1. It predicts nothing at a site that was held out; it is
+No few numbers describe it: one factor a site, pulled to 1. It predicts nothing at a site that was held out;
+it is
 named where sites differ by more than their shape's uncertainty and nothing else explains how.
 """
 

@@ -1,4 +1,5 @@
-"""Time delay: the force reads late (or early). A loop whose width grows with the rate of force; same in any place."""
+"""Time delay: the force reads late (or early). A loop whose width grows with the rate of force; same in any
+place."""
 
 from diagnose.effects.base import Effect, Parameter
 

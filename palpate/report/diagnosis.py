@@ -1,0 +1,183 @@
+"""The report of a diagnosis: the three answers on the first screen, with pictures, then the evidence."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from diagnose.library import effect
+from diagnose.result import Diagnosis
+from mechanics.model import Model
+from mechanics.recording import Recording
+from palpate.report.object3d import draw_object
+from palpate.report.page import Page
+
+AXIS_WORDS = {
+    "depth": "how deep the press is",
+    "rate": "how fast the press is",
+    "phase": "loading, holding or unloading",
+    "direction": "sideways against straight",
+    "space": "the place on the object",
+    "order": "the order in time",
+    "repeat": "first touch or repeat",
+    "free_air": "free air, nothing touched",
+}
+
+
+def write_report(path: Path | str, recording: Recording, model: Model, result: Diagnosis) -> Path:
+    """Write one self-contained HTML page; returns its path."""
+    page = Page(f"Where simulation and reality part: {recording.name}")
+    page.lead(result.summary[0].upper() + result.summary[1:] + ".")
+    page.paragraph(_how_far(result))
+    page.figure(first_picture(model, result), _caption(result))
+    page.heading("Which effect")
+    page.table(
+        ["effect", "what it means", "probability", "gap with it alone (N)", "closed", "parameters"],
+        [
+            [
+                e.name,
+                effect(e.name).words,
+                f"{e.probability:.2f}",
+                f"{e.gap_after_n:.4f}",
+                "-" if e.gap_closed is None else f"{e.gap_closed:.0%}",
+                _short(e.parameters),
+            ]
+            for e in result.entries[:8]
+        ],
+    )
+    for reason in result.reasons:
+        page.paragraph(reason[0].upper() + reason[1:] + ".")
+    page.heading("Where")
+    page.table(
+        ["the gap follows", "share of it", "p (family-wise)"],
+        [[AXIS_WORDS[a.axis], f"{a.share:.0%}", f"{a.p:.2g}"] for a in result.where.axes],
+    )
+    page.figure(
+        presses_picture(result),
+        "The presses with the largest gap: measured, ideal model, model with the effect.",
+    )
+    page.heading("Our own errors")
+    page.table(["source", "N rms"], [[k, f"{v:.4f}"] for k, v in result.errors_n.items()])
+    if result.next_touch is not None:
+        touch = result.next_touch
+        page.heading("Next touch")
+        page.paragraph(
+            f"To tell {' from '.join(n.replace('_', ' ') for n in touch.separates)}: press at "
+            f"({touch.x * 1e3:.0f}, {touch.y * 1e3:.0f}, {touch.z * 1e3:.0f}) mm, "
+            f"{touch.depth_m * 1e3:.1f} mm deep at "
+            f"{touch.speed_m_per_s * 1e3:.0f} mm/s, hold {touch.hold_s:.1f} s ({touch.why})."
+        )
+    if result.confusable:
+        page.paragraph(
+            "On these touches the following look alike: "
+            + "; ".join(
+                f"{a.replace('_', ' ')} and {b.replace('_', ' ')}" for a, b, _ in result.confusable[:6]
+            )
+            + "."
+        )
+    if result.left_out:
+        page.paragraph(f"The fast setting left out: {', '.join(result.left_out)}.")
+    return page.write(path)
+
+
+def _how_far(result: Diagnosis) -> str:
+    text = (
+        f"The ideal model (modulus refitted) misses the measured force by {result.gap_before_n * 1e3:.0f} mN "
+        f"rms on places that it was not fitted to; the sensor's noise is {result.noise_n * 1e3:.0f} mN."
+    )
+    if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
+        low, high = result.gap_closed_ci95
+        text += (
+            f" With the effect it misses by {result.gap_after_n * 1e3:.0f} mN: {result.gap_closed:.0%} of "
+            f"what exceeds the noise is closed (95 % interval {low:.0%} to {high:.0%})."
+        )
+    return text
+
+
+def _caption(result: Diagnosis) -> str:
+    axis = min(result.where.axes, key=lambda a: (a.p, -a.share))
+    return (
+        "Left: the gap at each place that was pressed. Middle: the mean gap along depth and speed. "
+        f"It follows {AXIS_WORDS[axis.axis]} most. Right: how much of the gap each effect alone closes."
+    )
+
+
+def first_picture(model: Model, result: Diagnosis) -> Any:
+    """Where, how it runs, and what closes it: three panels."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(13, 4.2), layout="constrained")
+    left, middle, right = figure.subplots(1, 3, width_ratios=[1.25, 1, 1])
+    _object(left, model, result)
+    x, mean, error = result.where.curves["speed of pressing (mm/s)"]
+    d, dmean, derror = result.where.curves["depth (mm)"]
+    middle.errorbar(d, dmean * 1e3, derror * 1e3, marker="o", color="#1d3557", label="against depth (mm)")
+    fastest = max(float(np.abs(x).max()), 1e-9)
+    label = f"against speed (full scale {fastest:.0f} mm/s)"
+    scaled = x / fastest * d.max()
+    middle.errorbar(scaled, mean * 1e3, error * 1e3, marker="s", color="#e76f51", label=label)
+    middle.axhline(0, color="#999999", lw=0.8)
+    middle.set(
+        xlabel="depth (mm), or speed scaled",
+        ylabel="measured - ideal (mN)",
+        title="the gap along depth and speed",
+    )
+    middle.legend(fontsize=8, frameon=False)
+    entries = [e for e in result.entries if e.gap_closed is not None][:7]
+    colours = ["#2a9d8f" if e.name in result.effects else "#c9c9c9" for e in entries]
+    values = [float(np.clip(e.gap_closed or 0.0, -0.5, 1.0)) for e in entries]
+    right.barh([e.name.replace("_", " ") for e in entries], values, color=colours)
+    right.invert_yaxis()
+    right.axvline(0, color="#999999", lw=0.8)
+    right.set(xlabel="share of the gap closed on unseen places", title="each effect alone (green: named)")
+    return figure
+
+
+def _object(ax: Any, model: Model, result: Diagnosis) -> None:
+    forward = result.forward
+    assert forward is not None
+    t = forward.touches
+    places = np.array([t.point[t.site == s].mean(axis=0) for s in range(t.sites)])
+    nodes = model.mesh.points
+    distance = np.linalg.norm(nodes[:, None] - places[None], axis=2)
+    weight = np.exp(-((distance / 0.015) ** 2)) + 1e-9
+    values = (weight @ (result.where.site_rmse * 1e3)) / weight.sum(axis=1)
+    draw_object(ax, model, values, label="gap (mN rms)", colour_map="magma", touches=places)
+    ax.set_title("the gap on the object (dots: places pressed)")
+
+
+def presses_picture(result: Diagnosis, count: int = 4) -> Any:
+    """Force against time of the presses with the largest gap."""
+    from matplotlib.figure import Figure
+
+    forward = result.forward
+    assert forward is not None and result.residual_before is not None and result.residual_after is not None
+    t = forward.touches
+    each = np.bincount(
+        t.press, weights=(result.residual_before**2).sum(axis=1) * t.counted, minlength=t.presses
+    )
+    figure = Figure(figsize=(13, 3.2), layout="constrained")
+    for ax, press in zip(figure.subplots(1, count), np.argsort(-each)[:count], strict=True):
+        rows = (t.press == press) & t.counted
+        clock = t.t[rows] - t.onset_s[press]
+        force = t.f[rows, 0]
+        ax.plot(clock, force, color="#1d3557", lw=1.6, label="measured")
+        ax.plot(clock, force - result.residual_before[rows, 0], color="#e76f51", lw=1, label="ideal model")
+        if result.effects:
+            ax.plot(
+                clock, force - result.residual_after[rows, 0], color="#2a9d8f", lw=1, label="with the effect"
+            )
+        ax.set(xlabel="s", ylabel="normal force (N)")
+    figure.axes[0].legend(fontsize=8, frameon=False)
+    return figure
+
+
+def _short(parameters: dict[str, Any]) -> str:
+    def word(value: Any) -> str:
+        if isinstance(value, list):
+            return "[" + ", ".join(word(v) for v in value) + "]"
+        return f"{value:.3g}" if isinstance(value, float) else str(value)
+
+    return ", ".join(f"{k} {word(v)}" for k, v in parameters.items())
