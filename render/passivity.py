@@ -28,7 +28,6 @@ from mechanics.options import option
 
 LONGEST_DELAY_TICKS = 64
 MOST_OWED_J = 2e-3
-GAIN_RECOVERY_S = 0.1
 
 
 @dataclass(frozen=True)
@@ -36,7 +35,7 @@ class PassivityOptions:
     """How strictly energy is kept, and what it may cost."""
 
     passivity: bool = option(True, "time-domain passivity observer and controller")
-    allowance_j: float = option(2e-4, "energy that may be owed before the guard cuts in", unit="J")
+    allowance_j: float = option(1e-4, "energy that may be owed before the guard cuts in", unit="J")
     payback_s: float = option(0.005, "time over which owed energy is damped away", unit="s")
     velocity_time_s: float = option(0.002, "time constant of the velocity that damping uses", unit="s")
     most_damping_n_s_per_m: float = option(10.0, "the damper's limit; the device's if lower", unit="N s/m")
@@ -84,7 +83,6 @@ class PassivityState(NamedTuple):
     energies: np.ndarray
     ticks: np.ndarray
     cut: np.ndarray
-    gain: np.ndarray
 
 
 NET, OWED, DISSIPATED, LEAST, TOTAL = range(5)
@@ -130,7 +128,6 @@ def passivity_state() -> PassivityState:
         energies=np.zeros(5),
         ticks=np.zeros(2, dtype=np.int64),
         cut=np.zeros(1),
-        gain=np.ones(1),
     )
 
 
@@ -227,9 +224,7 @@ def _guard(parameters, state, wanted, speed, dt_s):
             for i in range(3):
                 way2 += state.commanded[(tick - 1 - j) % LONGEST_DELAY_TICKS, i] ** 2
             left -= math.sqrt(way2) * reach
-        # cut at once, come back slowly: a gain that flickers would drive the very oscillation it is to stop
         scale = min(1.0, max(left, 0.0) / (size * reach))
-        state.gain[0] = scale
     # on the way the force itself speeds the mass up: F (v T + F T^2 / 2m) <= left
     half = 0.5 * dt_s * dt_s / parameters.least_mass_kg
     affordable = 2.0 * max(left, 0.0) / (reach + math.sqrt(reach * reach + 4.0 * half * max(left, 0.0)))

@@ -62,7 +62,7 @@ class Loop:
 
 @dataclass(frozen=True)
 class ClosedLoopResult:
-    """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given to the hand by then.
+    """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given so far.
 
     damped_j: what the controller took; compliance_m_per_n: the coupling's.
     """

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import threading
 import time
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -112,7 +113,12 @@ def kept(function: Any, renderer: Any) -> Any:
     Numba's index of a function names the types of every call ever compiled, and cannot be read in a process
     that cannot import one of them (a script's own renderer, say); such a renderer gets a fresh copy.
     """
-    return function if _is_ours(renderer) else njit(nogil=True)(function.py_func)
+    return function if _is_ours(renderer) else _fresh_copy(function)
+
+
+@cache
+def _fresh_copy(function: Any) -> Any:
+    return njit(nogil=True)(function.py_func)
 
 
 def warm_up(renderer: Any, state: Any, places: int = 100) -> None:

@@ -1,0 +1,85 @@
+"""An elastic plane at z = 0 with a renderer's interface: for trying a device or a loop without a model.
+
+Linear, without friction: force k d along z for the depth d of the tip's sphere, k behind the virtual coupling.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numba import njit
+
+from mechanics.progress import Progress
+from palpate.servo.free_air import FreeAir, FreeAirState
+
+
+class PlaneParameters(NamedTuple):
+    """stiffness: (1,) N/m; friction: unused; series_compliance: (1,) m/N."""
+
+    stiffness: np.ndarray
+    friction: np.ndarray
+    series_compliance: np.ndarray
+
+
+@njit(cache=True, nogil=True)
+def _kernel(parameters, state, tips):
+    stiffness = parameters.stiffness[0]
+    stiffness = stiffness / (1.0 + stiffness * parameters.series_compliance[0])
+    for t in range(tips.shape[0]):
+        depth = state.radii_m[t] - tips[t, 2]
+        touches = depth > 0.0
+        for i in range(3):
+            state.forces[t, i] = 0.0
+            state.points[t, i] = tips[t, i]
+            state.normals[t, i] = 0.0
+        state.points[t, 2] = 0.0
+        state.normals[t, 2] = 1.0
+        state.forces[t, 2] = stiffness * depth if touches else 0.0
+        state.touching[t] = 1 if touches else 0
+        state.depths[t] = depth if touches else 0.0
+        state.stiffness[t] = stiffness if touches else 0.0
+
+
+class ElasticPlane(FreeAir):
+    """A renderer of a plane of `stiffness_n_per_m`."""
+
+    kernel = staticmethod(_kernel)
+
+    def __init__(self, stiffness_n_per_m: float = 500.0, compliance_m_per_n: float = 0.0) -> None:
+        super().__init__()
+        self.parameters = PlaneParameters(
+            np.array([float(stiffness_n_per_m)]), np.full(1, np.inf), np.array([float(compliance_m_per_n)])
+        )
+
+    @property
+    def surface(self) -> tuple[np.ndarray, np.ndarray]:
+        """A square of 20 cm."""
+        square = np.array([[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]])
+        return square, np.array([[0, 1, 2], [0, 2, 3]])
+
+    def step(self, state: FreeAirState, tips: np.ndarray) -> tuple[FreeAirState, np.ndarray]:
+        """(m, 3) N on the tool."""
+        _kernel(self.parameters, state, tips)
+        return state, state.forces
+
+    def with_modulus(self, young_modulus_pa: float) -> ElasticPlane:
+        """The stiffness of a 1 cm square, 1 cm thick: E times 1 cm."""
+        return ElasticPlane(0.01 * young_modulus_pa, float(self.parameters.series_compliance[0]))
+
+    def with_series_compliance(self, compliance_m_per_n: float) -> ElasticPlane:
+        """The same plane felt through a spring."""
+        return ElasticPlane(float(self.parameters.stiffness[0]), compliance_m_per_n)
+
+
+@dataclass(frozen=True)
+class PlaneSource:
+    """Makes the plane in a servo process."""
+
+    stiffness_n_per_m: float = 500.0
+    name: str = "elastic-plane"
+
+    def make(self, progress: Progress) -> tuple[Any, None]:
+        """The plane; there is no model behind it."""
+        return ElasticPlane(self.stiffness_n_per_m), None
