@@ -34,6 +34,7 @@ class Solver:
     ) -> None:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
+        self.modulus_ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
         self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
         self.free = free_dofs(mesh, support)
         full = stiffness(mesh, poisson_ratio, modulus_ratio, mean_dilatation=mean_dilatation)

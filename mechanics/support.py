@@ -80,7 +80,7 @@ def base_triangles(mesh: TetMesh) -> np.ndarray:
 def support_of(
     effects: Mapping[str, Mapping[str, Any]], normal: np.ndarray, young_modulus_pa: float
 ) -> Support | None:
-    """The support that a model's effects describe (compliant_base, unbonded_base); None where it is bonded."""
+    """The support that compliant_base and unbonded_base describe; None where the base is bonded."""
     springs, fraction, direction = None, 1.0, None
     if "compliant_base" in effects:
         keys = effects["compliant_base"]
