@@ -27,7 +27,7 @@ SPEC = DeviceSpec(
     max_speed_m_per_s=1.0,
     buttons=3,
 )
-WINDOW_SILENT_S = 0.5
+WINDOW_SILENT_S = 2.0
 _ZERO = np.zeros(3)
 
 

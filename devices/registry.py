@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
-from devices.base import Availability, Clock, PositionSource, host_clock
+from devices.base import Availability, Clock, DeviceSpec, PositionSource, host_clock
 from mechanics.errors import DeviceError
 
 DEVICES: dict[str, tuple[str, str]] = {
@@ -45,6 +45,11 @@ def make_device(name: str, *, clock: Clock = host_clock, **options: Any) -> Posi
     """A device by name, not yet open; raises DeviceError for a name that is not known."""
     module = _module(name)
     return getattr(module, DEVICES[name][1])(clock=clock, **options)
+
+
+def spec_of(name: str) -> DeviceSpec:
+    """What a kind of device can do, before any is open; raises DeviceError for a name that is not known."""
+    return _module(name).SPEC
 
 
 def find_devices(names: list[str] | None = None) -> list[Availability]:

@@ -19,7 +19,7 @@ import numpy as np
 from devices.channel import PoseChannel
 from devices.intention import Intention
 from devices.mapper import MapperOptions, Mapping
-from devices.registry import DEVICES, DeviceChoice
+from devices.registry import DEVICES, DeviceChoice, spec_of
 from devices.simulated import SimulatedOptions
 from mechanics.errors import DeviceError, OptionError
 from mechanics.model import Model
@@ -94,6 +94,7 @@ def run(arguments: argparse.Namespace) -> int:
         if name == "mouse":
             channel = PoseChannel.create()
             stack.callback(channel.close)
+            channel.write(time.perf_counter(), tuple(_above(model)))
         device, until = device_choice(arguments, name, model, channel)
         session = stack.enter_context(
             TouchSession(
@@ -185,11 +186,13 @@ def _mapping(arguments: argparse.Namespace, name: str, scene: Scene, model: Mode
         return None
     given = {f: getattr(arguments, f) for f in MapperOptions.__dataclass_fields__ if hasattr(arguments, f)}
     options = MapperOptions(**{**vars(scene.mapper), **given})
+    return Mapping.from_options(options, centre_m=_above(model), rate=spec_of(name).control == "rate")
+
+
+def _above(model: Model) -> np.ndarray:
+    """(3,) m, two finger's widths over the middle of the object: where a device's middle lies."""
     top = ((model.mesh.points - model.support_point) @ model.support_normal).max()
-    base = model.mesh.points[model.mesh.fixed].mean(axis=0)
-    # the device's middle lies a finger's width over the object
-    centre = base + (top + 0.02) * np.asarray(model.support_normal)
-    return Mapping.from_options(options, centre_m=centre, rate=name == "spacemouse")
+    return model.mesh.points[model.mesh.fixed].mean(axis=0) + (top + 0.03) * model.support_normal
 
 
 def _wait(session: TouchSession, seconds: float | None) -> None:

@@ -12,6 +12,7 @@ import tempfile
 import threading
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
@@ -19,7 +20,8 @@ from typing import Self
 import numpy as np
 
 from devices.mapper import Mapping
-from devices.registry import DeviceChoice
+from devices.registry import DeviceChoice, spec_of
+from mechanics.compliance import load_or_condense
 from mechanics.errors import PalpateError
 from mechanics.model import Model, read_model, write_model
 from mechanics.progress import Progress, silent
@@ -97,6 +99,7 @@ class TouchSession:
         self._pictures = pictures
         self._beside_name = beside
         self._device = DeviceChoice(device) if isinstance(device, str) else device
+        self._has_force = spec_of(self._device.name).has_force
         self._servo = Servo(model, renderer=renderer, device=self._device, mapping=mapping, options=options)
         self._renderers: dict[str, Renderer] = {}
         self._recorder: Recorder | None = None
@@ -108,12 +111,16 @@ class TouchSession:
 
     def start(self, progress: Progress = silent) -> Self:
         """Spawn the servo, load the renderers that draw, begin to record where asked; force stays off."""
-        self._servo.start(lambda stage, share: progress(stage, 0.6 * share))
-        if self._pictures or self._beside_name:
-            for name in {self._servo.renderer, self._beside_name} - {""}:
-                self._renderers[name] = create(
-                    name, self.model, progress=lambda s, f: progress(s, 0.6 + 0.4 * f)
-                )
+        drawn = (
+            {self._servo.renderer, self._beside_name} - {""} if self._pictures else {self._beside_name} - {""}
+        )
+        if "fem" in {self._servo.renderer, *drawn}:
+            # once, before two processes ask for it at the same time
+            load_or_condense(self.model, lambda stage, share: progress(stage, 0.5 * share))
+        with ThreadPoolExecutor(1) as pool:
+            loading = {name: pool.submit(create, name, self.model) for name in sorted(drawn)}
+            self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share))
+            self._renderers = {name: job.result() for name, job in loading.items()}
         self._restart_beside()
         self._apply()
         self._next = int(self._servo.arrays.ring_head[0])
@@ -187,7 +194,7 @@ class TouchSession:
             touching=bool(snapshot.touching[0]),
             stiffness_n_per_m=float(snapshot.stiffness[0]),
             force_enabled=snapshot.force_enabled,
-            reason=snapshot.reason,
+            reason=snapshot.reason if self._has_force else "",
             views=tuple(views),
             busy=self.busy or self.failure,
             recorded_s=None if self._recorder is None else self._recorded_s(rows),
@@ -261,6 +268,16 @@ class TouchSession:
             base_model=None if self._tracing.done or self.model.path is None else self.model.path.resolve(),
         )
         return write_recording(self.recording_path, recording, truth=truth)
+
+    @property
+    def recording(self) -> bool:
+        """Whether a recording runs."""
+        return self._recorder is not None
+
+    @property
+    def traced(self) -> float:
+        """The share of the way around the base that the recording has traced on the support."""
+        return self._tracing.share if self._recorder is not None else 0.0
 
     def _work(self, words: str, job: Callable[[], None]) -> None:
         """Run a job that takes longer than a frame; one at a time, a second request is dropped."""

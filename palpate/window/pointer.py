@@ -1,0 +1,149 @@
+"""From a mouse over a picture to a tip over an object.
+
+The tip hovers over the place that the mouse points at, a little off the surface; while the button is held it
+goes in along the inward normal, and out again when it is let go. Over the support it comes down onto the
+support, and beside the object it slides along the foot, so that the base can be traced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pyvista
+import vtk
+
+from mechanics.tetmesh import vertex_normals
+
+HOVER_M = 0.008
+PRESS_SPEED_M_PER_S = 0.02
+RELEASE_SPEED_M_PER_S = 0.06
+BEAR_DOWN_M = 0.0003
+LEAN_M = 0.0003
+LEAST_PRESS_M, MOST_PRESS_M = 0.0005, 0.010
+MOST_SPEED_M_PER_S = 0.4
+
+
+@dataclass(frozen=True)
+class Target:
+    """A place that the mouse points at: (3,) m on the surface, outward unit normal, and on what."""
+
+    point: np.ndarray
+    normal: np.ndarray
+    on_support: bool
+
+
+class Pointer:
+    """Holds where the mouse points, whether it presses and how deep; `place` moves the tip for one frame."""
+
+    def __init__(
+        self,
+        points: np.ndarray,
+        triangles: np.ndarray,
+        tip_radius_m: float,
+        support_point: np.ndarray,
+        support_normal: np.ndarray,
+    ) -> None:
+        self._points = np.asarray(points, dtype=float)
+        self._triangles = np.asarray(triangles)
+        self._normals = vertex_normals(self._points, self._triangles)
+        self._shell = pyvista.PolyData.from_regular_faces(self._points, self._triangles)
+        self._locator = vtk.vtkStaticCellLocator()
+        self._locator.SetDataSet(self._shell)
+        self._locator.BuildLocator()
+        self.radius = tip_radius_m
+        self._support_point = np.asarray(support_point, dtype=float)
+        self._up = np.asarray(support_normal, dtype=float)
+        self.press_depth_m = 0.004
+        self.pressing = False
+        self.target: Target | None = None
+        top = ((self._points - self._support_point) @ self._up).max() + 0.03
+        middle = self._points.mean(axis=0)
+        self._tip = middle + (top - (middle - self._support_point) @ self._up) * self._up
+        self._depth = -HOVER_M
+
+    @property
+    def tip_m(self) -> np.ndarray:
+        """(3,) m, where the hand means the tip's centre to be."""
+        return self._tip
+
+    def point_along(self, near: np.ndarray, far: np.ndarray) -> Target | None:
+        """What a ray from the eye meets first; None where it meets nothing (the target then stays)."""
+        found = self._hit(near, far)
+        if found is not None:
+            self.target = found
+        return found
+
+    def deeper(self, steps: float) -> None:
+        """The wheel: how deep a press goes, 0.5 mm a step."""
+        self.press_depth_m = float(np.clip(self.press_depth_m + 0.0005 * steps, LEAST_PRESS_M, MOST_PRESS_M))
+
+    def place(self, duration_s: float) -> np.ndarray:
+        """(3,) m, where the hand means the tip's centre to be after another frame."""
+        target = self.target
+        if target is None:
+            return self._tip
+        deepest = BEAR_DOWN_M if target.on_support else self.press_depth_m
+        goal = deepest if self.pressing else -HOVER_M
+        speed = PRESS_SPEED_M_PER_S if goal > self._depth else RELEASE_SPEED_M_PER_S
+        # far away one may be quick; near the surface a press has the speed of a press
+        if goal > self._depth and self._depth < -0.002:
+            speed = RELEASE_SPEED_M_PER_S
+        step = speed * duration_s
+        self._depth += float(np.clip(goal - self._depth, -step, step))
+        self._depth = min(self._depth, deepest)
+        centre = target.point + (self.radius - self._depth) * target.normal
+        if target.on_support:
+            centre = self._beside_the_object(centre)
+        move = centre - self._tip
+        reach = MOST_SPEED_M_PER_S * duration_s
+        distance = float(np.linalg.norm(move))
+        self._tip = self._tip + move * min(1.0, reach / max(distance, 1e-12))
+        return self._tip
+
+    def _beside_the_object(self, centre: np.ndarray) -> np.ndarray:
+        """Moved along the support until the tip leans on the foot and no further."""
+        gap_wanted = self.radius - LEAN_M
+        for _ in range(8):
+            closest, inside = self._closest(centre)
+            away = centre - closest
+            gap = -float(np.linalg.norm(away)) if inside else float(np.linalg.norm(away))
+            if gap >= gap_wanted:
+                break
+            sideways = (-away if inside else away) - ((-away if inside else away) @ self._up) * self._up
+            length = float(np.linalg.norm(sideways))
+            if length < 1e-9:
+                break
+            centre = centre + (gap_wanted - gap) * sideways / length
+        return centre
+
+    def _closest(self, point: np.ndarray) -> tuple[np.ndarray, bool]:
+        found, cell, sub, squared = [0.0] * 3, vtk.mutable(0), vtk.mutable(0), vtk.mutable(0.0)
+        self._locator.FindClosestPoint(point, found, cell, sub, squared)
+        place = np.array(found)
+        normal = self._normal_at(int(cell), place)
+        return place, float((point - place) @ normal) < 0
+
+    def _hit(self, near: np.ndarray, far: np.ndarray) -> Target | None:
+        ray = far - near
+        share, place, parametric = vtk.mutable(0.0), [0.0] * 3, [0.0] * 3
+        sub, cell = vtk.mutable(0), vtk.mutable(0)
+        met = self._locator.IntersectWithLine(near, far, 1e-9, share, place, parametric, sub, cell)
+        downward = float(ray @ self._up)
+        on_plane = float((self._support_point - near) @ self._up) / downward if downward < -1e-12 else np.inf
+        if met and float(share) <= on_plane:
+            point = np.array(place)
+            return Target(point, self._normal_at(int(cell), point), False)
+        if 0 < on_plane <= 1:
+            return Target(near + on_plane * ray, self._up, True)
+        return None
+
+    def _normal_at(self, cell: int, point: np.ndarray) -> np.ndarray:
+        """Interpolated over the triangle, so that the tip does not jerk from facet to facet."""
+        corners = self._triangles[cell]
+        a, b, c = self._points[corners]
+        matrix = np.column_stack([b - a, c - a])
+        u, v = np.linalg.lstsq(matrix, point - a, rcond=None)[0]
+        weights = np.clip([1 - u - v, u, v], 0.0, 1.0)
+        normal = weights @ self._normals[corners]
+        return normal / np.linalg.norm(normal)
