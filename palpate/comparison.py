@@ -1,0 +1,297 @@
+"""FEM against the interpolated 1D models on presses that none of them has seen: folds over sites, whole
+regions.
+
+Every model is fitted to the same training presses and predicts the same held-out paths, measured from the
+same first touches, at the same places with the same normals; of the model only the geometry is used.
+
+- fem: one Young's modulus (least squares; the force of a path is proportional to it) and the dent law, linear
+or
+  neo-Hookean, that fits the training presses best.
+- kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
+  interpolated to the held-out place by radial basis functions (render.one_d), force along the normal.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mechanics.errors import ContactError
+from mechanics.model import Model
+from mechanics.options import option
+from mechanics.progress import Progress, silent
+from mechanics.recording import Recording
+from mechanics.sites import touch_sites
+from mechanics.touch import touch_forces
+from palpate.regions import Region, regions
+from reconstruct.casting import cast
+from reconstruct.contacts import Exploration, explore
+from reconstruct.modulus import site_labels
+from reconstruct.one_d import fit_robust
+from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+from reconstruct.uniaxial import profiles
+from render.one_d import Law, spread_law
+
+MODELS = ("fem", "kelvin-voigt", "hunt-crossley")
+LAWS = ("linear", "neo-hookean")
+_AROUND_S = 0.05
+
+
+@dataclass(frozen=True)
+class CompareOptions:
+    """How presses are held out."""
+
+    folds: int = option(8, "parts that the sites are split into")
+    site_m: float = option(0.008, "presses closer than this are one site", unit="m", flag="--site-size")
+    interpolation: str = option("rbf", "of the 1D parameters", choices=("rbf", "nearest"))
+
+
+@dataclass(frozen=True)
+class Presses:
+    """p presses, their contact samples one after another (n rows; starts (p + 1,)); device frame, SI units.
+
+    path: (n, 3) m, travel of the tip's centre since first touch. depth, rate: (n,) along -n. force: (n, 3) N
+    measured, on the tool. points, normals: (p, 3). site: (p,). unit: law -> (n, 3) m^2, force for unit
+    modulus. laws: 1D name -> Law of each press's own fit.
+    """
+
+    starts: np.ndarray
+    path: np.ndarray
+    depth: np.ndarray
+    rate: np.ndarray
+    force: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    site: np.ndarray
+    unit: dict[str, np.ndarray]
+    laws: dict[str, Law]
+
+    def __len__(self) -> int:
+        return len(self.points)
+
+    def rows(self, presses: np.ndarray) -> np.ndarray:
+        """Sample indices of these presses, in order."""
+        return np.concatenate([np.arange(self.starts[i], self.starts[i + 1]) for i in presses])
+
+
+@dataclass(frozen=True)
+class RegionResult:
+    """Errors over the presses of one region, fitted on all the others.
+
+    rmse_n: N. bias: share by which the predicted force is too large (-0.5: half as stiff as the object).
+    """
+
+    region: Region
+    rmse_n: dict[str, float]
+    relative_rmse: dict[str, float]
+    bias: dict[str, float]
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Held-out errors. press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM."""
+
+    presses: Presses
+    model: Model
+    rmse_n: dict[str, float]
+    relative_rmse: dict[str, float]
+    press_rmse_n: dict[str, np.ndarray]
+    fold: np.ndarray
+    moduli_pa: np.ndarray
+    noise_n: float
+    predicted: dict[str, np.ndarray]
+    regions: tuple[RegionResult, ...] = field(default_factory=tuple)
+
+    def wins(self, name: str) -> int:
+        """On how many held-out presses the model errs least."""
+        table = np.array([self.press_rmse_n[m] for m in MODELS])
+        return int((table.argmin(axis=0) == MODELS.index(name)).sum())
+
+
+def compare(
+    recording: Recording,
+    model: Model | None = None,
+    options: CompareOptions | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Comparison:
+    """Compare on one recording; without a model its geometry is reconstructed. Raises ContactError for fewer
+    sites than two."""
+    options = options or CompareOptions()
+    if model is None:
+        made = reconstruct_fully(recording, ReconstructOptions(seed=seed), lambda s, f: progress(s, 0.6 * f))
+        model, exploration = made.model, made.exploration
+    else:
+        exploration = explore(recording)
+    presses = gather(exploration, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f))
+    sites = np.unique(presses.site)
+    folds = min(options.folds, len(sites))
+    if folds < 2:
+        raise ContactError(
+            f"{len(sites)} site was palpated: a comparison holds some out and needs 2 at least"
+        )
+    fold_of_site = np.random.default_rng(seed).permutation(np.arange(len(sites)) % folds)
+    fold = fold_of_site[np.searchsorted(sites, presses.site)]
+    predicted = {name: np.zeros_like(presses.force) for name in MODELS}
+    moduli = np.zeros(folds)
+    for k in range(folds):
+        progress("folds", 0.8 + 0.1 * k / folds)
+        held = np.flatnonzero(fold == k)
+        rows = presses.rows(held)
+        forces, moduli[k] = _predict(presses, np.flatnonzero(fold != k), held, options.interpolation)
+        for name in MODELS:
+            predicted[name][rows] = forces[name]
+    found = []
+    for region in regions(model, presses.points, presses.normals):
+        progress(region.name, 0.95)
+        held = np.flatnonzero(region.members)
+        forces, _ = _predict(presses, np.flatnonzero(~region.members), held, options.interpolation)
+        measured = presses.force[presses.rows(held)]
+        found.append(
+            RegionResult(
+                region,
+                {m: _rms(f - measured) for m, f in forces.items()},
+                {m: _rms(f - measured) / _rms(measured) for m, f in forces.items()},
+                {m: float((f * measured).sum() / (measured**2).sum() - 1) for m, f in forces.items()},
+            )
+        )
+    error = {m: predicted[m] - presses.force for m in MODELS}
+    each = {
+        m: np.array([_rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))])
+        for m in MODELS
+    }
+    return Comparison(
+        presses=presses,
+        model=model,
+        rmse_n={m: _rms(error[m]) for m in MODELS},
+        relative_rmse={m: _rms(error[m]) / _rms(presses.force) for m in MODELS},
+        press_rmse_n=each,
+        fold=fold,
+        moduli_pa=moduli,
+        noise_n=exploration.noise_n * np.sqrt(3.0),
+        predicted=predicted,
+        regions=tuple(found),
+    )
+
+
+def gather(exploration: Exploration, model: Model, site_m: float, progress: Progress = silent) -> Presses:
+    """Contact samples, sites and what each model needs; the touch sites are solved here."""
+    recording = exploration.recording
+    mesh = model.mesh
+    where = cast(mesh.points, mesh.touchable_surface, exploration.points, exploration.normals)
+    solved = touch_sites(mesh, where.points, where.normals, model.poisson_ratio, progress=progress)
+    normals = solved.normals
+    around = round(_AROUND_S * recording.sample_rate_hz)
+    paths, rates, forces, starts = [], [], [], [0]
+    for contact, normal in zip(exploration.contacts, normals, strict=True):
+        rows = slice(max(contact.start - around, 0), min(contact.end + around, len(recording.t)))
+        path = exploration.position[rows] - contact.centre
+        paths.append(path)
+        rates.append(np.gradient(-(path @ normal), recording.t[rows]))
+        forces.append(recording.force_on_tool[rows])
+        starts.append(starts[-1] + len(path))
+    path = np.concatenate(paths)
+    press = np.repeat(np.arange(len(normals)), np.diff(starts))
+    unit = {
+        law: touch_forces(
+            path,
+            np.array(starts),
+            normals,
+            solved.far,
+            young_modulus_pa=1.0,
+            poisson_ratio=model.poisson_ratio,
+            tip_radius_m=recording.tip_radius_m,
+            curvature=solved.curvature,
+            law=law,
+        )
+        for law in LAWS
+    }
+    fits = fit_robust(profiles(exploration, normals))
+
+    def column(name: str) -> np.ndarray:
+        return np.array([getattr(fit, name) for fit in fits])
+
+    one, none = np.ones(len(fits)), np.zeros(len(fits))
+    return Presses(
+        starts=np.array(starts),
+        path=path,
+        depth=-(path * normals[press]).sum(axis=1),
+        rate=np.concatenate(rates),
+        force=np.concatenate(forces),
+        points=where.points,
+        normals=normals,
+        site=site_labels(where.points, site_m),
+        unit=unit,
+        laws={
+            "kelvin-voigt": Law(column("k_kv"), column("b_kv"), one, none),
+            "hunt-crossley": Law(column("k_hc"), column("b_hc"), column("r_hc"), column("r_hc")),
+        },
+    )
+
+
+def _predict(
+    presses: Presses, train: np.ndarray, test: np.ndarray, interpolation: str
+) -> tuple[dict[str, np.ndarray], float]:
+    """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM's modulus, Pa."""
+    seen, rows = presses.rows(train), presses.rows(test)
+    measured = presses.force[seen]
+    fits = []
+    for law, unit in presses.unit.items():
+        modulus = float((unit[seen] * measured).sum() / (unit[seen] ** 2).sum())
+        fits.append((_rms(modulus * unit[seen] - measured), modulus, law))
+    _, modulus, law = min(fits)
+    forces = {"fem": modulus * presses.unit[law][rows]}
+    counts = np.diff(presses.starts)[test]
+    for name, fitted in presses.laws.items():
+        at = spread_law(
+            presses.points[train],
+            Law(*(column[train] for column in fitted)),
+            presses.points[test],
+            interpolation,
+        )
+        k, b, r, s = (np.repeat(column, counts) for column in at)
+        u = np.maximum(presses.depth[rows], 0.0)
+        inside = u > 0
+        safe = np.where(inside, u, 1.0)
+        push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate[rows], 0.0), 0.0)
+        forces[name] = push[:, None] * np.repeat(presses.normals[test], counts, axis=0)
+    return forces, modulus
+
+
+def _rms(forces: np.ndarray) -> float:
+    return float(np.sqrt((forces**2).sum(axis=1).mean()))
+
+
+def stiffness_along(
+    presses: Presses, train: np.ndarray, places: np.ndarray, normals: np.ndarray, model: Model, depth_m: float
+) -> dict[str, np.ndarray]:
+    """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
+    solved = touch_sites(model.mesh, places, normals, model.poisson_ratio)
+    _, modulus = _predict(presses, train, train[:1], "rbf")
+    seen = presses.rows(train)
+    law = min(LAWS, key=lambda name: _rms(_scaled(presses.unit[name][seen], presses.force[seen])))
+    steps = np.linspace(0.0, depth_m, 60)
+    path = (-steps[None, :, None] * solved.normals[:, None, :]).reshape(-1, 3)
+    force = touch_forces(
+        path,
+        np.arange(len(places) + 1) * len(steps),
+        solved.normals,
+        solved.far,
+        young_modulus_pa=modulus,
+        poisson_ratio=model.poisson_ratio,
+        tip_radius_m=model.tip_radius_m,
+        curvature=solved.curvature,
+        law=law,
+    )
+    deepest = force.reshape(len(places), len(steps), 3)[:, -1]
+    result = {"fem": (deepest * solved.normals).sum(axis=1)}
+    for name, fitted in presses.laws.items():
+        at = spread_law(presses.points[train], Law(*(c[train] for c in fitted)), places)
+        result[name] = at.k * depth_m**at.r
+    return result
+
+
+def _scaled(unit: np.ndarray, measured: np.ndarray) -> np.ndarray:
+    return float((unit * measured).sum() / (unit**2).sum()) * unit - measured
