@@ -1,0 +1,125 @@
+"""The precompute against its limit and against its peers, for meshes of three sizes.
+
+limit: the dense inverse (potrf, potri) of a matrix as large as the result. schur:
+mechanics.compliance.condense.
+columns: a solve a column from the same factor, one at a time (SOFA's way) and in batches; timed on a
+sample of columns and scaled. Memory: the greatest resident set of a fresh process that condenses, less
+that before.
+"""
+
+from __future__ import annotations
+
+import argparse
+import multiprocessing
+import resource
+import time
+
+import numpy as np
+
+from benchmarks.timing import measure, table
+from mechanics.box_mesh import box_mesh
+from mechanics.compliance import condense, inverse
+from mechanics.errors import OptionError
+from mechanics.pardiso import Pardiso, available
+from mechanics.solver import Solver
+from mechanics.tetmesh import TetMesh
+
+SUMMARY = "condensed compliance against the dense inverse and column solves"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Sizes, element, repeats."""
+    parser.add_argument(
+        "--touchable", type=int, nargs="+", default=[1000, 2000, 5000], help="touchable nodes, about"
+    )
+    parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="element order (default: 2)")
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument(
+        "--no-memory", action="store_true", help="skip the fresh process that measures memory"
+    )
+
+
+def block(touchable: int, order: int) -> TetMesh:
+    """A 105 x 105 x 47 mm block with about that many touchable nodes."""
+    step = np.sqrt((0.105**2 + 4 * 0.105 * 0.047) / touchable) * order
+    cells = tuple(max(1, round(length / step)) for length in (0.105, 0.105, 0.047))
+    mesh = box_mesh(cells, (0.105, 0.105, 0.047))
+    return mesh if order == 1 else mesh.quadratic()
+
+
+def memory_of(touchable: int, order: int) -> tuple[float, float]:
+    """(peak beyond the start, result and factor), bytes, of one condensation in this process."""
+    mesh = block(touchable, order)
+    factor = Pardiso(Solver(block(200, order), 0.49).matrix)  # loads the library before the start is read
+    factor.free()
+    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    result = condense(mesh, 0.49)
+    peak = 1024.0 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    need = result.matrix.nbytes + 8.0 * Pardiso(Solver(mesh, 0.49).matrix).factor_nonzeros
+    return peak, need
+
+
+def _worker(touchable: int, order: int, queue) -> None:  # type: ignore[no-untyped-def]
+    queue.put(memory_of(touchable, order))
+
+
+def fresh_memory(touchable: int, order: int) -> tuple[float, float]:
+    """`memory_of` in a new process."""
+    context = multiprocessing.get_context("spawn")
+    queue = context.Queue()
+    process = context.Process(target=_worker, args=(touchable, order, queue))
+    process.start()
+    result = queue.get()
+    process.join()
+    return result
+
+
+def one_size(touchable: int, order: int, repeats: int) -> dict[str, float]:
+    """Seconds of each way for one mesh."""
+    mesh = block(touchable, order)
+    large = mesh.touchable.sum() > 3000
+    schur = measure(lambda: condense(mesh, 0.49), repeats=1 if large else repeats, warm_up=0 if large else 1)
+    n = 3 * int(mesh.touchable.sum())
+    rng = np.random.default_rng(0)
+    dense = rng.normal(size=(n, 200))
+    dense = dense @ dense.T / 200 + np.eye(n)
+    limit = measure(lambda: inverse(dense.copy()), repeats=1 if large else repeats, warm_up=0 if large else 1)
+    copy = measure(dense.copy, repeats=1, warm_up=0).median_s
+    started = time.perf_counter()
+    solver = Solver(mesh, 0.49)
+    factor = time.perf_counter() - started
+    one = np.zeros((len(solver.free), 1))
+    one[5] = 1
+    many = np.zeros((len(solver.free), 96), order="F")
+    many[np.arange(96) * 3, np.arange(96)] = 1
+    single = measure(lambda: solver.solve_free(one), repeats=15).median_s
+    batch = measure(lambda: solver.solve_free(many), repeats=3).median_s / 96
+    return {
+        "touchable_nodes": n // 3,
+        "unknowns": len(solver.free),
+        "schur_s": schur.median_s,
+        "schur_spread": schur.spread,
+        "limit_s": limit.median_s - copy,
+        "columns_s": factor + n * single,
+        "columns_in_batches_s": factor + n * batch,
+        "factor_s": factor,
+        "result_gb": 8e-9 * n * n,
+    }
+
+
+def run(arguments: argparse.Namespace) -> dict:
+    """Print one row a size."""
+    if not available():
+        raise OptionError("this benchmark compares ways of MKL Pardiso, which is not installed here")
+    results = []
+    for touchable in arguments.touchable:
+        row = one_size(touchable, arguments.order, arguments.repeats)
+        row["over_limit"] = row["schur_s"] / row["limit_s"]
+        row["columns_over_schur"] = row["columns_s"] / row["schur_s"]
+        row["batches_over_schur"] = row["columns_in_batches_s"] / row["schur_s"]
+        if not arguments.no_memory:
+            peak, need = fresh_memory(touchable, arguments.order)
+            row |= {"peak_gb": peak / 1e9, "peak_over_need": peak / need}
+        results.append(row)
+        print(table([k.replace("_", " ") for k in row], [list(row.values())]), flush=True)
+    return {"order": arguments.order, "sizes": results}
