@@ -105,7 +105,7 @@ def passivity_parameters(
     )
     return PassivityParameters(
         options.passivity,
-        options.allowance_j,
+        options.allowance_j * min(1.0, rate_hz / 1000.0),
         options.payback_s,
         options.velocity_time_s,
         damping / (1.0 + 2.0 * delay_ticks),

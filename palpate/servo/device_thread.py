@@ -46,6 +46,7 @@ from palpate.servo.tick import (
 )
 
 STALE_COMMAND_S = 0.02
+ENABLING_S = 0.25
 ZERO = np.zeros(3)
 
 
@@ -67,6 +68,7 @@ class DeviceThread:
         self._pose = np.zeros(IN_WIDTH)
         self._command = np.zeros(OUT_WIDTH)
         self._enabled = 0
+        self._enabled_s = 0.0
         self._sink = device if isinstance(device, ForceSink) else None
         self._thread = threading.Thread(target=self._run, name="servo device", daemon=True)
 
@@ -100,7 +102,7 @@ class DeviceThread:
         pose[IN_SEQUENCE] = raw.sequence
         pose[IN_CONNECTED] = raw.connected
         pose[IN_CALIBRATED] = raw.calibrated
-        pose[IN_FAULT] = bool(raw.fault)
+        pose[IN_FAULT] = bool(raw.fault) or self._refuses_force(raw)
         # the mapper clears the flag while the clutch is held
         pose[IN_ENABLED] = tip.force_enabled or not raw.force_enabled
         pose[IN_BUTTONS] = raw.buttons
@@ -124,11 +126,18 @@ class DeviceThread:
                 return
         self._sink.send_force(ZERO)
 
+    def _refuses_force(self, raw: TipState) -> bool:
+        """Whether the driver takes no force although it was enabled (it came back after an unplugging, say)."""
+        wanted = self._sink is not None and self._enabled != 0
+        settled = time.perf_counter() - self._enabled_s > ENABLING_S
+        return wanted and settled and not raw.force_enabled
+
     def _follow_enable(self) -> None:
         wanted = int(self._arrays.control[ENABLE])
         if wanted == self._enabled:
             return
         self._enabled = wanted
+        self._enabled_s = time.perf_counter()
         try:
             if wanted:
                 self._sink.enable_force()

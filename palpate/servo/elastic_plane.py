@@ -1,6 +1,6 @@
 """An elastic plane at z = 0 with a renderer's interface: for trying a device or a loop without a model.
 
-Linear, without friction: force k d along z for the depth d of the tip's sphere, k behind the virtual coupling.
+Linear, without friction: force k d along z for the depth d of the tip, k behind the virtual coupling.
 """
 
 from __future__ import annotations

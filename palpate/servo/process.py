@@ -67,11 +67,14 @@ class ServoProcess:
     def _progress(self, stage: str, fraction: float) -> None:
         self._tell({"stage": stage, "fraction": fraction})
 
+    def _device_delay_ticks(self) -> float:
+        """What a device slower than the loop adds; a prompt one's latency is in its maker's limits."""
+        return max(0.0, self.job.options.rate_hz / self._device.spec.rate_hz - 1.0)
+
     def _delay_ticks(self) -> float:
         """From reading a pose to its force acting: read ahead of the tick, answered after it."""
         options = self.job.options
-        own = options.read_ahead_s * options.rate_hz + 0.15
-        return own + max(0.0, options.rate_hz / self._device.spec.rate_hz - 1.0)
+        return options.read_ahead_s * options.rate_hz + 0.15 + self._device_delay_ticks()
 
     def _coupled(self, renderer: Any) -> Any:
         """The renderer behind the virtual coupling that this device demands."""
@@ -79,7 +82,9 @@ class ServoProcess:
         options, spec = self.job.options, self._device.spec
         if not (options.coupling and spec.has_force and len(renderer.surface[1])):
             return renderer
-        limit = stable_stiffness_n_per_m(spec.max_stiffness_n_per_m, options.rate_hz, self._delay_ticks())
+        limit = stable_stiffness_n_per_m(
+            spec.max_stiffness_n_per_m, options.rate_hz, self._device_delay_ticks()
+        )
         limit /= max(self._mapping.force_scale * self._mapping.scale, 1e-12)
         stiffest = stiffest_n_per_m(renderer, spec.max_force_n)
         compliance = series_compliance_m_per_n(stiffest, limit)

@@ -1,0 +1,64 @@
+"""The histogram and the seqlock."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+
+from palpate.servo.histogram import BINS, Histogram, bin_of, count, lower_edge_ns
+from palpate.servo.seqlock import begin_write, read_copy, write_block
+
+
+def test_every_duration_lies_in_its_bin_and_bins_are_3_percent_wide():
+    for value in np.unique(np.geomspace(1, 1e11, 4000).astype(np.int64)):
+        index = bin_of(value)
+        assert lower_edge_ns(index) <= value < lower_edge_ns(index + 1)
+        if value >= 64:
+            assert lower_edge_ns(index + 1) / lower_edge_ns(index) < 1.04
+    assert bin_of(-5) == 0 and bin_of(2**62) == BINS - 1
+
+
+def test_quantiles_agree_with_sorting():
+    values = np.random.default_rng(0).lognormal(9.0, 1.0, 20_000).astype(np.int64)
+    bins, extremes = np.zeros(BINS, dtype=np.int64), np.zeros(3, dtype=np.int64)
+    for value in values:
+        count(bins, extremes, value)
+    histogram = Histogram(bins, int(extremes[1]), int(extremes[2]))
+    for share in (0.5, 0.99, 0.999):
+        exact = np.quantile(values, share) / 1000.0
+        np.testing.assert_allclose(histogram.quantile_us(share), exact, rtol=0.04)
+    summary = histogram.summary()
+    assert summary["max"] == values.max() / 1000.0
+    np.testing.assert_allclose(summary["mean"], values.mean() / 1000.0)
+    above = histogram.over(20_000)
+    assert (values > 21_000).sum() <= above <= (values >= 19_999).sum()
+
+
+def test_a_reader_never_sees_half_a_write():
+    version, block = np.zeros(1, dtype=np.int64), np.zeros(64)
+    read_copy(version, block)
+    write_block(version, block, np.zeros(64))
+    stop = threading.Event()
+
+    def write() -> None:
+        k = 0.0
+        while not stop.is_set():
+            k += 1.0
+            write_block(version, block, np.full(64, k))
+
+    writer = threading.Thread(target=write)
+    writer.start()
+    try:
+        seen = [read_copy(version, block) for _ in range(5000)]
+    finally:
+        stop.set()
+        writer.join()
+    assert all(copy is None or (copy == copy[0]).all() for copy in seen)
+    assert len({float(copy[0]) for copy in seen if copy is not None}) > 1
+
+
+def test_a_writer_that_died_half_way_is_noticed():
+    version, block = np.zeros(1, dtype=np.int64), np.zeros(4)
+    begin_write(version)
+    assert read_copy(version, block) is None

@@ -1,0 +1,208 @@
+"""The servo as a process of its own, with a device over real sockets: what a hand feels when things die."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import numpy as np
+import pytest
+
+from devices.haply import HaplyOptions
+from devices.registry import DeviceChoice
+from mechanics.errors import DeviceError, PalpateError
+from palpate.servo import Recorder, SafetyOptions, Servo, ServoOptions
+from palpate.servo.elastic_plane import PlaneSource
+
+from ..devices.fake_inverse import FakeInverse
+
+pytest.importorskip("websockets")
+
+DEADLINE_S = 20.0
+
+
+def eventually(condition, within_s: float = DEADLINE_S) -> bool:
+    end = time.perf_counter() + within_s
+    while time.perf_counter() < end:
+        if condition():
+            return True
+        time.sleep(0.005)
+    return bool(condition())
+
+
+def choice(fake: FakeInverse) -> DeviceChoice:
+    states, events = fake.ports
+    uris = HaplyOptions(uri=f"ws://localhost:{states}", events_uri=f"ws://localhost:{events}")
+    return DeviceChoice("haply", {"options": uris})
+
+
+def pressing(fake: FakeInverse) -> bool:
+    return fake.force_n()[2] > 0.3
+
+
+def pressing_after_enabling(servo: Servo, fake: FakeInverse) -> bool:
+    """As a person does: enable, and once more where the device was not back yet."""
+    for _ in range(8):
+        servo.enable()
+        if eventually(lambda: pressing(fake), 2.5):
+            return True
+    return False
+
+
+@pytest.fixture
+def fake():
+    device = FakeInverse()
+    # 1 mm into the plane with a 5 mm tip
+    device.position = [0.0, 0.0, 0.004]
+    yield device
+    device.stop()
+
+
+@pytest.fixture
+def servo(fake):
+    # a shared machine stalls for longer than 20 ms now and then, which rightly zeroes the force
+    options = ServoOptions(safety=SafetyOptions(ramp_s=0.1, stale_s=0.05))
+    with Servo(PlaneSource(500.0), device=choice(fake), options=options) as session:
+        yield session.start()
+
+
+def test_a_session_feels_follows_commands_and_ends_at_zero(fake, servo, tmp_path):
+    assert eventually(lambda: servo.snapshot() is not None)
+    recorder = Recorder(servo)
+    time.sleep(0.1)
+    snapshot = servo.snapshot()
+    np.testing.assert_allclose(snapshot.forces_n[0], [0, 0, 0.5], atol=1e-9)
+    assert snapshot.touching[0] and snapshot.reason and not snapshot.command_n.any()
+    assert fake.force_n() == (0.0, 0.0, 0.0), "no force before it is enabled"
+
+    assert pressing_after_enabling(servo, fake)
+    assert eventually(lambda: fake.force_n()[2] > 0.45)
+    np.testing.assert_allclose(servo.snapshot().depths[0], 0.001)
+
+    servo.set_modulus(80e3)
+    assert eventually(lambda: fake.force_n()[2] > 0.7), "a new modulus is felt at once"
+    servo.set_source(PlaneSource(300.0))
+    assert eventually(lambda: 0.2 < fake.force_n()[2] < 0.35), "a new object is felt"
+    with pytest.raises(PalpateError, match="no command"):
+        servo._command("dance", None)
+
+    servo.disable()
+    assert eventually(lambda: fake.force_n() == (0.0, 0.0, 0.0))
+    recording = recorder.write(tmp_path / "session.csv")
+    assert recording.exists()
+    rows, _ = servo.history()
+    assert (np.diff(rows["tick"]) >= 1).all()
+    assert len(rows) == servo.report().ticks or len(rows) > 1000
+    assert servo.stop() == 0
+    assert fake.force_n() == (0.0, 0.0, 0.0)
+    report = servo.report()
+    assert report.compute.number == report.ticks > 100
+    assert report.peak_force_n > 0.7
+
+
+def test_a_killed_servo_leaves_the_device_at_zero(fake, servo):
+    assert pressing_after_enabling(servo, fake)
+    os.kill(servo.process_id, signal.SIGKILL)
+    assert eventually(lambda: fake.force_n() == (0.0, 0.0, 0.0), 2.0)
+    time.sleep(0.1)
+    assert fake.force_n() == (0.0, 0.0, 0.0)
+    assert eventually(lambda: not servo.alive, 2.0)
+    with pytest.raises(DeviceError):
+        servo.set_modulus(1e4)
+
+
+def test_a_stopped_process_leaves_the_device_at_zero_and_can_go_on(fake, servo):
+    assert pressing_after_enabling(servo, fake)
+    os.kill(servo.process_id, signal.SIGSTOP)
+    assert eventually(lambda: fake.force_n() == (0.0, 0.0, 0.0), 2.0)
+    time.sleep(0.3)
+    assert fake.force_n() == (0.0, 0.0, 0.0)
+    missed = servo.report().missed_ticks
+    os.kill(servo.process_id, signal.SIGCONT)
+    assert pressing_after_enabling(servo, fake), "a driver that lost touch meanwhile wants it anew"
+    assert servo.report().missed_ticks >= missed + 200, "skipped deadlines are counted, not made up for"
+
+
+def test_an_unplugged_device_needs_a_new_enabling(fake, servo):
+    assert pressing_after_enabling(servo, fake)
+    fake.event("device-disconnected")
+    fake.status["calibrated"] = False
+    assert eventually(lambda: fake.force_n() == (0.0, 0.0, 0.0), 2.0)
+    fake.status["calibrated"] = True
+    time.sleep(0.5)
+    assert fake.force_n() == (0.0, 0.0, 0.0)
+    assert pressing_after_enabling(servo, fake)
+
+
+PARENT = """
+import sys, time
+from devices.haply import HaplyOptions
+from devices.registry import DeviceChoice
+from palpate.servo import Servo, ServoOptions
+from palpate.servo.elastic_plane import PlaneSource
+
+options = HaplyOptions(uri=sys.argv[1], events_uri=sys.argv[2])
+servo = Servo(PlaneSource(500.0), device=DeviceChoice("haply", {"options": options}),
+              options=ServoOptions(on_orphan=sys.argv[3]))
+servo.start()
+servo.enable()
+print(servo.process_id, flush=True)
+time.sleep(600)
+"""
+
+
+def process_runs(process_id: int) -> bool:
+    try:
+        os.kill(process_id, 0)
+    except ProcessLookupError:
+        return False
+    try:
+        with open(f"/proc/{process_id}/stat", encoding="ascii") as file:
+            return file.read().rsplit(")", 1)[1].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.parametrize("on_orphan", ["stop", "continue"])
+def test_a_killed_window(fake, on_orphan):
+    states, events = fake.ports
+    parent = subprocess.Popen(
+        [
+            sys.executable,
+            "-c",
+            PARENT,
+            f"ws://localhost:{states}",
+            f"ws://localhost:{events}",
+            on_orphan,
+        ],
+        stdout=subprocess.PIPE,
+    )
+    assert parent.stdout is not None
+    process_id = int(parent.stdout.readline())
+    assert eventually(lambda: pressing(fake))
+    parent.kill()
+    parent.wait()
+    if on_orphan == "stop":
+        assert eventually(lambda: not process_runs(process_id), 5.0)
+    else:
+        time.sleep(0.5)
+        assert process_runs(process_id)
+        assert eventually(lambda: pressing(fake)), "the hand goes on feeling without a window"
+        os.kill(process_id, signal.SIGTERM)
+        assert eventually(lambda: not process_runs(process_id), 5.0)
+    assert fake.force_n() == (0.0, 0.0, 0.0)
+
+
+def test_what_stops_the_servo_from_starting_is_told(fake):
+    fake.devices = []
+    with Servo(PlaneSource(), device=choice(fake)) as servo, pytest.raises(PalpateError, match="Inverse3"):
+        servo.start()
+
+
+def test_a_model_that_is_not_there_is_told():
+    with Servo("nowhere/model", options=ServoOptions()) as servo:
+        with pytest.raises(PalpateError, match="nowhere/model"):
+            servo.start()

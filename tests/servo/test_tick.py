@@ -1,0 +1,205 @@
+"""The tick and its clock's arithmetic with a fake clock: deadlines absolute, misses counted, faults zeroed."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from devices.safety import SafetyOptions, reason_words, safety_parameters
+from devices.simulated import SPEC
+from palpate.servo.elastic_plane import ElasticPlane
+from palpate.servo.layout import DEADLINE, ENABLE, LATE, MISSED, TICKS, total_bytes, views
+from palpate.servo.loop import make_program, run_tick
+from palpate.servo.report import report, ring_rows, snapshot
+from palpate.servo.source import no_support
+from palpate.servo.tick import (
+    IN_CALIBRATED,
+    IN_CONNECTED,
+    IN_ENABLED,
+    IN_FAULT,
+    IN_FORCE_MAP,
+    IN_POSITION,
+    IN_QUATERNION,
+    IN_SEQUENCE,
+    IN_TIME,
+    IN_TIP,
+    IN_WIDTH,
+    OUT_FORCE,
+    TickParameters,
+    account,
+    put_pose,
+    tick_arrays,
+)
+from render.passivity import PassivityOptions, passivity_parameters
+from render.support import SupportParameters
+
+PERIOD = 1_000_000
+START = 10**9
+
+
+class FakeServo:
+    """One tick at a time, at times that the test chooses; the device is well unless told otherwise."""
+
+    def __init__(self, offsets=((0.0, 0.0, 0.0),), support=None, stiffness=500.0) -> None:
+        self.shared = views(bytearray(total_bytes()))
+        self.arrays = tick_arrays(self.shared, np.array(offsets), np.zeros(3))
+        parameters = TickParameters(
+            PERIOD,
+            200_000,
+            safety_parameters(SafetyOptions(), SPEC),
+            passivity_parameters(PassivityOptions(), max_damping_n_s_per_m=10.0),
+            support or no_support(),
+        )
+        self.program = make_program(ElasticPlane(stiffness), self.arrays, parameters)
+        self.arrays.counts[DEADLINE] = START
+        self.arrays.control[ENABLE] = 1
+        self.sequence = 0
+
+    def pose(self, position, time_s, **cells) -> None:
+        self.sequence += 1
+        pose = np.zeros(IN_WIDTH)
+        pose[[IN_CONNECTED, IN_CALIBRATED, IN_ENABLED, IN_QUATERNION]] = 1.0
+        pose[[IN_FORCE_MAP, IN_FORCE_MAP + 4, IN_FORCE_MAP + 8]] = 1.0
+        pose[IN_TIME], pose[IN_SEQUENCE] = time_s, self.sequence
+        pose[IN_POSITION : IN_POSITION + 3] = pose[IN_TIP : IN_TIP + 3] = position
+        for name, value in cells.items():
+            cell = {"fault": IN_FAULT, "enabled": IN_ENABLED, "connected": IN_CONNECTED}[name]
+            pose[cell] = value
+        put_pose(self.arrays, pose)
+
+    def tick(self, late_ns: int = 0, compute_ns: int = 10_000) -> np.ndarray:
+        deadline = int(self.arrays.counts[DEADLINE])
+        run_tick(self.program, self.arrays, deadline + late_ns, deadline)
+        account(
+            self.arrays,
+            self.program.parameters,
+            deadline,
+            deadline + late_ns,
+            deadline + late_ns + compute_ns,
+        )
+        return self.arrays.outbox[OUT_FORCE : OUT_FORCE + 3].copy()
+
+    def press(self, depth_m: float, ticks: int, **cells) -> np.ndarray:
+        for _ in range(ticks):
+            self.pose([0.0, 0.0, 0.005 - depth_m], self.arrays.counts[DEADLINE] * 1e-9, **cells)
+            force = self.tick()
+        return force
+
+    @property
+    def reasons(self) -> str:
+        return reason_words(int(snapshotted_reasons(self)))
+
+
+def snapshotted_reasons(servo: FakeServo) -> float:
+    rows, _ = ring_rows(servo.shared, 0)
+    return rows["reasons"][-1]
+
+
+def test_a_rendered_force_reaches_the_device_after_the_ramp():
+    servo = FakeServo()
+    np.testing.assert_allclose(servo.press(0.002, 600), [0.0, 0.0, 1.0], rtol=1e-9)
+    seen = snapshot(servo.shared)
+    assert seen.touching[0] and seen.reason == ""
+    np.testing.assert_allclose([seen.depths[0], seen.stiffness[0]], [0.002, 500.0])
+    np.testing.assert_allclose(seen.command_n, seen.forces_n[0])
+
+
+def test_deadlines_are_absolute_and_do_not_drift_with_lateness():
+    servo = FakeServo()
+    for k in range(1000):
+        assert servo.arrays.counts[DEADLINE] == START + k * PERIOD
+        servo.tick(late_ns=(k * 37_001) % 300_000)
+    counts = servo.arrays.counts
+    assert counts[TICKS] == 1000 and counts[MISSED] == 0
+    assert counts[LATE] == sum((k * 37_001) % 300_000 > 200_000 for k in range(1000))
+
+
+def test_a_stall_is_counted_as_missed_ticks_and_the_loop_stays_in_phase():
+    servo = FakeServo()
+    servo.tick()
+    servo.tick(late_ns=7_400_000)
+    assert servo.arrays.counts[MISSED] == 6
+    assert (servo.arrays.counts[DEADLINE] - START) % PERIOD == 0
+    rows, _ = ring_rows(servo.shared, 0)
+    servo.tick()
+    after, head = ring_rows(servo.shared, len(rows))
+    assert head == 3 and after["tick"][0] - rows["tick"][-1] == 7
+    done = report(servo.shared, PERIOD, (), 0.0, 0.0)
+    assert (done.ticks, done.missed_ticks, done.lateness.number) == (3, 6, 3)
+
+
+def test_a_device_that_stops_talking_gets_zero_after_20_ms():
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    forces = np.array([servo.tick() for _ in range(40)])
+    assert (forces[:19, 2] == forces[0, 2]).all() and forces[0, 2] > 0.99
+    assert (forces[21:] == 0).all()
+    assert "no fresh pose" in servo.reasons
+
+
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_pose_that_is_no_number_gets_zero_and_contact_comes_back_ramped(bad):
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    servo.pose([0.0, bad, 0.003], servo.arrays.counts[DEADLINE] * 1e-9)
+    assert (servo.tick() == 0).all()
+    assert 0 < servo.press(0.002, 1)[2] < 0.01
+    np.testing.assert_allclose(servo.press(0.002, 600)[2], 1.0)
+
+
+def test_a_fault_zeroes_until_enabled_anew():
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    assert (servo.press(0.002, 1, fault=1.0) == 0).all()
+    assert (servo.press(0.002, 1000) == 0).all()
+    servo.arrays.control[ENABLE] = 2
+    np.testing.assert_allclose(servo.press(0.002, 600)[2], 1.0)
+
+
+def test_a_clock_that_jumps_back_zeroes_the_force():
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    servo.pose([0.0, 0.0, 0.003], servo.arrays.counts[DEADLINE] * 1e-9 + 3600.0)
+    assert (servo.tick() == 0).all()
+    assert "clock" in servo.reasons
+    assert (servo.press(0.002, 100) == 0).all()
+
+
+def test_a_held_clutch_feels_nothing():
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    assert servo.press(0.002, 5, enabled=0.0)[2] == 0.0
+
+
+def test_tips_follow_the_tools_orientation():
+    servo = FakeServo(offsets=((0.0, 0.0, 0.0), (0.01, 0.0, 0.0)))
+    half = np.sqrt(0.5)
+    servo.pose([0.0, 0.0, 0.02], 1.0)
+    servo.arrays.inbox[IN_QUATERNION : IN_QUATERNION + 4] = [half, 0.0, half, 0.0]
+    servo.tick()
+    # a quarter turn about y takes +x to -z
+    np.testing.assert_allclose(snapshot(servo.shared).tips, [[0, 0, 0.02], [0, 0, 0.01]], atol=1e-12)
+
+
+def test_two_tips_add_up():
+    servo = FakeServo(offsets=((0.0, 0.0, 0.0), (0.01, 0.0, 0.0)))
+    np.testing.assert_allclose(servo.press(0.001, 700)[2], 1.0, rtol=1e-9)
+
+
+def test_the_support_is_felt_as_a_plane_with_friction():
+    support = SupportParameters(np.array([0.0, 0.0, -0.02]), np.array([0.0, 0.0, 1.0]), 1500.0, 2.0, 0.2)
+    servo = FakeServo(support=support, stiffness=1e-9)
+    force = servo.press(0.022, 700)
+    np.testing.assert_allclose(force[2], 1500.0 * 0.002, rtol=1e-6)
+
+
+def test_the_ring_holds_the_last_seconds_and_tells_where_to_go_on():
+    servo = FakeServo()
+    for _ in range(10_000):
+        servo.tick()
+    rows, head = ring_rows(servo.shared, 0)
+    assert head == 10_000 and 7000 <= len(rows) <= 8192
+    assert rows["tick"][-1] == 9999 and (np.diff(rows["tick"]) == 1).all()
+    servo.tick()
+    more, head = ring_rows(servo.shared, head)
+    assert len(more) == 1 and head == 10_001
