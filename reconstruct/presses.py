@@ -10,7 +10,7 @@ from mechanics.recording import Recording
 from reconstruct.onset import Rise, fit_rise
 
 _LEAD_S = 0.15
-_FIT_SAMPLES = 400
+_FIT_SAMPLES = 250
 
 
 @dataclass(frozen=True)
