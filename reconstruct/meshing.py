@@ -11,10 +11,13 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import FACES, TetMesh
 from reconstruct.proximity import closest, distance, sample
+from reconstruct.shapes.voxels import voxel_surface
 from reconstruct.surface import Surface
 from reconstruct.tetwild import tetrahedralize
 
 _SAMPLES = 4000
+_COARSE = 0.75
+_ATTEMPTS = 2
 
 
 @dataclass(frozen=True)
@@ -26,6 +29,11 @@ class MeshingOptions:
         0.002, "bound sigma on the distance between mesh and surface", unit="m", flag="--surface-distance"
     )
     radius_edge_ratio: float = option(2.0, "bound rho on circumradius over shortest edge")
+    mesh_source: str = option(
+        "surface",
+        "what is meshed: the surface, or its voxels (the paper's way)",
+        choices=("surface", "voxels"),
+    )
 
 
 @dataclass(frozen=True)
@@ -63,16 +71,39 @@ def mesh_surface(
         raise MeshError(f"--mesh-size is {options.mesh_size_m} m; it must be greater than 0")
     progress("meshing", 0.0)
     up, origin = surface.support_normal, surface.support_point
-    envelope = 0.1 * options.surface_distance_m
-    points, cells = tetrahedralize(
-        surface.vertices, surface.triangles, edge_m=options.mesh_size_m, envelope_m=envelope
+    sigma = options.surface_distance_m
+    vertices, triangles = _input(surface, options)
+    # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
+    envelope = (
+        0.4 * sigma if options.mesh_source == "voxels" else min(0.1 * sigma, 0.04 * options.mesh_size_m)
     )
-    points, fixed = _stand(points, cells, origin, up, 2 * envelope)
-    on_surface = np.zeros(len(points), dtype=bool)
-    on_surface[_boundary(cells)] = True
-    mesh = TetMesh(points, cells, fixed, on_surface & ~fixed)
+    best: Meshing | None = None
+    for attempt in range(_ATTEMPTS):
+        points, cells = tetrahedralize(vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope)
+        points, cells, fixed = _stand(points, cells, origin, up, 1.01 * envelope + 1e-6)
+        on_surface = np.zeros(len(points), dtype=bool)
+        on_surface[_boundary(cells)] = True
+        mesh = TetMesh(points, cells, fixed, on_surface & ~fixed)
+        found = Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
+        if best is None or found.report.radius_edge_ratio.max() < best.report.radius_edge_ratio.max():
+            best = found
+        if best.report.radius_edge_ratio.max() <= options.radius_edge_ratio:
+            break
+        progress("meshing", (attempt + 1) / (_ATTEMPTS + 1))
     progress("meshing", 1.0)
-    return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
+    return best
+
+
+def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:
+    """What the mesher is given, device frame: a drawing no finer than the tetrahedra need, or the voxels' surface."""
+    frame = surface.frame
+    if options.mesh_source == "voxels":
+        flat = (surface.vertices - surface.support_point) @ frame.T
+        vertices, triangles = voxel_surface(flat, surface.triangles, options.surface_distance_m)
+        return vertices @ frame + surface.support_point, triangles
+    if surface.redraw is None:
+        return surface.vertices, surface.triangles
+    return surface.redraw(_COARSE * options.mesh_size_m)
 
 
 def _boundary(cells: np.ndarray) -> np.ndarray:
@@ -83,8 +114,11 @@ def _boundary(cells: np.ndarray) -> np.ndarray:
 
 def _stand(
     points: np.ndarray, cells: np.ndarray, origin: np.ndarray, up: np.ndarray, reach_m: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Nodes of downward faces within `reach_m` of the support, put on it; and which they are."""
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes of downward faces within `reach_m` of the support, put on it: points, tetrahedra, which nodes those are.
+
+    Tetrahedra that this flattens onto the support are left out, and nodes that no tetrahedron uses.
+    """
     faces = _boundary(cells)
     corner = points[faces]
     normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
@@ -97,7 +131,11 @@ def _stand(
     fixed[faces[base]] = True
     points = points.copy()
     points[fixed] -= height[fixed, None] * up
-    return points, fixed
+    cells = cells[~fixed[cells].all(axis=1)]
+    used = np.unique(cells)
+    index = np.full(len(points), -1)
+    index[used] = np.arange(len(used))
+    return points[used], index[cells], fixed[used]
 
 
 def quality(mesh: TetMesh, surface: Surface) -> MeshReport:

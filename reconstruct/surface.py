@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING
 
@@ -13,9 +13,10 @@ from mechanics.errors import SurfaceError
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from reconstruct.proximity import distance
+from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.candidates import FITTED, first_guesses
 from reconstruct.shapes.drawing import draw
-from reconstruct.shapes.evidence import Evidence
+from reconstruct.shapes.evidence import Evidence, support_axes
 from reconstruct.shapes.fit import Seen, fit
 from reconstruct.shapes.hull import hull_surface
 from reconstruct.shapes.kriging import Explained, explain
@@ -30,6 +31,8 @@ SURFACES = ("auto", "hull", "tangent", *FITTED)
 
 _CORRECTED = 6
 """So many of the best shapes are tried with a free residual field as well."""
+
+Redraw = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 
 @dataclass(frozen=True)
@@ -51,7 +54,8 @@ class Surface:
     support_point, support_normal: (3,). method: the shape's name, with '+' where a free field corrects it.
     reason: why it was chosen, in words. parameters: what the shape's fit found (support frame). held_out_m: rms error
     of touches that were held out, place by place, for every shape tried. bracket_m3: volumes of the hull of the touches
-    and of the tangent planes' intersection, between which a convex object's lies.
+    and of the tangent planes' intersection, between which a convex object's lies. redraw: the same surface with
+    triangles of another edge length (m), of the same volume; None where it has no finer truth.
     """
 
     vertices: np.ndarray
@@ -64,6 +68,7 @@ class Surface:
     parameters: Mapping[str, float] = field(default_factory=dict)
     held_out_m: Mapping[str, float] = field(default_factory=dict)
     bracket_m3: tuple[float, float] = (float("nan"), float("nan"))
+    redraw: Redraw | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.mesh.is_watertight:
@@ -79,6 +84,11 @@ class Surface:
         import trimesh
 
         return trimesh.Trimesh(self.vertices, self.triangles, process=False)
+
+    @cached_property
+    def frame(self) -> np.ndarray:
+        """(3, 3), rows: unit vectors of a frame on the support, right-handed, the third along its normal."""
+        return support_axes(self.support_normal)
 
     @property
     def volume_m3(self) -> float:
@@ -113,17 +123,25 @@ def reconstruct_surface(
     Raises SurfaceError where no closed surface can be made.
     """
     options = options or SurfaceOptions()
-    bracket = bounds(evidence)
     if options.surface in ("hull", "tangent"):
         shells = {"hull": hull_surface, "tangent": tangent_surface}
         vertices, triangles = shells[options.surface](evidence)
         gap = _bracket_gap(evidence, vertices, options.surface)
-        return _surface(evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bracket)
+        return _surface(
+            evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bounds(evidence)
+        )
     tried = try_shapes(evidence, options.surface, progress)
     best = max(tried, key=score)
     vertices, triangles, deviation = draw(best, options.surface_spacing_m)
     deviation = np.hypot(deviation, _spread(vertices, best, tried))
+    facing = best.feet[1][: len(evidence.centres)] @ evidence.axes
+    bracket = bounds(replace(evidence, normals=facing))
     progress("surface", 1.0)
+
+    def redraw(spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        coarse = draw(best, spacing_m)[:2]
+        return evidence.to_device(balanced(coarse, (vertices, triangles))), coarse[1]
+
     return _surface(
         evidence,
         vertices,
@@ -134,6 +152,7 @@ def reconstruct_surface(
         {p.label: p.value for p in best.shape.parameters},
         {e.name: held_out_error(e) for e in sorted(tried, key=score)},
         bracket,
+        redraw,
     )
 
 
@@ -222,6 +241,7 @@ def _surface(
     parameters: Mapping[str, float] | None = None,
     held_out: Mapping[str, float] | None = None,
     bracket: tuple[float, float] = (float("nan"), float("nan")),
+    redraw: Redraw | None = None,
 ) -> Surface:
     return Surface(
         vertices=evidence.to_device(vertices),
@@ -234,4 +254,5 @@ def _surface(
         parameters=parameters or {},
         held_out_m=held_out or {},
         bracket_m3=bracket,
+        redraw=redraw,
     )

@@ -21,24 +21,24 @@ def draw(explained: Explained, spacing_m: float) -> tuple[np.ndarray, np.ndarray
     """
     vertices, triangles = explained.shape.mesh(spacing_m)
     on_base = vertices[:, 2] < 1e-9
-    owner, normals = _normals(vertices, triangles, on_base)
+    owner, normals = corner_normals(vertices, triangles, on_base)
     points = vertices[owner]
     mean, variance = explained.field(points, normals)
-    moved = _moved(vertices, owner, normals, mean, on_base) if explained.free else vertices
+    drawn = moved(vertices, owner, normals, mean, on_base) if explained.free else vertices
     if explained.free:
         touches = np.vstack([explained.seen.centres, explained.seen.outline])
         target = explained.gap.copy()
         for _ in range(2):
-            target = target + _signed_gap(moved, triangles, touches) - explained.seen.tip_radius_m
+            target = target + signed_gap(drawn, triangles, touches) - explained.seen.tip_radius_m
             target[len(explained.seen.centres) :] += explained.lean_m
-            moved = _moved(vertices, owner, normals, explained.mean(points, normals, target), on_base)
+            drawn = moved(vertices, owner, normals, explained.mean(points, normals, target), on_base)
     square = np.zeros(len(vertices))
     np.add.at(square, owner, variance)
     square += _rim_deviation(vertices, owner, normals, on_base, explained) ** 2
-    return moved, triangles, np.sqrt(square)
+    return drawn, triangles, np.sqrt(square)
 
 
-def _normals(
+def corner_normals(
     vertices: np.ndarray, triangles: np.ndarray, on_base: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Vertex numbers (k,) and normals (k, 3) of the faces that meet there, one a group of like direction.
@@ -68,14 +68,14 @@ def _normals(
     return np.array(owner), np.array(normals)
 
 
-def _moved(
+def moved(
     vertices: np.ndarray, owner: np.ndarray, normals: np.ndarray, by_m: np.ndarray, on_base: np.ndarray
 ) -> np.ndarray:
     """Vertices moved so far along each of their normals; those of the base's rim within the support."""
     count = np.bincount(owner, minlength=len(vertices))
-    moved = vertices.copy()
+    found = vertices.copy()
     single = (count[owner] == 1) & ~on_base[owner]
-    moved[owner[single]] += by_m[single, None] * normals[single]
+    found[owner[single]] += by_m[single, None] * normals[single]
     for vertex in np.unique(owner[~single]):
         rows = np.flatnonzero(owner == vertex)
         system, right = normals[rows], by_m[rows]
@@ -84,11 +84,11 @@ def _moved(
         step = np.linalg.lstsq(system, right, rcond=0.2)[0]
         if on_base[vertex]:
             step[2] = 0.0
-        moved[vertex] += step
-    return moved
+        found[vertex] += step
+    return found
 
 
-def _signed_gap(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+def signed_gap(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
     """(k,) m: distance of points (k, 3) from the surface, negative inside."""
     foot, index, _ = closest(vertices, triangles, points)
     corner = vertices[triangles[index]]

@@ -67,11 +67,7 @@ class Evidence:
     @cached_property
     def axes(self) -> np.ndarray:
         """(3, 3), rows: unit vectors of the support frame in the device frame, right-handed, the third up."""
-        up = self.support_normal / np.linalg.norm(self.support_normal)
-        start = np.eye(3)[np.argmin(np.abs(up))]
-        first = np.cross(start, up)
-        first /= np.linalg.norm(first)
-        return np.array([first, np.cross(up, first), up])
+        return support_axes(self.support_normal)
 
     @cached_property
     def origin(self) -> np.ndarray:
@@ -87,3 +83,12 @@ class Evidence:
     def to_device(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) from the support frame into the device frame."""
         return np.asarray(points) @ self.axes + self.origin
+
+
+def support_axes(normal: np.ndarray) -> np.ndarray:
+    """(3, 3), rows: a right-handed frame whose third axis is along the support's normal (3,)."""
+    up = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
+    start = np.eye(3)[np.argmin(np.abs(up))]
+    first = np.cross(start, up)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(up, first), up])

@@ -8,6 +8,7 @@ from scipy.spatial import HalfspaceIntersection, QhullError
 
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.evidence import Evidence
+from reconstruct.shapes.fit import LEAN_M
 from reconstruct.shapes.hull import delaunay_hull
 
 _SECTORS = 48
@@ -18,7 +19,8 @@ def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarra
 
     A plane stands at every touch, moved out by `slack_m`, facing as the first force says but turned as far as needed
     for no other touch to lie before it (`supporting_normals`), so that the hull lies inside. An object that does not
-    lean outwards stays within its base: an upright plane stands at each of 48 sectors of the outline.
+    lean outwards stays within its base: an upright plane stands at each of 48 sectors of
+    the outline, as far out as tracing hands lean in.
     Raises SurfaceError where the planes enclose nothing.
     """
     rim = evidence.to_support(evidence.outline)[:, :2]
@@ -28,7 +30,7 @@ def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarra
     offsets = (touched * normals).sum(axis=1) + slack_m
     angle = 2 * np.pi * np.arange(_SECTORS) / _SECTORS
     walls = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(_SECTORS)])
-    reach = (rim @ walls[:, :2].T).max(axis=0) + slack_m
+    reach = (rim @ walls[:, :2].T).max(axis=0) + LEAN_M + slack_m
     top = touched[:, 2].max() + 0.02
     planes = np.vstack(
         [
