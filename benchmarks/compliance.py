@@ -11,8 +11,8 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
-import resource
 import time
+from pathlib import Path
 
 import numpy as np
 
@@ -47,14 +47,22 @@ def block(touchable: int, order: int) -> TetMesh:
     return mesh if order == 1 else mesh.quadratic()
 
 
+def _peak_resident() -> float:
+    """Bytes: the greatest resident set of this program so far (ru_maxrss would carry over a parent's)."""
+    for line in Path("/proc/self/status").read_text().splitlines():
+        if line.startswith("VmHWM"):
+            return 1024.0 * float(line.split()[1])
+    raise OptionError("peak memory is read from /proc, which is not here: use --no-memory")
+
+
 def memory_of(touchable: int, order: int) -> tuple[float, float]:
     """(peak beyond the start, result and factor), bytes, of one condensation in this process."""
     mesh = block(touchable, order)
     factor = Pardiso(Solver(block(200, order), 0.49).matrix)  # loads the library before the start is read
     factor.free()
-    before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    before = _peak_resident()
     result = condense(mesh, 0.49)
-    peak = 1024.0 * (resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before)
+    peak = _peak_resident() - before
     need = result.matrix.nbytes + 8.0 * Pardiso(Solver(mesh, 0.49).matrix).factor_nonzeros
     return peak, need
 
