@@ -161,7 +161,7 @@ class Search:
     def score(self, name: str, new: Candidate, old: Candidate) -> Score:
         """Compare two candidates."""
         extra = len(new.found.values) - len(old.found.values)
-        over = max(1.0, new.chi)
+        over = max(1.0, new.chi) * self.forward.touches.slowness
         per_group = old.held - new.held
         gain = float(per_group.sum())
         if name in SPATIAL:

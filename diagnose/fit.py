@@ -142,7 +142,9 @@ class _Descent:
         return residual + self.whitener.onset_column * onset[self.forward.touches.press][:, None]
 
     def loss(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> float:
-        """Half the whitened sum of squares, prior included."""
+        """Half the whitened sum of squares, prior included; infinite where the model gave no number."""
+        if not np.isfinite(residual).all():
+            return float("inf")
         quadratic = self.whitener.gram(self.effective(residual, onset)[:, :, None])[:, 0, 0]
         total = quadratic.sum() if self.weights is None else self.weights @ quadratic
         return float(0.5 * (total + self.prior @ (values - self.centre) ** 2))
@@ -157,7 +159,7 @@ class _Descent:
             moved[i] += h
             predicted = self.forward.predict(settings_of(self.forward, self.effects, moved, onset))
             columns[:, :, i] = (predicted - base) / h
-        return columns
+        return np.nan_to_num(columns, nan=0.0, posinf=0.0, neginf=0.0)
 
     def group_loss(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(g,) half the whitened sum of squares of each group."""
@@ -172,7 +174,7 @@ class _Descent:
         target = self.refined(values, residual, onset)
         for share in (1.0, 0.4):
             tried = onset + share * (target - onset)
-            new_residual = self.residual(values, tried)
+            new_residual = np.nan_to_num(self.residual(values, tried), nan=1e3)
             better = self.group_loss(new_residual, tried) < old
             accept = better[t.site]
             if accept.any():
@@ -190,7 +192,7 @@ class _Descent:
         h = 2e-5
         predicted = t.f - residual
         ahead = self.forward.predict(settings_of(self.forward, self.effects, values, onset + h))
-        slope = (ahead - predicted) / h
+        slope = np.nan_to_num((ahead - predicted) / h)
         slope[~t.counted] = 0.0
         keep = t.counted[:, None]
         force = np.where(keep, predicted, 0.0)

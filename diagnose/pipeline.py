@@ -36,6 +36,12 @@ FAST_LEAVES_OUT = (
 )
 
 
+FINITE_STRAIN_LEAST = 0.85
+"""Finite strain is named where it must be larger than this share of the noise ..."""
+FINITE_STRAIN_GAIN = 20.0
+"""... and the neo-Hookean law fits better than the linear one by this log likelihood."""
+
+
 @dataclass(frozen=True)
 class DiagnoseOptions:
     """What a diagnosis may be told."""
@@ -115,7 +121,8 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     plain_before = found.ideal.plain + settled.plain(search.whitener, found.ideal)
     gap_before = _gap(plain_before, counts, added)
     deep_size = predicted_size(forward, found.base.found)
-    with_fs = "finite_strain" not in excluded and deep_size > noise * 0.85 and found.finite_strain_gain > -50
+    with_fs = "finite_strain" not in excluded and deep_size > FINITE_STRAIN_LEAST * noise
+    with_fs = with_fs and found.finite_strain_gain > FINITE_STRAIN_GAIN
     names = list(settled.names) + list(found.chosen)
     factor, error = site_factors(found.final.found, t)
     per_site = np.array([site_sd[t.site == s].mean() for s in range(t.sites)])

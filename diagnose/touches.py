@@ -59,6 +59,7 @@ class Touches:
     noise_n: float
     raw_noise_n: float
     samples_per_step: int
+    slowness: float = 1.0
     extra: dict[str, np.ndarray] = field(default_factory=dict)
 
     @property
@@ -110,6 +111,7 @@ class Touches:
             noise_n=self.noise_n,
             raw_noise_n=self.raw_noise_n,
             samples_per_step=self.samples_per_step,
+            slowness=self.slowness,
             extra={k: v[rows] for k, v in self.extra.items()},
         )
 
@@ -126,7 +128,8 @@ def touches_of(recording: Recording, model: Model, *, step_s: float = STEP_S) ->
         )
     t = recording.t
     per_step = max(1, round(step_s * recording.sample_rate_hz))
-    raw_noise = free_air_noise(recording, model)
+    measured = free_air_noise(recording, model, per_step)
+    raw_noise = measured.raw_n
     onsets = np.array([p.t_onset for p in palpations])
     order = np.argsort(onsets)
     palpations = [palpations[i] for i in order]
@@ -188,7 +191,8 @@ def touches_of(recording: Recording, model: Model, *, step_s: float = STEP_S) ->
         site=site,
         onset_s=np.array(kept),
         repeat=repeat,
-        noise_n=raw_noise / np.sqrt(per_step),
+        noise_n=measured.thinned_n,
+        slowness=measured.slowness,
         raw_noise_n=raw_noise,
         samples_per_step=per_step,
         extra={k: np.concatenate([p[5][k] for p in parts]) for k in parts[0][5]},
@@ -212,17 +216,50 @@ def free_air(recording: Recording, model: Model) -> np.ndarray:
     return free
 
 
-def free_air_noise(recording: Recording, model: Model) -> float:
-    """N, std of one force component in free air, from differences (so that drift and bias do not count)."""
+@dataclass(frozen=True)
+class Noise:
+    """Of one force component in free air, bias and drift taken off. raw_n: N, std of a sample. thinned_n: N,
+    std of
+    the mean over a thinned step. slowness: how much more a 0.1 s mean scatters (variance) than white noise
+    would."""
+
+    raw_n: float
+    thinned_n: float
+    slowness: float
+
+
+def free_air_noise(recording: Recording, model: Model, per_step: int) -> Noise:
+    """Measure the noise in free air; the stated (or a usual) value, white, where there is too little of
+    it."""
     free = free_air(recording, model)
-    pairs = free[1:] & free[:-1]
-    if pairs.sum() < 200:
-        return recording.force_noise_std_n or FALLBACK_NOISE_N
-    steps = np.diff(recording.force_on_tool, axis=0)[pairs]
-    measured = 1.4826 * np.median(np.abs(steps)) / np.sqrt(2)
-    levels = recording.force_on_tool[free]
-    slow = 1.4826 * np.median(np.abs(levels - np.median(levels, axis=0)))
-    return float(max(measured, min(slow, 1.5 * measured), 1e-4))
+    stated = recording.force_noise_std_n or FALLBACK_NOISE_N
+    if free.sum() < 200 * max(per_step, 1):
+        return Noise(stated, stated / np.sqrt(per_step), 1.0)
+    force = recording.force_on_tool
+    steps = np.diff(force, axis=0)[free[1:] & free[:-1]]
+    white = max(_robust_std(steps) / np.sqrt(2), 1e-4)
+    line = np.polyfit(recording.t[free], force[free], 1)
+    left = force - (recording.t[:, None] * line[0] + line[1])
+
+    def of_means(size: int) -> float:
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
+        means = [
+            left[k : k + size].mean(axis=0)
+            for a, b in zip(edges[::2], edges[1::2], strict=True)
+            for k in range(a, b - size + 1, size)
+        ]
+        return _robust_std(np.array(means)) if len(means) > 20 else white / np.sqrt(size)
+
+    thinned = max(of_means(per_step), white / np.sqrt(per_step))
+    slow = of_means(10 * per_step) ** 2 * 10 / thinned**2
+    # a hand that accelerates a heavy tool is no noise: what exceeds these is left for the diagnosis to find
+    thinned = min(thinned, 2.2 * white / np.sqrt(per_step))
+    raw = np.sqrt(white**2 * (1 - 1 / per_step) + thinned**2)
+    return Noise(float(raw), float(thinned), float(np.clip(slow, 1.0, 10.0)))
+
+
+def _robust_std(values: np.ndarray) -> float:
+    return float(1.4826 * np.median(np.abs(values - np.median(values, axis=0))))
 
 
 def _loss_of_touch(recording, onset, peak, limit, normal, noise) -> float:

@@ -1,0 +1,28 @@
+"""The labelled recordings are diagnosed right with default options."""
+
+from __future__ import annotations
+
+import pytest
+
+from diagnose.pipeline import diagnose
+from mechanics.recording import read_recording
+
+EXPECTED = {
+    "silicone-1-cylinder": "finite_strain",
+    "silicone-2-block": "finite_strain",
+    "silicone-3-halfsphere": "finite_strain",
+    "example-inclusion": "inclusion",
+    "example-time-delay": "time_delay",
+    "example-viscoelasticity": "viscoelasticity",
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", EXPECTED)
+def test_labelled(shared_recordings, name):
+    from reconstruct.pipeline import ReconstructOptions, reconstruct
+
+    recording = read_recording(shared_recordings / f"{name}.toml")
+    result = diagnose(recording, reconstruct(recording, ReconstructOptions()))
+    assert list(result.effects) == [EXPECTED[name]], result.words()
+    assert result.gap_after_n < result.gap_before_n or EXPECTED[name] == "inclusion"

@@ -1,0 +1,106 @@
+"""On a block that the mechanics pressed: noise is called noise, and instrument and material effects by
+name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnose.apply import corrected, improved
+from diagnose.pipeline import DiagnoseOptions, diagnose
+
+FAST = DiagnoseOptions(fast=True, bootstrap=100)
+
+
+def _late(t, x, f):  # type: ignore[no-untyped-def]
+    return x, np.stack([np.interp(t - 0.02, t, c) for c in f.T], axis=1)
+
+
+def _relaxing(t, x, f):  # type: ignore[no-untyped-def]
+    """A Zener force, integrated by small implicit steps of its own (not the recursion under test)."""
+    memory = np.zeros(3)
+    out = np.empty_like(f)
+    dt = t[1] - t[0]
+    for i in range(len(t)):
+        change = f[i] - f[i - 1] if i else np.zeros(3)
+        memory = (memory + change) / (1 + dt / 0.3)
+        out[i] = f[i] + 0.4 * memory
+    return x, np.where(np.linalg.norm(f, axis=1, keepdims=True) > 0, out, 0.0)
+
+
+def test_noise_is_noise(bench):
+    result = diagnose(*bench.record(), FAST)
+    assert result.kind == "none" and not result.effects
+    assert result.gap_before_n < 1.5 * result.noise_n
+    assert result.young_modulus_pa == pytest.approx(20e3, rel=0.03)
+
+
+def test_delay_is_named_measured_and_taken_off(bench):
+    recording, model = bench.record(_late)
+    result = diagnose(recording, model, FAST)
+    assert result.effects == ("time_delay",) and result.kind == "effect"
+    entry = result.entries[0]
+    assert entry.domain == "instrument" and entry.parameters["delay_s"] == pytest.approx(0.02, abs=0.002)
+    assert result.gap_closed is not None and result.gap_closed > 0.8
+    # an instrument's effect corrects the recording and leaves the model alone
+    assert improved(model, result)[1] == []
+    again = diagnose(corrected(recording, result), model, FAST)
+    assert "time_delay" not in again.effects
+
+
+def test_memory_is_named_and_goes_into_the_model(bench):
+    recording, model = bench.record(_relaxing)
+    result = diagnose(recording, model, FAST)
+    assert result.effects[0] == "viscoelasticity"
+    better, kept = improved(model, result)
+    assert kept == ["viscoelasticity"]
+    assert sum(better.effects["viscoelasticity"]["g"]) == pytest.approx(0.4, rel=0.25)
+
+
+def test_bias_is_settled_in_free_air(bench):
+    recording, model = bench.record(lambda t, x, f: (x, f + np.array([0.05, 0.0, -0.02])))
+    result = diagnose(recording, model, FAST)
+    assert result.effects == ("force_bias",)
+    np.testing.assert_allclose(result.entries[0].parameters["bias_n"], [0.05, 0.0, -0.02], atol=0.003)
+    axes = {a.axis: a for a in result.where.axes}
+    assert axes["free_air"].p < 0.01
+
+
+def test_without_its_name_the_delay_is_not_called_something_else_alone(bench):
+    options = DiagnoseOptions(fast=True, bootstrap=100, without="time_delay")
+    result = diagnose(*bench.record(_late), options)
+    assert result.kind in ("unknown", "effect+unknown", "ambiguous")
+
+
+def test_json_has_the_contract(bench):
+    data = diagnose(*bench.record(_late), FAST).as_json()
+    assert {
+        "noise_n", "gap_before_n", "gap_after_n", "gap_closed", "gap_closed_ci95", "verdict", "where",
+        "effects", "young_modulus_pa", "next_touch",
+    } <= set(data)  # fmt: skip
+    assert [a["axis"] for a in data["where"]["axes"]] == [
+        "depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air",
+    ]  # fmt: skip
+    assert set(data["where"]["worst"][0]) == {"x", "y", "z", "rmse_n"}
+    first = data["effects"][0]
+    assert {
+        "name",
+        "domain",
+        "probability",
+        "gap_after_n",
+        "gap_closed",
+        "gap_closed_ci95",
+        "parameters",
+    } <= set(first)
+    touch = data["next_touch"]
+    assert {"x", "y", "z", "direction", "depth_m", "speed_m_per_s", "hold_s", "separates", "why"} <= set(
+        touch
+    )
+
+
+def test_the_same_input_gives_the_same_answer(bench):
+    recording, model = bench.record(_late)
+    one, two = (diagnose(recording, model, FAST).as_json() for _ in range(2))
+    for data in (one, two):
+        data.pop("seconds")
+    assert one == two
