@@ -1,7 +1,8 @@
 """Large surfaces: memory, precompute, query time and error of the low-rank form against the dense one.
 
-The block of the paper, refined towards its surface. Every touchable node is a place. Dense: 9 t^2 numbers in
-float32; its precompute is 3 t solves, timed on a sample and scaled. Error: the greatest of places solved exactly.
+The block of the paper, refined towards its surface. Every touchable node is a place. Dense: 9 t^2 numbers
+in float32; its precompute is 3 t solves, timed on a sample and scaled. Error: the greatest of places
+solved exactly.
 """
 
 from __future__ import annotations

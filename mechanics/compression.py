@@ -42,21 +42,25 @@ class LowRankCompliance:
         return np.einsum("iar,ibr->iab", self.factor, self.factor, optimize=True)
 
 
-@njit(cache=True, error_model="numpy")
+@njit(cache=True, error_model="numpy", fastmath=True)
 def between_low_rank(factor, corners_p, weights_p, corners_q, weights_q, out):
     """out (3, 3) 1/m: as surface_compliance.between_block, from the factor."""
     rank = factor.shape[2]
-    out[:] = 0.0
-    for k in range(rank):
-        for a in range(3):
-            p = 0.0
-            for i in range(3):
-                p += weights_p[i] * factor[corners_p[i], a, k]
-            for b in range(3):
-                q = 0.0
-                for j in range(3):
-                    q += weights_q[j] * factor[corners_q[j], b, k]
-                out[a, b] += p * q
+    for a in range(3):
+        for b in range(3):
+            out[a, b] = 0.0
+    mixed = np.zeros((6, rank), dtype=np.float32)
+    for a in range(3):
+        for i in range(3):
+            for k in range(rank):  # innermost and contiguous: the compiler vectorises it
+                mixed[a, k] += np.float32(weights_p[i]) * factor[corners_p[i], a, k]
+                mixed[3 + a, k] += np.float32(weights_q[i]) * factor[corners_q[i], a, k]
+    for a in range(3):
+        for b in range(3):
+            total = 0.0
+            for k in range(rank):
+                total += mixed[a, k] * mixed[3 + b, k]
+            out[a, b] = total
 
 
 def compress(
