@@ -15,6 +15,7 @@ COMPILED = sys.platform.startswith("linux")
 SPIN_S = 0.002
 
 _MONOTONIC = 1
+_THREAD_CPU = 3
 _ABSOLUTE = 1
 _gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.voidptr))
 _nanosleep = types.ExternalFunction(
@@ -26,6 +27,13 @@ _nanosleep = types.ExternalFunction(
 def compiled_now_ns(timespec):
     """CLOCK_MONOTONIC in ns; timespec: (2,) int64 scratch. The clock of time.perf_counter_ns on Linux."""
     _gettime(_MONOTONIC, timespec.ctypes)
+    return timespec[0] * 1_000_000_000 + timespec[1]
+
+
+@njit(cache=True, nogil=True)
+def compiled_thread_cpu_ns(timespec):
+    """CPU time of the calling thread in ns; timespec: (2,) int64 scratch."""
+    _gettime(_THREAD_CPU, timespec.ctypes)
     return timespec[0] * 1_000_000_000 + timespec[1]
 
 

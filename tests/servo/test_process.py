@@ -114,6 +114,7 @@ def test_a_killed_servo_leaves_the_device_at_zero(fake, servo):
         servo.set_modulus(1e4)
 
 
+@pytest.mark.slow
 def test_a_stopped_process_leaves_the_device_at_zero_and_can_go_on(fake, servo):
     assert pressing_after_enabling(servo, fake)
     os.kill(servo.process_id, signal.SIGSTOP)
@@ -141,16 +142,17 @@ PARENT = """
 import sys, time
 from devices.haply import HaplyOptions
 from devices.registry import DeviceChoice
-from palpate.servo import Servo, ServoOptions
+from palpate.servo import SafetyOptions, Servo, ServoOptions
 from palpate.servo.elastic_plane import PlaneSource
 
 options = HaplyOptions(uri=sys.argv[1], events_uri=sys.argv[2])
 servo = Servo(PlaneSource(500.0), device=DeviceChoice("haply", {"options": options}),
-              options=ServoOptions(on_orphan=sys.argv[3]))
+              options=ServoOptions(on_orphan=sys.argv[3], safety=SafetyOptions(ramp_s=0.1, stale_s=0.05)))
 servo.start()
-servo.enable()
 print(servo.process_id, flush=True)
-time.sleep(600)
+while True:
+    servo.enable()
+    time.sleep(3.0)
 """
 
 
