@@ -18,6 +18,7 @@ from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval, runs
 from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
 from reconstruct.presses import Contact, Signals, fitted_contact, paper_contact
+from reconstruct.tool_weight import tool_weight
 
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
@@ -159,7 +160,9 @@ def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarra
     filtered = low_pass(recording.force_on_tool, rate, cutoff_hz)
     noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), 1e-6)
     spread = noise * noise_gain(rate, cutoff_hz)
-    free_air, _ = free_air_force(recording.t, filtered, spread)
+    weight = tool_weight(recording, filtered, cutoff_hz, spread)
+    drift, _ = free_air_force(recording.t, filtered - weight, spread)
+    free_air = weight + drift
     force = filtered - free_air
     signals = Signals(
         recording=recording,

@@ -18,6 +18,7 @@ from palpate.arguments import add_json, add_options, add_seed, emit_json, option
 if TYPE_CHECKING:
     from reconstruct.pipeline import Reconstruction
 
+_NAMED = 12
 SUMMARY = "a recording becomes a model"
 
 
@@ -100,7 +101,8 @@ def _words(result: Reconstruction) -> list[str]:
     lines = [
         f"{exploration.recording.name}: {len(exploration.contacts)} palpations"
         + (f", {len(not_used)} contacts not used:" if not_used else ""),
-        *(f"  at {t:.2f} s: {reason}" for t, reason in not_used),
+        *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
+        *([f"  and {len(not_used) - _NAMED} more (--json names all)"] if len(not_used) > _NAMED else []),
         f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, "
         f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
     ]

@@ -83,6 +83,7 @@ def explore_cylinder(
     state_phase: bool = True,
     support_press: bool = False,
     without_phase: bool = False,
+    tool_mass_kg: float = 0.0,
     seed: int = 0,
 ) -> tuple[Recording, np.ndarray]:
     """(recording, times of first touch)."""
@@ -134,6 +135,15 @@ def explore_cylinder(
     t = np.arange(len(path)) / RATE
     force = frame.rotation @ force.T
     force = force.T + np.array(bias) + np.outer(t, [0, drift_n_per_s, 0])
+    quaternion = None
+    if tool_mass_kg:
+        turn = np.column_stack([0.5 * np.sin(0.7 * t), 0.6 * np.sin(0.4 * t + 1), 0.3 * np.sin(0.9 * t)])
+        attitude = Rotation.from_rotvec(turn)
+        quaternion = attitude.as_quat()[:, [3, 0, 1, 2]]
+        weight = tool_mass_kg * 9.81 * np.array([0, 0, -1.0])
+        tared = (attitude * attitude[0].inv()).apply(weight)
+        rate = np.gradient(np.gradient(frame.device(path), t, axis=0), t, axis=0)
+        force = force + weight - tared - tool_mass_kg * rate
     force += noise * random.standard_normal(force.shape)
     position = np.round(frame.device(path) / 3e-5) * 3e-5
     recording = Recording(
@@ -142,6 +152,7 @@ def explore_cylinder(
         force_on_tool=force,
         sample_rate_hz=RATE,
         tip_radius_m=TIP,
+        quaternion=quaternion,
         boundary_phase=phase if state_phase and not without_phase else None,
         force_noise_std_n=noise,
         poisson_ratio=0.49,

@@ -67,6 +67,19 @@ def test_bias_and_drift_of_the_sensor_are_followed():
     assert np.abs(exploration.free_air - expected)[after].max() < 0.01
 
 
+def test_the_tools_weight_and_inertia_are_taken_off():
+    recording, onsets = explore_cylinder(tool_mass_kg=0.05)
+    exploration = explore(recording)
+    assert len(exploration.contacts) == len(onsets)
+    assert np.median(np.abs(onset_errors(exploration))) < 2e-4
+    blind = dataclasses.replace(recording, quaternion=None)
+    try:
+        found = len(explore(blind).contacts)
+    except ContactError:
+        found = 0
+    assert found < len(onsets)
+
+
 def test_a_press_on_the_support_is_rejected_and_named():
     recording, onsets = explore_cylinder(support_press=True)
     exploration = explore(recording)

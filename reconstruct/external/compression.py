@@ -1,0 +1,73 @@
+"""Uniaxial compression of cylinders between platens (Instron exports), and the modulus of small strain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import RecordingError
+
+
+@dataclass(frozen=True)
+class Compression:
+    """Loading of a cylinder: strain (n,) engineering, positive in compression; stress (n,) Pa, force over the
+    first area."""
+
+    strain: np.ndarray
+    stress: np.ndarray
+    diameter_m: float
+    height_m: float
+
+
+def read_compression(path: Path | str) -> Compression:
+    """Read one test: `key: value;` lines with the cylinder's diameter and height in mm, then comma-separated
+    samples.
+
+    Stress comes from load over area, not from the file's own stress column, whose unit its documentation and
+    its header disagree about. Raises RecordingError where a line or column is missing.
+    """
+    path = Path(path)
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
+    start = next((i for i, line in enumerate(lines) if line.lower().startswith("time")), None)
+    if start is None:
+        raise RecordingError(f"'{path}' has no header line that starts with 'Time'")
+    sizes = {}
+    for key, _, value in (line.partition(":") for line in lines[:start]):
+        if key.startswith("Cylinder "):
+            sizes[key.split()[1]] = float("".join(c for c in value if c.isdigit() or c == ".")) / 1e3
+    if len(sizes) < 2:
+        raise RecordingError(f"'{path}' does not state the cylinder's diameter and height")
+    separator = ";" if lines[start].count(";") > lines[start].count(",") else ","
+    names = [name.strip().lower() for name in lines[start].split(separator)]
+    wanted = [
+        next((i for i, n in enumerate(names) if n.startswith(w)), None) for w in ("compression", "load")
+    ]
+    if None in wanted:
+        raise RecordingError(
+            f"'{path}' needs the columns Compression (mm) and Load (N); it has {', '.join(names)}"
+        )
+    rows = [line.split(separator) for line in lines[start + 1 :] if line.strip(" ;,")]
+    try:
+        compression, load = (np.array([float(row[i]) for row in rows]) for i in wanted)
+    except (ValueError, IndexError) as error:
+        raise RecordingError(f"'{path}' has a row that is no numbers: {error}") from error
+    area = np.pi * sizes["Diameter"] ** 2 / 4
+    return Compression(
+        np.abs(compression) / 1e3 / sizes["Height"], np.abs(load) / area, sizes["Diameter"], sizes["Height"]
+    )
+
+
+def small_strain_modulus(test: Compression, *, low: float = 0.0, high: float = 0.05) -> float:
+    """Slope (Pa) of a straight line through stress over strain between two strains.
+
+    It is Young's modulus only where the platens let the faces slide; bonded faces raise it.
+    """
+    used = (test.strain >= low) & (test.strain <= high)
+    if used.sum() < 3:
+        raise RecordingError(f"fewer than 3 samples lie between the strains {low} and {high}")
+    return float(np.polyfit(test.strain[used], test.stress[used], 1)[0])

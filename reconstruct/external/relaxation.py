@@ -1,0 +1,77 @@
+"""Relaxation under a held displacement: a Prony series, and whether a Kelvin-Voigt element could do the
+same."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from scipy.optimize import nnls
+
+from mechanics.errors import RecordingError
+
+
+@dataclass(frozen=True)
+class Relaxation:
+    """Force (or modulus) over its first value: end + sum g exp(-t / tau), end + sum g = 1 at t = 0.
+
+    g, tau_s: of the terms. end: share that stays. rms: misfit as a share of the first value. loss: share of
+    the first value lost by the last sample. kelvin_voigt_can: False where more is lost than noise explains: a
+    Kelvin-Voigt element (and Hunt-Crossley's) has constant force while its displacement is held.
+    """
+
+    g: tuple[float, ...]
+    tau_s: tuple[float, ...]
+    end: float
+    rms: float
+    loss: float
+    kelvin_voigt_can: bool
+
+
+def fit_relaxation(t: np.ndarray, value: np.ndarray, *, terms: int = 2) -> Relaxation:
+    """Fit `terms` exponentials to samples t (n,) s of a hold that starts at t[0], value (n,).
+
+    For given times g and the end are non-negative least squares; the times are searched on a logarithmic
+    grid, refined once. Raises RecordingError where samples are too few or not positive at the start.
+    """
+    t, value = np.asarray(t, dtype=float), np.asarray(value, dtype=float)
+    if len(t) < 3 * terms + 2 or not value[0] > 0 or not (np.diff(t) > 0).all():
+        raise RecordingError(
+            f"a relaxation of {terms} terms needs {3 * terms + 2} samples in time order that start above 0; "
+            f"got {len(t)}"
+        )
+    t = t - t[0]
+    share = value / value[0]
+    shortest = max(np.median(np.diff(t)), t[-1] / 1e6)
+    grid = np.geomspace(shortest, 2 * t[-1], 24)
+    best = _search(t, share, grid, terms)
+    step = grid[1] / grid[0]
+    finer = np.unique(np.concatenate([tau * np.geomspace(1 / step, step, 9) for tau in best[0]]))
+    best = _search(t, share, finer, terms)
+    tau, weights, rms = best
+    total = weights.sum()
+    noise = float(np.std(np.diff(share)) / np.sqrt(2))
+    loss = float(1 - np.mean(share[-max(1, len(t) // 20) :]))
+    return Relaxation(
+        g=tuple(map(float, weights[1:] / total)),
+        tau_s=tuple(map(float, tau)),
+        end=float(weights[0] / total),
+        rms=rms,
+        loss=loss,
+        kelvin_voigt_can=abs(loss) < 5 * noise,
+    )
+
+
+def _search(
+    t: np.ndarray, share: np.ndarray, grid: np.ndarray, terms: int
+) -> tuple[np.ndarray, np.ndarray, float]:
+    """(times, weights with the end first, rms) of the best combination of `terms` times of the grid."""
+    decay = np.exp(-t[:, None] / grid)
+    best = None
+    for pick in combinations(range(len(grid)), terms):
+        columns = np.column_stack([np.ones_like(t), decay[:, pick]])
+        weights, norm = nnls(columns, share)
+        if best is None or norm < best[2]:
+            best = (grid[list(pick)], weights, norm)
+    return best[0], best[1], float(best[2] / np.sqrt(len(t)))
