@@ -9,9 +9,11 @@ object (`blocks`): smooth, so a patch as wide as the mesh's own elements and the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, fields
 
 import numpy as np
+import scipy.sparse as sp
 from numba import njit
 from scipy.spatial import cKDTree
 
@@ -153,7 +155,7 @@ def surface_compliance(
     nodes, triangles = _corners(coarse.mesh)
     points = coarse.mesh.points[nodes]
     width = patch_width(coarse.mesh)
-    blocks = _blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
+    blocks = patch_blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
     curvature = mean_curvature(mesh, points, normals := _normals(coarse.mesh, nodes))
     del coarse
     fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support)
@@ -161,7 +163,7 @@ def surface_compliance(
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
     own_width = patch_width(fine.mesh)
-    own = _own(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f))
+    own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f))
     return SurfaceCompliance(
         nodes=nodes,
         points=points,
@@ -190,7 +192,10 @@ def _normals(mesh: TetMesh, nodes: np.ndarray) -> np.ndarray:
     return vertex_normals(mesh.points, mesh.touchable_surface[:, :3])[nodes]
 
 
-def _blocks(solver: Solver, points: np.ndarray, width: float, tell) -> np.ndarray:  # type: ignore[no-untyped-def]
+def patch_blocks(
+    solver: Solver, points: np.ndarray, width: float, tell: Callable[[float], None] = lambda share: None
+) -> np.ndarray:
+    """(t, t, 3, 3) float32, 1/m: mean displacement of the patch at i for a unit force on the patch at j."""
     mesh = solver.mesh
     average = PatchSampler(mesh, width).matrix(points)
     t = len(points)
@@ -209,7 +214,10 @@ def _blocks(solver: Solver, points: np.ndarray, width: float, tell) -> np.ndarra
     return blocks
 
 
-def _own(solver: Solver, points: np.ndarray, width: float, tell) -> np.ndarray:  # type: ignore[no-untyped-def]
+def own_blocks(
+    solver: Solver, points: np.ndarray, width: float, tell: Callable[[float], None] = lambda share: None
+) -> np.ndarray:
+    """(t, 3, 3) 1/m: mean displacement of every patch for a unit force on itself."""
     average = PatchSampler(solver.mesh, width).matrix(points)
     own = np.empty((len(points), 3, 3))
     for start in range(0, len(points), _CORNERS):
@@ -221,7 +229,7 @@ def _own(solver: Solver, points: np.ndarray, width: float, tell) -> np.ndarray: 
     return own
 
 
-def _loads(average) -> np.ndarray:  # type: ignore[no-untyped-def]
+def _loads(average: sp.csr_matrix) -> np.ndarray:
     """(n, 3, k, 3) nodal forces of unit loads x, y, z on each of k patches, from weights (k, n)."""
     dense = average.toarray().T
     loads = np.zeros((len(dense), 3, dense.shape[1], 3))
