@@ -42,7 +42,7 @@ class ModulusOptions:
         0.03, "error of the law as a share of the force; weights deep samples down", flag="--law-error"
     )
     law_bias: float = option(
-        0.01, "standard error common to all presses (law, mesh), as a share of the modulus", flag="--law-bias"
+        0.02, "standard error common to all presses (law, mesh), as a share of the modulus", flag="--law-bias"
     )
     bootstraps: int = option(1000, "resamples of the sites for the 95 % interval", flag="--bootstraps")
     site_m: float = option(0.008, "presses closer than this repeat one site", unit="m", flag="--site-size")
