@@ -10,6 +10,7 @@ from mechanics.touch import touch_solve
 from render.contact import place, turn_frame, walk
 
 SLIPS = 12
+CAUTION = 0.9
 
 
 @njit(cache=True, error_model="numpy")
@@ -114,9 +115,10 @@ def solve_one(p, state, tips, i, m):
             fu *= mu * fn / pull
             fv *= mu * fn / pull
             break
-        # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho
+        # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho.
+        # a little less than that, so that the force comes down onto the cone and is never left inside it
         give = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
-        length = give * (pull - mu * fn) / max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
+        length = CAUTION * give * (pull - mu * fn) / max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
         for k in range(3):
             move[k] = -length * (fu * frame[0, k] + fv * frame[1, k]) / pull
         grip.triangle[i] = walk(p.surface, grip.triangle[i], grip.weights[i], move)

@@ -25,9 +25,9 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
     page.lead(verdict(result)[:1].upper() + verdict(result)[1:] + ".")
     page.paragraph(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
-        f"paths. Errors are rms force vectors in N; the sensor's noise alone is {result.noise_n:.3f} N. The 1D "
-        "models are fitted press by press and interpolated over the surface; FEM has one number for the whole "
-        "object, its Young's modulus."
+        f"paths. Errors are rms force vectors in N; the sensor's noise alone is {result.noise_n:.3f} N. The "
+        "1D models are fitted press by press and interpolated over the surface; FEM has one number for the "
+        "whole object, its Young's modulus."
     )
     page.heading("Held-out palpations and regions")
     rows = [
@@ -50,9 +50,10 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
             )
     page.heading("What it means")
     page.paragraph(
-        "The 1D models need no mesh and no base, and cost nothing to compute; inside a dense cloud of touches "
-        "they follow the object. Where nobody touched they repeat what the nearest touches felt, and they have "
-        "no tangential force. FEM carries shape and base to untouched places, and is as good as the shape."
+        "The 1D models need no mesh and no base, and cost nothing to compute; inside a dense cloud of "
+        "touches they follow the object. Where nobody touched they repeat what the nearest touches felt, "
+        "and they have no tangential force. FEM carries shape and base to untouched places, and is as "
+        "good as the shape."
     )
     return page.write(path)
 

@@ -5,7 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.model import Model
-from mechanics.tetmesh import TetMesh
+from mechanics.sites import mean_curvature, patch_width
+from mechanics.solver import Solver
+from mechanics.surface_compliance import SurfaceCompliance, patch_blocks
+from mechanics.tetmesh import TetMesh, vertex_normals
+from render.fem import FemRenderer
+from render.options import RenderOptions
 
 _SIX = np.array([[0, 1, 3, 7], [0, 1, 7, 5], [0, 5, 7, 4], [0, 3, 2, 7], [0, 2, 6, 7], [0, 6, 4, 7]])
 
@@ -65,3 +70,37 @@ def model(mesh: TetMesh, modulus: float = 30e3, poisson: float = 0.49, tip: floa
         support_normal=np.array([0.0, 0.0, 1.0]),
         **more,
     )
+
+
+def quick_compliance(made: Model) -> SurfaceCompliance:
+    """The surface compliance on the model's own mesh, without the refinement that accuracy near edges asks
+    for."""
+    mesh = made.mesh
+    nodes, local = np.unique(mesh.touchable_surface[:, :3], return_inverse=True)
+    points = mesh.points[nodes]
+    normals = vertex_normals(mesh.points, mesh.touchable_surface[:, :3])[nodes]
+    width = patch_width(mesh)
+    blocks = patch_blocks(Solver(mesh, made.poisson_ratio), points, width)
+    every = np.arange(len(nodes))
+    curvature = mean_curvature(mesh, points, normals)
+    return SurfaceCompliance(
+        nodes=nodes,
+        points=points,
+        normals=normals,
+        curvature=curvature,
+        triangles=local.reshape(-1, 3),
+        blocks=blocks,
+        patch_width_m=np.array([width]),
+        own_points=points.copy(),
+        own_normals=normals.copy(),
+        own_curvature=curvature.copy(),
+        own_triangles=local.reshape(-1, 3).copy(),
+        own=blocks[every, every].astype(float),
+        own_width_m=np.array([width]),
+        poisson_ratio=np.array([made.poisson_ratio]),
+    )
+
+
+def fem(made: Model, **options) -> FemRenderer:
+    """A finite-element renderer on the quick compliance."""
+    return FemRenderer(made, RenderOptions(**options), compliance=quick_compliance(made))
