@@ -1,4 +1,4 @@
-"""What the servo's benchmark runs: a block, tips that slide over it in contact, and the loop that times them."""
+"""What the servo's benchmark runs: a block, tips that slide over it, and the loop that times them."""
 
 from __future__ import annotations
 

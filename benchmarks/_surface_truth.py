@@ -165,9 +165,41 @@ def bullet() -> Truth:
     return _stack("bullet", outline, [*((1.0, z) for z in np.linspace(0, 0.034, 14)), *ball])
 
 
+def horseshoe() -> Truth:
+    """A horseshoe of rounded section: mean radius 45 mm, 36 mm wide and high; no point sees its whole
+    outline."""
+    turn = np.linspace(-2.1, 2.1, 120)
+    middle = 0.045 * np.column_stack([np.cos(turn), np.sin(turn)])
+    x, y = np.meshgrid(np.arange(-0.075, 0.075, 0.0015), np.arange(-0.075, 0.075, 0.0015), indexing="ij")
+    z = np.arange(-0.0015, 0.045, 0.0015)
+    away = cKDTree(middle).query(np.column_stack([x.ravel(), y.ravel()]))[0].reshape(x.shape)
+    level = ((away[..., None] / 0.018) ** 3 + np.maximum(z / 0.036, 0) ** 3) ** (1 / 3) - 1
+    level[..., 0] = np.maximum(-level[..., 1], 0.05)
+    grid = pyvista.ImageData(dimensions=level.shape, spacing=(0.0015,) * 3, origin=(-0.075, -0.075, -0.0015))
+    grid["level"] = level.ravel(order="F")
+    found = grid.contour([0.0], scalars="level").triangulate().clean()
+    vertices, triangles = np.asarray(found.points, dtype=float), found.regular_faces
+    vertices[vertices[:, 2] < 1e-9, 2] = 0.0
+    truth = Truth("horseshoe", vertices, triangles)
+    return truth if truth.volume_m3 > 0 else Truth("horseshoe", vertices, triangles[:, ::-1])
+
+
 OWN: dict[str, Callable[[], Truth]] = {
     f().name: f
-    for f in (frustum, cone, hexagon, ellipsoid, blob, angle_piece, soap, gable, vault, saddle, bullet)
+    for f in (
+        frustum,
+        cone,
+        hexagon,
+        ellipsoid,
+        blob,
+        angle_piece,
+        soap,
+        gable,
+        vault,
+        saddle,
+        bullet,
+        horseshoe,
+    )
 }
 """Shapes that no phantom has."""
 
@@ -177,8 +209,8 @@ def touch(
 ) -> tuple[Evidence, Callable[[np.ndarray], np.ndarray]]:
     """What a hand would tell of the shape, and the map from the device frame back to the shape's own.
 
-    Places are spread over the surface above 12 mm and 9 mm away from edges; first-force normals are wrong by 6 degrees
-    a component; the tracing leans in by 0.25 mm in the mean and up to 0.6 mm.
+    Places are spread over the surface above 12 mm and 9 mm away from edges; first-force normals are wrong by
+    6 degrees a component; the tracing leans in by 0.25 mm in the mean and up to 0.6 mm.
     """
     rng = np.random.default_rng(seed)
     turn, shift = _frame(rng)

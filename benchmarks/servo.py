@@ -1,4 +1,4 @@
-"""The servo's tick: its compute time for 1 to 32 frictional contacts, and its late ticks against an empty loop.
+"""The servo's tick: compute time for 1 to 32 frictional contacts, and late ticks against an empty loop.
 
 Wall times of a tick include what neighbours on a shared machine steal; CPU times of the same ticks stand
 beside them. Late ticks (started 0.2 ms or more after their deadline) are counted in alternating slices with
@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contacts", type=int, nargs="+", default=[1, 4, 16, 32])
     parser.add_argument("--ticks", type=int, default=20_000, help="ticks a compute-time figure")
     parser.add_argument(
-        "--seconds", type=float, default=10.0, help="of each real-time loop, in slices of 1 s"
+        "--seconds", type=float, default=10.0, help="of each real-time loop, in 1 s slices"
     )
     parser.add_argument("--no-peer", action="store_true", help="leave MuJoCo's flex out")
 
@@ -125,7 +125,7 @@ def _alternate(loads: dict[str, Load], seconds: float, renderer: Any, busy: bool
 
 
 def _window_and_recording(stop: threading.Event, current: list[Load], renderer: Any) -> None:
-    """What a window does 30 times a second: read the newest tick and the ring, move the surface, keep rows."""
+    """What a window does 30 times a second: read tick and ring, move the surface, keep rows."""
     kept_rows: list[np.ndarray] = []
     while not stop.is_set():
         shared = current[0].shared

@@ -1,4 +1,4 @@
-"""Stability of the whole loop: simulated hands on an elastic plane, through the servo's own tick, in virtual time.
+"""Stability of the loop: simulated hands on an elastic plane, through the servo's tick, in virtual time.
 
 Every combination of hand, modulus, rate, quantisation and delay is pressed, held, let go and tapped; what
 counts is the greatest net energy that the hand ever got back (aim: at most 1 mJ), and what staying stable

@@ -1,7 +1,9 @@
-"""How far reconstructed surfaces lie from known shapes: mean and 95th percentile of the distance, error of volume.
+"""How far reconstructed surfaces lie from known shapes: mean and 95th percentile of the distance, error of
+volume.
 
-Every shape is touched at 28 places some 20 mm apart by a simulated hand (seeded); the peer is the paper's hull of the
-same touches. Distances are taken both ways over the touchable part (from the truth to the surface and back).
+Every shape is touched at 28 places some 20 mm apart by a simulated hand (seeded); the peer is the paper's
+hull of the same touches. Distances are taken both ways over the touchable part (from the truth to the surface
+and back).
 """
 
 from __future__ import annotations

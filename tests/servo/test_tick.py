@@ -1,4 +1,4 @@
-"""The tick and its clock's arithmetic with a fake clock: deadlines absolute, misses counted, faults zeroed."""
+"""The tick with a fake clock: deadlines absolute, misses counted, faults zeroed."""
 
 from __future__ import annotations
 
