@@ -13,6 +13,9 @@ from scipy.ndimage import gaussian_filter1d
 from mechanics.errors import ContactError
 from mechanics.options import option
 
+_LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
+_GAP_S = 1.0
+
 
 @dataclass(frozen=True)
 class BoundaryOptions:
@@ -87,8 +90,9 @@ def find_interval(
     """Sample indices [first, last) of phase I.
 
     given: approximate times from the recording; contact that starts inside is followed to its end. Without
-    them: the contacts in which the tip slides further than 16 radii while it stays in one plane.
-    touching: (n,) bool. Raises ContactError where there is none.
+    them: a contact in which the tip slides further than 8 radii while it stays in one plane, with the
+    contacts before and after it in that plane after short gaps. touching: (n,) bool. Raises ContactError
+    where there is none.
     """
     found = runs(touching)
     if given is not None:
@@ -100,16 +104,42 @@ def find_interval(
                 "trace the object's base first, or give [object] model = PATH of a model whose base stands in"
             )
         return inside[0][0], inside[-1][1]
-    for a, b in found:
-        if _travel(position[a:b]) < 16 * tip_radius_m:
+    for i, (a, b) in enumerate(found):
+        if _travel(position[a:b]) < _LEAST_SLIDE * tip_radius_m:
             continue
-        if fit_plane(position[a:b])[2] < 0.1 * tip_radius_m:
-            return a, b
+        centre, normal, flatness = fit_plane(position[a:b])
+        if flatness > 0.1 * tip_radius_m:
+            continue
+        reach = max(6 * flatness, 0.02 * tip_radius_m)
+        first, last = i, i
+        while first > 0 and _joins(found[first - 1], found[first], t, position, centre, normal, reach):
+            first -= 1
+        while last + 1 < len(found) and _joins(
+            found[last], found[last + 1], t, position, centre, normal, reach
+        ):
+            last += 1
+        return found[first][0], found[last][1]
     raise ContactError(
-        "no boundary phase found: no contact slides further than 16 tip radii in one plane; trace "
+        "no boundary phase found: no contact slides further than 8 tip radii in one plane; trace "
         "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
         "model whose base stands in"
     )
+
+
+def _joins(
+    earlier: tuple[int, int],
+    later: tuple[int, int],
+    t: np.ndarray,
+    position: np.ndarray,
+    centre: np.ndarray,
+    normal: np.ndarray,
+    reach_m: float,
+) -> bool:
+    """Whether two contacts are one trace: a short gap, and both all within `reach_m` of the plane."""
+    if t[later[0]] - t[earlier[1] - 1] > _GAP_S:
+        return False
+    path = position[earlier[0] : later[1]]
+    return bool(np.percentile(np.abs((path - centre) @ normal), 95) < reach_m)
 
 
 def _travel(points: np.ndarray) -> float:

@@ -21,7 +21,10 @@ SIDE = 0.3  # |n . support normal| below this: a press on the side
 
 @dataclass(frozen=True)
 class Trend:
-    """Correlation of a parameter with height over the presses on the side."""
+    """Correlation of a parameter with height over the presses on the side.
+
+    change: of a straight line over the range of heights, as a share of the mean.
+    """
 
     name: str
     pearson: float
@@ -29,6 +32,7 @@ class Trend:
     spearman: float
     spearman_p: float
     presses: int
+    change: float
 
 
 def column(model: Model, name: str) -> np.ndarray:
@@ -58,7 +62,9 @@ def height_trends(model: Model) -> list[Trend]:
         if used.sum() >= 5:
             r, p = pearsonr(height[used], values[used])
             s, q = spearmanr(height[used], values[used])
-            trends.append(Trend(name, float(r), float(p), float(s), float(q), int(used.sum())))
+            slope = np.polyfit(height[used], values[used], 1)[0]
+            change = float(slope * np.ptp(height[used]) / values[used].mean())
+            trends.append(Trend(name, float(r), float(p), float(s), float(q), int(used.sum()), change))
     return trends
 
 

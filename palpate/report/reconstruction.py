@@ -153,8 +153,11 @@ def _trends(page: Page, trends: list[Trend]) -> None:
         "the modulus should not."
     )
     page.table(
-        ["parameter", "Pearson r", "p", "Spearman", "p"],
-        [[t.name, t.pearson, t.pearson_p, t.spearman, t.spearman_p] for t in trends],
+        ["parameter", "Pearson r", "p", "Spearman", "p", "change over the height"],
+        [
+            [t.name, t.pearson, t.pearson_p, t.spearman, t.spearman_p, f"{100 * t.change:+.1f} %"]
+            for t in trends
+        ],
     )
 
 

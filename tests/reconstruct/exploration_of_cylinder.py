@@ -84,6 +84,7 @@ def explore_cylinder(
     support_press: bool = False,
     without_phase: bool = False,
     tool_mass_kg: float = 0.0,
+    lift: bool = False,
     seed: int = 0,
 ) -> tuple[Recording, np.ndarray]:
     """(recording, times of first touch)."""
@@ -107,7 +108,11 @@ def explore_cylinder(
     if not without_phase:
         add(here + smooth(300)[:, None] * (ring[0] - here))
         first = count()
-        add(ring, 2.5 * (np.array([0, 0, 1.0]) - 0.2 * along))
+        touch = np.ones((len(ring), 1))
+        if lift:
+            touch[3000:3200] = 0.0
+            ring[3000:3200, 2] += 0.002 * np.sin(np.linspace(0, np.pi, 200))
+        add(ring, 2.5 * touch * (np.array([0, 0, 1.0]) - 0.2 * along))
         phase = (first / RATE, count() / RATE)
         here = ring[-1] + [0, 0, 0.03]
         add(ring[-1] + smooth(300)[:, None] * (here - ring[-1]))

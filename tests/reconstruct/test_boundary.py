@@ -31,6 +31,14 @@ def test_a_phase_that_is_not_stated_is_detected():
     assert np.allclose(a.support_normal, b.support_normal)
 
 
+def test_a_trace_with_a_lift_in_it_is_detected_whole():
+    recording, _ = explore_cylinder(lift=True, state_phase=False)
+    whole, _ = explore_cylinder()
+    first, last = explore(whole).boundary.interval
+    found = explore(recording).boundary.interval
+    assert abs(found[0] - first) < 5 and abs(found[1] - last) < 5
+
+
 def test_contact_that_outlasts_the_stated_phase_belongs_to_it():
     recording, _ = explore_cylinder()
     start, end = recording.boundary_phase

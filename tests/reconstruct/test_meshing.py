@@ -1,0 +1,125 @@
+"""Tetrahedra: base planar and fixed, volume kept, quality reported."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from benchmarks._surface_truth import phantom_truth, touch
+from mechanics.errors import MeshError, SurfaceError
+from reconstruct.meshing import MeshingOptions, mesh_surface
+from reconstruct.shapes.balance import balanced
+from reconstruct.shapes.voxels import voxel_surface
+from reconstruct.surface import Surface, SurfaceOptions, reconstruct_surface
+
+
+@pytest.fixture(scope="module")
+def surface():
+    return reconstruct_surface(touch(phantom_truth("half-sphere"), 0)[0], SurfaceOptions(surface="sphere"))
+
+
+@pytest.fixture(scope="module")
+def meshing(surface):
+    return mesh_surface(surface, MeshingOptions(mesh_size_m=0.012))
+
+
+def test_fixed_nodes_are_the_base(surface, meshing):
+    mesh = meshing.mesh
+    height = (mesh.points - surface.support_point) @ surface.support_normal
+    assert np.abs(height[mesh.fixed]).max() < 1e-9
+    assert height[mesh.touchable].min() > 0
+    assert mesh.fixed.sum() > 40
+    assert not (mesh.fixed & mesh.touchable).any()
+    on_surface = np.zeros(len(mesh.points), dtype=bool)
+    on_surface[np.unique(mesh.surface)] = True
+    assert np.array_equal(on_surface, mesh.fixed | mesh.touchable)
+
+
+def test_the_mesh_fills_the_surface(surface, meshing):
+    report = meshing.report
+    assert report.volume_m3 == pytest.approx(surface.volume_m3, rel=0.005)
+    assert np.percentile(report.surface_distance_m, 95) < 0.0005
+    assert report.edge_m.mean() == pytest.approx(0.012, rel=0.25)
+    assert np.mean(report.radius_edge_ratio > 2) < 0.01
+
+
+def test_radius_edge_ratio_of_regular_tetrahedra():
+    from mechanics.tetmesh import TetMesh
+    from reconstruct.meshing import quality
+
+    corner = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
+    cell = np.array([[0, 1, 3, 2]])
+    volume = np.linalg.det(corner[cell[0, 1:]] - corner[cell[0, 0]])
+    cell = cell if volume > 0 else cell[:, [0, 2, 1, 3]]
+    yes = np.array([True, True, True, False])
+    mesh = TetMesh(corner, cell, yes, ~yes)
+    shell = Surface(
+        corner, mesh.surface, np.zeros(4), np.zeros(3), np.array([0, 0, 1.0]), method="known", reason=""
+    )
+    report = quality(mesh, shell)
+    assert report.radius_edge_ratio == pytest.approx(np.sqrt(6) / 4)
+    assert report.surface_distance_m.max() < 1e-9
+
+
+def test_uncertainty_reaches_the_nodes(surface, meshing):
+    found = meshing.shape_uncertainty_m
+    assert found.shape == (len(meshing.mesh.points),)
+    assert (found[meshing.mesh.touchable] > 0).all()
+    assert found.max() <= surface.uncertainty_m.max() + 1e-12
+
+
+def test_a_coarse_drawing_keeps_the_volume():
+    from reconstruct.shapes.cap import Cap
+
+    ball = Cap.sphere(np.array([0.0, 0, 0.01]), 0.05)
+    fine, coarse = ball.mesh(0.002), ball.mesh(0.009)
+
+    def volume(vertices, triangles):
+        c = vertices[triangles]
+        return np.einsum("ij,ij->i", np.cross(c[:, 0], c[:, 1]), c[:, 2]).sum() / 6
+
+    before = volume(*coarse) / volume(*fine) - 1
+    after = volume(balanced(coarse, fine), coarse[1]) / volume(*fine) - 1
+    assert before < -0.005
+    assert abs(after) < 0.15 * abs(before)
+
+
+def test_voxels_keep_the_base_and_the_volume():
+    truth = phantom_truth("block")
+    vertices, triangles = voxel_surface(truth.vertices, truth.triangles, 0.002)
+    corner = vertices[triangles]
+    volume = np.einsum("ij,ij->i", np.cross(corner[:, 0], corner[:, 1]), corner[:, 2]).sum() / 6
+    assert volume == pytest.approx(truth.volume_m3, rel=0.02)
+    assert vertices[:, 2].min() == 0.0
+
+
+def test_a_surface_with_a_hole_is_refused(surface):
+    with pytest.raises(SurfaceError, match="open"):
+        Surface(
+            surface.vertices,
+            surface.triangles[1:],
+            surface.uncertainty_m,
+            surface.support_point,
+            surface.support_normal,
+            method="known",
+            reason="",
+        )
+
+
+def test_a_mesh_size_of_nothing_is_refused(surface):
+    with pytest.raises(MeshError, match="mesh-size"):
+        mesh_surface(surface, MeshingOptions(mesh_size_m=0.0))
+
+
+def test_a_surface_off_the_support_is_refused(surface):
+    lifted = Surface(
+        surface.vertices + 0.02 * surface.support_normal,
+        surface.triangles,
+        surface.uncertainty_m,
+        surface.support_point,
+        surface.support_normal,
+        method="known",
+        reason="",
+    )
+    with pytest.raises(MeshError, match="support"):
+        mesh_surface(lifted, MeshingOptions(mesh_size_m=0.015))

@@ -1,0 +1,193 @@
+"""Surfaces of known shapes, touched by a seeded hand: geometry is the oracle."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from benchmarks._surface_truth import OWN, phantom_truth, touch
+from benchmarks.surface import deviation
+from mechanics.errors import SurfaceError
+from reconstruct.shapes.evidence import Evidence
+from reconstruct.surface import SurfaceOptions, reconstruct_surface
+
+MEAN_M, P95_M, VOLUME = 0.0012, 0.003, 0.04
+
+
+def reconstructed(truth, seed=0, surface="auto", change=lambda e: e, **hand):
+    evidence, back = touch(truth, seed, **hand)
+    found = reconstruct_surface(change(evidence), SurfaceOptions(surface=surface))
+    return found, deviation(truth, back(found.vertices), found.triangles)
+
+
+@pytest.mark.parametrize(
+    ("name", "method"), [("cylinder", "cylinder"), ("block", "block"), ("half-sphere", "sphere")]
+)
+def test_the_papers_shapes_are_recognised(name, method):
+    found, error = reconstructed(phantom_truth(name))
+    assert found.method.rstrip("+") == method
+    assert error["mean_m"] < 0.0003
+    assert abs(error["volume_error"]) < 0.01
+    assert "left out" in found.reason
+
+
+def test_a_sharp_shape_beats_the_hull_at_its_rims():
+    truth = phantom_truth("cylinder")
+    _, own = reconstructed(truth)
+    _, hull = reconstructed(truth, surface="hull")
+    assert own["p95_m"] < 0.1 * hull["p95_m"]
+    assert hull["volume_error"] < -0.05
+
+
+def test_a_bean_keeps_its_dent():
+    truth = phantom_truth("bean")
+    found, error = reconstructed(truth)
+    assert error["mean_m"] < MEAN_M
+    assert error["p95_m"] < P95_M
+    hull = found.mesh.convex_hull.volume
+    true_hull = deviation_of_hull(truth)
+    assert found.volume_m3 / hull == pytest.approx(true_hull, abs=0.02)
+
+
+def deviation_of_hull(truth):
+    import trimesh
+
+    return truth.volume_m3 / trimesh.Trimesh(truth.vertices, truth.triangles).convex_hull.volume
+
+
+@pytest.mark.parametrize("name", ["frustum", "ellipsoid", "blob", "gable"])
+def test_shapes_nobody_told_it_of(name):
+    _, error = reconstructed(OWN[name]())
+    assert error["mean_m"] < 1.5 * MEAN_M
+    assert error["p95_m"] < 1.5 * P95_M
+    assert abs(error["volume_error"]) < 1.5 * VOLUME
+
+
+def test_an_outline_that_no_point_sees_whole():
+    found, error = reconstructed(OWN["horseshoe"]())
+    assert found.method == "implicit"
+    assert error["mean_m"] < 1.5 * MEAN_M
+    assert abs(error["volume_error"]) < 1.5 * VOLUME
+
+
+@pytest.mark.slow
+def test_every_known_shape_within_the_targets():
+    from benchmarks.surface import truths
+
+    for name, make in truths().items():
+        _, error = reconstructed(make(), seed=3)
+        assert error["mean_m"] < 1.5 * MEAN_M, name
+        assert abs(error["volume_error"]) < 1.5 * VOLUME, name
+
+
+def test_bad_presses_do_not_bend_the_surface():
+    def spoil(evidence: Evidence) -> Evidence:
+        centres = evidence.centres.copy()
+        centres[[3, 11]] -= 0.004 * evidence.normals[[3, 11]]
+        return replace(evidence, centres=centres)
+
+    found, error = reconstructed(phantom_truth("bean"), 1, change=spoil)
+    assert error["mean_m"] < 0.0006
+
+
+def test_the_hull_lies_inside_a_convex_object_and_the_tangent_planes_outside():
+    truth = phantom_truth("block")
+    found, _ = reconstructed(truth)
+    low, high = found.bracket_m3
+    assert low < truth.volume_m3
+    assert low < found.volume_m3 < 1.02 * high
+
+
+def test_the_frame_of_the_device_does_not_matter():
+    truth = phantom_truth("half-sphere")
+    evidence, _ = touch(truth, 4)
+    quarter = np.array([[0.0, 0, 1], [1, 0, 0], [0, 1, 0]])
+    shift = np.array([0.3, -0.2, 0.1])
+    turned = replace(
+        evidence,
+        **{
+            name: getattr(evidence, name) @ quarter.T + shift
+            for name in ("support_point", "outline", "outline_centres", "centres")
+        },
+        **{name: getattr(evidence, name) @ quarter.T for name in ("support_normal", "normals")},
+    )
+    one, two = reconstruct_surface(evidence), reconstruct_surface(turned)
+    assert one.method == two.method
+    assert two.volume_m3 == pytest.approx(one.volume_m3, rel=1e-3)
+
+
+def test_the_base_lies_on_the_support():
+    found, _ = reconstructed(phantom_truth("dome"))
+    height = (found.vertices - found.support_point) @ found.support_normal
+    assert height.min() == pytest.approx(0, abs=1e-9)
+    assert (np.abs(height) < 1e-9).sum() > 50
+
+
+def test_uncertainty_is_small_at_touches_and_large_at_rims():
+    truth = phantom_truth("cylinder")
+    evidence, back = touch(truth, 0)
+    found = reconstruct_surface(evidence)
+    local = back(found.vertices)
+    radius = np.linalg.norm(local[:, :2], axis=1)
+    rim = (np.abs(local[:, 2] - 0.08) < 0.002) & (np.abs(radius - 0.04) < 0.002)
+    wall = (np.abs(radius - 0.04) < 0.001) & (np.abs(local[:, 2] - 0.04) < 0.01)
+    assert found.uncertainty_m[rim].mean() > 0.001
+    assert found.uncertainty_m[wall].mean() < 0.0003
+
+
+def test_uncertainty_covers_the_error_of_a_free_form():
+    truth = OWN["blob"]()
+    evidence, back = touch(truth, 2)
+    found = reconstruct_surface(evidence)
+    from reconstruct.proximity import distance
+
+    local = back(found.vertices)
+    off = local[:, 2] > 0.012
+    error = distance(truth.vertices, truth.triangles, local[off])
+    assert np.mean(error < 3 * found.uncertainty_m[off] + 5e-5) > 0.85
+
+
+def test_too_few_touches_are_refused():
+    evidence, _ = touch(phantom_truth("block"), 0)
+    with pytest.raises(SurfaceError, match="touch more places"):
+        replace(evidence, centres=evidence.centres[:3], normals=evidence.normals[:3], centre_error_m=1e-4)
+
+
+def test_values_that_are_not_finite_are_refused():
+    evidence, _ = touch(phantom_truth("block"), 0)
+    centres = evidence.centres.copy()
+    centres[0, 0] = np.nan
+    with pytest.raises(SurfaceError, match="not finite"):
+        replace(evidence, centres=centres)
+
+
+def test_touches_on_the_support_alone_are_refused():
+    evidence, _ = touch(phantom_truth("block"), 0)
+    height = (evidence.centres - evidence.origin) @ evidence.axes[2]
+    flat = evidence.centres - (height - evidence.tip_radius_m)[:, None] * evidence.axes[2]
+    with pytest.raises(SurfaceError, match="on the support"):
+        reconstruct_surface(replace(evidence, centres=flat))
+
+
+def test_the_labelled_recordings_meet_the_targets(shared_recordings):
+    from mechanics.recording import read_recording
+    from reconstruct.contacts import explore
+    from reconstruct.surface import evidence_of
+
+    stems = {
+        "silicone-1-cylinder": "cylinder",
+        "silicone-2-block": "block",
+        "silicone-3-halfsphere": "half-sphere",
+    }
+    for stem, name in stems.items():
+        recording = read_recording(shared_recordings / f"{stem}.toml")
+        found = reconstruct_surface(evidence_of(explore(recording)))
+        truth = recording.truth
+        turn = np.array(truth.get("device_from_object_rotation", np.eye(3)))
+        shift = 1e-3 * np.array(truth.get("device_from_object_shift_mm", [0, 0, 0]))
+        error = deviation(phantom_truth(name), (found.vertices - shift) @ turn, found.triangles)
+        assert error["mean_m"] < MEAN_M, stem
+        assert error["p95_m"] < P95_M, stem
+        assert abs(error["volume_error"]) < VOLUME, stem
