@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from mechanics.errors import ContactError
+from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
@@ -21,7 +21,14 @@ _GAP_S = 1.0
 class BoundaryOptions:
     """How the base is sampled."""
 
-    base_spacing_m: float = option(0.005, "threshold d of the farthest-point sampling of the base", unit="m")
+    base_spacing_m: float = option(
+        0.005, "threshold d of the farthest-point sampling of the base", unit="m", flag="--base-spacing"
+    )
+
+    def __post_init__(self) -> None:
+        """Raises OptionError for a spacing that is not positive."""
+        if not self.base_spacing_m > 0:
+            raise OptionError(f"--base-spacing is {self.base_spacing_m} m; it must be greater than 0")
 
 
 @dataclass(frozen=True)

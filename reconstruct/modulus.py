@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import theilslopes
 
+from mechanics.errors import OptionError
 from mechanics.options import option
 from mechanics.sites import TouchSites
 from reconstruct.contacts import Exploration
@@ -46,6 +47,17 @@ class ModulusOptions:
     )
     bootstraps: int = option(1000, "resamples of the sites for the 95 % interval", flag="--bootstraps")
     site_m: float = option(0.008, "presses closer than this repeat one site", unit="m", flag="--site-size")
+
+    def __post_init__(self) -> None:
+        """Raises OptionError for sizes that are not positive, errors below 0, or fewer than 20 resamples."""
+        for flag, value in (("--site-size", self.site_m), ("--greatest-depth", self.greatest_depth_m)):
+            if value is not None and not value > 0:
+                raise OptionError(f"{flag} is {value} m; it must be greater than 0")
+        for flag, value in (("--law-error", self.law_error), ("--law-bias", self.law_bias)):
+            if not 0 <= value < 1:
+                raise OptionError(f"{flag} is {value}; it must lie between 0 and 1 (a share)")
+        if self.bootstraps < 20:
+            raise OptionError(f"--bootstraps is {self.bootstraps}; an interval needs at least 20 resamples")
 
 
 @dataclass(frozen=True)

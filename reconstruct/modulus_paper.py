@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.elasticity import stiffness
-from mechanics.errors import ContactError
+from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
@@ -27,6 +27,11 @@ class PaperOptions:
     indentation_m: float = option(
         0.010, "method paper: displacement at which each press is read", unit="m", flag="--indentation"
     )
+
+    def __post_init__(self) -> None:
+        """Raises OptionError for an indentation that is not positive."""
+        if not self.indentation_m > 0:
+            raise OptionError(f"--indentation is {self.indentation_m} m; it must be greater than 0")
 
 
 @dataclass(frozen=True)

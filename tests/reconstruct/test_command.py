@@ -103,6 +103,11 @@ def test_too_few_presses_are_found(files, tmp_path, capsys):
         (("--mesh-size", "0"), "--mesh-size"),
         (("--method", "paper"), "usable palpations"),
         (("--beside", "nowhere"), "no MODEL folder"),
+        (("--base-spacing", "0"), "--base-spacing"),
+        (("--indentation", "-0.01"), "--indentation"),
+        (("--site-size", "0"), "--site-size"),
+        (("--law-bias", "2"), "between 0 and 1"),
+        (("--bootstraps", "1"), "at least 20"),
     ],
 )
 def test_bad_options_say_what_is_allowed(files, tmp_path, capsys, words, part):
