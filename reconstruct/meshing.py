@@ -1,4 +1,5 @@
-"""Tetrahedra inside a surface: base exactly on the support and fixed, everything else touchable (section 2.2)."""
+"""Tetrahedra inside a surface: base exactly on the support and fixed, everything else touchable (section
+2.2)."""
 
 from __future__ import annotations
 
@@ -38,7 +39,8 @@ class MeshingOptions:
 
 @dataclass(frozen=True)
 class MeshReport:
-    """Achieved quality. radius_edge_ratio: (m,). surface_distance_m: (k,) of samples of mesh and surface, both ways.
+    """Achieved quality. radius_edge_ratio: (m,). surface_distance_m: (k,) of samples of mesh and surface,
+    both ways.
 
     edge_m: (e,) edge lengths. volume_m3 of the mesh; surface_volume_m3 of the surface it fills.
     """
@@ -95,7 +97,8 @@ def mesh_surface(
 
 
 def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:
-    """What the mesher is given, device frame: a drawing no finer than the tetrahedra need, or the voxels' surface."""
+    """What the mesher is given, device frame: a drawing no finer than the tetrahedra need, or the voxels'
+    surface."""
     frame = surface.frame
     if options.mesh_source == "voxels":
         flat = (surface.vertices - surface.support_point) @ frame.T
@@ -115,7 +118,8 @@ def _boundary(cells: np.ndarray) -> np.ndarray:
 def _stand(
     points: np.ndarray, cells: np.ndarray, origin: np.ndarray, up: np.ndarray, reach_m: float
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes of downward faces within `reach_m` of the support, put on it: points, tetrahedra, which nodes those are.
+    """Nodes of downward faces within `reach_m` of the support, put on it: points, tetrahedra, which nodes
+    those are.
 
     Tetrahedra that this flattens onto the support are left out, and nodes that no tetrahedron uses.
     """
@@ -160,7 +164,8 @@ def quality(mesh: TetMesh, surface: Surface) -> MeshReport:
 
 
 def uncertainty_at(mesh: TetMesh, surface: Surface) -> np.ndarray:
-    """(n,) the surface's uncertainty at each node: of the closest place on it; 0 on the base's nodes inside."""
+    """(n,) the surface's uncertainty at each node: of the closest place on it; 0 on the base's nodes
+    inside."""
     found = np.zeros(len(mesh.points))
     nodes = np.flatnonzero(mesh.touchable)
     _, triangle, weight = closest(surface.vertices, surface.triangles, mesh.points[nodes])

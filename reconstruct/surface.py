@@ -14,11 +14,12 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from reconstruct.proximity import distance
 from reconstruct.shapes.balance import balanced
-from reconstruct.shapes.candidates import FITTED, first_guesses
+from reconstruct.shapes.candidates import FITTED, HiddenOutlineError, first_guesses
 from reconstruct.shapes.drawing import draw
 from reconstruct.shapes.evidence import Evidence, support_axes
 from reconstruct.shapes.fit import Seen, fit
 from reconstruct.shapes.hull import hull_surface
+from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
 from reconstruct.shapes.kriging import Explained, explain
 from reconstruct.shapes.tangent import tangent_surface
 
@@ -27,10 +28,15 @@ if TYPE_CHECKING:
 
     from reconstruct.contacts import Exploration
 
-SURFACES = ("auto", "hull", "tangent", *FITTED)
+SURFACES = ("auto", "hull", "tangent", "implicit", *FITTED)
+
+_IMPLICIT_CELL_M = 0.005
 
 _CORRECTED = 6
 """So many of the best shapes are tried with a free residual field as well."""
+
+_POOR_M = 0.0012
+"""Above this held-out error of the best shape, the implicit surface is tried as well."""
 
 Redraw = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
@@ -49,12 +55,12 @@ class SurfaceOptions:
 class Surface:
     """A closed surface standing on the support; device frame, m.
 
-    vertices: (n, 3). triangles: (m, 3), outward by the right-hand rule, base included.
-    uncertainty_m: (n,) standard deviation of the surface along its normal at each vertex.
-    support_point, support_normal: (3,). method: the shape's name, with '+' where a free field corrects it.
-    reason: why it was chosen, in words. parameters: what the shape's fit found (support frame). held_out_m: rms error
-    of touches that were held out, place by place, for every shape tried. bracket_m3: volumes of the hull of the touches
-    and of the tangent planes' intersection, between which a convex object's lies. redraw: the same surface with
+    vertices: (n, 3). triangles: (m, 3), outward by the right-hand rule, base included. uncertainty_m: (n,)
+    standard deviation of the surface along its normal at each vertex. support_point, support_normal: (3,).
+    method: the shape's name, with '+' where a free field corrects it. reason: why it was chosen, in words.
+    parameters: what the shape's fit found (support frame). held_out_m: rms error of touches that were held
+    out, place by place, for every shape tried. bracket_m3: volumes of the hull of the touches and of the
+    tangent planes' intersection, between which a convex object's lies. redraw: the same surface with
     triangles of another edge length (m), of the same volume; None where it has no finer truth.
     """
 
@@ -130,8 +136,24 @@ def reconstruct_surface(
         return _surface(
             evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bounds(evidence)
         )
-    tried = try_shapes(evidence, options.surface, progress)
+    if options.surface == "implicit":
+        return _implicit(evidence, options, "asked for")
+    try:
+        tried = try_shapes(evidence, options.surface, progress)
+    except HiddenOutlineError:
+        if options.surface != "auto":
+            raise
+        return _implicit(
+            evidence, options, "no point sees the whole base outline, which the other shapes need"
+        )
     best = max(tried, key=score)
+    error = held_out_error(best)
+    if options.surface == "auto" and error > _POOR_M:
+        implicit = _implicit(
+            evidence, options, f"no shape explains the touches ({best.name}: {1e3 * error:.2f} mm)"
+        )
+        if implicit.held_out_m["implicit"] < 0.8 * error:
+            return implicit
     vertices, triangles, deviation = draw(best, options.surface_spacing_m)
     deviation = np.hypot(deviation, _spread(vertices, best, tried))
     facing = best.feet[1][: len(evidence.centres)] @ evidence.axes
@@ -156,6 +178,24 @@ def reconstruct_surface(
     )
 
 
+def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:
+    vertices, triangles = implicit_surface(evidence, options.surface_spacing_m)
+    error = implicit_held_out(evidence, Seen.of(evidence))
+    deviation = implicit_deviation(evidence, vertices)
+    text = f"{why}; predicts touches at places left out within {1e3 * error:.2f} mm"
+    return _surface(
+        evidence,
+        vertices,
+        triangles,
+        deviation,
+        "implicit",
+        text,
+        None,
+        {"implicit": error},
+        bounds(evidence),
+    )
+
+
 def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = silent) -> list[Explained]:
     """Every shape (or those named `which`), fitted, without and with a free residual field."""
     seen = Seen.of(evidence)
@@ -168,7 +208,8 @@ def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = sil
         progress("surface", (k + 1) / (len(guesses) + 3))
     for plain in sorted(tried, key=score)[-_CORRECTED:]:
         free = explain(plain.shape, plain.lean_m, seen, free=True)
-        # a free field follows systematic errors of the touches as well: it must predict places it has not seen
+        # a free field follows systematic errors of the touches as well: it must predict places it has not
+        # seen
         if held_out_error(free) < held_out_error(plain):
             tried.append(free)
     return tried
@@ -197,7 +238,8 @@ def reason(best: Explained, tried: list[Explained]) -> str:
 
 
 def bounds(evidence: Evidence) -> tuple[float, float]:
-    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or nan)."""
+    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or
+    nan)."""
     import trimesh
 
     low = trimesh.Trimesh(*hull_surface(evidence), process=False).volume

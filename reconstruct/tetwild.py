@@ -1,7 +1,7 @@
 """Tetrahedra inside a closed surface by fTetWild, in a process of its own.
 
-fTetWild leaves a file in the current folder, prints, and cannot be stopped: a child process in a temporary folder
-keeps all three away from the caller.
+fTetWild leaves a file in the current folder, prints, and cannot be stopped: a child process in a temporary
+folder keeps all three away from the caller.
 """
 
 from __future__ import annotations
@@ -16,12 +16,10 @@ import numpy as np
 from mechanics.errors import MeshError
 
 _CHILD = """
-import sys, numpy as np, pytetwild
+import numpy as np, pytetwild
 given = np.load("surface.npz")
-points, cells = pytetwild.tetrahedralize(
-    given["vertices"], given["triangles"], edge_length_abs=float(given["edge"]), epsilon=float(given["envelope"]),
-    stop_energy=float(given["energy"]), num_threads=int(given["threads"]), num_opt_iter=int(given["passes"]),
-)
+settings = {name: given[name].item() for name in given.files if name not in ("vertices", "triangles")}
+points, cells = pytetwild.tetrahedralize(given["vertices"], given["triangles"], **settings)
 np.savez("mesh.npz", points=points, cells=cells)
 """
 
@@ -35,12 +33,13 @@ def tetrahedralize(
     energy: float = 10.0,
     passes: int = 80,
     threads: int = 0,
-    timeout_s: float = 120.0,
+    timeout_s: float = 300.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
 
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
-    energy: the optimisation stops at this AMIPS energy (3 is ideal). Raises MeshError where nothing comes back.
+    energy: the optimisation stops at this AMIPS energy (3 is ideal). Raises MeshError where nothing comes
+    back.
     """
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
@@ -48,11 +47,11 @@ def tetrahedralize(
             Path(folder) / "surface.npz",
             vertices=np.asarray(vertices, dtype=np.float64),
             triangles=np.asarray(triangles, dtype=np.int32),
-            edge=edge_m,
-            envelope=envelope_m / diagonal,
-            energy=energy,
-            passes=passes,
-            threads=threads,
+            edge_length_abs=edge_m,
+            epsilon=envelope_m / diagonal,
+            stop_energy=energy,
+            num_opt_iter=passes,
+            num_threads=threads,
         )
         try:
             done = subprocess.run(
@@ -64,7 +63,7 @@ def tetrahedralize(
             )
         except subprocess.TimeoutExpired as error:
             raise MeshError(
-                f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size ({edge_m} m was asked for)"
+                f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size (asked: {edge_m} m)"
             ) from error
         result = Path(folder) / "mesh.npz"
         if not result.is_file():

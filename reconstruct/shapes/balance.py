@@ -1,4 +1,5 @@
-"""A coarse drawing of a surface that encloses what the fine one does: chords cut curved faces, this puts them back."""
+"""A coarse drawing of a surface that encloses what the fine one does: chords cut curved faces, this puts them
+back."""
 
 from __future__ import annotations
 
@@ -7,13 +8,15 @@ import numpy as np
 from reconstruct.shapes.drawing import corner_normals, moved, signed_gap
 
 _SAMPLES = np.array([[1 / 3, 1 / 3, 1 / 3], [0.6, 0.2, 0.2], [0.2, 0.6, 0.2], [0.2, 0.2, 0.6]])
+_WEIGHTS = np.array([-27, 25, 25, 25]) / 48
+"""Strang and Fix's rule of third degree for the mean over a triangle."""
 
 
 def balanced(
     coarse: tuple[np.ndarray, np.ndarray], fine: tuple[np.ndarray, np.ndarray], rounds: int = 2
 ) -> np.ndarray:
-    """The coarse surface's vertices (n, 3), moved along their normals until its triangles lie on the fine surface in
-    the mean; both as (vertices, triangles) in the support frame. The base stays on z = 0."""
+    """The coarse surface's vertices (n, 3), moved along their normals until its triangles lie on the fine
+    surface in the mean; both as (vertices, triangles) in the support frame. The base stays on z = 0."""
     vertices, triangles = coarse
     on_base = vertices[:, 2] < 1e-9
     used = ~on_base[triangles].all(axis=1)
@@ -23,7 +26,7 @@ def balanced(
         area = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
         size = np.linalg.norm(area, axis=1)
         samples = np.einsum("sk,tkj->tsj", _SAMPLES, corner).reshape(-1, 3)
-        gap = signed_gap(*fine, samples).reshape(-1, len(_SAMPLES)).mean(axis=1)
+        gap = signed_gap(*fine, samples).reshape(-1, len(_SAMPLES)) @ _WEIGHTS
         row = _rows(owner, normals, triangles[used], area / np.maximum(size, 1e-18)[:, None])
         weight = np.repeat(size, 3)
         total = np.bincount(row, weight, len(owner))
@@ -33,7 +36,8 @@ def balanced(
 
 
 def _rows(owner: np.ndarray, normals: np.ndarray, triangles: np.ndarray, unit: np.ndarray) -> np.ndarray:
-    """(3 m,) which row of (owner, normals) each triangle's corners belong to: of its vertex, the likest normal."""
+    """(3 m,) which row of (owner, normals) each triangle's corners belong to: of its vertex, the likest
+    normal."""
     first = np.searchsorted(owner, np.arange(owner.max() + 2))
     vertex, facing = triangles.ravel(), np.repeat(unit, 3, axis=0)
     best = first[vertex]

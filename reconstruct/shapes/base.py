@@ -1,4 +1,5 @@
-"""What every fitted shape can do: tell distances, follow its parameters, and be drawn as rings of triangles."""
+"""What every fitted shape can do: tell distances, follow its parameters, and be drawn as rings of
+triangles."""
 
 from __future__ import annotations
 
@@ -10,7 +11,8 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Parameter:
-    """One number of a shape: what it is, its prior spread (one standard deviation) and its bounds; m, rad or 1."""
+    """One number of a shape: what it is, its prior spread (one standard deviation) and its bounds; m, rad or
+    1."""
 
     label: str
     value: float
@@ -23,8 +25,8 @@ class Parameter:
 class Shape(Protocol):
     """A shape in the support frame with free parameters.
 
-    name: as `--surface` spells it. complexity: how many ideas it needs; of two that predict held-out touches alike the
-    simpler is taken. faceted: side and top are separate faces that may err differently.
+    name: as `--surface` spells it. complexity: how many ideas it needs; of two that predict held-out touches
+    alike the simpler is taken. faceted: side and top are separate faces that may err differently.
     """
 
     name: str
@@ -36,7 +38,8 @@ class Shape(Protocol):
         """The same shape with other parameter values."""
 
     def distance(self, points: np.ndarray) -> np.ndarray:
-        """Signed distance (k,) m of points (k, 3), positive outside; right for points on or outside the shape."""
+        """Signed distance (k,) m of points (k, 3), positive outside; right for points on or outside the
+        shape."""
 
     def mesh(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
         """Closed triangle surface: vertices (n, 3), outward triangles (m, 3), base on z = 0."""
@@ -73,7 +76,8 @@ def parameter_slopes(shape: Shape, points: np.ndarray) -> np.ndarray:
 
 
 def rings_to_mesh(rings: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rings (r, n, 3), from the base's rim upwards, counter-clockwise from above, closed by an apex (3,) and a base.
+    """Rings (r, n, 3), from the base's rim upwards, counter-clockwise from above, closed by an apex (3,) and
+    a base.
 
     The base is drawn with inner rings towards the middle of the rim's radii, flat on the first ring's plane.
     """
@@ -96,7 +100,8 @@ def rings_to_mesh(rings: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.n
 def project(implicit: object, points: np.ndarray, rounds: int = 4) -> np.ndarray:
     """Signed distance (k,) of points (k, 3) from the zero set of `implicit(points) -> (k,)`, by Newton steps.
 
-    The foot is sought along the gradient and then, so that it is the closest one, along the normal found there.
+    The foot is sought along the gradient and then, so that it is the closest one, along the normal found
+    there.
     """
     step = 2e-5
     shifts = step * np.vstack([np.zeros(3), np.eye(3), -np.eye(3)])

@@ -8,8 +8,8 @@ from scipy.spatial import cKDTree
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.base import Shape
 from reconstruct.shapes.cap import Cap
-from reconstruct.shapes.cushion import Cushion
 from reconstruct.shapes.crown import Crown
+from reconstruct.shapes.cushion import Cushion
 from reconstruct.shapes.dish import Dish
 from reconstruct.shapes.dome import Dome
 from reconstruct.shapes.evidence import Evidence
@@ -36,16 +36,20 @@ _ROUND_M = 0.0015
 """A rim further from a circle than this, as a standard deviation, carries no round shape."""
 
 
+class HiddenOutlineError(SurfaceError):
+    """No point of the base sees its whole outline, so that the fitted shapes cannot be drawn."""
+
+
 def first_guesses(evidence: Evidence, seen: Seen) -> list[Shape]:
     """One or more starts of each shape that the outline allows.
 
-    Raises SurfaceError where no point sees the whole outline.
+    Raises HiddenOutlineError where no point sees the whole outline, SurfaceError where nothing stands on it.
     """
     rim = evidence.to_support(evidence.outline)[:, :2]
     outward = evidence.to_support(evidence.outline_centres)[:, :2] - rim
     centre, cosine = seeing_centre(rim, outward / max(evidence.tip_radius_m, 1e-9))
     if cosine <= 0:
-        raise SurfaceError("no point sees the whole base outline: use --surface implicit")
+        raise HiddenOutlineError("no point sees the whole base outline: use --surface implicit")
     curve = smooth_curve(rim, centre)
     straight, round_ = polygon(curve, rim), circle(rim)
     height = float(seen.centres[:, 2].max() - seen.tip_radius_m)
@@ -84,7 +88,8 @@ def _dishes(seen: Seen, outlines: list[Outline]) -> list[Shape]:
     spacing = float(np.median(cKDTree(places).query(places, k=2)[0][:, 1])) if len(places) > 2 else 0.02
     bottom = feet[top][np.argmin(feet[top, 2])]
     highest = int(np.argmax(feet[:, 2]))
-    # a level place that high is on the rim itself; else hands keep half a spacing away from it, on a wall that slopes
+    # a level place that high is on the rim itself; else hands keep half a spacing away from it, on a wall
+    # that slopes
     height = feet[highest, 2] + (0.0 if seen.normals[highest, 2] > 0.94 else 0.35 * spacing)
     return [Dish.of(outline, float(height), bottom) for outline in outlines]
 

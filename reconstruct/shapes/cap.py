@@ -11,7 +11,8 @@ from reconstruct.shapes.base import Parameter, project, rings_to_mesh, values_of
 
 @dataclass(frozen=True)
 class Cap:
-    """Sphere: centre_x_m, centre_y_m, centre_z_m, radius_m. Ellipsoid: the three semi-axes and turn_rad instead."""
+    """Sphere: centre_x_m, centre_y_m, centre_z_m, radius_m. Ellipsoid: the three semi-axes and turn_rad
+    instead."""
 
     name: str
     parameters: tuple[Parameter, ...]

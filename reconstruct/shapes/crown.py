@@ -13,8 +13,8 @@ from reconstruct.shapes.prism import Prism
 
 @dataclass(frozen=True)
 class Crown:
-    """The upright prism's parameters, then slope_x, slope_y (1) and bend_xx, bend_xy, bend_yy (1/m) of the top:
-    z = height + slope . d + d . bend . d / 2 with d from the outline's centre."""
+    """The upright prism's parameters, then slope_x, slope_y (1) and bend_xx, bend_xy, bend_yy (1/m) of the
+    top: z = height + slope . d + d . bend . d / 2 with d from the outline's centre."""
 
     prism: Prism
     parameters: tuple[Parameter, ...]

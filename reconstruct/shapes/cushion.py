@@ -1,4 +1,5 @@
-"""An extrusion whose top edge is rounded over a width: walls, a rounding, and a flat top where it is wide enough."""
+"""An extrusion whose top edge is rounded over a width: walls, a rounding, and a flat top where it is wide
+enough."""
 
 from __future__ import annotations
 
@@ -12,7 +13,8 @@ from reconstruct.shapes.outline import Outline
 
 @dataclass(frozen=True)
 class Cushion:
-    """Height falls with the distance s inside the outline: ((w - s) / w)^p + ((z - h + d) / d)^p = 1 for s < w.
+    """Height falls with the distance s inside the outline: ((w - s) / w)^p + ((z - h + d) / d)^p = 1 for s <
+    w.
 
     Parameters: grown_m, height_m h, rounding_width_m w, rounding_share d / h, exponent p.
     """

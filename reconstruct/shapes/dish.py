@@ -15,8 +15,8 @@ from reconstruct.shapes.prism import Prism
 class Dish:
     """The prism's parameters, then ball_x_m, ball_y_m, ball_z_m (its centre) and ball_radius_m.
 
-    Nobody touches the rim, so its height is known from the highest touch only: its prior stands half a touch spacing
-    above, as far as hands keep away from edges.
+    Nobody touches the rim, so its height is known from the highest touch only: its prior stands half a touch
+    spacing above, as far as hands keep away from edges.
     """
 
     prism: Prism

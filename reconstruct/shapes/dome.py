@@ -1,4 +1,5 @@
-"""A dome over any base outline: (rho)^p + (z / h)^q = 1 with rho the outline's gauge; the top may lean over."""
+"""A dome over any base outline: (rho)^p + (z / h)^q = 1 with rho the outline's gauge; the top may lean
+over."""
 
 from __future__ import annotations
 
@@ -14,8 +15,8 @@ from reconstruct.shapes.outline import Outline
 class Dome:
     """Every level is the base outline shrunk towards its centre: cushions, breasts, kidneys, rounded columns.
 
-    Parameters: grown_m, height_m, wall_exponent p, cap_exponent q, and how far the top leans, lean_x_m, lean_y_m
-    (growing with the square of the height).
+    Parameters: grown_m, height_m, wall_exponent p, cap_exponent q, and how far the top leans, lean_x_m,
+    lean_y_m (growing with the square of the height).
     """
 
     outline: Outline

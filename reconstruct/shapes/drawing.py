@@ -16,8 +16,8 @@ _ROUNDING_M = 0.010
 def draw(explained: Explained, spacing_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Vertices (n, 3) in the support frame, outward triangles (m, 3), and standard deviations (n,) m.
 
-    Where a free field is used, vertices move along their normals (along all of them at an edge) until the tip touches
-    at every touch; the base stays on z = 0. A shape without one keeps its exact faces.
+    Where a free field is used, vertices move along their normals (along all of them at an edge) until the tip
+    touches at every touch; the base stays on z = 0. A shape without one keeps its exact faces.
     """
     vertices, triangles = explained.shape.mesh(spacing_m)
     on_base = vertices[:, 2] < 1e-9
@@ -100,7 +100,8 @@ def signed_gap(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) 
 def _rim_deviation(
     vertices: np.ndarray, owner: np.ndarray, normals: np.ndarray, on_base: np.ndarray, explained: Explained
 ) -> np.ndarray:
-    """(n,) m: an edge may be rounded as far as the nearest touch, unnoticed. Uniform radius, so 0.41 / 3^(1/2) of it."""
+    """(n,) m: an edge may be rounded as far as the nearest touch, unnoticed. Uniform radius, so 0.41 /
+    3^(1/2) of it."""
     count = np.bincount(owner, minlength=len(vertices))
     edge = np.flatnonzero((count > 1) & ~on_base)
     found = np.zeros(len(vertices))

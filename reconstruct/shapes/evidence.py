@@ -1,8 +1,8 @@
 """What a hand told about a shape: where its spherical tip met the object and the support.
 
-Shapes are fitted in the support frame: origin on the support below the middle of the base, z along the support's
-normal. A touch says that the tip's centre is one tip radius away from the surface; its force says roughly where the
-surface faces.
+Shapes are fitted in the support frame: origin on the support below the middle of the base, z along the
+support's normal. A touch says that the tip's centre is one tip radius away from the surface; its force says
+roughly where the surface faces.
 """
 
 from __future__ import annotations
@@ -19,11 +19,11 @@ from mechanics.errors import SurfaceError
 class Evidence:
     """Touches and base outline; device frame, m.
 
-    support_point, support_normal: (3,), the support's plane, normal into the object.
-    outline: (k, 3) rim of the base on the support, tip radius taken off, ordered along the path (which may overlap
-    itself). outline_centres: (k, 3) the tip's centre there, one tip radius above the support.
-    centres: (m, 3) tip's centre at first touch. normals: (m, 3) outward unit normals from the first force, a few
-    degrees wrong. centre_error_m: (m,) standard deviation of a centre along the normal.
+    support_point, support_normal: (3,), the support's plane, normal into the object. outline: (k, 3) rim of
+    the base on the support, tip radius taken off, ordered along the path (which may overlap itself).
+    outline_centres: (k, 3) the tip's centre there, one tip radius above the support. centres: (m, 3) tip's
+    centre at first touch. normals: (m, 3) outward unit normals from the first force, a few degrees wrong.
+    centre_error_m: (m,) standard deviation of a centre along the normal.
     Raises SurfaceError where arrays disagree, are not finite or hold too few points.
     """
 
@@ -48,11 +48,11 @@ class Evidence:
         object.__setattr__(self, "centre_error_m", error)
         if self.outline.ndim != 2 or len(self.outline) < 8:
             raise SurfaceError(
-                f"the base outline has {len(self.outline)} points; at least 8 are needed: trace the object's whole base"
+                f"the base outline has {len(self.outline)} points; 8 are needed: trace the whole base"
             )
         if self.centres.ndim != 2 or len(self.centres) < 4:
             raise SurfaceError(
-                f"{len(self.centres)} touches cannot carry a surface; at least 4 are needed: touch more places"
+                f"{len(self.centres)} touches carry no surface; at least 4 are needed: touch more places"
             )
         if self.normals.shape != self.centres.shape or self.outline_centres.shape != self.outline.shape:
             raise SurfaceError("normals need one row a touch, outline_centres one row an outline point")

@@ -24,8 +24,8 @@ _ROBUST_M = 0.0003
 class Seen:
     """The evidence as the fits want it: support frame, the outline thinned.
 
-    centres: (m, 3). outline: (k, 3) tip's centre. normals: (m, 3). error_m: (m,). sites: (m,) place number of each
-    touch; repeats share one.
+    centres: (m, 3). outline: (k, 3) tip's centre. normals: (m, 3). error_m: (m,). sites: (m,) place number of
+    each touch; repeats share one.
     """
 
     centres: np.ndarray
@@ -66,7 +66,8 @@ def sites(centres: np.ndarray, reach_m: float) -> np.ndarray:
 
 
 def residuals(shape: Shape, seen: Seen, lean_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Gap (m,) between the shape and the touching tip, and (k,) the same along the outline; m, outward positive."""
+    """Gap (m,) between the shape and the touching tip, and (k,) the same along the outline; m, outward
+    positive."""
     found = shape.distance(np.vstack([seen.centres, seen.outline])) - seen.tip_radius_m
     return found[: len(seen.centres)], found[len(seen.centres) :] + lean_m
 

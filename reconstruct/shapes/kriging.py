@@ -1,10 +1,10 @@
 """What a fitted shape leaves unexplained, spread over its surface with its uncertainty (a Gaussian process).
 
-The true surface lies g(p) outside the fitted one. Each touch says what g is at its foot, up to an error; g is smooth
-along the surface and says little across an edge (its covariance falls with distance and with the turn of the normal).
-The shape's parameters stay uncertain beside it: their slopes enter the same covariance (universal kriging), so that
-held-out errors and the uncertainty of places that nobody touched are in closed form. Rasmussen & Williams, Gaussian
-Processes for Machine Learning, eqs. 2.25-2.26, 2.42 and 5.12.
+The true surface lies g(p) outside the fitted one. Each touch says what g is at its foot, up to an error; g is
+smooth along the surface and says little across an edge (its covariance falls with distance and with the turn
+of the normal). The shape's parameters stay uncertain beside it: their slopes enter the same covariance
+(universal kriging), so that held-out errors and the uncertainty of places that nobody touched are in closed
+form. Rasmussen & Williams, Gaussian Processes for Machine Learning, eqs. 2.25-2.26, 2.42 and 5.12.
 """
 
 from __future__ import annotations
@@ -24,7 +24,8 @@ _TURN = 0.6
 
 @dataclass(frozen=True)
 class Law:
-    """Standard deviation of g on walls and on tops (m), its correlation length (m), and the touches' error (m)."""
+    """Standard deviation of g on walls and on tops (m), its correlation length (m), and the touches' error
+    (m)."""
 
     wall_m: float
     top_m: float
@@ -70,7 +71,8 @@ class Explained:
 
     @cached_property
     def gap(self) -> np.ndarray:
-        """(m + k,) m: how far the true surface lies outside the shape, seen at each touch and outline point."""
+        """(m + k,) m: how far the true surface lies outside the shape, seen at each touch and outline
+        point."""
         return np.concatenate(residuals(self.shape, self.seen, self.lean_m))
 
     @cached_property
@@ -82,7 +84,8 @@ class Explained:
 
     @cached_property
     def slopes(self) -> np.ndarray:
-        """(m + k, p + 1) of the gap with each parameter, in its prior standard deviations, and with the lean."""
+        """(m + k, p + 1) of the gap with each parameter, in its prior standard deviations, and with the
+        lean."""
         centres = np.vstack([self.seen.centres, self.seen.outline])
         spread = np.array([p.spread for p in self.shape.parameters])
         lean = np.concatenate([np.zeros(len(self.seen.centres)), np.ones(len(self.seen.outline))])
@@ -111,7 +114,8 @@ class Explained:
 
     @cached_property
     def held_out(self) -> tuple[np.ndarray, np.ndarray]:
-        """Per place: root mean square of its touches' errors (m) and their log density, predicted without that place."""
+        """Per place, predicted without it: root mean square error (m) of its touches that are not bad, and
+        log density."""
         inverse = cho_solve(self._factor, np.eye(len(self.gap)))
         weighted = inverse @ self.gap
         error, density = [], []
@@ -119,7 +123,9 @@ class Explained:
             own = np.flatnonzero(self.seen.sites == site)
             block = inverse[np.ix_(own, own)]
             miss = np.linalg.solve(block, weighted[own])
-            error.append(np.sqrt(np.mean(miss**2)))
+            good = self.seen.error_m[own] < _FAR_M
+            if good.any():
+                error.append(np.sqrt(np.mean(miss[good] ** 2)))
             # Gaussian, but a miss beyond four deviations counts linearly: one bad press must not decide
             square = miss @ block @ miss / len(own)
             square = min(square, 8 * np.sqrt(max(square, 1e-12)) - 16) if square > 16 else square
@@ -127,8 +133,15 @@ class Explained:
             density.append(-0.5 * square + 0.5 * logdet)
         return np.array(error), np.array(density)
 
+    @cached_property
+    def misses(self) -> np.ndarray:
+        """(m,) m, error of each touch as all the others predict it (repeats at its place included)."""
+        inverse = cho_solve(self._factor, np.eye(len(self.gap)))
+        return ((inverse @ self.gap) / np.diag(inverse))[: len(self.seen.centres)]
+
     def field(self, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """How far the true surface lies outside the shape at its points (k, 3) with normals: mean m, variance m^2."""
+        """How far the true surface lies outside the shape at its points (k, 3) with normals: mean m, variance
+        m^2."""
         slopes, across = self._across(points, normals)
         own = self.law.size(normals) ** 2 + (slopes**2).sum(axis=1)
         variance = own - np.einsum("ij,ji->i", across, cho_solve(self._factor, across.T))
@@ -145,13 +158,32 @@ class Explained:
         return slopes, self.law.covariance(points, normals, *self.feet) + slopes @ self.slopes[:, :-1].T
 
 
+_FAR, _FAR_M, _BAD_AT_MOST = 6.0, 0.0006, 0.15
+"""A touch is bad that lies six typical deviations and 0.6 mm off, if they are at most 15 % of all."""
+
 _TOUCH_M = (2e-5, 1e-4, 3e-4, 1e-3)
 _FIELD_M = (0.0003, 0.001, 0.003, 0.01)
 _LENGTH_M = (0.02, 0.04, 0.08)
 
 
 def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained:
-    """The residual field of greatest likelihood; without one (free false) only the touches' error is sought."""
+    """The residual field of greatest likelihood; without one (free false) only the touches' error is sought.
+
+    Touches that lie far off while all others agree are given their own error, so that a bad press neither
+    bends the surface nor speaks against a shape more than once.
+    """
+    found = _explain(shape, lean_m, seen, free=free)
+    touches = len(seen.centres)
+    miss = found.misses if free else found.gap[:touches]
+    typical = 1.4826 * float(np.median(np.abs(miss)))
+    bad = np.abs(miss) > max(_FAR * typical, _FAR_M)
+    if not 0 < bad.sum() <= _BAD_AT_MOST * touches:
+        return found
+    error = np.where(bad, np.maximum(np.abs(miss), seen.error_m), seen.error_m)
+    return _explain(shape, lean_m, replace(seen, error_m=error), free=free)
+
+
+def _explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained:
     start = Explained(shape, seen, lean_m, Law(0.0, 0.0, 0.03, _TOUCH_M[0]))
     shared = {name: getattr(start, name) for name in ("gap", "feet", "slopes")}
 

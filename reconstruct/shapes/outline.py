@@ -1,7 +1,8 @@
-"""The base's outline in the plane of the support: circle, polygon with straight sides, or a smooth closed curve.
+"""The base's outline in the plane of the support: circle, polygon with straight sides, or a smooth closed
+curve.
 
-The tip was leaned into the object's foot while tracing, so an outline is known up to an inward bias, which the fits
-of `reconstruct.shapes.fit` estimate from the touches.
+The tip was leaned into the object's foot while tracing, so an outline is known up to an inward bias, which
+the fits of `reconstruct.shapes.fit` estimate from the touches.
 """
 
 from __future__ import annotations
@@ -22,8 +23,8 @@ _SHORTEST_SIDE_M = 0.009
 class Outline:
     """A closed curve seen whole from its centre; support frame, m.
 
-    kind: 'circle', 'polygon' or 'curve'. vertices: (n, 2), counter-clockwise, not closed (corners of a polygon,
-    dense points of the others). centre: (2,), a point from which every vertex is seen.
+    kind: 'circle', 'polygon' or 'curve'. vertices: (n, 2), counter-clockwise, not closed (corners of a
+    polygon, dense points of the others). centre: (2,), a point from which every vertex is seen.
     """
 
     kind: str
@@ -42,7 +43,8 @@ class Outline:
 
     @cached_property
     def _distance_map(self) -> Callable[[np.ndarray], np.ndarray]:
-        """The distance on a grid, splined: a curve of many short pieces is asked some hundred thousand times."""
+        """The distance on a grid, splined: a curve of many short pieces is asked some hundred thousand
+        times."""
         step, margin = 0.002, 0.012
         low = self.vertices.min(axis=0) - margin
         count = np.ceil((self.vertices.max(axis=0) + margin - low) / step).astype(int) + 1
@@ -61,7 +63,8 @@ class Outline:
         return interpolated
 
     def ring(self, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
-        """Points (n, 2) along the outline about `spacing_m` apart, corners kept, and outward unit normals (n, 2)."""
+        """Points (n, 2) along the outline about `spacing_m` apart, corners kept, and outward unit normals (n,
+        2)."""
         ends = np.roll(self.vertices, -1, axis=0)
         if self.kind == "polygon":
             pieces = []
@@ -123,7 +126,8 @@ def sides(vertices: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def corners(angles: np.ndarray, offsets: np.ndarray) -> np.ndarray:
-    """Vertices of the polygon whose side k has outward angle `angles[k]` at `offsets[k]`; inverse of `sides`."""
+    """Vertices of the polygon whose side k has outward angle `angles[k]` at `offsets[k]`; inverse of
+    `sides`."""
     before, before_offset = np.roll(angles, 1), np.roll(offsets, 1)
     turn = np.sin(angles - before)
     turn = np.where(np.abs(turn) < 1e-3, np.copysign(1e-3, turn), turn)
@@ -133,7 +137,8 @@ def corners(angles: np.ndarray, offsets: np.ndarray) -> np.ndarray:
 
 
 def seeing_centre(rim: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, float]:
-    """A point that sees the whole rim (k, 2) best, and the least cosine at which it does (negative: not star-shaped)."""
+    """A point that sees the whole rim (k, 2) best, and the least cosine at which it does (negative: not
+    star-shaped)."""
     low, high = rim.min(axis=0), rim.max(axis=0)
     grid = np.stack(
         np.meshgrid(*(np.linspace(a, b, 25) for a, b in zip(low, high, strict=True))), -1
@@ -150,7 +155,8 @@ def seeing_centre(rim: np.ndarray, outward: np.ndarray) -> tuple[np.ndarray, flo
 
 
 def smooth_curve(rim: np.ndarray, centre: np.ndarray, count: int = 180) -> Outline:
-    """Closed curve through overlapping, noisy rim points (k, 2): radius over angle with a curvature penalty."""
+    """Closed curve through overlapping, noisy rim points (k, 2): radius over angle with a curvature
+    penalty."""
     offset = rim - centre
     radius = np.linalg.norm(offset, axis=1)
     place = np.arctan2(offset[:, 1], offset[:, 0]) / (2 * np.pi) * count % count

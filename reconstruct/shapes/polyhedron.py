@@ -18,8 +18,8 @@ _TOPS_AT_MOST = 5
 
 @dataclass(frozen=True)
 class Polyhedron:
-    """Parameters: side_k_rad, side_k_m and tilt_k_rad of each wall (tilt inwards), then height, slope_x, slope_y of
-    each top plane z = height + slope . (x, y)."""
+    """Parameters: side_k_rad, side_k_m and tilt_k_rad of each wall (tilt inwards), then height, slope_x,
+    slope_y of each top plane z = height + slope . (x, y)."""
 
     walls: int
     tops: int
@@ -117,7 +117,8 @@ class Polyhedron:
 
 
 def refine(vertices: np.ndarray, triangles: np.ndarray, spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """Split every edge longer than 4/3 of the spacing at its middle, until none is left; the surface stays closed."""
+    """Split every edge longer than 4/3 of the spacing at its middle, until none is left; the surface stays
+    closed."""
     for _ in range(12):
         edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         unique, inverse = np.unique(edges, axis=0, return_inverse=True)
@@ -160,7 +161,8 @@ def _wall_gap(
 
 
 def _planes(centres: np.ndarray, normals: np.ndarray, tip_radius_m: float) -> list[np.ndarray]:
-    """(height, slope_x, slope_y) of planes on which several touches lie and as which they face (seeded RANSAC)."""
+    """(height, slope_x, slope_y) of planes on which several touches lie and as which they face (seeded
+    RANSAC)."""
     rng = np.random.default_rng(0)
     left, found = np.arange(len(centres)), []
     while len(left) >= 3 and len(found) < _TOPS_AT_MOST:
@@ -186,7 +188,8 @@ def _planes(centres: np.ndarray, normals: np.ndarray, tip_radius_m: float) -> li
 
 
 def _plane(points: np.ndarray) -> np.ndarray | None:
-    """(4,): upward unit normal and offset of the plane through points; None where they are in a line or it stands."""
+    """(4,): upward unit normal and offset of the plane through points; None where they are in a line or it
+    stands."""
     middle = points.mean(axis=0)
     _, size, axes = np.linalg.svd(points - middle)
     if size[1] < 0.006 or abs(axes[2, 2]) < 0.25:

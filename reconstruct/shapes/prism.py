@@ -128,7 +128,8 @@ class Prism:
 
 
 def _lean(outline: Outline, rim: np.ndarray, outward: np.ndarray) -> np.ndarray:
-    """(n, 2): how far the rim moves inwards a metre of height for a draft of 45 degrees; mitred at corners."""
+    """(n, 2): how far the rim moves inwards a metre of height for a draft of 45 degrees; mitred at
+    corners."""
     if outline.kind != "polygon":
         return outward
     moved = outline.grown(-1e-4).vertices

@@ -1,4 +1,5 @@
-"""Outer bound of a convex object: the half-spaces behind the tangent planes at all touches, and the base's."""
+"""Outer bound of a convex object: the half-spaces behind the tangent planes at all touches, and the
+base's."""
 
 from __future__ import annotations
 
@@ -17,10 +18,10 @@ _SECTORS = 48
 def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
     """Vertices (n, 3) and outward triangles (m, 3) in the support frame, base on z = 0.
 
-    A plane stands at every touch, moved out by `slack_m`, facing as the first force says but turned as far as needed
-    for no other touch to lie before it (`supporting_normals`), so that the hull lies inside. An object that does not
-    lean outwards stays within its base: an upright plane stands at each of 48 sectors of
-    the outline, as far out as tracing hands lean in.
+    A plane stands at every touch, moved out by `slack_m`, facing as the first force says but turned as far as
+    needed for no other touch to lie before it (`supporting_normals`), so that the hull lies inside. An object
+    that does not lean outwards stays within its base: an upright plane stands at each of 48 sectors of the
+    outline, as far out as tracing hands lean in.
     Raises SurfaceError where the planes enclose nothing.
     """
     rim = evidence.to_support(evidence.outline)[:, :2]
@@ -51,7 +52,8 @@ def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarra
 
 
 def supporting_normals(points: np.ndarray, normals: np.ndarray, others: np.ndarray) -> np.ndarray:
-    """The unit normals (k, 3) closest to `normals` whose planes through `points` (k, 3) have all `others` behind them.
+    """The unit normals (k, 3) closest to `normals` whose planes through `points` (k, 3) have all `others`
+    behind them.
 
     Projection onto the cone {n: n . (q - p) <= 0 for all q}, by non-negative least squares on its polar cone
     (Moreau). A point inside the others' hull has no such plane and keeps its normal.

@@ -1,4 +1,5 @@
-"""The paper's volumetric detour: a grid labelled inside or outside, and the surface between the labels (section 2.2)."""
+"""The paper's volumetric detour: a grid labelled inside or outside, and the surface between the labels
+(section 2.2)."""
 
 from __future__ import annotations
 
@@ -13,11 +14,12 @@ _LEFT_OUT = 0.85
 def voxel_surface(
     vertices: np.ndarray, triangles: np.ndarray, pitch_m: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (n, 3) and outward triangles (m, 3) between voxels of edge `pitch_m` labelled inside and the others.
+    """Vertices (n, 3) and outward triangles (m, 3) between voxels of edge `pitch_m` labelled inside and the
+    others.
 
-    Support frame. Layers are placed so that the base comes to lie on z = 0 again. The surface is the labels' mean
-    level after one smoothing over neighbours: hull facets of poor quality are gone, corners are rounded by about a
-    voxel. Raises SurfaceError where the object is thinner than a voxel.
+    Support frame. Layers are placed so that the base comes to lie on z = 0 again. The surface is the labels'
+    mean level after one smoothing over neighbours: hull facets of poor quality are gone, corners are rounded
+    by about a voxel. Raises SurfaceError where the object is thinner than a voxel.
     """
     import pyvista
     from scipy.ndimage import gaussian_filter
