@@ -2,8 +2,8 @@
 
 Sampled at T and delayed by n ticks, a device renders a stiffness stably up to a limit that its maker states
 at 1 kHz; it falls with T (1 + 2 n) (Colgate and Schenkel 1997: b > K T / 2, and each tick of delay adds K T),
-and because the passivity controller's damper must shrink by the same factor, by that factor to the power 1.5
-here (chosen on `palpate bench stability`). An object stiffer than that, k, is felt through a series spring c
+and because the passivity controller's damper must shrink by the same factor, by that factor squared here
+(chosen on `palpate bench stability`). An object stiffer than that, k, is felt through a series spring c
 that brings it to the limit exactly; softer places are softened less, and soft objects not at all:
 
     1 / k_felt = 1 / k + c,    c = max(0, 1 / k_limit - 1 / k_stiffest)
@@ -24,7 +24,7 @@ def stable_stiffness_n_per_m(
 ) -> float:
     """What a device that renders `max_stiffness_n_per_m` at 1 kHz renders at this rate and delay."""
     slower = max(1.0, 1000.0 / rate_hz) * (1.0 + 2.0 * delay_ticks)
-    return max_stiffness_n_per_m / slower**1.5
+    return max_stiffness_n_per_m / slower**2
 
 
 def series_compliance_m_per_n(stiffest_n_per_m: float, limit_n_per_m: float) -> float:

@@ -21,7 +21,7 @@ from mechanics.tetmesh import TetMesh
 from render.bvh import Bvh, build_bvh
 
 CREASE_DEGREES = 35.0
-NORMAL_SMOOTHING_M = 1.5e-3
+NORMAL_SMOOTHING_M = 2.5e-3
 
 
 class SurfaceArrays(NamedTuple):

@@ -1,0 +1,89 @@
+"""Rendered effects: memory, softening, adhesion, stiffening, tip radius, friction, as a model names them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.errors import ModelError
+
+from . import shapes
+
+TIP = 0.005
+
+
+@pytest.fixture(scope="module")
+def base():
+    """A small block and its compliance."""
+    made = shapes.model(shapes.block((0.08, 0.08, 0.05), (4, 4, 3)))
+    return made, shapes.quick_compliance(made)
+
+
+def render_with(base, **effects):
+    from render.fem import FemRenderer
+    from render.options import RenderOptions
+
+    made, compliance = base
+    return FemRenderer(
+        made.replaced(effects=effects), RenderOptions(dent_law="linear"), compliance=compliance
+    )
+
+
+def force(renderer, height, dt=1e-3):
+    path = np.zeros((len(height), 1, 3))
+    path[:, 0, 2] = 0.05 + TIP + np.asarray(height)
+    return renderer.follow(renderer.start(), path, np.full(len(height), dt))[:, 0, 2]
+
+
+IN = np.linspace(1e-3, -4e-3, 200)
+
+
+def test_viscoelastic_force_starts_stiffer_and_relaxes_to_the_elastic_one(base):
+    path = np.concatenate([IN, np.full(3000, -4e-3)])
+    elastic = force(render_with(base), path)
+    slow = force(render_with(base, viscoelasticity={"g": [0.3], "tau_s": [0.3]}), path)
+    assert 1.15 < slow[199] / elastic[199] < 1.3
+    assert slow[-1] == pytest.approx(elastic[-1], rel=1e-3)
+    step = np.concatenate([[1e-3], np.full(5, -4e-3)])
+    jump = force(render_with(base, viscoelasticity={"g": [0.3], "tau_s": [0.3]}), step)
+    assert jump[1] == pytest.approx(1.3 * elastic[-1], rel=5e-3)
+
+
+def test_mullins_softens_the_second_press_below_the_first_depth(base):
+    twice = np.concatenate([IN, IN[::-1], IN])
+    soft = force(render_with(base, mullins_softening={"r": 4.0, "m_rel": 0.3}), twice)
+    elastic = force(render_with(base), twice)
+    assert soft[:200] == pytest.approx(elastic[:200], abs=1e-12)
+    assert soft[520] < 0.9 * elastic[520]
+    assert soft[599] == pytest.approx(elastic[599], rel=1e-6)
+
+
+def test_adhesion_pulls_at_release_only(base):
+    both = np.concatenate([IN, IN[::-1]])
+    sticky = force(render_with(base, adhesion={"pull_off_n": 0.1, "range_m": 5e-4}), both)
+    elastic = force(render_with(base), both)
+    assert sticky[:200] == pytest.approx(elastic[:200], abs=1e-12)
+    assert sticky.min() == pytest.approx(-0.1, rel=0.1)
+    assert sticky[-1] == 0.0
+    assert np.abs(np.diff(sticky)).max() < 0.03
+
+
+def test_stiffening_larger_tip_and_finite_strain_change_the_deep_force(base):
+    elastic = force(render_with(base), IN)[-1]
+    assert force(render_with(base, strain_stiffening={"c20_over_c10": 0.35}), IN)[-1] > 1.01 * elastic
+    assert force(render_with(base, tip_radius={"tip_radius_m": 0.0065}), IN)[-1] > 1.03 * elastic
+
+
+def test_an_effect_with_impossible_keys_is_refused(base):
+    with pytest.raises(ModelError, match="tau_s"):
+        render_with(base, viscoelasticity={"g": [0.3], "tau_s": [0.3, 1.0]})
+    with pytest.raises(ModelError, match="range_m"):
+        render_with(base, adhesion={"pull_off_n": 0.1})
+    with pytest.raises(ModelError, match="friction_slip"):
+        render_with(base, friction_slip={"mu": -1.0})
+
+
+def test_instrument_effects_are_not_rendered(base):
+    plain = force(render_with(base), IN)
+    biased = force(render_with(base, force_bias={"bias_n": [0, 0, 1.0]}, time_delay={"delay_s": 0.02}), IN)
+    assert plain.tobytes() == biased.tobytes()

@@ -1,0 +1,66 @@
+"""The contact surface: round where the mesh is round, closed, drawn through the touches; the search is
+exact."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.palpation import Palpation
+from render.bvh import STACK, closest_triangle
+from render.options import RenderOptions
+from render.snapping import touch_gaps, touched_surface
+from render.surface import contact_surface
+
+from . import shapes
+
+
+def test_a_cylinder_of_coarse_facets_is_felt_round():
+    mesh = shapes.cylinder(0.04, 0.08, (8, 8))
+    arrays = contact_surface(mesh).arrays
+    radius = np.linalg.norm(arrays.vertices[:, :2], axis=1)
+    side = (np.abs(arrays.vertices[:, 2] - 0.04) < 0.03) & (radius > 0.035)
+    assert np.abs(radius[side] - 0.04).max() < 6e-5  # the flat facets are 0.3 mm off
+    outward = arrays.vertices[side, :2] / radius[side, None]
+    assert (arrays.normals[side, :2] * outward).sum(axis=1).min() > 0.999
+
+
+def test_a_block_keeps_its_flat_faces_and_edges():
+    arrays = contact_surface(shapes.block((0.1, 0.1, 0.05), (5, 5, 3))).arrays
+    extent = arrays.vertices.max(axis=0)
+    assert extent == pytest.approx([0.05, 0.05, 0.05], abs=1e-12)
+    inner = (arrays.vertices[:, 2] > 0.0499) & (np.abs(arrays.vertices[:, :2]).max(axis=1) < 0.04)
+    assert arrays.normals[inner] == pytest.approx(np.tile([0, 0, 1.0], (inner.sum(), 1)), abs=2e-3)
+
+
+def test_the_search_finds_the_closest_triangle():
+    arrays = contact_surface(shapes.block((0.1, 0.06, 0.05), (4, 3, 3)), edge_m=8e-3).arrays
+    weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
+    p = arrays.vertices[arrays.triangles]
+    for tip in np.random.default_rng(0).uniform(-0.1, 0.1, (50, 3)):
+        triangle, distance = closest_triangle(
+            arrays.bvh, arrays.vertices, arrays.triangles, tip, np.inf, weights, stack
+        )
+        assert np.linalg.norm(weights @ p[triangle] - tip) == pytest.approx(distance)
+        box = np.maximum(np.abs(tip - [0, 0, 0.025]) - [0.05, 0.03, 0.025], 0)
+        inside = np.min(np.array([0.05, 0.03, 0.025]) - np.abs(tip - [0, 0, 0.025]))
+        assert distance == pytest.approx(np.linalg.norm(box) if inside < 0 else inside, abs=1e-9)
+
+
+def test_the_surface_is_drawn_to_the_touched_points():
+    shift = 4e-4
+    rows = tuple(
+        Palpation(1.0, 2.0, x, y, 0.05 + shift, 0.0, 0.0, 1.0, 0.004)
+        for x in (-0.02, 0.02)
+        for y in (-0.02, 0.02)
+    )
+    made = shapes.model(shapes.block((0.1, 0.1, 0.05), (6, 6, 3)), palpations=rows)
+    before = touch_gaps(contact_surface(made.mesh).arrays, made)[2]
+    surface = touched_surface(made, RenderOptions())
+    after = touch_gaps(surface.arrays, made)[2]
+    assert before == pytest.approx(np.full(4, shift), abs=1e-9)
+    assert np.abs(after).max() < 5e-5
+    far = surface.arrays.vertices[surface.arrays.vertices[:, 2] < 0.01]
+    assert np.abs(far).max(axis=0)[0] == pytest.approx(0.05, abs=1e-5)
+    kept = touched_surface(made, RenderOptions(snap_to_touches=False)).arrays.vertices
+    assert kept[:, 2].max() == pytest.approx(0.05)
