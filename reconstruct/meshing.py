@@ -74,6 +74,9 @@ def mesh_surface(
     progress("meshing", 0.0)
     up, origin = surface.support_normal, surface.support_point
     sigma = options.surface_distance_m
+    lowest = float(((surface.vertices - origin) @ up).min())
+    if abs(lowest) > 0.1 * sigma:
+        raise MeshError(f"the surface ends {1e3 * lowest:.2f} mm above the support; it must stand on it")
     vertices, triangles = _input(surface, options)
     # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
     envelope = (

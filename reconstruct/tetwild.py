@@ -63,7 +63,7 @@ def tetrahedralize(
             )
         except subprocess.TimeoutExpired as error:
             raise MeshError(
-                f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size (asked: {edge_m} m)"
+                f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size than {edge_m} m"
             ) from error
         result = Path(folder) / "mesh.npz"
         if not result.is_file():

@@ -26,6 +26,9 @@ def voxel_surface(
 
     low = vertices.min(axis=0) - 3 * pitch_m
     count = np.ceil((vertices.max(axis=0) + 3 * pitch_m - low) / pitch_m).astype(int) + 1
+    # what a side gains or loses against the grid is shared with the opposite one
+    middle = (vertices.max(axis=0) + vertices.min(axis=0)) / 2
+    low = middle - pitch_m * (count - 1) / 2
     low[2] = -3.5 * pitch_m
     grid = pyvista.ImageData(dimensions=tuple(count), spacing=(pitch_m,) * 3, origin=tuple(low))
     shell = pyvista.PolyData.from_regular_faces(vertices, triangles)
