@@ -2,16 +2,15 @@
 
 limit: the dense inverse (potrf, potri) of a matrix as large as the result. schur:
 mechanics.compliance.condense.
-columns: a solve a column from the same factor, one at a time (SOFA's way) and in batches; timed on a
-sample of columns and scaled. Memory: the greatest resident set of a fresh process that condenses, less
-that before.
+Times are wall and CPU: on a shared machine the CPU ratios are the fairer ones. columns: a solve a column
+from the same factor, one at a time (SOFA's way) and in batches; timed on a sample of columns and scaled.
+Memory: the greatest resident set of a fresh process that condenses, less that before.
 """
 
 from __future__ import annotations
 
 import argparse
 import multiprocessing
-import time
 from pathlib import Path
 
 import numpy as np
@@ -86,33 +85,37 @@ def one_size(touchable: int, order: int, repeats: int) -> dict[str, float]:
     """Seconds of each way for one mesh."""
     mesh = block(touchable, order)
     large = mesh.touchable.sum() > 3000
-    schur = measure(lambda: condense(mesh, 0.49), repeats=1 if large else repeats, warm_up=0 if large else 1)
+    repeats = 1 if large else repeats
+    schur = measure(lambda: condense(mesh, 0.49), repeats=repeats, warm_up=0 if large else 1)
     n = 3 * int(mesh.touchable.sum())
     rng = np.random.default_rng(0)
     dense = rng.normal(size=(n, 200))
     dense = dense @ dense.T / 200 + np.eye(n)
-    limit = measure(lambda: inverse(dense.copy()), repeats=1 if large else repeats, warm_up=0 if large else 1)
-    copy = measure(dense.copy, repeats=1, warm_up=0).median_s
-    started = time.perf_counter()
+    limit = measure(lambda: inverse(dense.copy()), repeats=repeats, warm_up=0 if large else 1)
+    factor = measure(lambda: Solver(mesh, 0.49), repeats=1, warm_up=0)
     solver = Solver(mesh, 0.49)
-    factor = time.perf_counter() - started
     one = np.zeros((len(solver.free), 1))
     one[5] = 1
     many = np.zeros((len(solver.free), 96), order="F")
     many[np.arange(96) * 3, np.arange(96)] = 1
-    single = measure(lambda: solver.solve_free(one), repeats=15).median_s
-    batch = measure(lambda: solver.solve_free(many), repeats=3).median_s / 96
-    return {
-        "touchable_nodes": n // 3,
-        "unknowns": len(solver.free),
-        "schur_s": schur.median_s,
-        "schur_spread": schur.spread,
-        "limit_s": limit.median_s - copy,
-        "columns_s": factor + n * single,
-        "columns_in_batches_s": factor + n * batch,
-        "factor_s": factor,
-        "result_gb": 8e-9 * n * n,
-    }
+    single = measure(lambda: solver.solve_free(one), repeats=15)
+    batch = measure(lambda: solver.solve_free(many), repeats=3)
+    row: dict[str, float] = {"touchable_nodes": n // 3, "unknowns": len(solver.free)}
+    for clock in ("median_s", "cpu_median_s"):
+        name = clock.removesuffix("median_s")
+        whole, least = getattr(schur, clock), getattr(limit, clock)
+        columns = getattr(factor, clock) + n * getattr(single, clock)
+        batches = getattr(factor, clock) + n * getattr(batch, clock) / 96
+        row |= {
+            f"schur_{name}s": whole,
+            f"limit_{name}s": least,
+            f"columns_{name}s": columns,
+            f"columns_in_batches_{name}s": batches,
+            f"{name}over_limit": whole / least,
+            f"{name}columns_over_schur": columns / whole,
+            f"{name}batches_over_schur": batches / whole,
+        }
+    return row | {"result_gb": 8e-9 * n * n}
 
 
 def run(arguments: argparse.Namespace) -> dict:
@@ -122,9 +125,6 @@ def run(arguments: argparse.Namespace) -> dict:
     results = []
     for touchable in arguments.touchable:
         row = one_size(touchable, arguments.order, arguments.repeats)
-        row["over_limit"] = row["schur_s"] / row["limit_s"]
-        row["columns_over_schur"] = row["columns_s"] / row["schur_s"]
-        row["batches_over_schur"] = row["columns_in_batches_s"] / row["schur_s"]
         if not arguments.no_memory:
             peak, need = fresh_memory(touchable, arguments.order)
             row |= {"peak_gb": peak / 1e9, "peak_over_need": peak / need}

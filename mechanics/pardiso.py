@@ -56,6 +56,7 @@ class Pardiso:
         self._iparm = np.zeros(64, dtype=np.int32)
         self._iparm[0] = 1  # the values below, not the library's defaults
         self._iparm[1] = 2  # nested dissection
+        self._iparm[17] = -1  # tell the number of nonzeros in the factor
         self._iparm[34] = 1  # zero-based indices
         self._perm = np.zeros(self.size, dtype=np.int32)
         self.schur: np.ndarray | None = None
