@@ -30,7 +30,8 @@ SPATIAL = (
 )
 """Effects that differ from site to site rather than within a press."""
 
-SLOW_STAGES = ("poisson", "unbonded", "springs")
+LINEAR_UNLESS = -8.0
+"""Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
 
 
 @dataclass(frozen=True)
@@ -39,11 +40,15 @@ class AttributionOptions:
 
     gain: float = option(150.0, "least gain in log likelihood over held-out sites that names an effect")
     spatial_gain: float = option(120.0, "the same for effects that live in a few places, penalised in sample")
+    plain_gain: float = option(35.0, "a lower gain that is enough where the gap closes plainly ...")
+    plain_share: float = option(0.35, "... by at least this share on held-out sites")
     z: float = option(2.5, "least gain over its own standard error across sites")
     size_n: float = option(0.009, "least size of an effect: rms change of force after the refit", unit="N")
     toward: float = option(
         0.3, "least share of an effect's own size by which it lowers the plain gap in sample"
     )
+    first_share: float = option(0.10, "least share of the held-out gap that the first effect closes")
+    further_share: float = option(0.25, "the same for each further effect, of what is left")
     rival_share: float = option(
         0.12, "a rival within this share of the winner's gain counts as not told apart"
     )
@@ -73,6 +78,7 @@ class Score:
 
     gain: log likelihood, deflated by its own lack of fit. z: gain over its standard error across sites.
     size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
+    share: of the old excess over the noise.
     toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
     """
 
@@ -81,6 +87,7 @@ class Score:
     z: float
     size_n: float
     closes: float
+    share: float
     toward: float
     per_group: np.ndarray
     candidate: Candidate
@@ -90,13 +97,16 @@ class Score:
 class Attribution:
     """The search's outcome. base: what effects were added to (finite strain in it where the data prefer it).
 
-    ideal: linear elasticity alone. chosen: names, strongest first. scores: of every single effect on the
+    ideal: linear elasticity alone; deep: neo-Hookean alone. finite_strain_gain: log likelihood, in the final
+    set.
+    chosen: names, strongest first. scores: of every single effect on the
     base.
     final: the chosen set. rivals: names not told apart from a chosen one. path: what each step looked like.
     """
 
     base: Candidate
     ideal: Candidate
+    deep: Candidate
     scores: dict[str, Score]
     chosen: tuple[str, ...]
     rivals: tuple[str, ...]
@@ -122,34 +132,34 @@ class Search:
         whitener = Whitener(forward, forward.ideal(modulus), nuisance, site_sd)
         onset = first_touches(forward, whitener, modulus)
         rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
-        settings = settings_of(forward, [finite_strain], rough.values, rough.onset)
-        self.whitener = Whitener(forward, settings, nuisance, site_sd)
-        self.dof = 3.0 * float(self.whitener.counts().sum())
-        self._start = (rough.modulus, rough.onset)
-        self._cache: dict[tuple[str, ...], Candidate] = {}
         self.finite_strain = finite_strain
+        self.renew(rough)
+
+    def renew(self, found: Fit) -> None:
+        """Weigh from now on with the nuisances as they are at a fit; earlier judgements are forgotten."""
+        settings = settings_of(self.forward, found.effects, found.values, found.onset)
+        self.whitener = Whitener(self.forward, settings, self.nuisance, self.site_sd)
+        self.dof = 3.0 * float(self.whitener.counts().sum())
+        self._near = found
+        self._cache: dict[tuple[str, ...], Candidate] = {}
 
     def judge(self, effects: Sequence[Effect], like: Candidate | None = None) -> Candidate:
-        """Fit a set and judge it on held-out groups; starts from `like` where given."""
+        """Fit a set and judge it on held-out groups; starts from `like`, or from what was last settled on."""
         key = tuple(sorted(e.name for e in effects))
         if key in self._cache:
             return self._cache[key]
-        modulus, onset = self._start if like is None else (like.found.modulus, like.found.onset)
-        start = None
-        found: Fit | None = None
-        if like is not None and len(effects) == len(like.found.effects) + 1:
-            added = [e for e in effects if e.name not in like.found.names][0]
-            order = [*like.found.effects, added]
-            starts = [np.concatenate([like.found.values, own]) for own in added.starts(self.forward)]
-            found = self._best(order, starts, modulus, onset)
-        if found is None:
-            found = fit(self.forward, self.whitener, effects, modulus=modulus, start=start, onset=onset)
+        near = self._near if like is None else like.found
+        starts = [np.array([near.values[0]])]
+        for effect in effects:
+            own = [near.of(effect.name)] if effect.name in near.names else effect.starts(self.forward)
+            starts = [np.concatenate([s, o]) for s in starts for o in own]
+        found = self._best(list(effects), starts, near.onset)
         held, plain = held_out(found)
         candidate = Candidate(found, held, plain, self.dof)
         self._cache[key] = candidate
         return candidate
 
-    def _best(self, order: list[Effect], starts: list[np.ndarray], modulus: float, onset: np.ndarray) -> Fit:
+    def _best(self, order: list[Effect], starts: list[np.ndarray], onset: np.ndarray) -> Fit:
         from diagnose.fit import _Descent
 
         descent = _Descent(self.forward, self.whitener, tuple(order), None)
@@ -175,28 +185,34 @@ class Search:
         closes = float((old.plain.sum() - new.plain.sum()) / counted.sum())
         squares = [(c.found.residual[counted] ** 2).sum(axis=1).mean() for c in (old, new)]
         toward = float((squares[0] - squares[1]) / max(size**2, 1e-12))
-        return Score(name, float(gain / over), float(z), size, closes, toward, per_group / over, new)
+        noise = 3 * self.forward.touches.noise_n**2
+        excess = max(float(old.plain.sum() / counted.sum()) - noise, 0.02 * noise)
+        share = closes / excess
+        return Score(name, float(gain / over), float(z), size, closes, share, toward, per_group / over, new)
 
-    def passes(self, score: Score) -> bool:
-        """Whether a score names its effect."""
+    def passes(self, score: Score, *, first: bool = True) -> bool:
+        """Whether a score names its effect; one beside another must close a fair share of what is left."""
         o = self.options
-        if score.size_n < o.size_n:
+        if score.size_n < o.size_n or score.toward < o.toward:
             return False
-        if score.name in SPATIAL:
-            held = score.closes > 0 or (score.name == "inclusion" and score.closes > -0.3 * score.size_n**2)
-            return score.gain > o.spatial_gain and score.toward > o.toward and held
-        return score.gain > o.gain and score.z > o.z and score.closes > 0 and score.toward > o.toward
+        if score.name == "inclusion":
+            return score.gain > o.spatial_gain and score.share > -0.3
+        if score.share < (o.first_share if first else o.further_share):
+            return False
+        if score.gain > o.plain_gain and score.share > o.plain_share and score.z > 2.0:
+            return True
+        return score.gain > o.spatial_gain if score.name in SPATIAL else score.gain > o.gain and score.z > o.z
 
 
 def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:
     """Forward selection with backward check; rivals of the first choice are declared."""
     fs = search.finite_strain
-    ideal = search.judge([])
-    deep = search.judge([fs])
-    finite_strain_gain = float(ideal.found.loss - deep.found.loss)
-    base = deep if finite_strain_gain > 0 else ideal
+    ideal, deep = search.judge([]), search.judge([fs])
+    _, strain_gain = _with_strain(search, [])
+    base = deep if strain_gain > LINEAR_UNLESS else ideal
     library = [e for e in effects if e.name not in ("finite_strain", "surface_shape")]
-    current, chosen = base, []
+    current = base
+    chosen: list[str] = []
     steps: list[dict[str, Score]] = []
     for step in range(search.options.most):
         scores: dict[str, Score] = {}
@@ -207,29 +223,41 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
             candidate = search.judge([*current.found.effects, effect], like=current)
             scores[effect.name] = search.score(effect.name, candidate, current)
         steps.append(scores)
-        passing = [s for s in scores.values() if search.passes(s)]
+        passing = [s for s in scores.values() if search.passes(s, first=not chosen)]
         if not passing:
             break
         best = max(passing, key=lambda s: s.gain)
         chosen.append(best.name)
-        current = best.candidate
-    chosen, current = _without_idle(search, base, chosen, current, library)
+        search.renew(best.candidate.found)
+        current, strain_gain = _with_strain(search, best.candidate.found.effects)
+    current, chosen = _without_idle(search, chosen, current)
     rivals = _rivals(search, steps, chosen)
     order = _strongest_first(search, current, chosen)
-    return Attribution(base, ideal, steps[0], tuple(order), rivals, current, tuple(steps), finite_strain_gain)
+    return Attribution(
+        base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps), float(strain_gain)
+    )
 
 
-def _without_idle(search: Search, base: Candidate, chosen: list[str], current: Candidate, library):  # type: ignore[no-untyped-def]
+def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float]:
+    """The set with or without finite strain, whichever fits better, and the gain of having it."""
+    rest = [e for e in effects if e.name != "finite_strain"]
+    without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
+    over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.slowness
+    gain = (without.found.loss - deep.found.loss) / over
+    return (deep if gain > LINEAR_UNLESS else without), float(gain)
+
+
+def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tuple[Candidate, list[str]]:
     """Drop effects that later ones made idle."""
+    chosen = list(chosen)
     for name in list(chosen):
         if len(chosen) < 2:
             break
-        rest = [e for e in current.found.effects if e.name != name]
-        without = search.judge(rest)
-        if not search.passes(search.score(name, current, without)):
+        without = search.judge([e for e in current.found.effects if e.name != name])
+        if not search.passes(search.score(name, current, without), first=False):
             chosen.remove(name)
             current = without
-    return chosen, current
+    return current, chosen
 
 
 def _rivals(search: Search, steps: list[dict[str, Score]], chosen: list[str]) -> tuple[str, ...]:
@@ -242,9 +270,9 @@ def _rivals(search: Search, steps: list[dict[str, Score]], chosen: list[str]) ->
         return ()
     found = []
     for score in steps[0].values():
-        if score.name in chosen or score.gain <= 0.3 * search.options.gain:
+        if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
             continue
-        if score.toward < search.options.toward or (score.closes < 0 and score.name != "inclusion"):
+        if score.toward < search.options.toward or (score.share < 0 and score.name != "inclusion"):
             continue
         behind = first.gain - score.gain
         difference = first.per_group - score.per_group

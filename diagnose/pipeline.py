@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.attribution import Attribution, AttributionOptions, Candidate, Score, Search, attribute
+from diagnose.attribution import (
+    LINEAR_UNLESS,
+    Attribution,
+    AttributionOptions,
+    Candidate,
+    Score,
+    Search,
+    attribute,
+)
 from diagnose.confusable import alike, next_touch
 from diagnose.finite import predicted_size
 from diagnose.fit import settings_of
@@ -254,8 +262,8 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
                 score.gain,
             )
         )
-    if "finite_strain" in found.base.found.names or "finite_strain" in names:
-        deep = search.judge([search.finite_strain])
+    if found.finite_strain_gain > LINEAR_UNLESS or "finite_strain" in names:
+        deep = found.deep
         closed, interval = _closed(
             before, deep.plain, counts, noise, added, rng, max(100, options.bootstrap // 4)
         )
@@ -281,7 +289,7 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
 def _probability(score: Score, search: Search, best: float, chosen: bool) -> float:
     """Rough odds from the share of the best gain and from how far the threshold is passed."""
     need = search.options.spatial_gain if score.name in ("inclusion",) else search.options.gain
-    over = 1 / (1 + np.exp(-(score.gain - need) / max(0.25 * need, 1.0)))
+    over = 1 / (1 + np.exp(np.clip(-(score.gain - need) / max(0.25 * need, 1.0), -50, 50)))
     rank = np.exp(min(0.0, (score.gain - best) / max(0.1 * best, 20.0)))
     value = float(over * rank)
     return float(np.clip(max(value, 0.9) if chosen else min(value, 0.6), 0.0, 0.99))

@@ -82,6 +82,7 @@ class Bench:
                 young_modulus_pa=MODULUS,
                 poisson_ratio=NU,
                 tip_radius_m=RADIUS,
+                curvature=self.sites.curvature[i],
                 law=law,
             )
             times.append(clock + local)
