@@ -133,6 +133,9 @@ class TouchWindow:
     def _listen(self) -> None:
         style = vtk.vtkInteractorStyleTrackballCamera()
         interactor = self.plotter.iren.interactor
+        # two quick presses would give the mouse to a chart, and pyvista's keys change the picture
+        self.plotter.iren.untrack_click_position("left")
+        self.plotter.iren.clear_key_event_callbacks()
         interactor.SetInteractorStyle(style)
         self._style, self._interactor = style, interactor
         # an observer on the style replaces what the style would do with that event
