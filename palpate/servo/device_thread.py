@@ -127,7 +127,7 @@ class DeviceThread:
         self._sink.send_force(ZERO)
 
     def _refuses_force(self, raw: TipState) -> bool:
-        """Whether the driver takes no force although it was enabled (it came back after an unplugging, say)."""
+        """Whether the driver takes no force although enabled (it came back after an unplugging, say)."""
         wanted = self._sink is not None and self._enabled != 0
         settled = time.perf_counter() - self._enabled_s > ENABLING_S
         return wanted and settled and not raw.force_enabled

@@ -160,12 +160,15 @@ def before(arrays):
 def after(arrays, parameters, felt, points, normals, depths, touching, stiffness, radii, now_ns, deadline_ns):
     """From the renderer's forces `felt` to the command; writes outbox, snapshot and ring."""
     pose, wanted, rendered, forces = arrays.pose, arrays.wanted, arrays.rendered, arrays.forces
-    forces[:] = felt
     dt_s = _elapsed(arrays, parameters, deadline_ns)
     velocity = pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3]
     contacts = 0
-    rendered[:] = 0.0
+    # loops, not slice assignments, which take numba seconds to compile
+    for i in range(3):
+        rendered[i] = 0.0
     for t in range(forces.shape[0]):
+        for i in range(3):
+            forces[t, i] = felt[t, i]
         touches = add_support_force(parameters.support, arrays.tips[t], velocity, radii[t], forces[t])
         if touches or touching[t] != 0:
             contacts += 1
@@ -191,7 +194,8 @@ def after(arrays, parameters, felt, points, normals, depths, touching, stiffness
         pose[IN_FAULT] != 0.0,
     )
     if clutched:
-        wanted[:] = 0.0
+        for i in range(3):
+            wanted[i] = 0.0
     reasons = safety_step(parameters.safety, arrays.safety, wanted, reading, enable, dt_s)
     command = arrays.safety.force
     passivity_after(arrays.passivity, wanted, command)
