@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 import numpy as np
+from scipy.stats import t as student
 from scipy.stats import theilslopes
 
 from mechanics.errors import OptionError
@@ -188,7 +189,7 @@ def _greatest_consistent(
 
     far: (k,) far-field compliance along the normal, 1/m. Two depths disagree where the mean of ln(deep /
     shallow), or its trend with the far-field compliance (which a law that fails for the whole body's give
-    brings about), exceeds two of its standard errors and half a percent.
+    brings about), is beyond its 99 % interval and half a percent.
     """
     chosen, rows = ladder[0], []
     broken = False
@@ -209,16 +210,22 @@ def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) 
     mean = np.array([np.median(difference[both & (site == s)]) for s in labels])
     give = np.array([np.median(far[both & (site == s)]) for s in labels])
     middle = np.median(mean)
-    error = 1.25 * 1.4826 * np.median(np.abs(mean - middle)) / np.sqrt(len(mean))
-    if abs(middle) > max(2 * error, _AGREE):
+    certain = float(student.ppf(0.995, len(mean) - 1))
+    error = 1.25 * _scatter(mean - middle) / np.sqrt(len(mean))
+    if abs(middle) > max(certain * error, _AGREE):
         return True
     if len(labels) < 8 or np.ptp(give) <= 0:
         return False
     # the trend over the sites' whole range, Theil-Sen, with the error of a least-squares line of that scatter
     slope, intercept, _, _ = theilslopes(mean, give)
-    scatter = 1.4826 * np.median(np.abs(mean - intercept - slope * give))
-    spread = np.ptp(give) / (np.sqrt(len(give)) * np.std(give))
-    return bool(abs(slope) * np.ptp(give) > max(2 * scatter * spread, _AGREE))
+    error = _scatter(mean - intercept - slope * give) / (np.sqrt(len(give)) * np.std(give))
+    return bool(abs(slope) * np.ptp(give) > max(certain * error * np.ptp(give), _AGREE))
+
+
+def _scatter(values: np.ndarray) -> float:
+    """The greater of standard deviation and scaled median deviation: neither few values nor two groups fool
+    it."""
+    return float(max(np.std(values, ddof=1), 1.4826 * np.median(np.abs(values))))
 
 
 def _bootstrap(

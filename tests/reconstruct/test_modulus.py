@@ -119,6 +119,14 @@ def test_depths_at_which_the_law_fails_are_left_out(block):
     assert abs(whole.modulus_pa - E) > 2 * abs(fit.modulus_pa - E)
 
 
+def test_depths_that_agree_are_all_used(block):
+    _, sites = block
+    for seed in range(3):
+        fit = fit_modulus(exploration(sites, deep=0.008, seed=seed), sites, FAST)
+        assert fit.press.depth_m > 0.008
+        assert all(agrees for _, _, agrees in fit.by_depth)
+
+
 def test_the_interval_covers_when_sites_scatter(block):
     _, sites = block
     random = np.random.default_rng(7)
@@ -163,4 +171,4 @@ def test_shape_covariance_matches_a_changed_shape(block):
         ).far  # fmt: skip
         changes.append(far[0, 2, 2])
     # triangles of the top beside the moved rim count for part of it as well
-    assert predicted == pytest.approx(abs(changes[1] - changes[0]), rel=0.3)
+    assert predicted == pytest.approx(abs(changes[1] - changes[0]), rel=0.1)
