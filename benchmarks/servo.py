@@ -31,9 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--nodes", type=int, nargs="+", default=[1000, 5000], help="touchable nodes, about")
     parser.add_argument("--contacts", type=int, nargs="+", default=[1, 4, 16, 32])
     parser.add_argument("--ticks", type=int, default=20_000, help="ticks a compute-time figure")
-    parser.add_argument(
-        "--seconds", type=float, default=10.0, help="of each real-time loop, in 1 s slices"
-    )
+    parser.add_argument("--seconds", type=float, default=10.0, help="of each real-time loop, in 1 s slices")
     parser.add_argument("--no-peer", action="store_true", help="leave MuJoCo's flex out")
 
 
