@@ -21,6 +21,7 @@ from reconstruct.shapes.fit import Seen, fit
 from reconstruct.shapes.hull import hull_surface
 from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
 from reconstruct.shapes.kriging import Explained, explain
+from reconstruct.shapes.polyhedron import refine
 from reconstruct.shapes.tangent import tangent_surface
 
 if TYPE_CHECKING:
@@ -48,7 +49,9 @@ class SurfaceOptions:
     surface: str = option(
         "auto", "shape of the object; auto weighs all by held-out touches", choices=SURFACES
     )
-    surface_spacing_m: float = option(0.003, "edge length of the surface's triangles", unit="m")
+    surface_spacing_m: float = option(
+        0.003, "edge length of the surface's triangles", unit="m", flag="--surface-spacing"
+    )
 
 
 @dataclass(frozen=True)
@@ -131,7 +134,8 @@ def reconstruct_surface(
     options = options or SurfaceOptions()
     if options.surface in ("hull", "tangent"):
         shells = {"hull": hull_surface, "tangent": tangent_surface}
-        vertices, triangles = shells[options.surface](evidence)
+        # finer than the facets need, so that the gap between the bounds is told inside them as well
+        vertices, triangles = refine(*shells[options.surface](evidence), 2 * options.surface_spacing_m)
         gap = _bracket_gap(evidence, vertices, options.surface)
         return _surface(
             evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bounds(evidence)

@@ -35,6 +35,9 @@ def draw(explained: Explained, spacing_m: float) -> tuple[np.ndarray, np.ndarray
     square = np.zeros(len(vertices))
     np.add.at(square, owner, variance)
     square += _rim_deviation(vertices, owner, normals, on_base, explained) ** 2
+    # first touch is found a little late everywhere alike: an error as large as the touches' own may be common
+    # to all
+    square += np.median(explained.seen.error_m) ** 2 + explained.law.touch_m**2
     return drawn, triangles, np.sqrt(square)
 
 
