@@ -20,6 +20,8 @@ from mechanics.model import Model
 from mechanics.sites import touch_sites
 
 STANDARD_GRAVITY = 9.80665
+BACKLASH_TURN_M = 6e-5
+"""Way back of the reading over which a tip that runs ahead of it has changed sides of the play."""
 
 
 @dataclass
@@ -103,10 +105,8 @@ class Forward:
         t = self.touches
         y = t.y.copy()
         y[:, 0] += s.onset[t.press]
-        if s.backlash > 0:
-            played = np.empty_like(y)
-            kernel.play(t.start, y, s.backlash, played)
-            y = played
+        if s.backlash != 0:
+            y = self._with_play(y, s.backlash)
         table = self._linear
         if s.finite_strain != 0:
             table = table + s.finite_strain * (self._deep - table)
@@ -151,6 +151,19 @@ class Forward:
         turn = Rotation.from_quat(t.extra["quaternion"], scalar_first=True)
         tared = turn.apply(turn[0].inv().apply(weight))
         return weight - (1 - share) * tared
+
+    def _with_play(self, y: np.ndarray, width: float) -> np.ndarray:
+        """The tip's path behind a play, by device axes: lagging its reading (width > 0) or ahead (< 0)."""
+        t = self.touches
+        frame = t.frame[t.press]
+        device = np.ascontiguousarray(np.einsum("nij,ni->nj", frame, y))
+        played = np.empty_like(device)
+        if width > 0:
+            kernel.play(t.start, device, width, played)
+        else:
+            kernel.play(t.start, device, BACKLASH_TURN_M, played)
+            played = device - width * (device - played) / BACKLASH_TURN_M
+        return np.einsum("nij,nj->ni", frame, played)
 
     def _read(self, s: Settings, f: np.ndarray) -> np.ndarray:
         if s.gain is None and s.bias is None and s.drift is None and s.inertia == 0 and s.gravity is None:

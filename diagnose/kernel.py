@@ -92,19 +92,10 @@ def relax(start, t, force, g, tau, out):
 
 @numba.njit(cache=True)
 def play(start, y, width, out):
-    """Play operator (backlash) on a vector path: the tip is dragged once the handle is width / 2 away."""
+    """Play operator (backlash), axis by axis: what follows is dragged once it is width / 2 behind."""
     half = 0.5 * width
     for p in range(start.shape[0] - 1):
-        for i in range(start[p], start[p + 1]):
-            if i == start[p]:
-                for k in range(3):
-                    out[i, k] = y[i, k]
-                continue
-            d0 = y[i, 0] - out[i - 1, 0]
-            d1 = y[i, 1] - out[i - 1, 1]
-            d2 = y[i, 2] - out[i - 1, 2]
-            distance = np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-            s = 1.0 - half / distance if distance > half else 0.0
-            out[i, 0] = out[i - 1, 0] + s * d0
-            out[i, 1] = out[i - 1, 1] + s * d1
-            out[i, 2] = out[i - 1, 2] + s * d2
+        for k in range(3):
+            out[start[p], k] = y[start[p], k]
+            for i in range(start[p] + 1, start[p + 1]):
+                out[i, k] = min(max(out[i - 1, k], y[i, k] - half), y[i, k] + half)

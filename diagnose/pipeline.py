@@ -141,7 +141,8 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     reasons = list(settled.reasons)
     candidates = list(found.rivals)
     chi = found.final.chi
-    remainder = chi > search.options.unknown_chi
+    slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
+    remainder = chi > slack * search.options.unknown_chi
     if with_fs:
         sizes = {n: found.steps[0][n].size_n for n in found.chosen if n in found.steps[0]}
         place = next((i for i, n in enumerate(names) if sizes.get(n, np.inf) < deep_size), len(names))

@@ -42,7 +42,7 @@ class Effect:
     contract's keys in SI units, device frame. needs: stages that must be computed first ('fields', 'poisson',
     'base', 'unbonded'). candidates(forward): starts found from the data (list of value vectors) where a grid
     is
-    not enough. flexible: true where the fit has so many freedoms that it mimics others (it then pays for
+    not enough. extra: 'slack', a factor on the lack of fit that the effect's own law may leave. flexible: true where the fit has so many freedoms that it mimics others (it then pays for
     them).
     """
 
