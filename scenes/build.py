@@ -28,7 +28,7 @@ from scenes.phantoms import phantom
 from scenes.scene import Scene
 from scenes.virtual_presses import palpate_model
 
-VERSION = 2
+VERSION = 3
 DEFAULT_TIP_RADIUS_M = 0.005
 
 

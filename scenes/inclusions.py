@@ -10,9 +10,10 @@ import numpy as np
 from mechanics.tetmesh import TetMesh
 from scenes.phantoms import Region
 
-_STEPS = 5
-_WEIGHTS = np.array([w for w in product(range(_STEPS + 1), repeat=4) if sum(w) == _STEPS]) / _STEPS
-"""(56, 4) barycentric points spread over a tetrahedron."""
+_STEPS = 6
+_COUNTS = np.array([w for w in product(range(_STEPS + 1), repeat=4) if sum(w) == _STEPS])
+_WEIGHTS = (_COUNTS + 0.25) / (_STEPS + 1)
+"""(k, 4) barycentric points spread evenly inside a tetrahedron, none on its faces."""
 
 
 def modulus_ratio(mesh: TetMesh, regions: Iterable[Region]) -> np.ndarray:

@@ -1,0 +1,52 @@
+"""A small object for the window's tests: a block meshed by hand, the same every time."""
+
+from __future__ import annotations
+
+from itertools import permutations
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.model import Model, read_model, write_model
+from mechanics.tetmesh import TetMesh
+from scenes.virtual_presses import palpate_model
+
+SIZE = np.array([0.08, 0.08, 0.04])
+CELLS = (6, 6, 3)
+
+
+def block_mesh() -> TetMesh:
+    """Six tetrahedra a cube (Kuhn's), linear; the base z = 0 is fixed."""
+    axes = [np.linspace(0, s, n + 1) for s, n in zip(SIZE, CELLS, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3) - [0.04, 0.04, 0.0]
+    shape = tuple(n + 1 for n in CELLS)
+    tetrahedra = []
+    for cube in np.ndindex(*CELLS):
+        for order in permutations(range(3)):
+            corner = np.array(cube)
+            nodes = [np.ravel_multi_index(corner, shape)]
+            for axis in order:
+                corner = corner + np.eye(3, dtype=int)[axis]
+                nodes.append(np.ravel_multi_index(corner, shape))
+            p = grid[nodes]
+            if np.linalg.det(p[1:] - p[0]) < 0:
+                nodes[2], nodes[3] = nodes[3], nodes[2]
+            tetrahedra.append(nodes)
+    fixed = grid[:, 2] < 1e-9
+    outside = (np.abs(grid[:, :2]) > 0.04 - 1e-9).any(axis=1) | (grid[:, 2] > SIZE[2] - 1e-9)
+    return TetMesh(grid, np.array(tetrahedra), fixed, outside & ~fixed)
+
+
+def block_model(folder: Path, young_modulus_pa: float = 20e3) -> Model:
+    """A MODEL folder of the block, with presses for the 1D renderers."""
+    model = Model(
+        mesh=block_mesh().quadratic(),
+        young_modulus_pa=young_modulus_pa,
+        poisson_ratio=0.49,
+        tip_radius_m=0.005,
+        mesh_size_m=0.013,
+        support_point=np.zeros(3),
+        support_normal=np.array([0.0, 0.0, 1.0]),
+        effects={"finite_strain": {}},
+    )
+    return read_model(write_model(folder / "block", palpate_model(model, sites=16)))

@@ -1,0 +1,116 @@
+"""Scenes: what a file may say, and the model that comes of it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mechanics.errors import SceneError
+from mechanics.model import Model
+from scenes.build import model_of
+from scenes.exploration import ExplorationOptions, base_tracing, explore
+from scenes.inclusions import modulus_ratio
+from scenes.phantoms import Region
+from scenes.scene import load_scene, read_scene, scene_names
+from scenes.virtual_presses import spread_places
+
+from .small import block_mesh
+
+
+def test_embedded_scenes_are_there_and_whole() -> None:
+    assert {"silicone-1", "silicone-2", "silicone-3", "bean", "nodule", "your-recording"} <= set(
+        scene_names()
+    )
+    for name in scene_names():
+        scene = load_scene(name)
+        assert scene.title and scene.about and scene.renderer == "fem"
+    assert load_scene("silicone-1").young_modulus_pa == 29e3
+    assert load_scene("nodule").inclusions[0].modulus_ratio > 1
+
+
+def test_anything_that_can_be_touched_is_a_scene(block: Model, tmp_path: Path) -> None:
+    assert load_scene(block.path).kind == "model"
+    assert load_scene("bowl").kind == "phantom"
+    assert load_scene("silicone-1-cylinder").kind == "recording"
+    with pytest.raises(SceneError, match="silicone-1, .*MODEL folder.*bowl"):
+        load_scene("teapot")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("[object]\nphantom = 'block'\nmodel = 'x'", "exactly one of"),
+        ("[object]", "exactly one of"),
+        ("[object]\nphantom = 'block'\nyoung_modulus_kpa = 3", "allowed are .*young_modulus_pa"),
+        ("colour = 'red'\n[object]\nphantom = 'block'", "'colour'"),
+        ("[object]\nphantom = 'block'\nyoung_modulus_pa = -3", "greater than 0"),
+        ("[object]\nphantom = 'block'\nyoung_modulus_pa = 'soft'", "wrong kind"),
+        ("[object]\nphantom = 'block'\n[render]\ncolour = 'red'", "displacement, stiffness"),
+        ("[object]\nphantom = 'block'\n[[inclusion]]\nradius_m = 0.01", "lacks centre_m, modulus_ratio"),
+        ("[object", "no valid TOML"),
+    ],
+)
+def test_a_wrong_scene_says_what_is_allowed(tmp_path: Path, text: str, words: str) -> None:
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    with pytest.raises(SceneError, match=words):
+        read_scene(path)
+
+
+def test_paths_are_from_the_scenes_own_folder(block: Model, tmp_path: Path, own_cache: Path) -> None:
+    path = tmp_path / "mine.toml"
+    (tmp_path / "here").symlink_to(block.path)
+    path.write_text("[object]\nmodel = 'here'\nyoung_modulus_pa = 5e3\n[tool]\ntip_radius_m = 0.004\n")
+    model = load_scene(path).model()
+    assert (model.young_modulus_pa, model.tip_radius_m) == (5e3, 0.004)
+    assert model.path.is_relative_to(own_cache) and block.young_modulus_pa == 20e3
+    again = load_scene(path).model()
+    assert again.path == model.path
+    path.write_text(path.read_text().replace("5e3", "6e3"))
+    assert load_scene(path).model().path != model.path
+
+
+def test_a_model_about_which_nothing_changes_is_used_itself(block: Model) -> None:
+    assert model_of(load_scene(block.path)).path == block.path
+
+
+def test_inclusion_keeps_its_volume_wherever_it_is() -> None:
+    """Even smaller than an element: the excess modulus integrates to the ball's volume times (ratio - 1)."""
+    mesh = block_mesh()
+    for radius in (0.004, 0.008, 0.012):
+        excess = []
+        for shift in np.linspace(0, 0.013, 6):
+            ball = Region("ball", (shift, 0.5 * shift, 0.02), radius, 5.0)
+            excess.append(((modulus_ratio(mesh, [ball]) - 1.0) * mesh.volumes).sum())
+        expected = 4.0 * 4 / 3 * np.pi * radius**3
+        assert np.mean(excess) == pytest.approx(expected, rel=0.1)
+    assert (modulus_ratio(mesh, []) == 1.0).all()
+
+
+def test_virtual_presses_spread_and_stay_off_rims(block: Model) -> None:
+    places = block.mesh.points[spread_places(block, 12)]
+    gaps = np.linalg.norm(places[:, None] - places[None], axis=2) + np.eye(len(places))
+    assert gaps.min() > 0.01
+    on_faces = (np.abs(places[:, :2]) > 0.0399).sum(axis=1) + (places[:, 2] > 0.0399)
+    assert (on_faces == 1).all()
+    for row in block.palpations:
+        assert row.k_kv > 0 and row.k_hc > 0 and 1.0 < row.r_hc < 1.6 and row.depth == 0.005
+
+
+def test_exploration_traces_the_foot_and_presses_outside_in(block: Model) -> None:
+    options = ExplorationOptions(sites=5, repeats=2)
+    trace = base_tracing(block, options)
+    outside = np.maximum(np.abs(trace[:, :2]) - 0.04, 0.0)
+    assert np.linalg.norm(outside, axis=1) == pytest.approx(block.tip_radius_m - options.lean_m, abs=2e-4)
+    assert trace[:, 2] == pytest.approx(block.tip_radius_m - options.bear_down_m)
+    angle = np.unwrap(np.arctan2(trace[:, 1], trace[:, 0]))
+    assert angle[-1] - angle[0] > 2 * np.pi
+    path, traced_s = explore(block, options)
+    inside = (np.abs(path.waypoints_m[:, :2]) < 0.04 + block.tip_radius_m).all(axis=1)
+    inside &= path.waypoints_m[:, 2] < 0.04 + block.tip_radius_m
+    presses = path.times_s[inside & (path.times_s > traced_s)]
+    assert len(presses) == 5 * 2 * 2  # reached, then held
+    again, _ = explore(block, options)
+    assert (again.waypoints_m == path.waypoints_m).all()

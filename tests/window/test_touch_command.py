@@ -1,0 +1,146 @@
+"""`palpate touch` without a window, its words where it cannot, and with a real window on a virtual screen."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mechanics.model import Model
+from mechanics.recording import read_recording
+from palpate.cli import main
+from palpate.window.tracing import BaseTracing
+
+
+def test_headless_session_with_a_recording(
+    block: Model, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    path = tmp_path / "session.csv.gz"
+    words = ["touch", str(block.path), "--headless", "--seconds", "4", "--record", str(path), "--json", "-"]
+    assert main(words) == 0
+    result = json.loads(capsys.readouterr().out)
+    assert result["device"] == "simulated" and result["servo"]["ticks"] > 1000
+    recording = read_recording(path)
+    assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--headless", "--device", "mouse"], "drop --headless"),
+        (["--headless", "--device", "glove"], "allowed are mouse"),
+        (["--headless", "--renderer", "magic"], "allowed are fem"),
+        (["--headless", "--seconds", "-1"], "greater than 0"),
+        (["--headless", "--device", "replay"], "--replay REC"),
+        (["--headless", "--device", "spacemouse"], "plug"),
+    ],
+)
+def test_what_cannot_be_says_why(
+    block: Model, words: list[str], says: str, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["touch", str(block.path), *words]) == 2
+    error = capsys.readouterr().err.strip()
+    assert says in error and "\n" not in error
+
+
+def test_no_screen_is_said(
+    block: Model, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
+) -> None:
+    if not sys.platform.startswith("linux"):
+        pytest.skip("only Linux can be without a screen")
+    for name in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(name, raising=False)
+    assert main(["touch", str(block.path)]) == 2
+    assert "--headless" in capsys.readouterr().err
+
+
+def test_tracing_counts_the_way_around(block: Model) -> None:
+    tracing = BaseTracing(block)
+    angle = np.linspace(0, np.pi, 200)
+    half = 0.06 * np.column_stack([np.cos(angle), np.sin(angle), np.full(200, 0.0048 / 0.06)])
+    tracing.add(half)
+    assert tracing.share == pytest.approx(0.5, abs=0.03) and not tracing.done
+    tracing.add(half * [-1, -1, 2])  # above the support: does not count
+    assert not tracing.done
+    tracing.add(half * [-1, -1, 1])
+    assert tracing.done
+
+
+@pytest.fixture
+def screen() -> Iterator[str]:
+    """A virtual screen; skipped where Xvfb or xdotool is missing."""
+    if not (shutil.which("Xvfb") and shutil.which("xdotool")):
+        pytest.skip("needs Xvfb and xdotool")
+    read, write = os.pipe()
+    server = subprocess.Popen(
+        ["Xvfb", "-displayfd", str(write), "-screen", "0", "1300x850x24"],
+        pass_fds=(write,),
+        stderr=subprocess.DEVNULL,
+    )
+    os.close(write)
+    with os.fdopen(read) as pipe:
+        display = f":{pipe.readline().strip()}"
+    yield display
+    server.terminate()
+    server.wait()
+
+
+@pytest.mark.slow
+def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -> None:
+    """A real window, a real pointer: hover, press, drag, keys; the recording holds what the hand did."""
+    path, picture = tmp_path / "mouse.csv.gz", tmp_path / "window.png"
+    environment = {**os.environ, "DISPLAY": screen}
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-m", "palpate.cli", "touch", str(block.path), "--beside", "hunt-crossley"]
+    command += ["--record", str(path), "--screenshot", str(picture)]
+    program = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
+
+    def pointer(*words: str) -> str:
+        return subprocess.run(
+            ["xdotool", *words], env=environment, capture_output=True, text=True, check=False
+        ).stdout.strip()
+
+    end = time.monotonic() + 180
+    while not (window := pointer("search", "--name", "^Palpate")) and time.monotonic() < end:
+        time.sleep(0.5)
+    assert window, "no window opened"
+    window = window.splitlines()[-1]
+    time.sleep(5.0)
+    pointer("mousemove", "--window", window, "320", "280")
+    time.sleep(3.0)
+    for _ in range(2):
+        pointer("mousedown", "1")
+        time.sleep(4.0)
+        pointer("mouseup", "1")
+        time.sleep(2.0)
+    pointer("key", "--window", window, "q")
+    pointer("windowfocus", window)
+    pointer("key", "q")
+    words, _ = program.communicate(timeout=60)
+    assert program.returncode == 0 and "ticks" in words
+    force = np.linalg.norm(read_recording(path).force_on_tool, axis=1)
+    touching = force > 0.05
+    assert int((np.diff(touching.astype(int)) == 1).sum()) >= 2, "two presses were felt"
+    assert picture.stat().st_size > 10_000
+
+
+@pytest.mark.slow
+def test_what_was_rendered_is_reconstructed(block: Model, tmp_path: Path) -> None:
+    """Base traced on the support, palpations, reconstruction: the modulus that was rendered, within 5 %."""
+    from reconstruct.pipeline import reconstruct
+
+    path = tmp_path / "session.csv.gz"
+    words = ["touch", str(block.path), "--headless", "--record", str(path), "--sites", "12", "--repeats", "1"]
+    assert main(words) == 0
+    recording = read_recording(path)
+    assert recording.base_model is None, "the base was traced, so nothing stands in for it"
+    model = reconstruct(recording)
+    assert model.young_modulus_pa == pytest.approx(block.young_modulus_pa, rel=0.05)

@@ -1,0 +1,222 @@
+"""The touch window off-screen: events in, the servo's answer and a picture out."""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from devices.channel import PoseChannel
+from devices.registry import DeviceChoice
+from mechanics.model import Model
+from mechanics.recording import read_recording
+from palpate.window.session import TouchSession
+from palpate.window.window import TouchWindow
+from scenes.scene import Scene
+
+SIZE = (640, 480)
+
+
+class Driven:
+    """A window with a hand on its mouse."""
+
+    def __init__(self, window: TouchWindow) -> None:
+        self.window = window
+        self.session = window.session
+        window.plotter.show(interactive_update=True, auto_close=False)
+
+    def mouse(self, x: float, y: float) -> None:
+        """x, y: shares of the first picture."""
+        width = SIZE[0] / (2 if self.session.beside_name else 1)
+        interactor = self.window._interactor
+        interactor.SetEventPosition(int(x * width), int((0.28 + 0.72 * y) * SIZE[1]))
+        interactor.InvokeEvent("MouseMoveEvent")
+
+    def button(self, down: bool) -> None:
+        self.window._interactor.InvokeEvent("LeftButtonPressEvent" if down else "LeftButtonReleaseEvent")
+
+    def key(self, symbol: str) -> None:
+        interactor = self.window._interactor
+        interactor.SetKeySym(symbol)
+        interactor.InvokeEvent("KeyPressEvent")
+        self.session.wait()
+
+    def until(self, condition, frames: int = 2000):
+        """Frames go by until `condition(frame)`; a frame that never comes fails the test."""
+        pause = threading.Event()
+        for _ in range(frames):
+            frame = self.window.tick()
+            if frame is not None and condition(frame):
+                return frame
+            pause.wait(0.005)
+        raise AssertionError(f"the window never came to this; its last frame: {frame}")
+
+    def picture(self) -> np.ndarray:
+        self.window.plotter.render()
+        return self.window.plotter.screenshot(return_img=True)
+
+
+@pytest.fixture(scope="module")
+def driven(block: Model, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Driven]:
+    """One session for all tests of this file: they leave it hovering, as it was."""
+    channel = PoseChannel.create()
+    channel.write(0.0, (0.0, 0.0, 0.08))
+    scene = Scene("block", "model", str(block.path), title="Block", beside="hunt-crossley")
+    device = DeviceChoice("mouse", {"channel": str(channel.path)})
+    with TouchSession(block, title="Block", device=device, beside=scene.beside) as session:
+        session.start()
+        session.enable()
+        window = TouchWindow(session, scene, channel, off_screen=True, size=SIZE)
+        yield Driven(window)
+        window.plotter.close()
+    channel.close()
+
+
+def sizes(frame) -> list[float]:
+    return [float(np.linalg.norm(view.force_n)) for view in frame.views]
+
+
+def press(driven: Driven):
+    driven.mouse(0.5, 0.55)
+    driven.button(True)
+    depth = driven.window.pointer.press_depth_m
+    return driven.until(lambda f: f.touching and abs(f.depth_m - depth) < 5e-5)
+
+
+def release(driven: Driven):
+    driven.button(False)
+    return driven.until(lambda f: not f.touching and not any(sizes(f)))
+
+
+def test_hover_press_release(driven: Driven) -> None:
+    driven.mouse(0.5, 0.55)
+    hovering = driven.until(lambda f: f.tip_m[2] < 0.06)
+    assert not hovering.touching and not any(sizes(hovering))
+    pressed = press(driven)
+    fem, one_d = pressed.views
+    assert (fem.name, one_d.name) == ("fem", "hunt-crossley")
+    assert fem.force_n[2] > 0.1 and one_d.force_n[2] > 0.1, "the tool is pushed out"
+    assert sizes(pressed)[1] == pytest.approx(sizes(pressed)[0], rel=0.35), "one tip drives both"
+    sunk = fem.displacement_m[:, 2].min()
+    assert sunk == pytest.approx(-pressed.depth_m, rel=0.15)
+    assert np.abs(fem.displacement_m).sum() > 2 * np.abs(one_d.displacement_m).sum(), "1D only dents"
+    released = release(driven)
+    assert np.abs(released.views[0].displacement_m).max() < 1e-9
+
+
+def test_the_picture_shows_tip_arrow_and_plot(driven: Driven) -> None:
+    def like(colour: tuple[int, int, int]) -> int:
+        return int((np.abs(driven.picture().astype(int) - colour).sum(axis=2) < 90).sum())
+
+    arrow = (27, 79, 156)
+    before, hovering = like(arrow), like((217, 95, 2))
+    press(driven)
+    for _ in range(3):
+        driven.window.tick()
+    assert hovering > 50, "the tip is drawn"
+    assert like(arrow) > before + 30, "an arrow appears"
+    assert len(driven.session.trace.curves()) > 100
+    assert driven.session.trace.curves()[:, 1].max() > 0.1
+    release(driven)
+
+
+def test_wheel_presses_deeper(driven: Driven) -> None:
+    before = press(driven)
+    for _ in range(4):
+        driven.window._interactor.InvokeEvent("MouseWheelForwardEvent")
+    deeper = driven.until(lambda f: f.depth_m > before.depth_m + 0.0019)
+    assert sizes(deeper)[0] > 1.3 * sizes(before)[0]
+    for _ in range(4):
+        driven.window._interactor.InvokeEvent("MouseWheelBackwardEvent")
+    release(driven)
+
+
+def test_keys_change_modulus_and_friction(driven: Driven) -> None:
+    soft = press(driven)
+    driven.key("plus")
+    stiff = driven.until(lambda f: sizes(f)[0] > 1.2 * sizes(soft)[0])
+    assert sizes(stiff)[0] == pytest.approx(1.25 * sizes(soft)[0], rel=0.01)
+    driven.key("minus")
+    driven.until(lambda f: sizes(f)[0] == pytest.approx(sizes(soft)[0], rel=0.01))
+    driven.key("f")
+    assert driven.session.friction == 1.0
+    while driven.session.friction != float("inf"):
+        driven.key("f")
+    release(driven)
+
+
+def test_tab_changes_the_renderer_that_is_felt(driven: Driven) -> None:
+    driven.key("Tab")
+    assert driven.session.renderer_name == "kelvin-voigt"
+    pressed = press(driven)
+    assert pressed.views[0].name == "kelvin-voigt" and sizes(pressed)[0] > 0.1
+    release(driven)
+    driven.session.set_renderer("fem")
+    driven.session.wait()
+    assert driven.session.renderer_name == "fem"
+
+
+def test_colour_by_stiffness(driven: Driven) -> None:
+    before = driven.picture()
+    driven.key("c")
+    picture = driven.window._pictures[0]
+    values = picture._surface["stiffness (N/m)"]
+    assert 20 < np.median(values) < 300
+    changed = np.abs(driven.picture().astype(int) - before).mean()
+    driven.key("c")
+    back = np.abs(driven.picture().astype(int) - before).mean()
+    assert changed > 5 and back < 0.5 * changed
+
+
+@pytest.mark.slow
+def test_an_inclusion_is_felt_and_taken_out_again(driven: Driven) -> None:
+    plain = press(driven)
+    release(driven)
+    driven.key("i")
+    assert driven.session.inclusion is not None and driven.session.failure == ""
+    stiff = press(driven)
+    assert sizes(stiff)[0] > 1.05 * sizes(plain)[0]
+    release(driven)
+    driven.key("Right")
+    assert driven.session.inclusion.centre_m[0] == pytest.approx(0.002, abs=0.004)
+    driven.key("i")
+    assert driven.session.inclusion is None
+    again = press(driven)
+    assert sizes(again)[0] == pytest.approx(sizes(plain)[0], rel=0.02)
+    release(driven)
+
+
+def test_a_session_is_recorded(driven: Driven, block: Model, tmp_path: Path) -> None:
+    path = tmp_path / "touched.csv.gz"
+    driven.session.begin_recording(path)
+    press(driven)
+    frame = release(driven)
+    assert frame.recorded_s > 0
+    driven.session.end_recording()
+    recording = read_recording(path)
+    assert recording.base_model == block.path and recording.poisson_ratio == 0.49
+    assert recording.truth["young_modulus_pa"] == pytest.approx(20e3)
+    assert np.median(np.diff(recording.t)) == pytest.approx(0.001)
+    assert recording.force_on_tool[:, 2].max() > 0.1
+    deepest = recording.position[:, 2].min()
+    assert deepest == pytest.approx(0.045 - driven.window.pointer.press_depth_m, abs=3e-4)
+
+
+def test_help_and_screenshot(driven: Driven, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = driven.picture()
+    driven.key("h")
+    assert np.abs(driven.picture().astype(int) - before).mean() > 0.5
+    driven.key("h")
+    driven.key("p")
+    assert len(list(tmp_path.glob("touch-*.png"))) == 1
+
+
+def test_the_servo_kept_ticking(driven: Driven) -> None:
+    """Whatever the window did, the loop in the other process ran on."""
+    report = driven.session.report()
+    assert report.ticks > 0 and report.missed_ticks < 0.2 * report.ticks
+    assert driven.session.servo.alive
