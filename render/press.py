@@ -83,7 +83,8 @@ def press(
     steepness = -float(normal @ direction)
     if steepness < np.cos(np.radians(80)):
         raise OptionError(
-            f"the press runs along the surface, normal {np.round(normal, 3).tolist()}: turn --direction into it"
+            f"the press runs along the surface, normal {np.round(normal, 3).tolist()}: turn it into the "
+            "surface"
         )
     travel = approach_m + depth_m / steepness
     times = np.array([0.0, travel, travel, 2 * travel]) / speed_m_per_s + np.array([0.0, 0.0, hold_s, hold_s])
@@ -122,8 +123,9 @@ def first_touch(
         if along > reach:
             break
     raise OptionError(
-        f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does "
-        f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to {np.round(high, 4).tolist()} m)"
+        f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does not "
+        f"meet the touchable surface (object within {np.round(low, 4).tolist()} to "
+        f"{np.round(high, 4).tolist()} m)"
     )
 
 

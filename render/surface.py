@@ -22,6 +22,7 @@ from render.bvh import Bvh, build_bvh
 
 CREASE_DEGREES = 35.0
 NORMAL_SMOOTHING_M = 2.5e-3
+EDGE_ROUNDING_M = 2.2e-3
 
 
 class SurfaceArrays(NamedTuple):
@@ -93,6 +94,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     neighbours = _neighbours(triangles)
     if (neighbours < 0).any():
         raise MeshError("the mesh's boundary is not closed: mesh the surface again")
+    vertices = _rounded_edges(vertices, triangles, neighbours, free)
     return ContactSurface(
         with_vertices(vertices, triangles, neighbours, free), nodes, node_weights, parents, parent_weights
     )
@@ -125,6 +127,37 @@ def with_vertices(
         edge_pseudo=np.ascontiguousarray(edge_pseudo),
         bvh=build_bvh(p),
     )
+
+
+def _rounded_edges(
+    vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, free: np.ndarray
+) -> np.ndarray:
+    """Vertices with the creases between touchable triangles filleted over about a fine edge.
+
+    Over a sharp edge a tip that is held by friction would snap from one face to the other.
+    """
+    p = vertices[triangles]
+    face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
+    sharp = np.einsum("kx,kex->ke", face, face[neighbours]) < np.cos(np.radians(CREASE_DEGREES))
+    sharp &= (free[:, None] > 0) & (free[neighbours] > 0)
+    near = np.zeros(len(vertices), dtype=bool)
+    for edge in range(3):
+        near[triangles[sharp[:, edge], edge]] = True
+        near[triangles[sharp[:, edge], (edge + 1) % 3]] = True
+    near[triangles[near[triangles].any(axis=1)]] = True  # and the ring around it
+    near[triangles[free == 0]] = False
+    pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
+    n = len(vertices)
+    links = sp.coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
+    degree = np.asarray(links.sum(axis=1)).ravel()
+    rounded = vertices.copy()
+    # as in _smooth_normals, a sweep spreads by a quarter of the squared edge
+    fine = float(np.median(np.linalg.norm(p[:, 1] - p[:, 0], axis=1)))
+    for _ in range(round(EDGE_ROUNDING_M**2 / (0.25 * fine**2))):
+        mean = links @ rounded / np.maximum(degree, 1)[:, None]
+        rounded[near] = (rounded[near] + mean[near]) / 2
+    return rounded
 
 
 def _smooth_normals(

@@ -25,16 +25,21 @@ def test_a_cylinder_of_coarse_facets_is_felt_round():
     assert (arrays.normals[side, :2] * outward).sum(axis=1).min() > 0.999
 
 
-def test_a_block_keeps_its_flat_faces_and_edges():
+def test_a_block_keeps_its_flat_faces_and_its_edges_are_eased():
     arrays = contact_surface(shapes.block((0.1, 0.1, 0.05), (5, 5, 3))).arrays
-    extent = arrays.vertices.max(axis=0)
-    assert extent == pytest.approx([0.05, 0.05, 0.05], abs=1e-12)
+    face = arrays.vertices[np.abs(arrays.vertices[:, :2]).max(axis=1) < 0.04]
+    assert face[:, 2].max() == pytest.approx(0.05, abs=1e-9)
+    upper = arrays.vertices[np.abs(arrays.vertices[:, 0]) < 0.04]
+    rim = (upper[:, 1] + upper[:, 2]).max()  # of a sharp edge 0.1 m
+    assert 0.096 < rim < 0.099
     inner = (arrays.vertices[:, 2] > 0.0499) & (np.abs(arrays.vertices[:, :2]).max(axis=1) < 0.04)
-    assert arrays.normals[inner] == pytest.approx(np.tile([0, 0, 1.0], (inner.sum(), 1)), abs=2e-3)
+    assert arrays.normals[inner] == pytest.approx(np.tile([0, 0, 1.0], (inner.sum(), 1)), abs=1e-2)
 
 
 def test_the_search_finds_the_closest_triangle():
-    arrays = contact_surface(shapes.block((0.1, 0.06, 0.05), (4, 3, 3)), edge_m=8e-3).arrays
+    arrays = contact_surface(
+        shapes.block((0.1, 0.06, 0.05), (4, 3, 3)), edge_m=8e-3
+    ).arrays  # too coarse to ease the edges
     weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
     p = arrays.vertices[arrays.triangles]
     for tip in np.random.default_rng(0).uniform(-0.1, 0.1, (50, 3)):
@@ -61,6 +66,6 @@ def test_the_surface_is_drawn_to_the_touched_points():
     assert before == pytest.approx(np.full(4, shift), abs=1e-9)
     assert np.abs(after).max() < 5e-5
     far = surface.arrays.vertices[surface.arrays.vertices[:, 2] < 0.01]
-    assert np.abs(far).max(axis=0)[0] == pytest.approx(0.05, abs=1e-5)
+    assert np.abs(far).max(axis=0)[0] == pytest.approx(0.05, abs=1e-4)
     kept = touched_surface(made, RenderOptions(snap_to_touches=False)).arrays.vertices
     assert kept[:, 2].max() == pytest.approx(0.05)
