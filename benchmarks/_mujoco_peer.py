@@ -89,9 +89,10 @@ def ours(touchable: int) -> dict[str, Any]:
     mesh = block_model(touchable).mesh
     top = mesh.points.max(axis=0)
     middle = 0.5 * (top + mesh.points.min(axis=0))
-    state, forces = renderer.start(), []
+    forces = []
     for depth in DEPTHS_M:
-        for part in np.linspace(0.0, depth, 50):
+        state = renderer.start()
+        for part in np.linspace(-0.001, depth, 50):
             tip = np.array([[middle[0], middle[1], top[2] + TIP_RADIUS_M - part]])
             state, force = renderer.step(state, tip)
         forces.append(float(np.linalg.norm(force[0])))
