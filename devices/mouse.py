@@ -29,6 +29,7 @@ SPEC = DeviceSpec(
 )
 WINDOW_SILENT_S = 2.0
 _ZERO = np.zeros(3)
+_NOWHERE = np.full(3, np.nan)
 
 
 @dataclass(frozen=True)
@@ -83,7 +84,7 @@ class MouseDevice:
         if pose is None:
             self._sequence = max(self._sequence, 0)
             fault = "no pose from the window yet"
-            return TipState(self._time, self._sequence, _ZERO, connected=False, fault=fault)
+            return TipState(self._time, self._sequence, _NOWHERE, connected=False, fault=fault)
         if self._position is None:
             self._position, self._velocity = np.array(pose.position_m), _ZERO
             self._target = self._position

@@ -19,7 +19,7 @@ TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
 
 class ObjectPicture:
-    """Draws onto the plotter's active subplot; `update` moves what is there, nothing is added again."""
+    """Draws onto the subplot `place`; `update` moves what is there, nothing is added again."""
 
     def __init__(
         self,
@@ -28,10 +28,13 @@ class ObjectPicture:
         model: Model,
         tip_radius_m: float,
         *,
+        place: tuple[int, int] = (0, 0),
         label: str = "",
         colour: str = "displacement",
     ) -> None:
         self._plotter = plotter
+        self._place = place
+        plotter.subplot(*place)
         points, triangles = renderer.surface
         self._rest = np.array(points, dtype=float)
         self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
@@ -72,6 +75,7 @@ class ObjectPicture:
         if name == self._colour and not stiff:
             return
         self._colour = name
+        self._plotter.subplot(*self._place)
         if self._actor is not None:
             self._plotter.remove_actor(self._actor, render=False)
             self._plotter.remove_scalar_bar(self._bar, render=False)

@@ -112,6 +112,7 @@ class TouchWindow:
             session.drawing(name),
             session.model,
             session.servo.tip_radius_m,
+            place=(0, side),
             label=name if side else "",
         )
 
@@ -232,8 +233,7 @@ class TouchWindow:
     def _show_stiffness(self) -> None:
         """Press every place of the renderers' surfaces, once; takes about a second."""
         radius = self.session.servo.tip_radius_m
-        for side, (picture, name) in enumerate(zip(self._pictures, self._names, strict=True)):
-            self.plotter.subplot(0, side)
+        for picture, name in zip(self._pictures, self._names, strict=True):
             picture.colour_by("stiffness", local_stiffness(self.session.drawing(name), radius))
 
     def _toggle_inclusion(self) -> None:

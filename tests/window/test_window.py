@@ -160,6 +160,7 @@ def test_tab_changes_the_renderer_that_is_felt(driven: Driven) -> None:
 
 
 def test_colour_by_stiffness(driven: Driven) -> None:
+    driven.until(lambda f: not any(sizes(f)) and f.tip_m[2] > 0.0529)
     before = driven.picture()
     driven.key("c")
     picture = driven.window._pictures[0]
@@ -168,7 +169,7 @@ def test_colour_by_stiffness(driven: Driven) -> None:
     changed = np.abs(driven.picture().astype(int) - before).mean()
     driven.key("c")
     back = np.abs(driven.picture().astype(int) - before).mean()
-    assert changed > 5 and back < 0.5 * changed
+    assert changed > 5 and back < 0.1 * changed
 
 
 @pytest.mark.slow
