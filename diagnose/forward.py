@@ -49,7 +49,7 @@ class Settings:
     g: np.ndarray | None = None
     tau: np.ndarray | None = None
     mullins: tuple[float, float] | None = None
-    adhesion: tuple[float, float] | None = None
+    adhesion: tuple[float, float, float] | None = None
     delay: float = 0.0
     gain: np.ndarray | None = None
     bias: np.ndarray | None = None
@@ -249,14 +249,18 @@ def _shifted(t: Touches, f: np.ndarray, delay: float) -> np.ndarray:
     return out
 
 
-def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float) -> np.ndarray:
-    """Adhesive pull (n,), N: on the way out only, greatest where the surface is level again, zero at
-    `reach`."""
+def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float, inside: float) -> np.ndarray:
+    """Adhesive pull (n,), N, on the way out only: greatest where the surface is level again, zero at `reach`
+    above it; `inside` of it (0 to 1) already holds deeper in the contact, after a millimetre of the way out."""
     out = np.zeros(len(depth))
     for a, b in zip(t.start[:-1], t.start[1:], strict=True):
-        after = np.arange(b - a) > np.argmax(depth[a:b])
-        if depth[a:b].max() > 0:
-            out[a:b] = after * pull_off * np.clip(1 - np.abs(depth[a:b]) / reach, 0, None)
+        own = depth[a:b]
+        after = np.arange(b - a) > np.argmax(own)
+        if own.max() <= 0:
+            continue
+        near = np.clip(1 - np.abs(own) / reach, 0, None)
+        deep = inside * (own > 0) * np.clip((own.max() - own) / 1e-3, 0, 1)
+        out[a:b] = after * pull_off * np.maximum(near, deep)
     return out
 
 

@@ -21,6 +21,7 @@ from diagnose.finite import predicted_size
 from diagnose.fit import settings_of
 from diagnose.forward import Forward, build_forward
 from diagnose.freeair import FreeAir, free_air_of
+from diagnose.gaps import closed_share, gap
 from diagnose.inclusions import inclusion_starts
 from diagnose.library import NAMES, effect
 from diagnose.result import Diagnosis, EffectEntry
@@ -127,7 +128,7 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     counts = search.whitener.counts()
     rng = np.random.default_rng(options.seed)
     plain_before = found.ideal.plain + settled.plain(search.whitener, found.ideal)
-    gap_before = _gap(plain_before, counts, added)
+    gap_before = gap(plain_before, counts, added)
     deep_size = predicted_size(forward, found.base.found)
     with_fs = "finite_strain" not in excluded and deep_size > FINITE_STRAIN_LEAST * noise
     with_fs = with_fs and found.finite_strain_gain > FINITE_STRAIN_GAIN
@@ -167,8 +168,8 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         forward, search, found, names, settled, counts, plain_before, noise, added, deep_size, options, rng
     )
     after = found.final.plain
-    gap_after = _gap(after, counts, added) if names else gap_before
-    closed, interval = _closed(plain_before, after, counts, noise, added, rng, options.bootstrap)
+    gap_after = gap(after, counts, added) if names else gap_before
+    closed, interval = closed_share(plain_before, after, counts, noise, added, rng, options.bootstrap)
     if not names:
         closed, interval = (0.0, (0.0, 0.0)) if gap_before > noise else (None, None)
     singles = {
@@ -220,34 +221,12 @@ def _kind(names: list[str], candidates: list[str], remainder: bool) -> str:
     return "ambiguous" if candidates else "effect"
 
 
-def _gap(plain: np.ndarray, counts: np.ndarray, added: float) -> float:
-    return float(np.sqrt(plain.sum() / counts.sum() + added))
-
-
-def _closed(before, after, counts, noise, added, rng, resamples):  # type: ignore[no-untyped-def]
-    """(share of the gap's excess over the noise that is closed, 95 % interval by resampling sites)."""
-
-    def share(index: np.ndarray) -> float:
-        n = counts[index].sum()
-        b = before[index].sum() / n + added - noise**2
-        a = after[index].sum() / n + added - noise**2
-        return 1 - a / b if b > 0 else np.nan
-
-    everyone = np.arange(len(counts))
-    value = share(everyone)
-    if not np.isfinite(value):
-        return None, None
-    draws = np.array([share(rng.choice(everyone, len(everyone))) for _ in range(resamples)])
-    low, high = np.nanquantile(draws, [0.025, 0.975])
-    return float(value), (float(low), float(high))
-
-
 def _entries(forward, search, found, names, settled, counts, before, noise, added, deep_size, options, rng):  # type: ignore[no-untyped-def]
     gains = {n: max(s.gain, 0.0) for n, s in found.scores.items()}
     best = max(gains.values(), default=0.0)
     entries = []
     for name, score in found.scores.items():
-        closed, interval = _closed(
+        closed, interval = closed_share(
             before, score.candidate.plain, counts, noise, added, rng, max(100, options.bootstrap // 4)
         )
         values = found.final.found.of(name) if name in found.chosen else score.candidate.found.of(name)
@@ -256,7 +235,7 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
                 name,
                 effect(name).domain,
                 _probability(score, search, best, name in found.chosen),
-                _gap(score.candidate.plain, counts, added),
+                gap(score.candidate.plain, counts, added),
                 closed,
                 interval,
                 effect(name).report(values, forward),
@@ -265,13 +244,13 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
         )
     if found.finite_strain_gain > LINEAR_UNLESS or "finite_strain" in names:
         deep = found.deep
-        closed, interval = _closed(
+        closed, interval = closed_share(
             before, deep.plain, counts, noise, added, rng, max(100, options.bootstrap // 4)
         )
         probability = 0.95 if "finite_strain" in names else 0.1
         entries.append(
             EffectEntry(
-                "finite_strain", "object", probability, _gap(deep.plain, counts, added), closed, interval, {},
+                "finite_strain", "object", probability, gap(deep.plain, counts, added), closed, interval, {},
                 found.finite_strain_gain,
             )
         )  # fmt: skip
@@ -279,7 +258,7 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
     if "surface_shape" in names:
         entries.append(
             EffectEntry(
-                "surface_shape", "boundary", 0.6, _gap(found.final.plain, counts, added), 0.0, None, {}
+                "surface_shape", "boundary", 0.6, gap(found.final.plain, counts, added), 0.0, None, {}
             )
         )
     place = {n: i for i, n in enumerate(names)}

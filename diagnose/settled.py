@@ -12,6 +12,7 @@ import numpy as np
 
 from diagnose.forward import STANDARD_GRAVITY, Forward
 from diagnose.freeair import FreeAir
+from diagnose.gaps import closed_share, gap
 from diagnose.result import EffectEntry
 
 Z = 6.0
@@ -41,15 +42,13 @@ class Settled:
 
     def entries(self, before, candidate, counts, noise, added, rng):  # type: ignore[no-untyped-def]
         """The effects' lines."""
-        from diagnose.pipeline import _closed, _gap
-
         result = []
         for name in self.names:
             after = candidate.plain
-            closed, interval = _closed(before, after, counts, noise, added, rng, 100)
-            gap = _gap(after, counts, added)
+            closed, interval = closed_share(before, after, counts, noise, added, rng, 100)
+            left = gap(after, counts, added)
             keys = self.parameters[name]
-            result.append(EffectEntry(name, "instrument", 0.97, gap, closed, interval, keys, 1e3))
+            result.append(EffectEntry(name, "instrument", 0.97, left, closed, interval, keys, 1e3))
         return result
 
 

@@ -4,7 +4,7 @@ from diagnose.effects.base import Effect, Parameter
 
 
 def _change(settings, values, forward):  # type: ignore[no-untyped-def]
-    settings.adhesion = (values[0], values[1])
+    settings.adhesion = (values[0], values[1], values[2])
 
 
 EFFECT = Effect(
@@ -14,6 +14,7 @@ EFFECT = Effect(
     parameters=(
         Parameter("pull_off_n", "N", 0.0, 1.5, 0.0, (0.05, 0.05), 0.005),
         Parameter("range_m", "m", 1e-4, 4e-3, 1e-3, (3e-4, 1.2e-3), 1e-4),
+        Parameter("inside", "1", 0.0, 1.0, 0.0, (0.1, 0.9), 0.05),
     ),
     change=_change,
     report=lambda values, forward: {"pull_off_n": float(values[0]), "range_m": float(values[1])},

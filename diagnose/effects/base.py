@@ -37,13 +37,11 @@ class Parameter:
 class Effect:
     """A departure from the ideal model.
 
-    change(settings, values, forward): sets what the forward model needs, in place. report(values, forward):
-    the
-    contract's keys in SI units, device frame. needs: stages that must be computed first ('fields', 'poisson',
-    'base', 'unbonded'). candidates(forward): starts found from the data (list of value vectors) where a grid
-    is
-    not enough. extra: 'slack', a factor on the lack of fit that the effect's own law may leave. flexible: true where the fit has so many freedoms that it mimics others (it then pays for
-    them).
+    change(settings, values, forward): sets what the forward model needs, in place.
+    report(values, forward): the contract's keys in SI units, device frame.
+    needs: stages that must be computed first ('fields', 'poisson', 'springs', 'unbonded').
+    candidates(forward): starts found from the data, where the parameters' own are not enough.
+    signature: in words. extra: 'slack', a factor on the lack of fit that its own law may leave.
     """
 
     name: str
