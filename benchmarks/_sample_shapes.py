@@ -8,6 +8,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.tetmesh import TetMesh
+from reconstruct.tetwild import tetrahedralize
 
 # sample: rows of (azimuth or x in degrees or mm, height or y in mm, which face)
 PLACES = {
@@ -49,13 +50,8 @@ def sample_places(sample: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def sample_mesh(sample: str, size_m: float) -> TetMesh:
     """A fresh tetrahedral mesh of that edge length; meshing is not deterministic."""
-    import pytetwild
-
     points, triangles = _surface(sample)
-    nodes, tets = pytetwild.tetrahedralize(points, triangles, edge_length_abs=size_m, num_threads=1)
-    p = nodes[tets]
-    volume = np.einsum("ij,ij->i", np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), p[:, 3] - p[:, 0])
-    tets = np.where((volume < 0)[:, None], tets[:, [0, 1, 3, 2]], tets)
+    nodes, tets = tetrahedralize(points, triangles, edge_m=size_m, envelope_m=1.5e-4)
     nodes = np.array(nodes, dtype=float)
     fixed = nodes[:, 2] < 2e-4
     nodes[fixed, 2] = 0.0

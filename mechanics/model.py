@@ -130,7 +130,8 @@ def read_model(path: Path | str) -> Model:
     for name in ("model.toml", "mesh.vtu", "palpations.csv"):
         if not (path / name).is_file():
             raise ModelError(
-                f"'{path}' is no MODEL folder: it has no {name}; make one with 'palpate reconstruct REC -o MODEL'"
+                f"'{path}' is no MODEL folder: it has no {name}; "
+                "make one with 'palpate reconstruct REC -o MODEL'"
             )
     try:
         table = tomllib.loads((path / "model.toml").read_text(encoding="utf-8"))
@@ -153,7 +154,8 @@ def read_model(path: Path | str) -> Model:
         uncertainty = grid.point_data.get("shape_uncertainty_m")
         if int(table["mesh"]["nodes"]) != len(mesh.points):
             raise ModelError(
-                f"'{path}': model.toml says {table['mesh']['nodes']} nodes, mesh.vtu holds {len(mesh.points)}: "
+                f"'{path}': model.toml says {table['mesh']['nodes']} nodes, "
+                f"mesh.vtu holds {len(mesh.points)}: "
                 "the files are of different models; reconstruct again"
             )
         ci = material.get("young_modulus_ci95_pa", [float("nan")] * 2)

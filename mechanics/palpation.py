@@ -21,7 +21,8 @@ class Palpation:
     nx, ny, nz: outward unit normal there. depth: m, greatest travel of the tip's centre along -n.
     k_kv (N/m), b_kv (N s/m): Kelvin-Voigt, eq. (1). k_hc (N/m^r), b_hc (N s/m^(r+1)), r_hc: Hunt-Crossley,
     eq. (2). k_v (N/m), eq. (5); k_c (N/m^r), r_c, eq. (6): without damping. k_h (N/m^r): eq. (6) again with
-    the recording's mean exponent. e_pa: Pa, modulus of this palpation alone, eq. (13). Equations: Goksel et al.
+    the recording's mean exponent. e_pa: Pa, modulus of this palpation alone, eq. (13). Equations: Goksel
+    et al.
     """
 
     t_onset: float

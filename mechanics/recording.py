@@ -132,7 +132,8 @@ def recording_files(path: Path | str) -> tuple[Path, Path]:
     for file in (samples, description):
         if not file.is_file():
             raise RecordingError(
-                f"'{file}' does not exist: a recording is NAME.csv (or NAME.csv.gz) and NAME.toml side by side"
+                f"'{file}' does not exist: a recording is NAME.csv (or NAME.csv.gz) "
+                "and NAME.toml side by side"
             )
     return samples, description
 
@@ -158,7 +159,8 @@ def read_recording(path: Path | str) -> Recording:
     force_on = about.get("force_on")
     if force_on not in ("tool", "object"):
         raise RecordingError(
-            f"'{description}' says [recording] force_on = {force_on!r}: allowed are \"tool\" (the reaction that "
+            f"'{description}' says [recording] force_on = {force_on!r}: "
+            'allowed are "tool" (the reaction that '
             'pushes the tool out) and "object" (its negative)'
         )
     force = np.column_stack([data[c] for c in ("fx", "fy", "fz")])

@@ -32,7 +32,8 @@ class TipState:
 
 @dataclass(frozen=True)
 class ForceState:
-    """The force commanded to the tool at one tick: (3,) N on the tool, device frame, and why it is what it is.
+    """The force commanded to the tool at one tick: (3,) N on the tool, device frame, and why it is what it
+    is.
 
     limited: the safety filter changed it; reason: in plain words ('' where nothing was changed).
     """
