@@ -1,7 +1,7 @@
 """Phantoms: soft things that nobody had to build, as closed triangle surfaces in an object frame.
 
-Object frame: metres, origin in the middle of the base, z up, the support is the plane z = 0. Every shape here
-is a stack of rings over one star-shaped outline, so that one triangulation serves them all.
+Object frame: metres, origin in the middle of the base, z up, the support is the plane z = 0. Every shape
+here is a stack of rings over one star-shaped outline, so that one triangulation serves them all.
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ SPACING_M = 0.0018
 
 @dataclass(frozen=True)
 class Region:
-    """A ball of other stiffness inside a phantom: centre (3,) m, radius m, modulus over the matrix's modulus."""
+    """A ball of other stiffness inside a phantom: centre (3,) m, radius m, modulus over the
+    matrix's modulus.
+    """
 
     name: str
     centre_m: tuple[float, float, float]
@@ -32,8 +34,8 @@ class Region:
 class Phantom:
     """A closed surface with its material.
 
-    vertices: (n, 3) m, object frame. faces: (m, 3), counter-clockwise from outside. young_modulus_pa: of the
-    matrix. regions: balls of another modulus. shape: one line in words and metres.
+    vertices: (n, 3) m, object frame. faces: (m, 3), counter-clockwise from outside. young_modulus_pa: of
+    the matrix. regions: balls of another modulus. shape: one line in words and metres.
     """
 
     name: str
@@ -61,7 +63,9 @@ class Phantom:
 
 
 def _stack(rings: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Rings (k, n, 3), counter-clockwise from above and ordered from the base's middle over the wall to the top."""
+    """Rings (k, n, 3), counter-clockwise from above and ordered from the base's middle over the wall to the
+    top.
+    """
     k, n = rings.shape[:2]
     vertices = np.vstack([rings.reshape(-1, 3), bottom, top])
     i = np.arange(n)
@@ -90,7 +94,9 @@ def _stacked(
     profile: np.ndarray,
     height: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """outline (n, 2) m; profile (k, 2): scale of the outline and z; `height(xy, z)` may replace z by place."""
+    """outline (n, 2) m; profile (k, 2): scale of the outline and z; `height(xy, z)` may replace
+    z by place.
+    """
     scale, z = profile[:, 0], profile[:, 1]
     inner = (scale > 1e-9).nonzero()[0]
     rings = np.empty((len(inner), len(outline), 3))
@@ -199,7 +205,9 @@ def wedge() -> Phantom:
 
 
 def bowl() -> Phantom:
-    """A round block, radius 48 mm and height 50 mm, with a spherical dish 18 mm deep in its top (not convex)."""
+    """A round block, radius 48 mm and height 50 mm, with a spherical dish 18 mm deep in its top
+    (not convex).
+    """
     radius, height, mouth, deep = 0.048, 0.050, 0.036, 0.018
     ball = (mouth**2 + deep**2) / (2 * deep)
     half = np.arcsin(mouth / ball)
@@ -238,7 +246,8 @@ def phantom(name: str | Path) -> Phantom:
     path = Path(name)
     if path.suffix.lower() not in (".stl", ".ply", ".vtu"):
         raise SceneError(
-            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as STL, PLY or VTU"
+            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as STL, "
+            f"PLY or VTU"
         )
     if not path.is_file():
         raise SceneError(

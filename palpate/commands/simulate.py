@@ -1,10 +1,10 @@
 """The virtual laboratory: a person explores a phantom, and what a device would have read is written down.
 
-PHANTOM is a name (cylinder, block, half-sphere, bean, dome, wedge, bowl) or a closed STL, PLY or VTU surface in metres
-that stands on its lowest plane. Without --effect the object is the ideal model: linear elastic, bonded to its
-support, sticking to the tip, readings exact but for white and slow noise. Solved touches are kept in the user's cache
-(PALPATE_CACHE), so that another seed, modulus, hand or instrument costs seconds, and an interrupted run goes on where it
-stopped.
+PHANTOM is a name (cylinder, block, half-sphere, bean, dome, wedge, bowl) or a closed STL, PLY or VTU
+surface in metres that stands on its lowest plane. Without --effect the object is the ideal model: linear
+elastic, bonded to its support, sticking to the tip, readings exact but for white and slow noise. Solved
+touches are kept in the user's cache (PALPATE_CACHE), so that another seed, modulus, hand or instrument
+costs seconds, and an interrupted run goes on where it stopped.
 """
 
 from __future__ import annotations
@@ -35,7 +35,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="NAME=STRENGTH",
-        help=f"an effect and its strength (repeatable; 1 is the table's, 0 leaves it out): {', '.join(REGISTRY)}",
+        help="an effect and its strength (repeatable; 1 is the table's, 0 leaves it out): "
+        f"{', '.join(REGISTRY)}",
     )
     parser.add_argument("--seal", action="store_true", help="withhold the truth; needs --truth")
     parser.add_argument(

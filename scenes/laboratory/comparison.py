@@ -22,7 +22,9 @@ SHARES = np.array([0.0, 0.04, 0.1, 0.18, 0.28, 0.4, 0.52, 0.64, 0.76, 0.88, 0.97
 
 @dataclass(frozen=True)
 class Press:
-    """The way in of one recorded press: point and normal (object frame, mm); travel (k, 3) mm; force (k, 3) N."""
+    """The way in of one recorded press: point and normal (object frame, mm); travel (k, 3) mm; force (k, 3)
+    N.
+    """
 
     point: np.ndarray
     normal: np.ndarray
@@ -34,7 +36,9 @@ Shape = Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]]
 
 
 def cylinder_shape(radius: float, height: float) -> Shape:
-    """Nearest-surface function of an upright cylinder, mm: position (3,) -> (surface point, outward normal)."""
+    """Nearest-surface function of an upright cylinder, mm: position (3,) -> (surface point,
+    outward normal).
+    """
 
     def nearest(x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         r = np.hypot(x[0], x[1])

@@ -1,9 +1,10 @@
-"""A rigid sphere against quadratic faces: unilateral penalty contact that sticks, or slips by Coulomb's law.
+"""A rigid sphere against quadratic faces: unilateral penalty contact that sticks, or slips by Coulomb's
+law.
 
-Contact is checked at seven points of each face (degree-5 rule, Radon 1948). A point that meets the sphere is
-anchored where it met it; a spring of stiffness `penalty` per area pulls it back to that place of the sphere.
-With friction the anchor slides when the tangential traction exceeds mu times the pressure (return mapping,
-Simo & Laursen 1992). Lengths mm, tractions in units of E, forces in E mm^2.
+Contact is checked at seven points of each face (degree-5 rule, Radon 1948). A point that meets the sphere
+is anchored where it met it; a spring of stiffness `penalty` per area pulls it back to that place of the
+sphere. With friction the anchor slides when the tangential traction exceeds mu times the pressure (return
+mapping, Simo & Laursen 1992). Lengths mm, tractions in units of E, forces in E mm^2.
 """
 
 from __future__ import annotations
@@ -45,7 +46,9 @@ SHAPES, SLOPES = _shapes(POINTS[:, 0], POINTS[:, 1])
 
 
 class Grip:
-    """Contact state of every quadrature point at a converged load step: anchors relative to the sphere's centre."""
+    """Contact state of every quadrature point at a converged load step: anchors relative to the sphere's
+    centre.
+    """
 
     def __init__(self, points: int) -> None:
         self.active = np.zeros(points, dtype=np.bool_)
@@ -53,7 +56,9 @@ class Grip:
         self.relative = np.full((points, 3), 1e6)
 
     def let_go(self, new: Grip) -> bool:
-        """Release the points held here that pull in `new`; they may still be pressed, but slide. Whether any were."""
+        """Release the points held here that pull in `new`; they may still be pressed, but slide. Whether any
+        were.
+        """
         pulling = self.active & ~new.active
         self.active = self.active & ~pulling
         return bool(pulling.any())
@@ -85,7 +90,8 @@ class SphereContact:
     def evaluate(
         self, displacement: np.ndarray, centre: np.ndarray, old: Grip, tangent: bool, arrivals: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Grip]:
-        """(face forces (k, 18) resisting, face stiffness (k, 18, 18) or empty, force on the sphere (3,), new grip).
+        """(face forces (k, 18) resisting, face stiffness (k, 18, 18) or empty, force on the sphere (3,),
+        new grip).
 
         arrivals: whether points that did not touch before may begin to.
         """

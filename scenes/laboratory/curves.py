@@ -26,7 +26,8 @@ LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.
 
 @dataclass(frozen=True)
 class Curve:
-    """A solved path. travel: (k, 3) mm, the tip's centre since first touch; force: (k, 3) E mm^2, on the tip.
+    """A solved path. travel: (k, 3) mm, the tip's centre since first touch; force: (k, 3) E mm^2, on the
+    tip.
 
     stiffness: (k, 3, 3) E mm, d(force on the tip)/d(tip position) with the contact as it is (negative
     definite). times: (k,) s, for paths whose solid creeps, or None. energy: (k,) E mm^3.
@@ -46,7 +47,9 @@ class Curve:
 
 @dataclass(frozen=True)
 class PathJob:
-    """One path to solve: point (3,) mm and unit normal (3,), object frame; travel (k, 3) mm from first touch."""
+    """One path to solve: point (3,) mm and unit normal (3,), object frame; travel (k, 3) mm
+    from first touch.
+    """
 
     point: np.ndarray
     normal: np.ndarray

@@ -1,4 +1,6 @@
-"""A sparse symmetric factorisation whose ordering is found once: MKL Pardiso, or SuperLU where there is none."""
+"""A sparse symmetric factorisation whose ordering is found once: MKL Pardiso, or SuperLU where
+there is none.
+"""
 
 from __future__ import annotations
 

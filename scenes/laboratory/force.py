@@ -1,4 +1,6 @@
-"""From a motion and solved touches to the force on the tool: still elastic, still without an instrument. N, mm."""
+"""From a motion and solved touches to the force on the tool: still elastic, still without an instrument. N,
+mm.
+"""
 
 from __future__ import annotations
 
@@ -14,8 +16,9 @@ from scenes.laboratory.paths import TouchForce
 def elastic_force(motion: Motion, touches: Sequence[TouchForce], modulus_pa: float) -> np.ndarray:
     """(n, 3) N on the tool, object frame: the solved force along each path, and what straying adds.
 
-    Straying pulls through the contact's own stiffness as the solid has it at that depth: increments add up while
-    the tip stays, and are let go in proportion as the contact shrinks (the no-slip contact of Mindlin & Deresiewicz).
+    Straying pulls through the contact's own stiffness as the solid has it at that depth: increments add up
+    while the tip stays, and are let go in proportion as the contact shrinks (the no-slip contact of
+    Mindlin & Deresiewicz).
     """
     force = np.zeros_like(motion.position)
     for number, touch in enumerate(touches):

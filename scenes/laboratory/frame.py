@@ -6,7 +6,9 @@ import numpy as np
 
 
 def random_frame(seed: int, height_mm: float) -> tuple[np.ndarray, np.ndarray]:
-    """(rotation (3, 3), shift (3,) m) from the object's frame to a device that stands anywhere, tilted a little."""
+    """(rotation (3, 3), shift (3,) m) from the object's frame to a device that stands anywhere, tilted a
+    little.
+    """
     rng = np.random.default_rng([seed, 991])
     yaw = rng.uniform(-np.pi, np.pi)
     tilt = np.radians(rng.uniform(0, 7))

@@ -1,8 +1,8 @@
 """The ideal object: linear elasticity, condensed exactly onto the faces that the tip may meet.
 
 Small strains and the same mesh as the finite-strain solid (its tangent before any load). The tip itself is
-not linearised: it meets the displaced surface. After one factorisation a path costs milliseconds. Units: mm,
-E mm^2.
+not linearised: it meets the displaced surface. After one factorisation a path costs milliseconds. Units:
+mm, E mm^2.
 """
 
 from __future__ import annotations
@@ -128,7 +128,9 @@ class LinearProblem:
 
 
 class LinearState:
-    """A converged equilibrium on the condensed faces: displacement (k, 3) mm, tip centre (3,), force on it (3,)."""
+    """A converged equilibrium on the condensed faces: displacement (k, 3) mm, tip centre (3,), force on it
+    (3,).
+    """
 
     def __init__(
         self, displacement: np.ndarray, centre: np.ndarray, force: np.ndarray, grip: Grip, energy: float

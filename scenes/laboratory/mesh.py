@@ -1,4 +1,6 @@
-"""Meshes of the laboratory: a coarse one of the whole object, and quadratic ones graded towards a touch. In mm."""
+"""Meshes of the laboratory: a coarse one of the whole object, and quadratic ones graded towards a touch. In
+mm.
+"""
 
 from __future__ import annotations
 
@@ -103,9 +105,11 @@ def _snap(points: np.ndarray, tetrahedra: np.ndarray, surface: Surface) -> np.nd
 
 @dataclass(frozen=True)
 class QuadraticMesh:
-    """points (n, 3) mm; cells (m, 10): corners, then edges 01 02 03 12 13 23; fixed (n,) bool: nodes of the base.
+    """points (n, 3) mm; cells (m, 10): corners, then edges 01 02 03 12 13 23; fixed (n,) bool: nodes of
+    the base.
 
-    faces (k, 6): boundary faces off the base, corners then edges 01 12 20; base (b, 6): faces on the support.
+    faces (k, 6): boundary faces off the base, corners then edges 01 12 20; base (b, 6): faces on the
+    support.
     """
 
     points: np.ndarray

@@ -22,8 +22,9 @@ NEAR_MM = 3.0
 class Motion:
     """Samples of an exploration. position: (n, 3) mm, tip's centre. axis: (n, 3) unit, tip to handle.
 
-    touch: (n,) number of the touch, -1 elsewhere. leg: (n,) leg of that touch; s: (n,) mm along it (negative: above
-    the surface). stray: (n, 3) mm sideways of the touch's path since first touch. trace_force: (n, 3) N of phase I.
+    touch: (n,) number of the touch, -1 elsewhere. leg: (n,) leg of that touch; s: (n,) mm along it
+    (negative: above the surface). stray: (n, 3) mm sideways of the touch's path since first touch.
+    trace_force: (n, 3) N of phase I.
     phase: (start, end) s of phase I.
     """
 
@@ -147,7 +148,9 @@ def _samples(distance: float, speed: float) -> int:
 
 
 def _hold(depth: float, seconds: float, hand: HandOptions, rng: np.random.Generator) -> np.ndarray:
-    """Depth while the hand holds still: it creeps in by a little and trembles, never beyond what was solved."""
+    """Depth while the hand holds still: it creeps in by a little and trembles, never beyond
+    what was solved.
+    """
     count = max(int(seconds * RATE_HZ), 3)
     drift = -rng.uniform(0.0, 0.12) * np.arange(count) / RATE_HZ / max(seconds, 0.3)
     tremor = 0.5e3 * hand.tremor_m * band_noise(count, RATE_HZ, 7, 11, rng)

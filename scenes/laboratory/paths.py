@@ -1,4 +1,6 @@
-"""From touches to paths to solve, and from solved curves back to the force of each touch. Object frame, mm, E mm^2."""
+"""From touches to paths to solve, and from solved curves back to the force of each touch. Object frame, mm, E
+mm^2.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ UNLOADING = np.array([0.93, 0.82, 0.68, 0.52, 0.36, 0.22, 0.12, 0.05, 0.0])
 """States of the way out, as shares of the depth; contact may be lost before."""
 
 BEYOND_MM, BEYOND_DRAG_MM = (0.4,), (0.4, 1.0, 1.8, 3.0)
-"""States of the way out above the place of first touch: a surface that was dragged along follows the tip for a while."""
+"""States of the way out above the place of first touch: a surface that was dragged along follows the tip for
+a while.
+"""
 
 WAY_IN, SIDEWAYS, WAY_OUT = 0, 1, 2
 """Legs of a touch."""
@@ -43,7 +47,9 @@ class Leg:
         self._stiffness = PchipInterpolator(s, stiffness, axis=0)
 
     def __call__(self, s: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """(force (k, 3), stiffness (k, 3, 3)) at distances s (k,); beyond the last state by its stiffness alone."""
+        """(force (k, 3), stiffness (k, 3, 3)) at distances s (k,); beyond the last state by its stiffness
+        alone.
+        """
         at = np.clip(s, self._low, self._high)
         force, stiffness = self._force(at), self._stiffness(at)
         if self._from_touch:
@@ -59,7 +65,9 @@ class Leg:
 
 @dataclass(frozen=True)
 class TouchForce:
-    """The solved force of one touch, leg by leg. `s` is the depth along the way in, or the distance sideways."""
+    """The solved force of one touch, leg by leg. `s` is the depth along the way in, or the
+    distance sideways.
+    """
 
     legs: tuple[Leg, Leg | None, Leg]
 
@@ -122,8 +130,8 @@ def touch_forces(
 ) -> list[TouchForce]:
     """The force of every touch, for a modulus of 1; solved where the cache does not hold it.
 
-    A reversible specimen's straight presses of one site share one curve; a specimen that remembers is driven
-    through all touches of a site in their order.
+    A reversible specimen's straight presses of one site share one curve; a specimen that remembers is
+    driven through all touches of a site in their order.
     """
     keywords = {
         "fineness": fineness, "workers": workers, "cache": cache, "progress": progress, "label": label

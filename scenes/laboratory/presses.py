@@ -1,4 +1,5 @@
-"""Which touches a person makes: sites spread over the surface, and the paths of the tip at each. Lengths mm.
+"""Which touches a person makes: sites spread over the surface, and the paths of the tip at each. Lengths
+mm.
 
 A press set depends on the shape, the protocol and its own number only, never on the seed of a recording:
 solved curves are shared between recordings of one press set.
@@ -44,9 +45,10 @@ RIM_MM, FLOOR_MM = 9.0, 13.0
 class Touch:
     """One touch: site number, point and normal (object frame), and the tip's travel from first touch.
 
-    kind: "press" (straight along -n), "oblique" (straight, tilted), "drag" (along -n, then sideways). depth:
-    greatest travel of the way in, mm. direction: unit vector of the way in. side: (3,) mm, sideways travel of
-    a drag. slow: the person holds or presses slowly here. repeat: how often this site was touched before.
+    kind: "press" (straight along -n), "oblique" (straight, tilted), "drag" (along -n, then sideways).
+    depth: greatest travel of the way in, mm. direction: unit vector of the way in. side: (3,) mm, sideways
+    travel of a drag. slow: the person holds or presses slowly here. repeat: how often this site was
+    touched before.
     """
 
     site: int
@@ -71,7 +73,8 @@ def sites(phantom: Phantom, count: int, rng: np.random.Generator) -> tuple[np.nd
         reachable &= distance > RIM_MM
     if not reachable.any():
         raise SceneError(
-            f"'{phantom.name}' has no place to touch {bottom:g} mm above its support and {RIM_MM:g} mm from every rim "
+            f"'{phantom.name}' has no place to touch {bottom:g} mm above its support and {RIM_MM:g} "
+            f"mm from every rim "
             f"(it is {top:.0f} mm high): choose a larger object"
         )
     candidates = np.flatnonzero(reachable)

@@ -1,6 +1,8 @@
-"""Sealing: a recording goes out without its truth, and a salted hash proves later that the truth was not changed.
+"""Sealing: a recording goes out without its truth, and a salted hash proves later that the truth was not
+changed.
 
-`NAME.sealed` holds SHA-256(salt + canonical JSON of the truth); the truth and the salt lie in a file elsewhere.
+`NAME.sealed` holds SHA-256(salt + canonical JSON of the truth); the truth and the salt lie in a file
+elsewhere.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ def digest(truth: Mapping[str, Any], salt: str) -> str:
 def write_sealed(
     path: Path | str, recording: Recording, truth: Mapping[str, Any], truth_path: Path | str
 ) -> Path:
-    """Write the recording without truth, `NAME.sealed` beside it, and truth with salt to `truth_path` (JSON).
+    """Write the recording without truth, `NAME.sealed` beside it, and truth with salt to `truth_path`
+    (JSON).
 
     Raises RecordingError where the truth would lie beside the recording under its name.
     """

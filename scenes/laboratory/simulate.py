@@ -46,7 +46,9 @@ class SimulateOptions:
 
 @dataclass(frozen=True)
 class Simulation:
-    """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device frame."""
+    """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device
+    frame.
+    """
 
     recording: Recording
     truth: Mapping[str, Any]
@@ -66,11 +68,13 @@ def simulate(
     cache: Path | None = None,
     progress: Progress = silent,
 ) -> Simulation:
-    """Explore `phantom` with `effects` (name: strength, see INTERFACE of the docs) and write down what is read.
+    """Explore `phantom` with `effects` (name: strength, see INTERFACE of the docs) and write down what is
+    read.
 
-    The ideal model has no effect: linear elastic, bonded, sticking, exact but for noise. Regions of the phantom count
-    as the effect `inclusion`. seed: timing, straying, tracing and noise; the press set has its own number, so that
-    solved curves are shared. sizes: also solve without each effect, to state its size. Raises OptionError, LabError.
+    The ideal model has no effect: linear elastic, bonded, sticking, exact but for noise. Regions of the
+    phantom count as the effect `inclusion`. seed: timing, straying, tracing and noise; the press set has
+    its own number, so that solved curves are shared. sizes: also solve without each effect, to state its
+    size. Raises OptionError, LabError.
     """
     options = options or SimulateOptions()
     hand = hand or HandOptions()
@@ -237,7 +241,9 @@ class _Session:
 
 
 def _aside(way: Motion, moved: np.ndarray, touches: Sequence[Touch]) -> Motion:
-    """The way of a tip that is displaced by `moved` (n, 3) mm: along each touch's path, and sideways of it."""
+    """The way of a tip that is displaced by `moved` (n, 3) mm: along each touch's path, and
+    sideways of it.
+    """
     s, stray = way.s.copy(), way.stray.copy()
     for number, touch in enumerate(touches):
         rows = way.touch == number
@@ -325,7 +331,9 @@ def contact_samples(way: Motion) -> np.ndarray:
 
 
 def size_of(with_effect: np.ndarray, without: np.ndarray) -> dict[str, float]:
-    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor on `without`."""
+    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor
+    on `without`.
+    """
     scale = float((with_effect * without).sum() / max((without * without).sum(), 1e-300))
     return {
         "rms_n": _rms(with_effect - without),

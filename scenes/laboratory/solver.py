@@ -1,4 +1,6 @@
-"""The quasi-static path of a tip through a solid: Newton's method on one factorisation pattern. Units: mm, E mm^2."""
+"""The quasi-static path of a tip through a solid: Newton's method on one factorisation pattern. Units: mm, E
+mm^2.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,8 @@ class Problem:
     """A solid on its support and a sphere; built once for a site, then driven along paths.
 
     free: (3 n,) bool, degrees of freedom that may move. springs: (3 n,) support stiffness on the diagonal;
-    floor: (3 n,) the same, but resisting negative displacement only. linear: small strains instead of finite
-    ones.
+    floor: (3 n,) the same, but resisting negative displacement only. linear: small strains instead of
+    finite ones.
     """
 
     solid: Solid
@@ -140,7 +142,8 @@ class Problem:
             return found
         if depth >= 5:
             raise LabError(
-                f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep or refine the mesh"
+                f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep or "
+                f"refine the mesh"
             )
         middle = self._advance(state, (state.centre + centre) / 2, step_s / 2, None, depth + 1)
         return self._advance(middle, centre, step_s / 2, None, depth + 1)

@@ -1,4 +1,5 @@
-"""A specimen: a phantom as it is on the bench, with everything in the solid, its base and its contact that matters.
+"""A specimen: a phantom as it is on the bench, with everything in the solid, its base and its contact that
+matters.
 
 Lengths mm; moduli relative to the matrix. A specimen knows how to become a discrete problem around a touch.
 """
@@ -26,13 +27,14 @@ VERSION = 3
 
 @dataclass(frozen=True)
 class Specimen:
-    """What the solver needs beyond the shape; every field that is not None or 0 departs from the ideal model.
+    """What the solver needs beyond the shape; every field that is not None or 0 departs from the ideal
+    model.
 
     finite: finite strain (neo-Hookean) instead of linear. balls: (x, y, z, radius, ratio) mm. gradient:
-    modulus ratios (base, top). skin: (thickness mm, ratio). base: None bonded; ("unbonded", bonded fraction,
-    direction angle rad); ("springs", k_normal, k_tangential) in E per mm. friction: None sticks. fibre:
-    (stiffness over shear modulus, x, y, z). mullins: (r, m). plastic: (share, yield strain measure). prony:
-    ((g, tau s), ...).
+    modulus ratios (base, top). skin: (thickness mm, ratio). base: None bonded; ("unbonded", bonded
+    fraction, direction angle rad); ("springs", k_normal, k_tangential) in E per mm. friction: None sticks.
+    fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m). plastic: (share, yield strain
+    measure). prony: ((g, tau s), ...).
     """
 
     poisson_ratio: float = 0.49
@@ -87,7 +89,9 @@ def build(
     fineness: Fineness | None = None,
     cache: Path | None = None,
 ) -> Problem | LinearProblem:
-    """The discrete problem for touches at `point` (mm, object frame) whose tip strays up to `travel` mm sideways."""
+    """The discrete problem for touches at `point` (mm, object frame) whose tip strays up to `travel` mm
+    sideways.
+    """
     fineness = fineness or Fineness()
     if specimen.skin is not None:
         fineness = Fineness(min(fineness.finest, 0.75 * specimen.skin[0]), fineness.reach, 0.5)

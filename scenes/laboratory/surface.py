@@ -62,7 +62,9 @@ def _barycentric(points: np.ndarray, corners: np.ndarray) -> np.ndarray:
 
 
 def _nearest_on_triangles(p: np.ndarray, corners: np.ndarray) -> np.ndarray:
-    """Nearest points to p (k, 1, 3) on triangles (k, m, 3, 3): the best of the interior and the three edges."""
+    """Nearest points to p (k, 1, 3) on triangles (k, m, 3, 3): the best of the interior and the
+    three edges.
+    """
     a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
     best, least = None, None
     for start, end in ((a, b), (b, c), (c, a)):

@@ -15,7 +15,9 @@ RATE_HZ = 1000.0
 
 @dataclass(frozen=True)
 class Trace:
-    """Samples of phase I: position (n, 3) mm of the tip's centre, force (n, 3) N on the tool, contact (n,) bool."""
+    """Samples of phase I: position (n, 3) mm of the tip's centre, force (n, 3) N on the tool, contact (n,)
+    bool.
+    """
 
     position: np.ndarray
     force: np.ndarray
@@ -86,7 +88,9 @@ def _outline(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
 def trace(
     phantom: Phantom, hand: HandOptions, radius: float, modulus_pa: float, rng: np.random.Generator
 ) -> Trace:
-    """Comes down from the air, goes around one and a bit times while leaning, slipping and lifting off, goes up."""
+    """Comes down from the air, goes around one and a bit times while leaning, slipping and lifting off, goes
+    up.
+    """
     surface = Surface(phantom.vertices * 1e3, phantom.faces)
     path, outward, arc = foot_path(surface, radius, 0.0)
     total = arc[-1]

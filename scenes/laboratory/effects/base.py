@@ -18,7 +18,9 @@ Parameters = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Bench:
-    """What an effect may look at to choose its parameters: the ideal object, the touches, and its own chance."""
+    """What an effect may look at to choose its parameters: the ideal object, the touches, and
+    its own chance.
+    """
 
     phantom: Phantom
     modulus_pa: float
@@ -44,9 +46,10 @@ class Readings:
 class Effect:
     """One departure from the ideal model.
 
-    parameters(strength, bench): the keys of the contract, SI. in_solid(specimen, parameters): solved in the solid.
-    on_force(force, motion, normals, parameters): acts on the elastic force (n, 3) N, object frame. on_readings(
-    readings, parameters): acts in the instrument. on_shape(phantom, parameters): changes the object's surface.
+    parameters(strength, bench): the keys of the contract, SI. in_solid(specimen, parameters): solved in
+    the solid. on_force(force, motion, normals, parameters): acts on the elastic force (n, 3) N, object
+    frame. on_readings( readings, parameters): acts in the instrument. on_shape(phantom, parameters):
+    changes the object's surface.
     needs_finite: whether it has no meaning at small strains.
     """
 

@@ -57,7 +57,9 @@ def _gain(strength: float, bench: Bench) -> dict[str, Any]:
 
 
 def _weigh(readings: Readings, p: Parameters) -> Readings:
-    """A mass beyond the sensor: its weight and inertia read as force on the tool; tared where the session began."""
+    """A mass beyond the sensor: its weight and inertia read as force on the tool; tared where the session
+    began.
+    """
     smooth = _smoothed(readings.position)
     acceleration = np.gradient(np.gradient(smooth, 1 / RATE_HZ, axis=0), 1 / RATE_HZ, axis=0)
     extra = p["mass_kg"] * (GRAVITY - acceleration)
