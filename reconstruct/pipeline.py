@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import OptionError
+from mechanics.linear_range import linear_range
 from mechanics.model import Model, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
@@ -144,6 +145,7 @@ def reconstruct_fully(
         shape_uncertainty_m=meshing.shape_uncertainty_m if paper else uncertainty_at(mesh, surface),
         palpations=palpation_rows(exploration, where.points, where.normals, one_d, each),
         provenance=_provenance(recording, options, surface, fit),
+        extra={} if sites is None else {"linear_range": linear_range(sites, recording.tip_radius_m).table()},
     )
     progress("done", 1.0)
     return Reconstruction(

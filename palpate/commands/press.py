@@ -79,8 +79,8 @@ def run(arguments: argparse.Namespace) -> int:
     }
     say(
         arguments,
-        f"{renderer.name}: {curve.peak_force_n:.4g} N at most; at {curve.depth.max() * 1e3:.3g} mm the force on "
-        f"the tool is {', '.join(f'{f:.4g}' for f in deepest)} N",
+        f"{renderer.name}: {curve.peak_force_n:.4g} N at most; at {curve.depth.max() * 1e3:.3g} mm the force "
+        f"on the tool is {', '.join(f'{f:.4g}' for f in deepest)} N",
     )
     code = 0
     if expected is not None:

@@ -1,0 +1,36 @@
+"""The depth at which finite strain is felt: deeper with a larger tip, and shown by the renderer itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.linear_range import linear_range
+from mechanics.sites import touch_sites
+from mechanics.solver import Solver
+from render.press import press
+
+from . import shapes
+
+
+def test_the_linear_range_scales_with_the_tip_on_a_half_space_and_marks_the_renderers_own_error():
+    made = shapes.model(shapes.block((0.12, 0.12, 0.08), (6, 6, 4)))
+    solver = Solver(made.mesh, 0.49)
+    at = np.array([[0.0, 0.0, 0.08]])
+    sites = touch_sites(made.mesh, at, [[0, 0, 1.0]], 0.49, solver=solver)
+    share = 0.03
+    found = linear_range(sites, 0.005, share)
+    assert 0.001 < found.depth_m[0] < 0.0125
+    larger = linear_range(sites, 0.008, share)
+    assert larger.depth_m[0] > 1.3 * found.depth_m[0]
+    compliance = shapes.quick_compliance(made)
+    force = {}
+    for law in ("linear", "neo-hookean"):
+        from render.fem import FemRenderer
+        from render.options import RenderOptions
+
+        renderer = FemRenderer(made, RenderOptions(dent_law=law), compliance=compliance)
+        curve = press(renderer, at[0], [0, 0, -1], float(found.depth_m[0]), 0.05)
+        force[law] = curve.force_at(curve.depth.max())[2]
+    assert abs(force["linear"] / force["neo-hookean"] - 1) == pytest.approx(share, abs=0.006)
+    assert found.table()["depth_median_m"] == pytest.approx(found.depth_m[0])
