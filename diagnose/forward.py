@@ -250,8 +250,10 @@ def _shifted(t: Touches, f: np.ndarray, delay: float) -> np.ndarray:
 
 
 def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float, inside: float) -> np.ndarray:
-    """Adhesive pull (n,), N, on the way out only: greatest where the surface is level again, zero at `reach`
-    above it; `inside` of it (0 to 1) already holds deeper in the contact, after a millimetre of the way out."""
+    """Adhesive pull (n,), N, on the way out only: greatest where the surface is level again, zero at `reach`.
+
+    `inside` of it (0 to 1) already holds deeper in the contact, after a millimetre of the way out.
+    """
     out = np.zeros(len(depth))
     for a, b in zip(t.start[:-1], t.start[1:], strict=True):
         own = depth[a:b]

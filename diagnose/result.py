@@ -98,7 +98,7 @@ class Diagnosis:
 
     def words(self) -> list[str]:
         """The three answers, a line each, for a terminal."""
-        near = min(self.where.axes, key=lambda a: (a.p, -a.share))
+        near = self.where.leading
         lines = [
             f"verdict: {self.summary}",
             f"where: gap {self.gap_before_n:.4f} N (noise {self.noise_n:.4f} N); it follows {near.axis} most "

@@ -37,6 +37,15 @@ class Where:
     site_rmse: np.ndarray
     curves: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
+    @property
+    def leading(self) -> Axis:
+        """The axis that the gap follows most: the largest share among those that are no chance.
+
+        Places have a freedom each, so their share counts for 0.6 of its value.
+        """
+        real = [a for a in self.axes if a.p < 0.05] or list(self.axes)
+        return max(real, key=lambda a: a.share * (0.6 if a.axis == "space" else 1.0))
+
 
 def locate(
     forward: Forward, residual: np.ndarray, free: FreeAir | None, site_sd: np.ndarray, *, seed: int = 0

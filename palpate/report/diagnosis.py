@@ -97,7 +97,7 @@ def _how_far(result: Diagnosis) -> str:
 
 
 def _caption(result: Diagnosis) -> str:
-    axis = min(result.where.axes, key=lambda a: (a.p, -a.share))
+    axis = result.where.leading
     return (
         "Left: the gap at each place that was pressed. Middle: the mean gap along depth and speed. "
         f"It follows {AXIS_WORDS[axis.axis]} most. Right: how much of the gap each effect alone closes."
