@@ -84,12 +84,15 @@ def test_every_known_shape_within_the_targets():
 
 def test_bad_presses_do_not_bend_the_surface():
     def spoil(evidence: Evidence) -> Evidence:
+        rng = np.random.default_rng(1)
+        bad = rng.choice(len(evidence.centres), 3, replace=False)
         centres = evidence.centres.copy()
-        centres[[3, 11]] -= 0.004 * evidence.normals[[3, 11]]
+        centres[bad] -= rng.uniform(0.002, 0.006, (3, 1)) * evidence.normals[bad]
         return replace(evidence, centres=centres)
 
     found, error = reconstructed(phantom_truth("bean"), 1, change=spoil)
-    assert error["mean_m"] < 0.0006
+    assert error["mean_m"] < 0.0003
+    assert found.held_out_m[found.method] < 0.0005
 
 
 def test_the_hull_lies_inside_a_convex_object_and_the_tangent_planes_outside():
