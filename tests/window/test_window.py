@@ -83,7 +83,7 @@ def press(driven: Driven):
     driven.mouse(0.5, 0.55)
     driven.button(True)
     depth = driven.window.pointer.press_depth_m
-    return driven.until(lambda f: f.touching and abs(f.depth_m - depth) < 5e-5)
+    return driven.until(lambda f: f.touching and abs(f.depth_m - depth) < 2e-6)
 
 
 def release(driven: Driven):
