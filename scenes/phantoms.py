@@ -173,10 +173,10 @@ def bean() -> Phantom:
     angle = 2 * np.pi * np.arange(200) / 200
     radius = 1 / np.sqrt((np.cos(angle) / 0.056) ** 2 + (np.sin(angle) / 0.038) ** 2)
     turn = np.angle(np.exp(1j * (angle + np.pi / 2)))
-    radius *= 1 - 0.38 * np.exp(-((turn / 0.55) ** 2))
+    radius *= 1 - 0.45 * np.exp(-((turn / 0.75) ** 2))
     outline = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
     vertices, faces = _stacked(outline, _cushion(0.046, 3.0, 0.045))
-    return Phantom("bean", "kidney 0.112 x 0.070 x 0.046, dent 0.014 deep in one side", vertices, faces, 20e3)
+    return Phantom("bean", "kidney 0.111 x 0.065 x 0.046, dent 0.006 deep in one side", vertices, faces, 20e3)
 
 
 def dome() -> Phantom:

@@ -186,8 +186,9 @@ def _evaluate(
                         if fresh:
                             value -= overlap / distance * side
                         if sliding and size > 1e-12:
-                            # the pressure's part of the sliding tangent is left out to keep it symmetric
                             value -= grip * slip[i] * slip[j] / (size * size)
+                            # sliding friction follows the pressure: this part is not symmetric
+                            value -= friction * slip[i] * m[j] / size
                         block[i, j] = w * value
                 for a in range(6):
                     for b in range(6):

@@ -119,7 +119,7 @@ class LinearProblem:
     def tip_stiffness(self, state: LinearState) -> np.ndarray:
         """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative."""
         _, face_k, _, _ = self._contact.evaluate(state.displacement, state.centre, state.grip, True)
-        on, stiffness = self._touching(face_k)
+        on, stiffness = self._touching((face_k + face_k.transpose(0, 2, 1)) / 2)
         unit = np.tile(np.eye(3), (len(on) // 3, 1))
         coupling = stiffness @ unit
         inner = np.eye(len(on)) + self._compliance[np.ix_(on, on)] @ stiffness

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter1d
 
 from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
 from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
@@ -207,7 +208,11 @@ def _reach(
     distance = distance + bulge * np.maximum(clear - distance, 0.0)
     way = middle + distance[:, None] * turn
     way[:, 2] = np.maximum(way[:, 2], min(radius + 3.0, start[2], end[2]))
-    way += (x**4)[:, None] * (end - way[-1])
+    # an arm has mass: no corner where the way passes over the top
+    way = gaussian_filter1d(way, 0.06 * RATE_HZ, axis=0, mode="nearest")
+    share = np.linspace(0.0, 1.0, count)
+    for weight, off in ((share**4, end - way[-1]), ((1 - share) ** 4, start - way[0])):
+        way += weight[:, None] * off
     pause = int(rng.exponential(hand.pause_s) * RATE_HZ)
     return np.vstack([way, np.repeat(way[-1:], pause, axis=0)]) if pause else way
 

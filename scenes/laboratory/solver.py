@@ -93,6 +93,8 @@ class Problem:
         return forces, self._constant, 0.5 * float((forces * local).sum()), history
 
     def _assemble(self, cell_k: np.ndarray, face_k: np.ndarray, u: np.ndarray) -> sp.csr_matrix:
+        # the factorisation is symmetric: friction's other half is left to Newton's further iterations
+        face_k = (face_k + face_k.transpose(0, 2, 1)) / 2
         data = np.bincount(
             self._into[0], cell_k.reshape(len(cell_k), -1)[self._use[0]], minlength=self._entries
         )

@@ -1,4 +1,4 @@
-"""What the solver must reproduce: patch test, Hertz, halved mesh and steps, tangent, energy. Figures, no verdicts."""
+"""What the solver must reproduce: patch test, Hertz, halved mesh and steps, tangent, energy. Figures only."""
 
 from __future__ import annotations
 

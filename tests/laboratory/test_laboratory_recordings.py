@@ -1,0 +1,181 @@
+"""Recordings that the laboratory writes: effects act as they say, seeds repeat, seals hold."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from mechanics.errors import OptionError, RecordingError
+from mechanics.recording import read_recording
+from palpate.cli import main
+from palpate.commands.simulate import effects_from
+from scenes.laboratory import simulate as module
+from scenes.laboratory.effects import REGISTRY, UNNAMED
+from scenes.laboratory.effects.contact import relaxed
+from scenes.laboratory.paths import Leg, TouchForce
+from scenes.laboratory.sealing import opened
+from scenes.laboratory.simulate import SimulateOptions, simulate, size_of
+from scenes.phantoms import phantom
+
+CONTRACT = set(
+    "finite_strain strain_stiffening viscoelasticity mullins_softening poisson_ratio inclusion "
+    "modulus_gradient skin_layer surface_shape unbonded_base compliant_base surface_offset tip_radius "
+    "friction_slip adhesion tool_compliance force_bias force_drift force_gain tool_gravity_inertia "
+    "time_delay backlash".split()
+)
+
+
+@pytest.fixture
+def springs(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Touches answered by a half space instead of the solver: what is tested here comes after the solid."""
+
+    def quick(thing, specimen, touches, **_):
+        forces = []
+        for touch in touches:
+            s = np.linspace(0, touch.depth, 12)
+            normal = 16 / 9 * np.sqrt(specimen.tip_radius) * s**1.5
+            stiffness = -2 * np.sqrt(specimen.tip_radius * s)[:, None, None] * np.eye(3)
+            leg = Leg(s, normal[:, None] * touch.normal, stiffness, from_touch=True)
+            side = Leg(
+                np.array([0.0, 9.0]), np.repeat(normal[-1] * touch.normal[None], 2, 0), stiffness[-2:], False
+            )
+            forces.append(TouchForce((leg, side, leg)))
+        return forces
+
+    monkeypatch.setattr(module, "touch_forces", quick)
+
+
+def _run(effects: dict[str, float] | None = None, seed: int = 3, **options):
+    return simulate(phantom("cylinder"), effects, SimulateOptions(protocol="sparse", **options), seed=seed)
+
+
+def test_every_effect_of_the_contract_is_there_and_some_beyond() -> None:
+    assert CONTRACT <= set(REGISTRY)
+    assert len(UNNAMED) >= 3 and not set(UNNAMED) & CONTRACT
+
+
+def test_same_seed_same_recording_and_another_seed_another_hand(springs) -> None:
+    first, again, other = _run(), _run(), _run(seed=4)
+    assert np.array_equal(first.recording.force_on_tool, again.recording.force_on_tool)
+    assert len(first.recording.t) != len(other.recording.t)
+    assert first.truth["effects"] == []
+
+
+def test_noise_and_steps_are_those_stated(springs) -> None:
+    result = _run()
+    noise = result.recording.force_on_tool - result.clean_n
+    assert noise.std(axis=0) == pytest.approx(0.012, rel=0.03)
+    assert np.abs(result.recording.position / 3e-5 - np.round(result.recording.position / 3e-5)).max() < 1e-6
+    free = np.linalg.norm(result.clean_n, axis=1) == 0
+    assert 0.3 < free.mean() < 0.95
+
+
+def test_delay_shifts_the_force_and_nothing_else(springs) -> None:
+    plain, late = _run(), _run({"time_delay": 1})
+    assert np.array_equal(plain.recording.position, late.recording.position)
+    assert late.clean_n[20:] == pytest.approx(plain.clean_n[:-20], abs=1e-9)
+    assert late.truth["effects"] == ["time_delay"]
+    assert late.truth["sizes"]["time_delay"]["rms_n"] > 0.02
+
+
+def test_bias_drift_and_gain_read_as_their_parameters_say(springs) -> None:
+    plain = _run()
+    result = _run({"force_gain": 1, "force_bias": 2, "force_drift": 1})
+    p = result.truth["parameters"]
+    assert np.linalg.norm(p["force_bias"]["bias_n"]) == pytest.approx(0.1, rel=1e-3)
+    expected = plain.clean_n @ np.array(p["force_gain"]["matrix"]).T + p["force_bias"]["bias_n"]
+    expected = expected + np.outer(plain.recording.t, p["force_drift"]["rate_n_per_s"])
+    assert result.clean_n == pytest.approx(expected, abs=1e-9)
+
+
+def test_soft_tool_reads_deeper_than_the_tip_goes(springs) -> None:
+    plain, soft = _run(), _run({"tool_compliance": 1})
+    moved = soft.recording.position - plain.recording.position
+    assert moved == pytest.approx(-plain.clean_n / 1200, abs=3.1e-5)
+    assert soft.truth["sizes"]["tool_compliance"]["rms_n"] > 0.02
+
+
+def test_backlash_loses_its_width_at_every_turn(springs) -> None:
+    plain, loose = _run(), _run({"backlash": 1})
+    lost = np.abs(plain.recording.position - loose.recording.position).max(axis=0)
+    assert lost == pytest.approx(0.125e-3, abs=4e-5)
+
+
+def test_weight_shows_when_the_tool_leans(springs) -> None:
+    plain, heavy = _run(), _run({"tool_gravity_inertia": 1})
+    extra = heavy.clean_n - plain.clean_n
+    assert np.linalg.norm(extra[0]) < 0.02
+    assert 0.05 < np.linalg.norm(extra, axis=1).max() < 1.5
+
+
+def test_adhesion_pulls_at_release_only(springs) -> None:
+    result = _run({"adhesion": 1})
+    plain = _run()
+    change = np.linalg.norm(result.clean_n - plain.clean_n, axis=1)
+    assert change.max() == pytest.approx(0.1, rel=0.05)
+    assert (change > 1e-9).mean() < 0.2
+
+
+def test_relaxation_decays_to_the_elastic_force() -> None:
+    force = np.zeros((4000, 3))
+    force[100:, 2] = 1.0
+    answer = relaxed(force, [0.3], [0.3])[:, 2]
+    assert answer[100] == pytest.approx(1.3, rel=0.005)
+    assert answer[400] == pytest.approx(1 + 0.3 * np.exp(-1), rel=0.005)
+    assert answer[-1] == pytest.approx(1.0, abs=1e-4)
+
+
+def test_size_of_an_effect_splits_off_what_the_modulus_absorbs() -> None:
+    force = np.random.default_rng(0).normal(size=(500, 3))
+    size = size_of(1.2 * force, force)
+    assert size["best_scale"] == pytest.approx(1.2)
+    assert size["rms_after_best_scale_n"] < 1e-12
+    assert size["rms_n"] == pytest.approx(0.2 * np.sqrt((force**2).sum(axis=1).mean()))
+
+
+def test_frame_turns_everything_together(springs) -> None:
+    plain, turned = _run(), _run(frame=True)
+    rotation = np.array(turned.truth["device_from_object_rotation"])
+    shift = 1e-3 * np.array(turned.truth["device_from_object_shift_mm"])
+    back = (turned.recording.position - shift) @ rotation
+    assert back == pytest.approx(plain.recording.position, abs=6e-5)
+    assert turned.clean_n @ rotation == pytest.approx(plain.clean_n, abs=1e-9)
+
+
+def test_sealed_recording_withholds_the_truth_and_the_seal_finds_changes(springs, tmp_path: Path) -> None:
+    record, truth = tmp_path / "case.csv.gz", tmp_path / "vault" / "case.json"
+    arguments = [
+        "simulate",
+        "cylinder",
+        "-o",
+        str(record),
+        "--effect",
+        "time_delay=1",
+        "--protocol",
+        "sparse",
+    ]
+    assert main([*arguments, "--seal", "--truth", str(truth)]) == 0
+    recording = read_recording(record)
+    assert recording.truth is None and "delay" not in (tmp_path / "case.toml").read_text()
+    seal = tmp_path / "case.sealed"
+    assert opened(seal, truth)["effects"] == ["time_delay"]
+    kept = json.loads(truth.read_text())
+    kept["truth"]["effects"] = ["backlash"]
+    truth.write_text(json.dumps(kept))
+    with pytest.raises(RecordingError, match="not what"):
+        opened(seal, truth)
+
+
+def test_bad_requests_say_what_is_allowed(springs, tmp_path: Path, capsys) -> None:
+    with pytest.raises(OptionError, match="time_delay"):
+        effects_from(["gremlins=1"])
+    with pytest.raises(OptionError, match="no number"):
+        effects_from(["time_delay=much"])
+    assert main(["simulate", "teapot", "-o", str(tmp_path / "a.csv.gz")]) == 2
+    assert main(["simulate", "cylinder", "-o", str(tmp_path / "a.csv.gz"), "--seal"]) == 2
+    assert "--truth" in capsys.readouterr().err
+    with pytest.raises(OptionError, match="strength"):
+        _run({"time_delay": -1})

@@ -1,0 +1,143 @@
+"""The laboratory's solver against physics that it must reproduce."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from scenes.laboratory.contact import SphereContact
+from scenes.laboratory.linear import LinearProblem
+from scenes.laboratory.refine import boundary_faces
+from scenes.laboratory.solid import Material, Solid
+from scenes.laboratory.solver import Problem
+from scenes.laboratory.verification import box, hertz_ratio, patch_test, tangent_error
+
+LAWS = {
+    "neo-hookean": {},
+    "yeoh": {"stiffening": 0.35},
+    "fibres": {"fibre": np.array([2.0, 1.0, 0.0, 0.0])},
+    "maxwell": {"prony": np.array([[0.3, 0.3], [0.2, 1.5]])},
+}
+
+
+def _solid(**changes: object) -> Solid:
+    mesh = box(20.0, 12.0, 6.0, 0.8)
+    material = Material(len(mesh.cells), 0.49)
+    for name, value in changes.items():
+        setattr(material, name, value)
+    return Solid(mesh, material)
+
+
+def _pressed(depth: float, friction: float | None, *, linear: bool, steps: int = 6):
+    """A sphere of radius 5 mm pressed into a box; returns (problem, states)."""
+    mesh = box(60.0, 40.0, 3.0, 0.8)
+    solid = Solid(mesh, Material(len(mesh.cells), 0.49))
+    top = np.array([0.0, 0.0, 40.0])
+    near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 12.0
+    contact = SphereContact(mesh.points, mesh.faces[near], 5.0, friction)
+    free = ~np.repeat(mesh.fixed, 3)
+    problem = LinearProblem(solid, contact, free) if linear else Problem(solid, contact, free)
+    state = problem.rest(top + [0, 0, 5.0])
+    states = []
+    for d in depth * (np.arange(1, steps + 1) / steps) ** 1.3:
+        state = problem.advance(state, top + [0, 0, 5.0 - d])
+        states.append(state)
+    return problem, states
+
+
+def test_uniform_deformation_leaves_inner_nodes_in_equilibrium() -> None:
+    assert patch_test() < 1e-10
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_tangent_is_the_derivative_of_the_force(law: str) -> None:
+    solid = _solid(**LAWS[law])
+    assert tangent_error(solid.material, solid) < 1e-7
+
+
+def test_force_is_the_gradient_of_the_energy() -> None:
+    solid = _solid(stiffening=0.2)
+    rng = np.random.default_rng(1)
+    u = solid.mesh.points @ (0.05 * rng.normal(size=(3, 3)))
+    d, history, step = rng.normal(size=u.shape), solid.new_history(), 1e-5
+    force = solid.evaluate(u, history, 0.0, False)[0]
+    plus = solid.evaluate(u + step * d, history, 0.0, False)[2]
+    minus = solid.evaluate(u - step * d, history, 0.0, False)[2]
+    work = (force * d[solid.mesh.cells].reshape(len(force), 30)).sum()
+    assert (plus - minus) / (2 * step) == pytest.approx(work, rel=1e-6)
+
+
+def test_rotation_costs_nothing() -> None:
+    solid = _solid()
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+    u = solid.mesh.points @ (turn - np.eye(3)).T
+    force, _, energy, _ = solid.evaluate(u, solid.new_history(), 0.0, False)
+    assert abs(energy) < 1e-10
+    assert np.abs(force).max() < 1e-10
+
+
+def test_refined_mesh_fills_the_box_and_grows_away_from_the_touch() -> None:
+    mesh = box(60.0, 40.0, 3.0, 0.8)
+    corners = mesh.points[mesh.cells[:, :4]]
+    volume = np.einsum(
+        "ij,ij->i",
+        corners[:, 1] - corners[:, 0],
+        np.cross(corners[:, 2] - corners[:, 0], corners[:, 3] - corners[:, 0]),
+    )
+    assert volume.min() > 0
+    assert volume.sum() / 6 == pytest.approx(60 * 60 * 40, rel=1e-9)
+    faces, _ = boundary_faces(mesh.cells[:, :4])
+    edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    assert set(np.unique(edges, axis=0, return_counts=True)[1]) == {2}
+    distance = np.linalg.norm(corners.mean(axis=1) - [0, 0, 40.0], axis=1)
+    assert volume[distance < 6].max() < 0.2 * volume[distance > 25].max()
+
+
+def test_small_dent_in_linear_box_equals_finite_strain() -> None:
+    linear = _pressed(0.4, None, linear=True, steps=3)[1][-1]
+    finite = _pressed(0.4, None, linear=False, steps=3)[1][-1]
+    assert finite.force[2] == pytest.approx(linear.force[2], rel=0.02)
+
+
+def test_energy_stored_is_the_work_done() -> None:
+    _, states = _pressed(3.0, None, linear=True, steps=24)
+    depth = np.array([0.0] + [45.0 - s.centre[2] for s in states])
+    force = np.array([0.0] + [s.force[2] for s in states])
+    assert np.trapezoid(force, depth) == pytest.approx(states[-1].energy, rel=0.03)
+
+
+def test_tip_stiffness_is_the_slope_of_the_force() -> None:
+    problem, states = _pressed(2.0, None, linear=True)
+    state, step = states[-1], np.array([1e-4, 0.0, 0.0])
+    plus = problem.advance(state, state.centre + step).force
+    minus = problem.advance(state, state.centre - step).force
+    slope = (plus - minus) / 2e-4
+    stiffness = problem.tip_stiffness(state)
+    assert stiffness[:, 0] == pytest.approx(slope, rel=0.02, abs=0.02 * abs(stiffness[0, 0]))
+    assert np.abs(stiffness - stiffness.T).max() < 1e-8
+    assert np.linalg.eigvalsh(stiffness).max() < 0
+
+
+def test_sliding_tip_feels_no_more_than_friction_allows() -> None:
+    problem, states = _pressed(2.0, 0.1, linear=True)
+    state = states[-1]
+    for k in range(1, 6):
+        state = problem.advance(state, states[-1].centre + [0.6 * k, 0.0, 0.0])
+    sideways = np.hypot(state.force[0], state.force[1])
+    # the dent's far wall adds a little ploughing on top of Coulomb's share
+    assert 0.05 < sideways / state.force[2] < 0.2
+
+
+def test_sticking_tip_drags_harder_than_a_sliding_one() -> None:
+    sideways = []
+    for friction in (None, 0.1):
+        problem, states = _pressed(2.0, friction, linear=True)
+        state = problem.advance(states[-1], states[-1].centre + [1.0, 0.0, 0.0])
+        sideways.append(-state.force[0])
+    assert sideways[0] > 2 * sideways[1] > 0
+
+
+@pytest.mark.slow
+def test_small_dent_is_hertz() -> None:
+    assert hertz_ratio() == pytest.approx(1.0, abs=0.015)
