@@ -137,7 +137,8 @@ class TouchWindow:
         # two quick presses would give the mouse to a chart, and pyvista's keys change the picture
         self.plotter.iren.untrack_click_position("left")
         self.plotter.iren.clear_key_event_callbacks()
-        interactor.SetInteractorStyle(style)
+        # through pyvista, which sets what it knows of again when the window is shown
+        self.plotter.iren.style = style
         self._style, self._interactor = style, interactor
         # an observer on the style replaces what the style would do with that event
         for event, action in (

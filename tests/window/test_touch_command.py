@@ -121,7 +121,6 @@ def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -
         time.sleep(4.0)
         pointer("mouseup", "1")
         time.sleep(2.0)
-    pointer("key", "--window", window, "q")
     pointer("windowfocus", window)
     pointer("key", "q")
     words, _ = program.communicate(timeout=60)
