@@ -15,6 +15,7 @@ from mechanics.options import option
 from mechanics.progress import Progress
 from mechanics.recording import Recording, read_recording
 from palpate.servo.report import ServoReport
+from palpate.warm_up import warming_up
 from reconstruct.pipeline import Reconstruction
 
 
@@ -75,10 +76,12 @@ def run_demo(
         seconds[label] = time.perf_counter() - start
 
     recording = read_recording(source)
-    with stage("reconstruct") as progress:
+    with warming_up() as compiling, stage("reconstruct") as progress:
         done = reconstruct_fully(recording, ReconstructOptions(seed=seed), progress)
         path = write_model(folder / "model", done.model)
         model = done.model.replaced(path=path)
+        progress("compiling", 0.99)
+        compiling.wait()
     with stage("precompute") as progress:
         load_or_condense(model, progress=progress)
         renderer = render.create(options.renderer, model, progress=progress)

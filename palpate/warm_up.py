@@ -1,0 +1,59 @@
+"""Compile what the demo needs on a small block, in a process beside the reconstruction.
+
+A fresh installation has no compiled kernels on disk; compiling them takes some tens of seconds of one core,
+which the second core can do while the first reconstructs. Run as `python -m palpate.warm_up`; a failure costs
+only time.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+
+@contextmanager
+def warming_up() -> Iterator[subprocess.Popen]:
+    """The compiling process, started at once; ended with the block where it is still running then."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "palpate.warm_up"],
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.DEVNULL,
+        env={**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"},
+    )
+    try:
+        yield process
+    finally:
+        if process.poll() is None:
+            process.terminate()
+        process.wait()
+
+
+def warm_up() -> None:
+    """Write, condense, replay and feel a block of 40 mm for a moment."""
+    import render
+    from mechanics.box_mesh import box_mesh
+    from mechanics.model import Model, write_model
+    from palpate.servo.headless import run_headless
+    from render.replay import replay
+
+    mesh = box_mesh((3, 3, 3), (0.04, 0.04, 0.04)).quadratic()
+    up = np.array([0.0, 0.0, 1.0])
+    with tempfile.TemporaryDirectory() as folder:
+        block = Model(mesh, 20e3, 0.49, 0.005, 0.0133, np.zeros(3), up)
+        block = block.replaced(path=write_model(Path(folder) / "block", block))
+        renderer = render.create("fem", block)
+        path = np.outer(np.linspace(0.05, 0.043, 50), up)
+        replay(renderer, np.arange(50) * 1e-3, path)
+        run_headless(block, "fem", seconds=0.2)
+
+
+if __name__ == "__main__":
+    warm_up()
