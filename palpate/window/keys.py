@@ -5,7 +5,7 @@ from __future__ import annotations
 KEYS: dict[str, str] = {
     "space": "force on / off",
     "Tab": "next renderer",
-    "b": "second renderer: 1D, 1D, none",
+    "b": "second renderer: hunt-crossley or kelvin-voigt",
     "plus": "stiffer by a quarter",
     "minus": "softer by a fifth",
     "f": "friction: stick, 1, 0.5, 0.2, 0.05",
@@ -19,7 +19,7 @@ KEYS: dict[str, str] = {
 }
 """Key, in words for the help; the window maps VTK's key symbols to them."""
 
-MOUSE = "move: hover   left: press   wheel: depth   right: turn   middle: shift   ctrl+wheel: zoom"
+MOUSE = "move: hover  left: press  wheel: depth\nright: turn  ctrl+wheel: zoom"
 
 
 def help_text() -> str:

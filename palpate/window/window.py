@@ -28,7 +28,7 @@ SIZE = (1280, 800)
 INCLUSION_RADIUS_M = 0.008
 INCLUSION_RATIO = 8.0
 STEP_M = 0.002
-BESIDES = ("hunt-crossley", "kelvin-voigt", "")
+BESIDES = ("hunt-crossley", "kelvin-voigt")
 
 
 class TouchWindow:
@@ -47,6 +47,7 @@ class TouchWindow:
         self.scene = scene
         self.frames = 0
         self.closed = False
+        self._ended = False
         self._channel = channel
         self._colour = scene.colour
         self._moved = False
@@ -310,11 +311,12 @@ class TouchWindow:
         self.plotter.close()
 
     def _timed(self, screenshot: Path | None) -> None:
-        if self.closed:
+        if self._ended:
             return
         self.tick()
         self.plotter.render()
         if self.closed:
+            self._ended = True
             if screenshot is not None:
                 self.plotter.screenshot(str(screenshot))
             self._interactor.TerminateApp()
