@@ -7,6 +7,7 @@ import os
 import zipfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
@@ -171,7 +172,7 @@ def curves(
                 failures.append(_work(*task))
                 progress(label, (done + 1) / len(tasks))
         else:
-            with ProcessPoolExecutor(workers, get_context("spawn"), _single_threaded) as pool:
+            with _one_thread_each(), ProcessPoolExecutor(workers, get_context("spawn")) as pool:
                 futures = [pool.submit(_work, *task) for task in tasks]
                 for done, future in enumerate(as_completed(futures)):
                     failures.append(future.result())
@@ -185,6 +186,17 @@ def curves(
     return found
 
 
-def _single_threaded() -> None:
-    for name in ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS"):
-        os.environ[name] = "1"
+@contextmanager
+def _one_thread_each() -> Iterator[None]:
+    """Processes started inside compute on one thread; libraries read this once, when they are loaded."""
+    names = ("OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
+    before = {name: os.environ.get(name) for name in names}
+    os.environ.update(dict.fromkeys(names, "1"))
+    try:
+        yield
+    finally:
+        for name, value in before.items():
+            if value is None:
+                del os.environ[name]
+            else:
+                os.environ[name] = value
