@@ -65,6 +65,7 @@ def test_curvature_shrinks_or_widens_the_sphere():
     assert effective_radius(5e-3, -1e4) == pytest.approx(20e-3)
 
 
+@pytest.mark.slow
 def test_axisymmetric_solution_meets_punches_and_the_tables():
     """The tables' own solver, coarse: flat punches in closed form, then one short press of each law."""
     pytest.importorskip("pypardiso")
