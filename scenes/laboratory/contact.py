@@ -93,7 +93,8 @@ class SphereContact:
         """(face forces (k, 18) resisting, face stiffness (k, 18, 18) or empty, force on the sphere (3,),
         new grip).
 
-        arrivals: whether points that did not touch before may begin to.
+        arrivals: whether points that did not touch before may begin to; without them those that touch are carried
+        along as if they stuck, which predicts a step.
         """
         count = len(self.faces)
         forces = np.zeros((count, 18))
@@ -154,7 +155,8 @@ def _evaluate(
             along = m[0] * r[0] + m[1] * r[1] + m[2] * r[2]
             overlap = radius - along
             # a held point may pull while Newton iterates: the solver lets go of it once the rest has settled
-            if overlap <= 0.0 and (fresh or friction >= 0.0):
+            carried = friction >= 0.0 and not fresh and not arrivals
+            if overlap <= 0.0 and (fresh or (friction >= 0.0 and not carried)):
                 continue
             active[k] = overlap > 0.0
             slip = r - hold
@@ -162,7 +164,7 @@ def _evaluate(
             slip -= out * m
             size = np.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2)
             grip = 0.0 if fresh else 1.0
-            sliding = friction >= 0.0 and size > friction * overlap and not fresh
+            sliding = friction >= 0.0 and size > friction * overlap and not fresh and not carried
             if sliding:
                 grip = friction * overlap / max(size, 1e-12)
             w = weights[f, q] * PENALTY

@@ -88,6 +88,7 @@ class LinearProblem:
         u = state.displacement
         held = state.grip.copy()
         arrivals = not held.active.any()
+        step, last, cut, least = np.zeros_like(u), u, 1.0, np.inf
         for iteration in range(60):
             forces, face_k, force, grip = self._contact.evaluate(u, centre, held, True, arrivals)
             load = np.bincount(self._dofs.ravel(), forces.ravel(), minlength=u.size)
@@ -97,6 +98,13 @@ class LinearProblem:
                 if held.let_go(grip):
                     continue
                 return LinearState(u, centre, force, grip, 0.5 * float(load @ given))
+            size = np.linalg.norm(r)
+            if size > 1.5 * least and cut > 0.1 and arrivals:
+                # sticking and sliding in turn: go back along the last step
+                cut *= 0.5
+                u = last + cut * step
+                continue
+            least = size if arrivals else np.inf
             arrivals = True
             on, stiffness = self._touching(face_k)
             if len(on):
@@ -104,7 +112,9 @@ class LinearProblem:
                 r = r + self._compliance[:, on] @ (stiffness @ np.linalg.solve(inner, -r[on]))
             # points that arrive and leave in turn are calmed by shorter steps
             calm = 1.0 if iteration < 25 else 0.5
-            u = u - r.reshape(-1, 3) * min(calm, 5.0 / max(np.abs(r).max(), 1e-12))
+            step = -r.reshape(-1, 3) * min(calm, 5.0 / max(np.abs(r).max(), 1e-12))
+            last, cut = u, 1.0
+            u = u + step
         return None
 
     def _touching(self, face_k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
