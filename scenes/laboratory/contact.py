@@ -93,8 +93,8 @@ class SphereContact:
         """(face forces (k, 18) resisting, face stiffness (k, 18, 18) or empty, force on the sphere (3,),
         new grip).
 
-        arrivals: whether points that did not touch before may begin to; without them those that touch are carried
-        along as if they stuck, which predicts a step.
+        arrivals: whether points that did not touch before may begin to; without them those that touch are
+        carried along as if they stuck, which predicts a step.
         """
         count = len(self.faces)
         forces = np.zeros((count, 18))
