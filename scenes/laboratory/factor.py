@@ -4,6 +4,8 @@ there is none.
 
 from __future__ import annotations
 
+import weakref
+
 import numpy as np
 import scipy.sparse as sp
 
@@ -29,6 +31,8 @@ class Factor:
         first = self._solver is None
         if first:
             self._solver = PyPardisoSolver(mtype=-2)
+            # the factors live outside Python's memory
+            weakref.finalize(self, self._solver.free_memory, everything=True)
         self._matrix = upper
         nothing = np.zeros((upper.shape[0], 1), order="F")
         if first:
@@ -44,7 +48,3 @@ class Factor:
         right = np.asfortranarray(b.reshape(len(b), -1))
         self._solver.set_phase(33)
         return self._solver._call_pardiso(self._matrix, right).reshape(b.shape)
-
-    def __del__(self) -> None:
-        if PyPardisoSolver is not None and self._solver is not None:
-            self._solver.free_memory(everything=True)
