@@ -76,7 +76,7 @@ class LinearProblem:
         found = self._newton(state, centre)
         if found is not None:
             return found
-        if depth >= 6:
+        if depth >= 9:
             raise LabError(
                 f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep"
             )
@@ -89,7 +89,7 @@ class LinearProblem:
         held = state.grip.copy()
         arrivals = not held.active.any()
         step, last, cut, least = np.zeros_like(u), u, 1.0, np.inf
-        for iteration in range(60):
+        for iteration in range(90):
             forces, face_k, force, grip = self._contact.evaluate(u, centre, held, True, arrivals)
             load = np.bincount(self._dofs.ravel(), forces.ravel(), minlength=u.size)
             given = self._compliance @ load
