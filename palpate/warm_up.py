@@ -40,6 +40,7 @@ def warm_up() -> None:
     """Write, condense, replay and feel a block of 40 mm for a moment."""
     import render
     from mechanics.box_mesh import box_mesh
+    from mechanics.compliance import load_or_condense
     from mechanics.model import Model, write_model
     from palpate.servo.headless import run_headless
     from render.replay import replay
@@ -49,6 +50,7 @@ def warm_up() -> None:
     with tempfile.TemporaryDirectory() as folder:
         block = Model(mesh, 20e3, 0.49, 0.005, 0.0133, np.zeros(3), up)
         block = block.replaced(path=write_model(Path(folder) / "block", block))
+        load_or_condense(block)  # from now on it is mapped from disk, read-only: another type to the compiler
         renderer = render.create("fem", block)
         path = np.outer(np.linspace(0.05, 0.043, 50), up)
         replay(renderer, np.arange(50) * 1e-3, path)
