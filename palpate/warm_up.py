@@ -53,7 +53,9 @@ def warm_up() -> None:
         load_or_condense(block)  # from now on it is mapped from disk, read-only: another type to the compiler
         renderer = render.create("fem", block)
         path = np.outer(np.linspace(0.05, 0.043, 50), up)
-        replay(renderer, np.arange(50) * 1e-3, path)
+        t = np.arange(50) * 1e-3
+        t.setflags(write=False)  # as a recording's
+        replay(renderer, t, path)
         run_headless(block, "fem", seconds=0.2)
 
 
