@@ -55,7 +55,7 @@ def warm_up() -> None:
         path = np.outer(np.linspace(0.05, 0.043, 50), up)
         t = np.arange(50) * 1e-3
         t.setflags(write=False)  # as a recording's
-        replay(renderer, t, path)
+        replay(renderer, t, path, tip_radius_m=block.tip_radius_m)
         run_headless(block, "fem", seconds=0.2)
 
 
