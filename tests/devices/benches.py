@@ -26,7 +26,7 @@ from devices.simulated import SimulatedHand
 from devices.spacemouse import make as make_spacemouse
 
 from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit
-from .fake_inverse import FakeInverse
+from .fake_inverse import IDLE_S, FakeInverse
 
 STUBS = Path(__file__).parent / "vendor_stubs.c"
 
@@ -46,6 +46,8 @@ class Bench:
 
     axes = "xyz"
     device: PositionSource
+
+    zero_travels_s = 0.0
 
     def move(self, position_m: np.ndarray) -> None:
         """Put the handle there (a rate device: deflect it that way)."""
@@ -109,6 +111,8 @@ class StickBench(SpaceMouseBench):
 
 
 class HaplyBench(Bench):
+    zero_travels_s = 0.5 * IDLE_S
+
     def __init__(self, key: str = "vector") -> None:
         self.key = key
         self.service = FakeInverse(key)
