@@ -29,7 +29,6 @@ SPEC = DeviceSpec(
     workspace_radius_m=0.15,
     buttons=3,
 )
-ANSWER_S = 0.1
 OPEN_S = 1.0
 FAULT_SHOWN_S = 1.0
 EVENTS_EVERY_S = 0.01
@@ -47,6 +46,7 @@ class HaplyOptions:
     uri: str = option("ws://localhost:10001", "state and command socket", flag="--haply-uri")
     events_uri: str = option("ws://localhost:10020", "event socket; '' for none", flag="--haply-events-uri")
     device_id: str = option("", "which Inverse3; '' for the first", flag="--haply-device")
+    answer_s: float = option(0.1, "silence after which it counts as gone", unit="s", flag="--haply-answer")
 
 
 class HaplyWire:
@@ -107,7 +107,7 @@ class HaplyWire:
             pass  # older services have no event socket; a state's own status says the rest
 
     def exchange(self, force_on_tool_n: np.ndarray | None, timeout_s: float) -> Reading | None:
-        """A force or a probe out, its one state back. A service silent for `ANSWER_S` counts as gone."""
+        """A force or a probe out, its one state back. A service silent for `answer_s` counts as gone."""
         started = time.perf_counter()
         if force_on_tool_n is None:
             message = codec.probe(self.device_id)
@@ -115,9 +115,9 @@ class HaplyWire:
             message = codec.force(self.device_id, tuple(force_on_tool_n), self._key)
         self._socket.send(message)
         try:
-            answer = self._socket.recv(timeout=ANSWER_S)
+            answer = self._socket.recv(timeout=self.options.answer_s)
         except TimeoutError as error:
-            raise OSError(f"the Inverse service is silent for {ANSWER_S} s") from error
+            raise OSError(f"the Inverse service is silent for {self.options.answer_s} s") from error
         state = codec.decode(answer, self.device_id)
         self._watch_events()
         # the service answers in a fraction of a millisecond; asking faster than this only heats the processor
