@@ -9,7 +9,7 @@ from __future__ import annotations
 import gzip
 import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -68,6 +68,12 @@ class Recording:
     def name(self) -> str:
         """The stem of the files, or the object's name where the recording was never on disk."""
         return self.path.name.removesuffix(".gz").rsplit(".", 1)[0] if self.path else self.object_name
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled by its fields and built anew, since a mapping proxy cannot be and arrays come back
+        writable."""
+        values = (getattr(self, f.name) for f in fields(self))
+        return Recording, tuple(dict(v) if isinstance(v, MappingProxyType) else v for v in values)
 
 
 def _check_samples(recording: Recording) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import gzip
+import pickle
 
 import numpy as np
 import pytest
@@ -87,3 +88,16 @@ def test_unit_quaternions_are_demanded(tmp_path):
     rows = [row + ",2,0,0,0" for row in ROWS]
     with pytest.raises(RecordingError, match="unit quaternions"):
         read_recording(written(tmp_path, header=HEADER + ",qw,qx,qy,qz", rows=rows))
+
+
+def test_a_pickled_recording_comes_back_whole_and_read_only():
+    t = np.arange(50) / 1000
+    wave = np.column_stack([np.sin(t), np.cos(t), t])
+    first = Recording(
+        t, wave, -wave, 1000.0, 0.004, boundary_phase=(0.0, 0.02), truth={"sizes": {"adhesion": 1.0}}
+    )
+    again = pickle.loads(pickle.dumps(first))
+    assert np.array_equal(again.position, first.position) and not again.position.flags.writeable
+    assert again.truth == first.truth and again.boundary_phase == first.boundary_phase
+    with pytest.raises(TypeError):
+        again.truth["sizes"] = {}
