@@ -22,7 +22,10 @@ from scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
 from scenes.phantoms import Phantom
 
 LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.0])
-"""Load steps of a straight press, as shares of its greatest depth."""
+"""States that are kept of a straight press, as shares of its greatest depth."""
+
+LINEAR_STEP_MM = 0.2
+"""Longest load step of a small-strain path; between kept states it is cut up (milliseconds each)."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +90,7 @@ def solve(
         fineness=fineness,
         cache=cache,
     )
+    longest = np.inf if specimen.finite else LINEAR_STEP_MM
     for job in jobs:
         start = place + specimen.tip_radius * job.normal
         state = problem.rest(start + 1e-3 * job.normal)
@@ -97,11 +101,20 @@ def solve(
             if k == 0 and not job.travel[0].any():
                 continue
             span = 0.0 if job.times is None else float(job.times[k] - job.times[k - 1])
-            state = problem.advance(state, start + job.travel[k], span)
+            before = job.travel[k - 1] if k else np.zeros(3)
+            for part, share in _parts(before, job.travel[k], longest):
+                state = problem.advance(state, start + part, share * span)
             force[k], energy[k] = state.force, state.energy
             if np.linalg.norm(state.force) > 1e-6:
                 stiffness[k] = problem.tip_stiffness(state)
         yield Curve(job.travel, force, stiffness, energy, job.times)
+
+
+def _parts(before: np.ndarray, after: np.ndarray, longest: float) -> Iterator[tuple[np.ndarray, float]]:
+    """(place, share of the way) of equal parts no longer than `longest` mm."""
+    count = max(1, int(np.ceil(np.linalg.norm(after - before) / longest - 1e-9)))
+    for k in range(1, count + 1):
+        yield before + (after - before) * k / count, 1 / count
 
 
 def _work(
