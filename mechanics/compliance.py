@@ -26,7 +26,8 @@ from mechanics.support import support_of
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 
-_COLUMNS = 96  # right-hand sides solved at once
+_COLUMNS = 64  # right-hand sides solved at once
+_CONDENSED = 0.75  # share of the unknowns taken from the Schur complement, whose square is held twice
 METHODS = ("schur", "columns")
 
 
@@ -62,9 +63,10 @@ def condense(
 ) -> Compliance:
     """Condense the stiffness on the touchable nodes and invert it.
 
-    method: 'schur' (static condensation in MKL Pardiso, then one dense inverse), 'columns' (a solve a
-    column, in batches, with either backend), None for the best that is there. Raises MeshError where the
-    mesh is not held or has nothing to touch.
+    method: 'schur' (static condensation in MKL Pardiso and one dense inverse for most of the result, column
+    solves for the rest, which bounds the memory), 'columns' (a solve a column, in batches, with either
+    backend), None for the best that is there. Raises MeshError where the mesh is not held or has nothing to
+    touch.
     """
     nodes = np.flatnonzero(mesh.touchable)
     free = free_dofs(mesh)
@@ -74,29 +76,53 @@ def condense(
         raise MeshError("the mesh has no touchable node that is free to move")
     if method is None:
         method = "schur" if pardiso.available() and backend in (None, "pardiso") else "columns"
-    if method == "schur":
-        full = stiffness(mesh, poisson_ratio, modulus_ratio)
-        matrix = full[free][:, free].tocsr()
-        del full
-        progress("static condensation", 0.05)
-        try:
-            schur = pardiso.Pardiso(matrix, schur=place).take_schur()
-        except ArithmeticError as error:
-            raise MeshError(f"the stiffness cannot be condensed ({error}): is every part held?") from error
-        progress("dense inverse", 0.4)
-        result = inverse(schur)
-    else:
-        solver = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend)
-        result = np.empty((len(wanted), len(wanted)))
-        for start in range(0, len(wanted), _COLUMNS):
-            part = slice(start, min(start + _COLUMNS, len(wanted)))
-            loads = np.zeros((len(free), part.stop - part.start), order="F")
-            loads[place[part], np.arange(loads.shape[1])] = 1.0
-            result[part] = solver.solve_free(loads)[place].T
-            progress("compliance columns", part.stop / len(wanted))
-        _symmetrise(result)
+    k = len(wanted)
+    result = np.empty((k, k))
+    first = int(_CONDENSED * k) if method == "schur" else 0
+    if first:
+        _condense_first(mesh, poisson_ratio, modulus_ratio, free, place, first, result, progress)
+    solver = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend)
+    for start in range(first, k, _COLUMNS):
+        part = slice(start, min(start + _COLUMNS, k))
+        loads = np.zeros((len(free), part.stop - part.start), order="F")
+        loads[place[part], np.arange(loads.shape[1])] = 1.0
+        result[part] = solver.solve_free(loads)[place].T
+        progress("compliance columns", 0.5 * bool(first) + (1 - 0.5 * bool(first)) * part.stop / k)
+    result[:first, first:] = result[first:, :first].T
+    _symmetrise(result[first:, first:])
     progress("compliance", 1.0)
     return Compliance(nodes, result)
+
+
+def _condense_first(
+    mesh: TetMesh,
+    poisson_ratio: float,
+    modulus_ratio: np.ndarray | None,
+    free: np.ndarray,
+    place: np.ndarray,
+    first: int,
+    result: np.ndarray,
+    progress: Progress,
+) -> None:
+    """Fill result[:first, :first] by the Schur complement on the unknowns place[:first] and its inverse.
+
+    The complement is written to the front of the result's own memory, packed; the library holds another
+    copy until it is freed.
+    """
+    full = stiffness(mesh, poisson_ratio, modulus_ratio)
+    matrix = full[free][:, free].tocsr()
+    del full
+    progress("static condensation", 0.05)
+    packed = result.reshape(-1)[: first * first].reshape(first, first)
+    packed[:] = 0.0
+    try:
+        pardiso.Pardiso(matrix, schur=place[:first], out=packed).free()
+    except ArithmeticError as error:
+        raise MeshError(f"the stiffness cannot be condensed ({error}): is every part held?") from error
+    progress("dense inverse", 0.3)
+    inverse(packed)
+    for row in range(first - 1, 0, -1):  # from the last one, so that none is overwritten before it moves
+        result[row, :first] = packed[row].copy()
 
 
 def inverse(matrix: np.ndarray) -> np.ndarray:

@@ -38,12 +38,17 @@ class Pardiso:
     """A factorisation of a symmetric positive definite matrix; frees MKL's memory when it dies.
 
     matrix: (n, n) sparse, both triangles stored. With `schur` (indices of k unknowns) the factorisation
-    stops there and `.schur` is the dense (k, k) Schur complement on those unknowns, in ascending order of
-    index. Raises ArithmeticError where the matrix is not positive definite.
+    stops there and writes the dense (k, k) Schur complement on those unknowns, in ascending order of index,
+    to `out`, C-contiguous and zero before. Raises ArithmeticError where the matrix is not positive definite.
     """
 
     def __init__(
-        self, matrix: sp.csr_matrix, schur: np.ndarray | None = None, *, definite: bool = True
+        self,
+        matrix: sp.csr_matrix,
+        schur: np.ndarray | None = None,
+        *,
+        out: np.ndarray | None = None,
+        definite: bool = True,
     ) -> None:
         upper = sp.triu(matrix, format="csr")
         upper.sort_indices()
@@ -59,13 +64,10 @@ class Pardiso:
         self._iparm[17] = -1  # tell the number of nonzeros in the factor
         self._iparm[34] = 1  # zero-based indices
         self._perm = np.zeros(self.size, dtype=np.int32)
-        self.schur: np.ndarray | None = None
         if schur is not None:
             self._perm[schur] = 1
             self._iparm[35] = 1  # only the Schur complement, no factors to solve with
-            k = int(self._perm.sum())
-            self.schur = np.zeros((k, k))
-        self._call(12, np.zeros(1), np.zeros(1) if self.schur is None else self.schur, 0)
+        self._call(12, np.zeros(1), np.zeros(1) if out is None else out, 0)
         self.factor_nonzeros = int(self._iparm[17])
 
     def solve(self, right: np.ndarray) -> np.ndarray:
@@ -110,12 +112,6 @@ class Pardiso:
         )
         if error.value:
             raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
-
-    def take_schur(self) -> np.ndarray:
-        """The Schur complement, (k, k); MKL's memory and this object's share in the array are let go."""
-        schur, self.schur = self.schur, None
-        self.free()
-        return schur
 
     def free(self) -> None:
         """Release the factor."""
