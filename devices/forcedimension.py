@@ -61,9 +61,9 @@ FUNCTIONS = {
 
 @dataclass(frozen=True)
 class ForceDimensionOptions:
-    """folder: where libdhd lies, searched before the usual places."""
+    """forcedimension_folder: where libdhd lies, searched before the usual places."""
 
-    folder: str = option("", "folder of the maker's libdhd", flag="--forcedimension-folder")
+    forcedimension_folder: str = option("", "folder of the maker's libdhd")
 
 
 class ForceDimensionWire:
@@ -79,7 +79,8 @@ class ForceDimensionWire:
     def connect(self) -> None:
         """Load the library, open the first device, set its watchdog; force stays off."""
         if self._library is None:
-            folders = (self.options.folder, *FOLDERS) if self.options.folder else FOLDERS
+            own = self.options.forcedimension_folder
+            folders = (own, *FOLDERS) if own else FOLDERS
             library = load(("dhd", "drd", "dhd64", "drd64"), folders, INSTALL)
             need(library, FUNCTIONS)
             self._library = library

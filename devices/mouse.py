@@ -128,7 +128,7 @@ class MouseDevice:
         self.close()
 
 
-def find() -> list[Availability]:
+def find(options: MouseOptions | None = None) -> list[Availability]:
     """There wherever a window can open: on a screen, or on macOS and Windows."""
     import os
     import sys

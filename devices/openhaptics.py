@@ -85,12 +85,12 @@ FUNCTIONS = {
 
 @dataclass(frozen=True)
 class OpenHapticsOptions:
-    """device_name: as the maker's configuration tool names it; folder: searched first for libHD."""
+    """device_name: as the maker's tool names it; openhaptics_folder: searched first for libHD."""
 
     device_name: str = option(
         "", "the device's name in the maker's tool; '' for the default", flag="--touch-name"
     )
-    folder: str = option("", "folder of the maker's libHD", flag="--openhaptics-folder")
+    openhaptics_folder: str = option("", "folder of the maker's libHD")
 
 
 class OpenHapticsWire:
@@ -111,7 +111,8 @@ class OpenHapticsWire:
     def connect(self) -> None:
         """Load the library, initialise the device, start its scheduler; forces are zero."""
         if self._library is None:
-            folders = (self.options.folder, *FOLDERS) if self.options.folder else FOLDERS
+            own = self.options.openhaptics_folder
+            folders = (own, *FOLDERS) if own else FOLDERS
             library = load(("HD", "hd"), folders, INSTALL)
             need(library, FUNCTIONS)
             self._library = library

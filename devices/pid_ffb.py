@@ -178,7 +178,7 @@ def _candidates(hid: Any = None) -> list[dict[str, Any]]:
     return enumerate_devices(lambda e: (e.get("usage_page"), e.get("usage")) in _JOYSTICK_USAGES, module=hid)
 
 
-def find(hid: Any = None) -> list[Availability]:
+def find(options: PidOptions | None = None, *, hid: Any = None) -> list[Availability]:
     """Every stick or wheel that is plugged in and whether it takes forces."""
     try:
         entries = _candidates(hid or load())
@@ -189,10 +189,10 @@ def find(hid: Any = None) -> list[Availability]:
     if not entries:
         words = "no stick or wheel is plugged in"
         return [Availability(SPEC.name, SPEC.title, False, SPEC, why_not=words, remedy="plug one in")]
-    return [_look(entry, hid) for entry in entries]
+    return [_look(entry, options or PidOptions(), hid) for entry in entries]
 
 
-def _look(entry: dict[str, Any], hid: Any) -> Availability:
+def _look(entry: dict[str, Any], options: PidOptions, hid: Any) -> Availability:
     path, title = entry["path"].decode(), entry.get("product_string") or SPEC.title
     if not may_open(path):
         rule = udev_rule(entry["vendor_id"])
@@ -207,6 +207,5 @@ def _look(entry: dict[str, Any], hid: Any) -> Availability:
         return Availability(
             SPEC.name, title, False, SPEC, path, str(error), "choose a device with force feedback"
         )
-    return Availability(
-        SPEC.name, title, True, replace(SPEC, actuated_axes=axes, sensed_axes=axes), where=path
-    )
+    spec = replace(PidWire(options, host_clock, hid).spec, actuated_axes=axes, sensed_axes=axes)
+    return Availability(SPEC.name, title, True, spec, where=path)

@@ -10,17 +10,17 @@ from typing import Any
 from devices.base import Availability, Clock, DeviceSpec, PositionSource, host_clock
 from mechanics.errors import DeviceError
 
-DEVICES: dict[str, tuple[str, str]] = {
-    "mouse": ("devices.mouse", "MouseDevice"),
-    "spacemouse": ("devices.spacemouse", "make"),
-    "pid-ffb": ("devices.pid_ffb", "make"),
-    "haply": ("devices.haply", "make"),
-    "forcedimension": ("devices.forcedimension", "make"),
-    "openhaptics": ("devices.openhaptics", "make"),
-    "simulated": ("devices.simulated", "SimulatedHand"),
-    "replay": ("devices.replay", "ReplayDevice"),
+DEVICES: dict[str, tuple[str, str, str]] = {
+    "mouse": ("devices.mouse", "MouseDevice", "MouseOptions"),
+    "spacemouse": ("devices.spacemouse", "make", "SpacemouseOptions"),
+    "pid-ffb": ("devices.pid_ffb", "make", "PidOptions"),
+    "haply": ("devices.haply", "make", "HaplyOptions"),
+    "forcedimension": ("devices.forcedimension", "make", "ForceDimensionOptions"),
+    "openhaptics": ("devices.openhaptics", "make", "OpenHapticsOptions"),
+    "simulated": ("devices.simulated", "SimulatedHand", "SimulatedOptions"),
+    "replay": ("devices.replay", "ReplayDevice", "ReplayOptions"),
 }
-"""name: (module, what makes one there). A module also has `find() -> list[Availability]`."""
+"""name: (module, what makes one there, its options). A module also has `find(options=None)`."""
 
 
 @dataclass(frozen=True)
@@ -52,9 +52,16 @@ def spec_of(name: str) -> DeviceSpec:
     return _module(name).SPEC
 
 
-def find_devices(names: list[str] | None = None) -> list[Availability]:
-    """What is there, and for the rest why not, in the registry's order."""
+def options_of(name: str) -> type:
+    """The options dataclass of a kind of device; raises DeviceError for a name that is not known."""
+    return getattr(_module(name), DEVICES[name][2])
+
+
+def find_devices(
+    names: list[str] | None = None, options: Mapping[str, Any] | None = None
+) -> list[Availability]:
+    """What is there, and for the rest why not, in the registry's order; options: of a kind, by its name."""
     found: list[Availability] = []
     for name in names or DEVICES:
-        found += _module(name).find()
+        found += _module(name).find((options or {}).get(name))
     return found

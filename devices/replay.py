@@ -102,6 +102,6 @@ def _smoothed(position: np.ndarray, samples: int = 21) -> np.ndarray:
     return (total[samples:] - total[:-samples]) / samples
 
 
-def find() -> list[Availability]:
+def find(options: ReplayOptions | None = None) -> list[Availability]:
     """Always there; it needs a recording."""
     return [Availability(SPEC.name, SPEC.title, True, SPEC, where="--replay REC")]

@@ -151,6 +151,6 @@ class SimulatedHand:
         self.close()
 
 
-def find() -> list[Availability]:
+def find(options: SimulatedOptions | None = None) -> list[Availability]:
     """Always there."""
     return [Availability(SPEC.name, SPEC.title, True, SPEC, where="in this program")]

@@ -109,7 +109,7 @@ def _is_spacemouse(entry: dict[str, Any]) -> bool:
     return entry["product_id"] in codec.PRODUCTS.get(entry["vendor_id"], ())
 
 
-def find(hid: Any = None) -> list[Availability]:
+def find(options: SpacemouseOptions | None = None, *, hid: Any = None) -> list[Availability]:
     """Every SpaceMouse that is plugged in, or why there is none."""
     try:
         entries = enumerate_devices(_is_spacemouse, module=hid or load())

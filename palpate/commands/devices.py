@@ -3,32 +3,65 @@
 from __future__ import annotations
 
 import argparse
+import time
+from typing import Any
 
 from devices.base import Availability, DeviceSpec
-from devices.registry import DEVICES, find_devices
-from palpate.arguments import add_json, emit_json, say
+from devices.io_thread import Rate, ThreadedDevice
+from devices.registry import DEVICES, find_devices, make_device, options_of
+from mechanics.errors import OptionError
+from palpate.arguments import add_json, add_options, emit_json, finite, options_from, say
 
 SUMMARY = "which devices are there, and for the others why not"
+HARDWARE = ("spacemouse", "pid-ffb", "haply", "forcedimension", "openhaptics")
+LEAST_MEASURE_S = 1.0
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """`NAME...` and `--json`."""
+    """`NAME...`, `--measure`, every driver's options, `--json`."""
     parser.add_argument(
         "names",
         nargs="*",
         metavar="NAME",
         help=f"only these (all by default): {', '.join(DEVICES)}",
     )
+    parser.add_argument(
+        "--measure",
+        metavar="S",
+        type=finite,
+        help="open the hardware that is there, force off, and measure its rate for this long [s]",
+    )
+    for name in HARDWARE:
+        add_options(parser, options_of(name))
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Look, and tell."""
-    found = find_devices(arguments.names or None)
-    for device in found:
-        say(arguments, *_lines(device))
-    emit_json({"devices": [_plain(device) for device in found]}, arguments.json)
+    if arguments.measure is not None and not arguments.measure >= LEAST_MEASURE_S:
+        raise OptionError(f"--measure is {arguments.measure}; it must be at least {LEAST_MEASURE_S:g} s")
+    options = {name: options_from(arguments, options_of(name)) for name in HARDWARE}
+    found = find_devices(arguments.names or None, options)
+    there = [device for device in found if device.present]
+    rates = {}
+    if arguments.measure is not None:
+        chosen = dict.fromkeys(device.name for device in there if device.name in HARDWARE)
+        rates = {name: _measured(name, options[name], arguments.measure) for name in chosen}
+    if there:
+        say(arguments, "there:", *(line for d in there for line in _present(d, rates.get(d.name))))
+    if len(there) < len(found):
+        say(arguments, "not there:", *(line for d in found if not d.present for line in _absent(d)))
+    if there:
+        say(arguments, "", f"to touch something with one: palpate touch --device {there[0].name}")
+    emit_json({"devices": [_plain(device, rates.get(device.name)) for device in found]}, arguments.json)
     return 0
+
+
+def _measured(name: str, options: Any, seconds: float) -> Rate:
+    with make_device(name, options=options) as device:
+        assert isinstance(device, ThreadedDevice)
+        time.sleep(seconds + 0.1)
+        return device.rate
 
 
 def abilities(spec: DeviceSpec) -> str:
@@ -43,19 +76,21 @@ def abilities(spec: DeviceSpec) -> str:
     return ", ".join(words)
 
 
-def _lines(device: Availability) -> list[str]:
-    mark = "yes" if device.present else "no "
+def _headed(device: Availability, *lines: str) -> list[str]:
     where = f" ({device.where})" if device.where else ""
-    lines = [f"{mark} {device.name:<15} {device.title}{where}"]
-    if device.present:
-        lines.append(f"    {abilities(device.spec)}")
-    else:
-        lines.append(f"    why not: {device.why_not}")
-        lines.append(f"    to do:   {device.remedy}")
-    return lines
+    return [f"  {device.name:<15} {device.title}{where}", *(" " * 18 + line for line in lines if line)]
 
 
-def _plain(device: Availability) -> dict[str, object]:
+def _present(device: Availability, rate: Rate | None) -> list[str]:
+    measured = f"measured: {rate.hz:.0f} Hz, jitter {1e6 * rate.jitter_s:.0f} us" if rate else ""
+    return _headed(device, abilities(device.spec), measured)
+
+
+def _absent(device: Availability) -> list[str]:
+    return _headed(device, f"why:   {device.why_not}", f"to do: {device.remedy}")
+
+
+def _plain(device: Availability, rate: Rate | None) -> dict[str, object]:
     spec = device.spec
     return {
         "name": device.name,
@@ -73,4 +108,6 @@ def _plain(device: Availability) -> dict[str, object]:
         "workspace_radius_m": spec.workspace_radius_m,
         "rate_hz": spec.rate_hz,
         "buttons": spec.buttons,
+        "measured_hz": rate.hz if rate else None,
+        "measured_jitter_s": rate.jitter_s if rate else None,
     }

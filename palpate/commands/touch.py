@@ -19,8 +19,7 @@ import numpy as np
 from devices.channel import PoseChannel
 from devices.intention import Intention
 from devices.mapper import MapperOptions, Mapping
-from devices.registry import DEVICES, DeviceChoice, spec_of
-from devices.simulated import SimulatedOptions
+from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
 from mechanics.errors import DeviceError, OptionError
 from mechanics.model import Model
 from palpate.arguments import (
@@ -76,7 +75,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_options(parser, MapperOptions)
     add_options(parser, ServoOptions, skip=("safety", "passivity", "tip_offsets_m"))
     add_options(parser, SafetyOptions)
-    add_options(parser, SimulatedOptions)
+    for name in DEVICES:
+        add_options(parser, options_of(name))
     add_options(parser, ExplorationOptions)
     add_seed(parser)
     add_json(parser)
@@ -156,12 +156,13 @@ def device_choice(
     arguments: argparse.Namespace, name: str, model: Model, channel: PoseChannel | None
 ) -> tuple[DeviceChoice, float | None]:
     """The device for the servo process to make, and when it will have done (s), None for never."""
+    options = options_from(arguments, options_of(name))
     if name == "mouse":
-        return DeviceChoice(name, {"channel": str(channel.path)}), None
+        return DeviceChoice(name, {"channel": str(channel.path), "options": options}), None
     if name == "replay":
-        return DeviceChoice(name, {"recording": str(Path(arguments.replay).resolve())}), None
+        recording = str(Path(arguments.replay).resolve())
+        return DeviceChoice(name, {"recording": recording, "options": options}), None
     if name == "simulated":
-        options = options_from(arguments, SimulatedOptions)
         path, _ = explore(
             model,
             options_from(arguments, ExplorationOptions),
@@ -171,7 +172,7 @@ def device_choice(
         intention: Intention = path
         keywords = {"options": options, "intention": intention, "seed": arguments.seed}
         return DeviceChoice(name, keywords), path.duration_s + 2.0
-    return DeviceChoice(name), None
+    return DeviceChoice(name, {"options": options}), None
 
 
 def _beside(arguments: argparse.Namespace, scene: Scene) -> str:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
 import subprocess
 import time
@@ -26,7 +27,8 @@ from devices.simulated import SimulatedHand
 from devices.spacemouse import make as make_spacemouse
 
 from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit
-from .fake_inverse import IDLE_S, FakeInverse
+from .fake_inverse import FakeInverse
+from .kernel.uhid import KernelUnit
 
 STUBS = Path(__file__).parent / "vendor_stubs.c"
 
@@ -47,8 +49,6 @@ class Bench:
     axes = "xyz"
     device: PositionSource
 
-    zero_travels_s = 0.0
-
     def move(self, position_m: np.ndarray) -> None:
         """Put the handle there (a rate device: deflect it that way)."""
         raise NotImplementedError
@@ -63,6 +63,10 @@ class Bench:
     def replug(self) -> None:
         raise NotImplementedError
 
+    def zeroed(self) -> bool:
+        """Whether the last that the driver sent was zero: commanded, not a force that lapsed by itself."""
+        return not self.felt().any()
+
     def hang(self, on: bool) -> None:
         """The driver's blocking calls stop answering, or answer again."""
 
@@ -70,12 +74,39 @@ class Bench:
         self.device.close()
 
 
-class SpaceMouseBench(Bench):
+class HidBench(Bench):
+    """hidapi over byte-level fakes, or hidapi itself over the kernel's uhid (see test_kernel.py)."""
+
+    def _plug(self, unit: SpaceMouseUnit | StickUnit) -> FakeHid | None:
+        self.unit = unit
+        self._kernel = KernelUnit(unit) if os.environ.get("PALPATE_UHID") else None
+        return None if self._kernel else FakeHid(unit)
+
+    def unplug(self) -> None:
+        self.unit.unplug()
+
+    def replug(self) -> None:
+        self.unit.replug()
+
+    def zeroed(self) -> bool:
+        if self._kernel:
+            self._kernel.settle()
+        return super().zeroed()
+
+    def hang(self, on: bool) -> None:
+        (self.unit.hang.set if on else self.unit.hang.clear)()
+
+    def close(self) -> None:
+        super().close()
+        if self._kernel:
+            self._kernel.close()
+
+
+class SpaceMouseBench(HidBench):
     axes = ""
 
     def __init__(self) -> None:
-        self.unit = SpaceMouseUnit()
-        self.device = make_spacemouse(hid=FakeHid(self.unit))
+        self.device = make_spacemouse(hid=self._plug(SpaceMouseUnit()))
 
     def move(self, position_m: np.ndarray) -> None:
         x, y, z = (int(np.clip(v * 3500, -350, 350)) for v in position_m)
@@ -84,22 +115,11 @@ class SpaceMouseBench(Bench):
     def felt(self) -> np.ndarray:
         return np.zeros(3)
 
-    def unplug(self) -> None:
-        self.unit.unplug()
 
-    def replug(self) -> None:
-        self.unit.replug()
-
-    def hang(self, on: bool) -> None:
-        (self.unit.hang.set if on else self.unit.hang.clear)()
-
-
-class StickBench(SpaceMouseBench):
-    axes = "xy"
-
+class StickBench(HidBench):
     def __init__(self, **kind: object) -> None:
-        self.unit = StickUnit(**kind)
-        self.device = make_pid(PidOptions(full_scale_n=8.0, stroke_m=0.05), hid=FakeHid(self.unit))
+        hid = self._plug(StickUnit(**kind))
+        self.device = make_pid(PidOptions(full_scale_n=8.0, stroke_m=0.05), hid=hid)
         self.axes = "xy"[: self.unit.axes]
 
     def move(self, position_m: np.ndarray) -> None:
@@ -111,8 +131,6 @@ class StickBench(SpaceMouseBench):
 
 
 class HaplyBench(Bench):
-    zero_travels_s = 0.5 * IDLE_S
-
     def __init__(self, key: str = "vector") -> None:
         self.key = key
         self.service = FakeInverse(key)
@@ -137,6 +155,10 @@ class HaplyBench(Bench):
 
     def replug(self) -> None:
         self.service, self.running = FakeInverse(self.key, *self.ports), True
+
+    def zeroed(self) -> bool:
+        # over a socket, which delivers what was sent before it was closed
+        return eventually(lambda: not any(self.service.commanded_n))
 
     def hang(self, on: bool) -> None:
         (self.service.silent.set if on else self.service.silent.clear)()
@@ -163,9 +185,9 @@ class VendorBench(Bench):
         self.library = ctypes.CDLL(str(library))
         self.kind = kind
         if kind == "dhd":
-            self.device = make_forcedimension(ForceDimensionOptions(folder=str(folder)))
+            self.device = make_forcedimension(ForceDimensionOptions(forcedimension_folder=str(folder)))
         else:
-            self.device = make_openhaptics(OpenHapticsOptions(folder=str(folder)))
+            self.device = make_openhaptics(OpenHapticsOptions(openhaptics_folder=str(folder)))
 
     def number(self, name: str) -> ctypes.c_int:
         return ctypes.c_int.in_dll(self.library, f"stub_{name}")

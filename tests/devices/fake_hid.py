@@ -133,24 +133,6 @@ class _Handle:
         self._unit = None
 
 
-class SpaceMouseUnit(Unit):
-    """A SpaceMouse Compact (split reports, 7 bytes each)."""
-
-    vendor_id, product_id, product_string = 0x256F, 0xC635, "SpaceMouse Compact"
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.led: bool | None = None
-
-    def output(self, report: bytes) -> None:
-        if report[0] == 4:
-            self.led = bool(report[1])
-
-    def deflect(self, x: int = 0, y: int = 0, z: int = 0) -> None:
-        self.emit(struct.pack("<B3h", 1, x, y, z))
-        self.emit(struct.pack("<B3h", 2, 0, 0, 0))
-
-
 class _Builder:
     """Writes a report descriptor item by item (HID 1.11)."""
 
@@ -202,6 +184,36 @@ class _Builder:
 
     def feature(self, flags: int = 2) -> _Builder:
         return self.item(0xB0, flags)
+
+
+def spacemouse_descriptor() -> bytes:
+    """Translations, rotations and buttons in reports of their own, a light."""
+    b = _Builder()
+    b.page(0x01).usage(0x08).collection(1)
+    for report, axes in ((1, (0x30, 0x31, 0x32)), (2, (0x33, 0x34, 0x35))):
+        b.report(report).page(0x01).usage(*axes).shape(16, 3, -350, 350).input()
+    b.report(3).page(0x09).usages(1, 2).shape(1, 2, 0, 1).input().shape(1, 14, 0, 1).input(3)
+    b.report(4).page(0x08).usage(0x4B).shape(1, 1, 0, 1).output().shape(1, 7, 0, 1).output(3)
+    return bytes(b.end().data)
+
+
+class SpaceMouseUnit(Unit):
+    """A SpaceMouse Compact (split reports, 7 bytes each)."""
+
+    vendor_id, product_id, product_string = 0x256F, 0xC635, "SpaceMouse Compact"
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.descriptor = spacemouse_descriptor()
+        self.led: bool | None = None
+
+    def output(self, report: bytes) -> None:
+        if report[0] == 4:
+            self.led = bool(report[1])
+
+    def deflect(self, x: int = 0, y: int = 0, z: int = 0) -> None:
+        self.emit(struct.pack("<B3h", 1, x, y, z))
+        self.emit(struct.pack("<B3h", 2, 0, 0, 0))
 
 
 def stick_descriptor(ids: dict[str, int], *, axes: int = 2, control_bits: bool = True) -> bytes:

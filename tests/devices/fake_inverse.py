@@ -34,7 +34,7 @@ class FakeInverse:
         self.devices = ["049D"]
         self.messages: list[dict] = []
         self.silent = threading.Event()
-        self._force = [0.0, 0.0, 0.0]
+        self.commanded_n = [0.0, 0.0, 0.0]
         self._force_s = float("-inf")
         self._sockets: set = set()
         self._events: set = set()
@@ -52,7 +52,7 @@ class FakeInverse:
 
     def force_n(self) -> tuple[float, float, float]:
         """What the hand feels now."""
-        return tuple(self._force) if time.perf_counter() - self._force_s < IDLE_S else (0.0, 0.0, 0.0)
+        return tuple(self.commanded_n) if time.perf_counter() - self._force_s < IDLE_S else (0.0, 0.0, 0.0)
 
     def _vector(self, values: list[float]) -> dict:
         return dict(zip("xyz", values, strict=True))
@@ -81,7 +81,7 @@ class FakeInverse:
                     commanded = device["commands"].get("set_cursor_force")
                     if commanded is not None:
                         force = commanded[self.key]  # the other spelling is an error to this service
-                        self._force = [force["x"], force["y"], force["z"]]
+                        self.commanded_n = [force["x"], force["y"], force["z"]]
                         self._force_s = time.perf_counter()
                 while self.silent.is_set():
                     time.sleep(0.002)

@@ -180,9 +180,7 @@ def test_zero_at_the_end(forceful: Bench, how: str) -> None:
                     signal.raise_signal(signal.SIGINT)
         except (ValueError, KeyboardInterrupt):
             pass
-        if forceful.zero_travels_s:  # over a socket; too short for the service to go idle by itself
-            eventually(lambda: not forceful.felt().any(), forceful.zero_travels_s)
-        assert not forceful.felt().any()
+        assert forceful.zeroed()
         assert not device.read().connected
     device.close()
 

@@ -162,14 +162,14 @@ def test_a_lost_release_does_not_creep_on() -> None:
 def test_other_devices_of_the_maker_are_left_alone() -> None:
     unit = SpaceMouseUnit()
     unit.vendor_id, unit.product_id = 0x046D, 0xC52B  # a Logitech receiver
-    found = spacemouse.find(FakeHid(unit))
+    found = spacemouse.find(hid=FakeHid(unit))
     assert not found[0].present and "plugged in" in found[0].why_not
 
 
 def test_a_stick_without_force_says_why() -> None:
     unit = StickUnit()
     unit.descriptor = bytes.fromhex("05010904a10109301581257f750895018102c0")
-    found = pid_ffb.find(FakeHid(unit))[0]
+    found = pid_ffb.find(hid=FakeHid(unit))[0]
     assert not found.present and "no set effect" in found.why_not
 
 
@@ -178,7 +178,7 @@ def test_permission_gives_a_rule_to_paste(tmp_path, monkeypatch: pytest.MonkeyPa
     unit.path = str(tmp_path / "hidraw3")
     (tmp_path / "hidraw3").touch()
     monkeypatch.setattr(hid_port.os, "access", lambda *_: False)
-    found = spacemouse.find(FakeHid(unit))[0]
+    found = spacemouse.find(hid=FakeHid(unit))[0]
     assert not found.present and "permission" in found.why_not
     assert 'KERNEL=="hidraw*", ATTRS{idVendor}=="256f", TAG+="uaccess"' in found.remedy
 

@@ -1,0 +1,62 @@
+"""`palpate devices`: what a person reads, what a program reads, and every driver's options as flags."""
+
+from __future__ import annotations
+
+import argparse
+import dataclasses
+import json
+
+import pytest
+
+from devices.haply import HaplyOptions
+from devices.registry import DEVICES, options_of
+from palpate.cli import main
+from palpate.commands import touch
+
+from .fake_inverse import FakeInverse
+
+
+@pytest.fixture
+def uri() -> str:
+    service = FakeInverse()
+    yield f"ws://localhost:{service.ports[0]}"
+    service.stop()
+
+
+def test_lists_what_is_there_and_why_not(uri: str, capsys: pytest.CaptureFixture) -> None:
+    assert main(["devices", "simulated", "haply", "--haply-uri", "ws://localhost:9"]) == 0
+    there, absent = capsys.readouterr().out.split("not there:")
+    assert "simulated" in there and "force to 20 N" in there
+    assert "does not answer at ws://localhost:9" in absent and "to do: install it" in absent
+    assert "palpate touch --device simulated" in absent
+    assert main(["devices", "haply", "--haply-uri", uri]) == 0
+    printed = capsys.readouterr().out
+    assert "not there" not in printed and "049D" in printed
+
+
+def test_measures_the_rate_of_what_is_there(uri: str, capsys: pytest.CaptureFixture) -> None:
+    words = ["devices", "haply", "simulated", "--haply-uri", uri, "--haply-answer", "2", "--measure", "1.5"]
+    assert main([*words, "--json", "-"]) == 0
+    haply, simulated = json.loads(capsys.readouterr().out)["devices"]
+    assert haply["measured_hz"] > 0 and haply["measured_jitter_s"] > 0
+    assert simulated["measured_hz"] is None
+    assert main(["devices", "--measure", "0.1"]) == 2
+    assert "at least 1 s" in capsys.readouterr().err
+
+
+def test_an_unknown_device_is_refused(capsys: pytest.CaptureFixture) -> None:
+    assert main(["devices", "dataglove"]) == 2
+    assert "allowed are mouse" in capsys.readouterr().err
+
+
+def test_every_option_of_every_driver_is_a_flag_of_its_own() -> None:
+    parser = argparse.ArgumentParser()
+    touch.add_arguments(parser)
+    names = [action.dest for action in parser._actions]
+    assert len(names) == len(set(names)), "two options would overwrite each other"
+    for device in DEVICES:
+        assert {field.name for field in dataclasses.fields(options_of(device))} <= set(names)
+    given = parser.parse_args(["block", "--haply-uri", "ws://elsewhere:1", "--ffb-full-scale", "4"])
+    choice, _ = touch.device_choice(given, "haply", None, None)
+    assert choice.options["options"] == HaplyOptions(uri="ws://elsewhere:1")
+    assert touch.device_choice(given, "pid-ffb", None, None)[0].options["options"].full_scale_n == 4.0
