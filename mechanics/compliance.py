@@ -17,8 +17,9 @@ import scipy.linalg as la
 
 from mechanics import pardiso
 from mechanics.elasticity import stiffness
-from mechanics.errors import MeshError
+from mechanics.errors import MeshError, OptionError
 from mechanics.model import Model
+from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver, free_dofs
 from mechanics.store import content_key, load_or_build
@@ -29,6 +30,7 @@ from mechanics.tetmesh import TetMesh
 _COLUMNS = 64  # right-hand sides solved at once
 _CONDENSED = 0.75  # share of the unknowns taken from the Schur complement, whose square is held twice
 METHODS = ("schur", "columns")
+FORMS = ("auto", "dense", "low-rank")
 
 
 @dataclass(frozen=True)
@@ -157,16 +159,42 @@ def _symmetrise(matrix: np.ndarray, block: int = 512) -> None:
         matrix[rest, rows] = mean.T
 
 
-def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompliance:
+@dataclass(frozen=True)
+class ComplianceOptions:
+    """In which form `load_or_condense` keeps how a touch at one place moves another."""
+
+    form: str = option("auto", "dense, low-rank, or auto: low-rank for a large surface", choices=FORMS)
+    largest_dense_bytes: float = option(1.5e8, "dense table beyond which auto takes low-rank", unit="bytes")
+    low_rank_error: float = option(0.005, "relative error of a low-rank table")
+
+    def __post_init__(self) -> None:
+        if self.form not in FORMS:
+            raise OptionError(f"form is '{self.form}'; allowed are {', '.join(FORMS)}")
+        if not 1e-6 < self.low_rank_error < 0.2:
+            raise OptionError(f"low_rank_error is {self.low_rank_error}; it must lie between 1e-6 and 0.2")
+
+    def error_of(self, mesh: TetMesh) -> float | None:
+        """The low-rank error for a mesh, None where its table is to be dense."""
+        corners = len(np.unique(mesh.touchable_surface[:, :3]))
+        large = 36.0 * corners**2 > self.largest_dense_bytes
+        dense = self.form == "dense" or (self.form == "auto" and not large)
+        return None if dense else self.low_rank_error
+
+
+def load_or_condense(
+    model: Model, progress: Progress = silent, *, options: ComplianceOptions | None = None
+) -> SurfaceCompliance:
     """The servo's compliance of a model: from the cache in its folder, or computed and stored there.
 
     The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
     a damaged or a truncated file is rebuilt. Of the model's effects those of the base count
     (mechanics.support). A model that was never written, or a folder that cannot be written, is computed in
-    memory.
+    memory. A large surface is compressed (ComplianceOptions).
     """
     support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
     held = () if support is None else dataclasses.astuple(support)
+    error = (options or ComplianceOptions()).error_of(model.mesh)
+    form = () if error is None else ("low-rank", error)
     key = content_key(
         "surface compliance 2",
         model.mesh.points,
@@ -176,11 +204,17 @@ def load_or_condense(model: Model, progress: Progress = silent) -> SurfaceCompli
         model.poisson_ratio,
         model.modulus_ratio,
         *held,
+        *form,
     )
 
     def build() -> dict[str, np.ndarray]:
         made = surface_compliance(
-            model.mesh, model.poisson_ratio, model.modulus_ratio, support=support, progress=progress
+            model.mesh,
+            model.poisson_ratio,
+            model.modulus_ratio,
+            support=support,
+            low_rank_error=error,
+            progress=progress,
         )
         return made.arrays()
 

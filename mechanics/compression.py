@@ -2,8 +2,7 @@
 
 Under a patch of width s the compliance of a body of size L is smooth: some (L / s)^2 load patterns hold
 all of it. With r random patterns O, Y = C O costs r solves, and C ~ Y (O'Y)^-1 Y' = U U' (Nystroem;
-symmetric, positive semidefinite, from below). t places then take 3 t r numbers instead of 9 t^2, and a
-query 6 r products.
+symmetric, positive semidefinite, from below). t places then take 3 t r numbers instead of 9 t^2.
 """
 
 from __future__ import annotations
@@ -12,26 +11,27 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
-from numba import njit
+import scipy.sparse as sp
 
+from mechanics.errors import MeshError
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
 
-_COLUMNS = 96
+_STEP = 120  # load patterns before the first look at the error; then a third more each time
 
 
 @dataclass(frozen=True)
 class LowRankCompliance:
     """factor: (t, 3, r) float32, unit modulus; block (i, j) = factor[i] @ factor[j].T, 1/m.
 
-    patch_width_m: of the places' patches. error: greatest error of the own block of some places that were
-    solved for exactly, over the block's norm.
+    error: greatest error of the own block of some places that were solved for exactly, over the block's
+    norm; loads: how many patterns were solved for.
     """
 
     factor: np.ndarray
-    patch_width_m: float
     error: float
+    loads: int
 
     def block(self, i: int, j: int) -> np.ndarray:
         """(3, 3) 1/m: displacement at place i for a unit force at place j."""
@@ -42,71 +42,85 @@ class LowRankCompliance:
         return np.einsum("iar,ibr->iab", self.factor, self.factor, optimize=True)
 
 
-@njit(cache=True, error_model="numpy", fastmath=True)
-def between_low_rank(factor, corners_p, weights_p, corners_q, weights_q, out):
-    """out (3, 3) 1/m: as surface_compliance.between_block, from the factor."""
-    rank = factor.shape[2]
-    for a in range(3):
-        for b in range(3):
-            out[a, b] = 0.0
-    mixed = np.zeros((6, rank), dtype=np.float32)
-    for a in range(3):
-        for i in range(3):
-            for k in range(rank):  # innermost and contiguous: the compiler vectorises it
-                mixed[a, k] += np.float32(weights_p[i]) * factor[corners_p[i], a, k]
-                mixed[3 + a, k] += np.float32(weights_q[i]) * factor[corners_q[i], a, k]
-    for a in range(3):
-        for b in range(3):
-            total = 0.0
-            for k in range(rank):
-                total += mixed[a, k] * mixed[3 + b, k]
-            out[a, b] = total
-
-
 def compress(
     solver: Solver,
     points: np.ndarray,
     width_m: float,
-    rank: int,
     *,
-    checked: int = 24,
+    tolerance: float = 0.005,
+    most: int = 3000,
+    checked: int = 32,
     seed: int = 0,
     progress: Progress = silent,
 ) -> LowRankCompliance:
     """Factor the compliance between patches of `width_m` at surface points (t, 3).
 
-    rank: load patterns, at most 3 t. checked: places solved for exactly to state the error. The same seed
-    gives the same factor.
+    Patterns are added until the own blocks of `checked` places, solved for exactly, agree to `tolerance`;
+    then those that the tolerance does not need are dropped. The same seed gives the same factor. Raises
+    MeshError where `most` patterns do not suffice.
     """
-    mesh = solver.mesh
-    average = PatchSampler(mesh, width_m).matrix(points)
+    average = PatchSampler(solver.mesh, width_m).matrix(points)
     t = len(points)
-    rank = min(rank, 3 * t)
     rng = np.random.default_rng(seed)
-    patterns = rng.normal(size=(t, 3, rank))
-    answers = np.empty((t, 3, rank))
-    free = solver.free
-    for start in range(0, rank, _COLUMNS):
-        part = slice(start, min(start + _COLUMNS, rank))
-        count = part.stop - start
-        loads = (average.T @ patterns[:, :, part].reshape(t, 3 * count)).reshape(len(mesh.points) * 3, count)
-        moved = np.zeros((3 * len(mesh.points), count))
-        moved[free] = solver.solve_free(loads[free])
-        answers[:, :, part] = (average @ moved.reshape(len(mesh.points), -1)).reshape(t, 3, count)
-        progress("load patterns", 0.9 * part.stop / rank)
-    y = answers.reshape(3 * t, rank)
-    core = patterns.reshape(3 * t, rank).T @ y
-    core = 0.5 * (core + core.T)
-    shift = 1e-12 * np.trace(core) / rank  # keeps rounding from making the core indefinite
-    root = la.cholesky(core + shift * np.eye(rank), lower=True)
-    factor = la.solve_triangular(root, y.T, lower=True, overwrite_b=False).T.astype(np.float32)
-    result = LowRankCompliance(factor.reshape(t, 3, rank), float(width_m), float("nan"))
-    probe = rng.choice(t, min(checked, t), replace=False)
-    loads = np.zeros((len(mesh.points), 3, len(probe), 3))
-    for axis in range(3):
-        loads[:, axis, :, axis] = average[probe].toarray().T
-    exact = solver.quadratic_forms(loads.reshape(-1, len(probe), 3)[free])
-    found = result.own()[probe]
-    error = np.linalg.norm(found - exact, axis=(1, 2)) / np.linalg.norm(exact, axis=(1, 2))
+    probe = np.sort(rng.choice(t, min(checked, t), replace=False))
+    exact = own_compliance(solver, average[probe])
+    patterns, answers = np.empty((3 * t, 0)), np.empty((3 * t, 0))
+    rows = (3 * probe[:, None] + np.arange(3)).ravel()
+    while True:
+        loads = patterns.shape[1]
+        new = rng.normal(size=(3 * t, min(max(_STEP, loads // 3), 3 * t - loads)))
+        patterns = np.hstack([patterns, new])
+        answers = np.hstack([answers, _answer(solver, average, new)])
+        factor = _factor(patterns, answers)
+        errors = _errors_by_rank(factor[rows].reshape(len(probe), 3, -1), exact)
+        loads = patterns.shape[1]
+        progress("load patterns", min(0.99, tolerance / errors[-1]))
+        if errors[-1] <= 0.8 * tolerance or loads == 3 * t:
+            break
+        if loads >= most:
+            raise MeshError(
+                f"{loads} load patterns leave an error of {errors[-1]:.2g} where {tolerance:.2g} was asked: "
+                "take a wider patch or a larger tolerance"
+            )
+    rank = int(np.argmax(errors <= max(tolerance, errors[-1]))) + 1
+    kept = np.ascontiguousarray(factor[:, :rank].reshape(t, 3, rank), dtype=np.float32)
     progress("load patterns", 1.0)
-    return LowRankCompliance(result.factor, float(width_m), float(error.max()))
+    return LowRankCompliance(kept, float(errors[rank - 1]), loads)
+
+
+def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
+    """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n)."""
+    n, count = average.shape[1], average.shape[0]
+    loads = np.zeros((n, 3, count, 3))
+    for axis in range(3):
+        loads[:, axis, :, axis] = average.toarray().T
+    return solver.quadratic_forms(loads.reshape(3 * n, count, 3)[solver.free])
+
+
+def _answer(solver: Solver, average: sp.csr_matrix, patterns: np.ndarray) -> np.ndarray:
+    """(3t, r) mean displacements of the patches for forces (3t, r) on them."""
+    t, n = average.shape
+    r = patterns.shape[1]
+    loads = (average.T @ patterns.reshape(t, 3 * r)).reshape(3 * n, r)
+    moved = np.zeros((3 * n, r))
+    moved[solver.free] = solver.solve_free(loads[solver.free])
+    return (average @ moved.reshape(n, 3 * r)).reshape(3 * t, r)
+
+
+def _factor(patterns: np.ndarray, answers: np.ndarray) -> np.ndarray:
+    """U (3t, r) of the Nystroem approximation, its columns from the most to the least important."""
+    core = patterns.T @ answers
+    core = 0.5 * (core + core.T)
+    core += 1e-12 * np.trace(core) / len(core) * np.eye(len(core))  # rounding must not make it indefinite
+    root = la.cholesky(core, lower=True)
+    factor = la.solve_triangular(root, answers.T, lower=True).T
+    _, turned = la.eigh(factor.T @ factor)
+    return factor @ turned[:, ::-1]
+
+
+def _errors_by_rank(rows: np.ndarray, exact: np.ndarray) -> np.ndarray:
+    """(r,) greatest relative error of own blocks (k, 3, 3) with the first 1 .. r columns of (k, 3, r)."""
+    left = np.broadcast_to(exact[..., None], (*exact.shape, rows.shape[2])).copy()
+    left -= np.cumsum(rows[:, :, None, :] * rows[:, None, :, :], axis=3)
+    size = np.linalg.norm(exact, axis=(1, 2))
+    return (np.linalg.norm(left, axis=(1, 2)) / size[:, None]).max(axis=0)

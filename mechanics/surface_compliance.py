@@ -3,27 +3,37 @@ asked.
 
 How one place gives under its own touch (`own`): sharp near edges and the base, so it is computed with a
 patch as narrow as a contact, at the corners of a surface finer than the mesh's. How a touch moves the rest
-of the
-object (`blocks`): smooth, so a patch as wide as the mesh's own elements and the mesh's own corners serve.
+of the object (`blocks`, or `factor` for a large surface): smooth, so a patch as wide as the mesh's own
+elements and the mesh's own corners serve.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 
 import numpy as np
 import scipy.sparse as sp
-from numba import njit
-from scipy.spatial import cKDTree
 
+from mechanics.compression import compress, own_compliance
+from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
-from mechanics.sites import mean_curvature, patch_width, touch_solver
+from mechanics.refine import typical_edge
+from mechanics.sites import (
+    PATCH_WIDTH_IN_EDGES,
+    SURFACE_EDGE_M,
+    mean_curvature,
+    patch_width,
+    touch_solver,
+)
 from mechanics.solver import Solver
+from mechanics.spread import spaced_corners, spread
 from mechanics.support import Support
 from mechanics.tetmesh import TetMesh, vertex_normals
 
+WIDE_PATCH_M = 0.008  # of the mutual give of a large surface, whatever its elements
+_SOLVED_EVERY_M = 0.005  # on a surface with nearer corners the give of the others is spread from these
 _CORNERS = 32  # patches solved at once
 
 
@@ -33,7 +43,8 @@ class SurfaceCompliance:
 
     Coarse, t corners of the mesh: nodes (t,), points, normals (t, 3), curvature (t,) 1/m mean and convex
     positive, triangles (f, 3) into them, blocks (t, t, 3, 3) float32, 1/m: displacement of the patch at i
-    for a unit force on the patch at j; symmetric as a whole. patch_width_m: (1,).
+    for a unit force on the patch at j; symmetric as a whole. patch_width_m: (1,). A large surface has no
+    blocks (shape 0) but a factor (t, 3, r) float32: block (i, j) = factor[i] @ factor[j].T.
     Fine, v corners: own_points, own_normals (v, 3), own_curvature (v,), own_triangles (g, 3) into them, own
     (v, 3, 3), 1/m: displacement of the patch at i for a unit force on itself. own_width_m: (1,).
     poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.
@@ -53,14 +64,15 @@ class SurfaceCompliance:
     own: np.ndarray
     own_width_m: np.ndarray
     poisson_ratio: np.ndarray
+    factor: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 0), dtype=np.float32))
 
     def __post_init__(self) -> None:
-        for field in fields(self):
-            getattr(self, field.name).setflags(write=False)
+        for each in fields(self):
+            getattr(self, each.name).setflags(write=False)
 
     def arrays(self) -> dict[str, np.ndarray]:
         """The fields by name."""
-        return {field.name: getattr(self, field.name) for field in fields(self)}
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @classmethod
     def from_arrays(cls, arrays: dict[str, np.ndarray]) -> SurfaceCompliance:
@@ -78,68 +90,12 @@ class SurfaceCompliance:
         nu, width = float(self.poisson_ratio[0]), float(self.own_width_m[0])
         return own - np.array([half_space_compliance(n, nu, width) for n in normals])
 
-    def displacement(self, triangle: int, barycentric: np.ndarray, force: np.ndarray) -> np.ndarray:
-        """(t, 3) m Pa: motion of all corners for a force (3,) N on the object, times the modulus."""
-        corners = self.triangles[triangle]
-        mixed = np.einsum("c,icab->iab", np.asarray(barycentric), self.blocks[:, corners].astype(float))
-        return mixed @ np.asarray(force, dtype=float)
-
-
-@njit(cache=True, error_model="numpy")
-def between_block(blocks, corners_p, weights_p, corners_q, weights_q, out):
-    """out (3, 3) 1/m: displacement at p a unit force at q; corners (3,), weights (3,) barycentric."""
-    out[:] = 0.0
-    for i in range(3):
-        for j in range(3):
-            w = weights_p[i] * weights_q[j]
-            block = blocks[corners_p[i], corners_q[j]]
-            for a in range(3):
-                for b in range(3):
-                    out[a, b] += w * block[a, b]
-
-
-def closest_on_triangles(
-    points: np.ndarray, corners: np.ndarray, triangles: np.ndarray, *, candidates: int = 24
-) -> tuple[np.ndarray, np.ndarray]:
-    """Nearest triangle (k,) and barycentric weights (k, 3) of the nearest point on it, for points (k, 3).
-
-    Among the triangles with the nearest centres; weights are not negative and sum to 1.
-    """
-    p = corners[triangles]
-    count = min(candidates, len(triangles))
-    _, near = cKDTree(p.mean(axis=1)).query(points, k=count)
-    near = np.asarray(near).reshape(len(points), count)
-    best = np.full(len(points), np.inf)
-    chosen = np.zeros(len(points), dtype=np.int64)
-    weights = np.zeros((len(points), 3))
-    for k in range(count):
-        w = _closest_weights(points, p[near[:, k]])
-        distance = np.linalg.norm(np.einsum("kc,kcx->kx", w, p[near[:, k]]) - points, axis=1)
-        better = distance < best - 1e-12
-        best[better], chosen[better], weights[better] = distance[better], near[better, k], w[better]
-    return chosen, weights
-
-
-def _closest_weights(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(k, 3) barycentric weights of the point of each triangle (k, 3, 3) nearest to its point (k, 3)."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    u, v, w = b - a, c - a, points - a
-    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
-    wu, wv = (w * u).sum(1), (w * v).sum(1)
-    det = uu * vv - uv * uv
-    s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
-    weights = np.stack([1 - s - t, s, t], axis=1)
-    outside = (weights < 0).any(axis=1)
-    best = np.full(len(points), np.inf)
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        side = triangles[:, j] - triangles[:, i]
-        f = np.clip(((points - triangles[:, i]) * side).sum(1) / (side * side).sum(1), 0, 1)
-        distance = np.linalg.norm(points - triangles[:, i] - f[:, None] * side, axis=1)
-        use = outside & (distance < best)
-        best[use] = distance[use]
-        weights[use] = 0
-        weights[use, i], weights[use, j] = 1 - f[use], f[use]
-    return weights
+    def displacement(self, corner: int, force: np.ndarray) -> np.ndarray:
+        """(t, 3) m Pa: motion of all corners for a force (3,) N on the object at one, times the modulus."""
+        force = np.asarray(force, dtype=np.float32)
+        if len(self.factor):
+            return self.factor @ (force @ self.factor[corner])
+        return self.blocks[:, corner] @ force
 
 
 def surface_compliance(
@@ -148,27 +104,54 @@ def surface_compliance(
     modulus_ratio: np.ndarray | None = None,
     *,
     support: Support | None = None,
+    low_rank_error: float | None = None,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
-    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None; support: None, bonded."""
+    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None; support: None, bonded.
+
+    low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
+    a patch of at least WIDE_PATCH_M.
+    """
     coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=support)
     nodes, triangles = _corners(coarse.mesh)
     points = coarse.mesh.points[nodes]
+    normals = _normals(coarse.mesh, nodes)
     width = patch_width(coarse.mesh)
-    blocks = patch_blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
-    curvature = mean_curvature(mesh, points, normals := _normals(coarse.mesh, nodes))
-    del coarse
-    fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support)
+    tables = {}
+    if low_rank_error is None:
+        blocks = patch_blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
+    else:
+        width = max(width, WIDE_PATCH_M)
+        blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
+        tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
+    finer = low_rank_error is None or typical_edge(mesh) > _SOLVED_EVERY_M
+    fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support) if finer else coarse
     own_nodes, own_triangles = _corners(fine.mesh)
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
-    own_width = patch_width(fine.mesh)
-    own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f))
+    own_width = patch_width(fine.mesh) if finer else PATCH_WIDTH_IN_EDGES * SURFACE_EDGE_M
+
+    def own_at(places: np.ndarray) -> np.ndarray:
+        return own_blocks(
+            fine, own_points[places], own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f)
+        )
+
+    if finer:
+        own = own_at(np.arange(len(own_points)))
+    else:
+        factor = tables["factor"]
+        known = np.einsum("iar,ibr->iab", factor, factor, optimize=True).astype(float)
+        for i, normal in enumerate(own_normals):
+            known[i] += half_space_compliance(normal, poisson_ratio, own_width)
+            known[i] -= half_space_compliance(normal, poisson_ratio, width)
+        places = spaced_corners(own_points, own_normals, _SOLVED_EVERY_M)
+        # what the wide patch misses: nothing but near an edge or the base, and smooth
+        own = known + spread(own_points, own_normals, places, own_at(places) - known[places])
     return SurfaceCompliance(
         nodes=nodes,
         points=points,
         normals=normals,
-        curvature=curvature,
+        curvature=mean_curvature(mesh, points, normals),
         triangles=triangles,
         blocks=blocks,
         patch_width_m=np.array([width]),
@@ -179,6 +162,7 @@ def surface_compliance(
         own=own,
         own_width_m=np.array([own_width]),
         poisson_ratio=np.array([float(poisson_ratio)]),
+        **tables,
     )
 
 
@@ -222,9 +206,7 @@ def own_blocks(
     own = np.empty((len(points), 3, 3))
     for start in range(0, len(points), _CORNERS):
         part = slice(start, min(start + _CORNERS, len(points)))
-        count = part.stop - start
-        loads = _loads(average[part]).reshape(-1, count, 3)
-        own[part] = solver.quadratic_forms(loads[solver.free])
+        own[part] = own_compliance(solver, average[part])
         tell(part.stop / len(points))
     return own
 

@@ -56,6 +56,7 @@ class FemRenderer(Renderer):
             parents=field.parents,
             parent_weights=self.contact.parent_weights,
             blocks=np.array(self.compliance.blocks),
+            factor=np.array(self.compliance.factor),
             table=np.array(self.dent_law.table),
             young_modulus_pa=np.array([model.young_modulus_pa]),
             poisson_ratio=np.array([model.poisson_ratio]),
@@ -95,7 +96,8 @@ class FemRenderer(Renderer):
             )
             for corner, weight in zip(p.parents[t], weights @ p.parent_weights[t], strict=True):
                 if corner >= 0:
-                    corners[:-1] -= weight / p.young_modulus_pa[0] * (p.blocks[:, corner] @ force)
+                    give = weight / p.young_modulus_pa[0]
+                    corners[:-1] -= give * self.compliance.displacement(corner, force)
         moved = np.einsum("vc,vcx->vx", self.contact.node_weights, corners[self._drawn])
         for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
             draw_dent(arrays.vertices, moved, point, normal, radius, depth)

@@ -6,6 +6,7 @@ from __future__ import annotations
 import numpy as np
 from numba import njit
 
+from mechanics.mutual import between_block, between_mixed, mix_factor
 from mechanics.touch import touch_solve
 from render.contact import place, turn_frame, walk
 
@@ -66,23 +67,16 @@ def couple(p, state, i, m):
             state.fresh[i] = 1
         n[i, a] = p.parents[t, a]
         state.node_weights[i, a] = total
+    if state.fresh[i] and state.mixed.shape[2]:
+        mix_factor(p.factor, n[i], state.node_weights[i], state.mixed[i])
     for j in range(i):
         if grip.triangle[j] < 0 or (state.fresh[i] == 0 and state.fresh[j] == 0):
             continue  # a pair that stuck where it was keeps its block
         block = state.blocks[i, j]
-        for r in range(3):
-            for c in range(3):
-                block[r, c] = 0.0
-        for a in range(3):
-            if n[i, a] < 0:
-                continue
-            for b in range(3):
-                if n[j, b] < 0:
-                    continue
-                w = state.node_weights[i, a] * state.node_weights[j, b]
-                for r in range(3):
-                    for c in range(3):
-                        block[r, c] += w * p.blocks[n[i, a], n[j, b], r, c]
+        if state.mixed.shape[2]:
+            between_mixed(state.mixed[i], state.mixed[j], block)
+        else:
+            between_block(p.blocks, n[i], state.node_weights[i], n[j], state.node_weights[j], block)
         for r in range(3):
             for c in range(3):
                 state.blocks[j, i, c, r] = block[r, c]

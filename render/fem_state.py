@@ -17,7 +17,8 @@ class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
     far: (v, 3, 3) 1/m. curvature: (v,) 1/m. parents: (k, 3) compliance nodes that interpolate over a
-    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m. table: dent law.
+    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor:
+    (n, 3, r) in their place, see SurfaceCompliance. table: dent law.
     young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each.
     """
 
@@ -27,6 +28,7 @@ class FemParameters(NamedTuple):
     parents: np.ndarray
     parent_weights: np.ndarray
     blocks: np.ndarray
+    factor: np.ndarray
     table: np.ndarray
     young_modulus_pa: np.ndarray
     poisson_ratio: np.ndarray
@@ -41,7 +43,8 @@ class FemState(NamedTuple):
     grip: where each tip is held. frames: (m, 3, 3) rows u, v, n. elastic: (m, 3) N, quasi-static forces on
     the tools. memory: (m, STATE_SIZE) of the sticks. prony: (m, k, 3) N and before: (m, 3) N of
     viscoelasticity. deepest: (m,) m of this touch. felt: (v,) greatest load of each fine vertex (Mullins).
-    blocks: (m, m, 3, 3) m/N between contacts. The others are scratch.
+    blocks: (m, m, 3, 3) m/N between contacts. mixed: (m, 3, r) the factor at each contact. The others are
+    scratch.
     """
 
     forces: np.ndarray
@@ -61,6 +64,7 @@ class FemState(NamedTuple):
     felt: np.ndarray
     memory: np.ndarray
     blocks: np.ndarray
+    mixed: np.ndarray
     solution: np.ndarray
     nodes: np.ndarray
     node_weights: np.ndarray
@@ -93,6 +97,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         felt=np.zeros(len(parameters.surface.vertices)),
         memory=np.zeros((m, STATE_SIZE)),
         blocks=np.zeros((m, m, 3, 3)),
+        mixed=np.zeros((m, 3, parameters.factor.shape[2])),
         solution=np.zeros((m, 8)),
         nodes=np.zeros((m, 3), dtype=np.int64),
         node_weights=np.zeros((m, 3)),

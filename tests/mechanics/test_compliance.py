@@ -5,12 +5,14 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance import condense
-from mechanics.errors import MeshError
+from mechanics.compliance import ComplianceOptions, condense
+from mechanics.errors import MeshError, OptionError
+from mechanics.mutual import between_block
+from mechanics.nearest import closest_on_triangles
 from mechanics.pardiso import available
 from mechanics.sites import touch_sites
 from mechanics.solver import Solver
-from mechanics.surface_compliance import between_block, closest_on_triangles, surface_compliance
+from mechanics.surface_compliance import patch_blocks, surface_compliance
 from mechanics.tetmesh import TetMesh
 
 WAYS = [("columns", "superlu")] + ([("schur", None), ("columns", "pardiso")] if available() else [])
@@ -91,8 +93,49 @@ def test_blocks_are_symmetric_positive_and_continuous(tables):
     between_block(surface.blocks, one, w, other, v, out)
     between_block(surface.blocks, other, v, one, w, back)
     assert out == pytest.approx(back.T, rel=1e-5)
-    moved = surface.displacement(7, v, np.array([0.0, 0.0, 1.0]))
+    moved = sum(v[c] * surface.displacement(other[c], np.array([0.0, 0.0, 1.0])) for c in range(3))
     assert w @ moved[one] == pytest.approx(out[:, 2], rel=1e-4)
+
+
+def test_a_large_surface_is_compressed_by_itself(box):
+    mesh = box((4, 4, 2), (0.05, 0.05, 0.02))
+    assert ComplianceOptions().error_of(mesh) is None
+    assert ComplianceOptions(largest_dense_bytes=1e3, low_rank_error=0.01).error_of(mesh) == 0.01
+    assert ComplianceOptions("dense", largest_dense_bytes=1e3).error_of(mesh) is None
+    assert ComplianceOptions("low-rank", low_rank_error=0.02).error_of(mesh) == 0.02
+    with pytest.raises(OptionError, match="dense, low-rank"):
+        ComplianceOptions("sparse")
+
+
+def test_a_held_corner_does_not_move(tables):
+    _, surface = tables
+    rim, out = np.array([-1, -1, -1]), np.ones((3, 3))
+    between_block(surface.blocks, rim, np.ones(3), surface.triangles[0], np.ones(3), out)
+    assert (out == 0).all()
+
+
+def test_low_rank_tables_serve_the_same_give(box):
+    """On elements of 4 mm: own give from some places, the rest spread; mutual give from a factor."""
+    mesh = box((8, 8, 5), (0.032, 0.032, 0.02))
+    made = surface_compliance(mesh, 0.45, low_rank_error=0.01)
+    assert made.blocks.size == 0
+    assert made.factor.shape[:2] == (len(made.points), 3)
+    rng = np.random.default_rng(0)
+    faces = made.own_points[made.own_triangles[rng.integers(0, len(made.own_triangles), 12)]]
+    points = np.einsum("c,kcx->kx", [0.3, 0.5, 0.2], faces)
+    normals = np.cross(faces[:, 1] - faces[:, 0], faces[:, 2] - faces[:, 0])
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    solver = Solver(mesh.quadratic(), 0.45)
+    width = float(made.own_width_m[0])
+    sites = touch_sites(
+        mesh, points, normals, 0.45, solver=solver, patch_width_m=width, curvature=np.zeros(12)
+    )
+    size = np.abs(made.own).max(axis=(0, 1, 2))
+    assert np.abs(made.far_at(points, normals) - sites.far).max() < 0.04 * size
+    dense = patch_blocks(solver, made.points[:40], float(made.patch_width_m[0]))
+    for i, j in ((0, 0), (3, 30), (39, 11)):
+        moved = [made.displacement(j, force)[i] for force in np.eye(3)]
+        assert np.abs(np.transpose(moved) - dense[i, j]).max() < 0.012 * np.abs(dense).max()
 
 
 def test_closest_point_on_triangles():

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compression import between_low_rank, compress
+from mechanics.compression import compress
+from mechanics.errors import MeshError
+from mechanics.mutual import between_block, between_mixed, mix_factor
 from mechanics.patch import PatchSampler
 from mechanics.solver import Solver
-from mechanics.surface_compliance import between_block
 
 
 @pytest.fixture(scope="module")
@@ -26,29 +27,34 @@ def dense(box):
     return solver, points, means.reshape(t, 3, t, 3).transpose(0, 2, 1, 3)
 
 
-def test_error_is_as_stated_and_shrinks_with_rank(dense):
+def test_error_is_as_asked_and_costs_rank(dense):
     solver, points, blocks = dense
     own = blocks[np.arange(len(points)), np.arange(len(points))]
-    errors = []
-    for rank in (60, 150, 300):
-        compressed = compress(solver, points, 0.008, rank, checked=len(points))
+    ranks = []
+    for tolerance in (0.1, 0.03, 0.005):
+        compressed = compress(solver, points, 0.008, tolerance=tolerance, checked=len(points))
         error = np.linalg.norm(compressed.own() - own, axis=(1, 2)) / np.linalg.norm(own, axis=(1, 2))
         assert compressed.error == pytest.approx(error.max(), rel=1e-3, abs=1e-6)
-        errors.append(error.max())
-    assert errors[0] > errors[1] > errors[2]
-    assert errors[2] < 0.01
+        assert error.max() <= tolerance
+        ranks.append(compressed.factor.shape[2])
+    assert ranks[0] < ranks[1] < ranks[2] <= compressed.loads
     assert compressed.factor.nbytes < 0.8 * 36 * len(points) ** 2
+    with pytest.raises(MeshError, match="take a wider patch"):
+        compress(solver, points, 0.008, tolerance=0.001, most=120)
 
 
 def test_queries_agree_and_are_symmetric(dense):
     solver, points, blocks = dense
-    compressed = compress(solver, points, 0.008, 400)
+    factor = (compressed := compress(solver, points, 0.008)).factor
     p, q = np.array([3, 50, 100]), np.array([20, 7, 3])
     w, v = np.array([0.2, 0.5, 0.3]), np.array([0.0, 0.9, 0.1])
     want, found, back = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     between_block(blocks.astype(np.float32), p, w, q, v, want)
-    between_low_rank(compressed.factor, p, w, q, v, found)
-    between_low_rank(compressed.factor, q, v, p, w, back)
+    here, there = np.empty(factor.shape[1:]), np.empty(factor.shape[1:])
+    mix_factor(factor, p, w, here)
+    mix_factor(factor, q, v, there)
+    between_mixed(here, there, found)
+    between_mixed(there, here, back)
     size = np.abs(blocks).max()
     assert np.abs(found - want).max() < 0.005 * size
     assert found == pytest.approx(back.T, abs=1e-5 * size)
@@ -57,5 +63,5 @@ def test_queries_agree_and_are_symmetric(dense):
 
 def test_the_same_seed_gives_the_same_factor(dense):
     solver, points, _ = dense
-    one, same = (compress(solver, points[:40], 0.008, 50, seed=3).factor for _ in range(2))
+    one, same = (compress(solver, points[:40], 0.008, seed=3).factor for _ in range(2))
     assert np.array_equal(one, same)

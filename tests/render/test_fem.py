@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from mechanics.sites import touch_sites
 from mechanics.solver import Solver
 from mechanics.touch import touch_force
+from render.fem import FemRenderer
 
 TIP = 0.005
 
@@ -163,6 +166,28 @@ def test_two_fingers_that_pinch_balance_and_stiffen_a_wall(thin_renderer):
     assert pinched[0, 1] > 2 * alone[1]  # one finger bends the wall, two squeeze it
     assert pinched[0, 1] == pytest.approx(-pinched[1, 1], rel=0.03)
     assert np.abs(pinched.sum(axis=0)).max() < 0.05 * pinched[0, 1]
+
+
+def test_a_low_rank_factor_serves_as_the_dense_table(thin_renderer):
+    compliance = thin_renderer.compliance
+    t = len(compliance.nodes)
+    dense = compliance.blocks.transpose(0, 2, 1, 3).reshape(3 * t, 3 * t).astype(float)
+    size, modes = np.linalg.eigh((dense + dense.T) / 2)
+    factor = (modes * np.sqrt(np.maximum(size, 0))).reshape(t, 3, -1).astype(np.float32)
+    less = dataclasses.replace(compliance, factor=factor, blocks=np.zeros((0, 0, 3, 3), dtype=np.float32))
+    compressed = FemRenderer(thin_renderer.model, thin_renderer.options, compliance=less)
+    side = down((0, 0.003, 0.03), 1.5e-3, normal=(0, 1, 0))
+    both = np.stack([side, side * [1, -1, 1], side + [0.012, 0, -0.01]], axis=1)
+    forces, moved = [], []
+    for renderer in (thin_renderer, compressed):
+        force, state = run(renderer, both, radii=(TIP,) * 3)
+        forces.append(force)
+        moved.append(
+            renderer.displacement_of(state.points, state.normals, force[-1], state.radii_m, state.depths)
+        )
+    assert forces[0][-1, 0, 1] > 0.05
+    assert np.abs(forces[0] - forces[1]).max() < 1e-4 * np.abs(forces[0]).max()
+    assert np.abs(moved[0] - moved[1]).max() < 1e-4 * np.abs(moved[0]).max()
 
 
 def test_sixteen_frictional_contacts_converge_whatever_their_order(cylinder_renderer):
