@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -73,6 +74,21 @@ class FemRenderer(Renderer):
             raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
         changed = self._with(young_modulus_pa=np.array([float(young_modulus_pa)]))
         changed.model = self.model.replaced(young_modulus_pa=float(young_modulus_pa))
+        return changed
+
+    def with_field(self, far: np.ndarray, blocks: np.ndarray | None = None) -> FemRenderer:
+        """The same renderer with another far field (v, 3, 3), mutual table (t, t, 3, 3), 1/m, unit modulus.
+
+        For an object that changes inside while it is touched. blocks: None keeps the table.
+        """
+        if far.shape != self.parameters.far.shape or (
+            blocks is not None and blocks.shape != self.parameters.blocks.shape
+        ):
+            raise OptionError("a changed field must have the shape of the renderer's own")
+        changed = self._with(far=np.array(far))
+        if blocks is not None:
+            changed.parameters = changed.parameters._replace(blocks=np.array(blocks, dtype=np.float32))
+            changed.compliance = replace(self.compliance, blocks=np.array(blocks, dtype=np.float32))
         return changed
 
     @property

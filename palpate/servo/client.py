@@ -7,7 +7,6 @@ import os
 import pickle
 import queue
 import subprocess
-import sys
 import threading
 import time
 from collections.abc import Mapping as MappingType
@@ -21,12 +20,13 @@ from devices.registry import DeviceChoice
 from mechanics.errors import DeviceError, PalpateError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
+from palpate.child import module_command, module_environment
 from palpate.servo import report as reports
 from palpate.servo.layout import ENABLE, STOP, SharedArrays, SharedBlock
 from palpate.servo.options import ServoOptions
 from palpate.servo.process import Job
 from palpate.servo.report import ServoReport, ServoSnapshot
-from palpate.servo.source import ModelFolder, ModelSource, RendererSource
+from palpate.servo.source import ModelFolder, ModelSource, RendererChange, RendererSource
 
 START_TIMEOUT_S = 600.0
 STOP_TIMEOUT_S = 5.0
@@ -108,7 +108,8 @@ class Servo:
         Raises the PalpateError that the servo process met.
         """
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "palpate.servo", self._block.path],
+            module_command("palpate.servo", self._block.path),
+            env=module_environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             # a Ctrl-C at the terminal is the parent's to handle
@@ -154,6 +155,10 @@ class Servo:
         """Go on with what `source` makes."""
         self._command("source", source, progress)
         self._source = source
+
+    def change(self, change: RendererChange) -> None:
+        """Change the renderer that runs; a touch goes on. One that is set later knows nothing of it."""
+        self._command("change", change)
 
     def set_modulus(self, young_modulus_pa: float) -> None:
         """Another global Young's modulus; costs nothing."""

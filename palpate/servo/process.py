@@ -189,6 +189,8 @@ class ServoProcess:
         now = self._loop.program
         if name == "modulus":
             self._swap(now._replace(renderer=self._coupled(now.renderer.with_modulus(value))))
+        elif name == "change":
+            self._swap(now._replace(renderer=self._coupled(value.changed(now.renderer))))
         elif name == "friction":
             self._swap(now._replace(renderer=now.renderer.with_friction(value)))
         elif name == "source":

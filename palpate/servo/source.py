@@ -42,6 +42,13 @@ class ModelSource:
         return replace(self, name=name)
 
 
+class RendererChange(Protocol):
+    """Makes another renderer of the running one, of the same arrays' shapes; touches go on through it."""
+
+    def changed(self, renderer: Any) -> Any:
+        """The other renderer."""
+
+
 @dataclass(frozen=True)
 class FreeAirSource:
     """No object."""
