@@ -7,9 +7,7 @@ only time.
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -17,16 +15,18 @@ from pathlib import Path
 
 import numpy as np
 
+from palpate.child import module_command, module_environment
+
 
 @contextmanager
 def warming_up() -> Iterator[subprocess.Popen]:
     """The compiling process, started at once; ended with the block where it is still running then."""
     process = subprocess.Popen(
-        [sys.executable, "-m", "palpate.warm_up"],
+        module_command("palpate.warm_up"),
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
-        env={**os.environ, "OMP_NUM_THREADS": "1", "MKL_NUM_THREADS": "1"},
+        env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
     )
     try:
         yield process
