@@ -21,7 +21,6 @@ from mechanics.errors import DeviceError, PalpateError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from palpate.child import module_command, module_environment
-from palpate.child import module_command, module_environment
 from palpate.servo import report as reports
 from palpate.servo.layout import ENABLE, STOP, SharedArrays, SharedBlock
 from palpate.servo.options import ServoOptions
