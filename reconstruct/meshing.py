@@ -12,13 +12,13 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import FACES, TetMesh
 from reconstruct.proximity import closest, distance, sample
+from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.voxels import voxel_surface
 from reconstruct.surface import Surface
 from reconstruct.tetwild import tetrahedralize
 
 _SAMPLES = 4000
-_COARSE = 0.75
-_ATTEMPTS = 2
+_PITCH = 0.8  # of sigma, a voxel: corners are cut by as much, and the mesh keeps to it within 0.4
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,9 @@ class MeshingOptions:
     )
     radius_edge_ratio: float = option(2.0, "bound rho on circumradius over shortest edge")
     mesh_source: str = option(
-        "surface",
-        "what is meshed: the surface, or its voxels (the paper's way)",
-        choices=("surface", "voxels"),
+        "auto",
+        "what is meshed: the surface, or its voxels; auto: voxels in the paper's mode, else the surface",
+        choices=("auto", "surface", "voxels"),
     )
 
 
@@ -78,25 +78,28 @@ def mesh_surface(
     if abs(lowest) > 0.1 * sigma:
         raise MeshError(f"the surface ends {1e3 * lowest:.2f} mm above the support; it must stand on it")
     vertices, triangles = _input(surface, options)
+    voxels = options.mesh_source == "voxels"
     # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
-    envelope = (
-        0.4 * sigma if options.mesh_source == "voxels" else min(0.1 * sigma, 0.04 * options.mesh_size_m)
+    envelope = 0.4 * sigma if voxels else min(0.15 * sigma, 0.03 * options.mesh_size_m)
+    points, cells = tetrahedralize(
+        vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope, simplify=voxels
     )
-    best: Meshing | None = None
-    for attempt in range(_ATTEMPTS):
-        points, cells = tetrahedralize(vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope)
-        points, cells, fixed = _stand(points, cells, origin, up, 1.01 * envelope + 1e-6)
-        on_surface = np.zeros(len(points), dtype=bool)
-        on_surface[_boundary(cells)] = True
-        mesh = TetMesh(points, cells, fixed, on_surface & ~fixed)
-        found = Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
-        if best is None or found.report.radius_edge_ratio.max() < best.report.radius_edge_ratio.max():
-            best = found
-        if best.report.radius_edge_ratio.max() <= options.radius_edge_ratio:
-            break
-        progress("meshing", (attempt + 1) / (_ATTEMPTS + 1))
+    progress("meshing", 0.8)
+    points, cells, fixed = _stand(points, cells, origin, up, 1.01 * envelope + 1e-6)
+    on_surface = np.zeros(len(points), dtype=bool)
+    on_surface[_boundary(cells)] = True
+    points = relaxed(
+        points,
+        cells,
+        options.radius_edge_ratio,
+        on_surface=on_surface,
+        fixed=fixed,
+        up=up,
+        limit_m=envelope,
+    )
+    mesh = TetMesh(points, cells, fixed, on_surface & ~fixed)
     progress("meshing", 1.0)
-    return best
+    return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
 
 
 def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:
@@ -105,11 +108,11 @@ def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.nd
     frame = surface.frame
     if options.mesh_source == "voxels":
         flat = (surface.vertices - surface.support_point) @ frame.T
-        vertices, triangles = voxel_surface(flat, surface.triangles, options.surface_distance_m)
+        vertices, triangles = voxel_surface(flat, surface.triangles, _PITCH * options.surface_distance_m)
         return vertices @ frame + surface.support_point, triangles
     if surface.redraw is None:
         return surface.vertices, surface.triangles
-    return surface.redraw(_COARSE * options.mesh_size_m)
+    return surface.redraw(options.mesh_size_m)
 
 
 def _boundary(cells: np.ndarray) -> np.ndarray:
@@ -148,17 +151,13 @@ def _stand(
 def quality(mesh: TetMesh, surface: Surface) -> MeshReport:
     """Radius-edge ratios, edge lengths, and distances between the mesh's boundary and the surface."""
     corner = mesh.points[mesh.tetrahedra[:, :4]]
-    a, b, c = (corner[:, k] - corner[:, 0] for k in (1, 2, 3))
-    cross = [np.cross(b, c), np.cross(c, a), np.cross(a, b)]
-    six = np.einsum("ij,ij->i", a, cross[0])
-    centre = sum((v * v).sum(axis=1)[:, None] * w for v, w in zip((a, b, c), cross, strict=True))
-    radius = np.linalg.norm(centre, axis=1) / (2 * six)
+    ratio = radius_edge_ratio(corner)
     edges = np.linalg.norm(corner[:, [0, 1, 2, 0, 1, 2]] - corner[:, [1, 2, 0, 3, 3, 3]], axis=2)
     shell, given = (mesh.points, mesh.surface[:, :3]), (surface.vertices, surface.triangles)
     out = distance(*given, sample(*shell, _SAMPLES))
     back = distance(*shell, sample(*given, _SAMPLES))
     return MeshReport(
-        radius_edge_ratio=radius / edges.min(axis=1),
+        radius_edge_ratio=ratio,
         surface_distance_m=np.concatenate([out, back]),
         edge_m=edges.ravel(),
         volume_m3=float(mesh.volumes.sum()),

@@ -106,7 +106,7 @@ def reconstruct_fully(
         evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
     )
     clock.lap("surface")
-    meshing = mesh_surface(surface, options.meshing, _part(progress, 0.3, 0.5))
+    meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
     clock.lap("mesh")
     where = cast(surface.vertices, surface.triangles, exploration.points, exploration.normals)
     mesh = meshing.mesh if paper else meshing.mesh.quadratic()
@@ -167,6 +167,12 @@ def _surface_options(options: ReconstructOptions) -> SurfaceOptions:
     if options.method == "paper" and options.surface.surface == "auto":
         return dataclasses.replace(options.surface, surface="hull")
     return options.surface
+
+
+def _meshing_options(options: ReconstructOptions) -> MeshingOptions:
+    if options.method == "paper" and options.meshing.mesh_source == "auto":
+        return dataclasses.replace(options.meshing, mesh_source="voxels")
+    return options.meshing
 
 
 def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:

@@ -30,6 +30,7 @@ def tetrahedralize(
     *,
     edge_m: float,
     envelope_m: float,
+    simplify: bool = True,
     energy: float = 10.0,
     passes: int = 80,
     threads: int = 0,
@@ -38,8 +39,9 @@ def tetrahedralize(
     """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
 
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
-    energy: the optimisation stops at this AMIPS energy (3 is ideal). Raises MeshError where nothing comes
-    back.
+    simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
+    and comes out better in half the time. energy: the optimisation stops at this AMIPS energy (3 is ideal).
+    Raises MeshError where nothing comes back.
     """
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
@@ -49,6 +51,7 @@ def tetrahedralize(
             triangles=np.asarray(triangles, dtype=np.int32),
             edge_length_abs=edge_m,
             epsilon=envelope_m / diagonal,
+            simplify=simplify,
             stop_energy=energy,
             num_opt_iter=passes,
             num_threads=threads,

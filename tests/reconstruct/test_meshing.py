@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from benchmarks._surface_truth import phantom_truth, touch
 from mechanics.errors import MeshError, SurfaceError
 from reconstruct.meshing import MeshingOptions, mesh_surface
+from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.balance import balanced
-from reconstruct.shapes.voxels import voxel_surface
+from reconstruct.shapes.voxels import labels, voxel_surface
 from reconstruct.surface import Surface, SurfaceOptions, reconstruct_surface
 
 
@@ -125,3 +127,53 @@ def test_a_surface_off_the_support_is_refused(surface):
     )
     with pytest.raises(MeshError, match="support"):
         mesh_surface(lifted, MeshingOptions(mesh_size_m=0.015))
+
+
+@pytest.fixture(scope="module")
+def paper_meshing():
+    """The paper's way: hull, voxels, tetrahedra."""
+    evidence = touch(phantom_truth("half-sphere"), 1)[0]
+    surface = reconstruct_surface(evidence, SurfaceOptions(surface="hull"))
+    return mesh_surface(surface, MeshingOptions(mesh_source="voxels"))
+
+
+def test_the_papers_mesh_keeps_both_of_its_bounds(paper_meshing):
+    report = paper_meshing.report
+    assert report.radius_edge_ratio.max() <= 2.0
+    assert report.surface_distance_m.max() <= 0.002
+
+
+def test_bad_tetrahedra_are_relaxed_and_nothing_else_moves():
+    # a flat tetrahedron over an edge of a regular stack: only its own nodes may move
+    grid = np.stack(np.meshgrid(*[np.arange(4.0)] * 3, indexing="ij"), axis=-1).reshape(-1, 3)
+    cells = Delaunay(grid + 0.15 * np.random.default_rng(4).random(grid.shape)).simplices
+    corner = grid[cells]
+    volume = np.linalg.det(corner[:, 1:] - corner[:, :1])
+    cells[volume < 0] = cells[volume < 0][:, [0, 2, 1, 3]]
+    cells = cells[np.abs(volume) > 1e-6]
+    inside = ((grid > 0) & (grid < 3)).all(axis=1)
+    node = np.flatnonzero(inside)[0]
+    bent = grid.copy()
+    bent[node] += [0.0, 0.0, 0.93]
+    star = cells[(cells == node).any(axis=1)]
+    before = radius_edge_ratio(bent[star])
+    after = relaxed(
+        bent, cells, 2.0, on_surface=~inside, fixed=grid[:, 2] == 0, up=np.array([0, 0, 1.0]), limit_m=0.05
+    )
+    assert before.max() > 4
+    assert radius_edge_ratio(after[cells]).max() <= 2
+    assert np.abs(after - bent)[~inside].max() <= 0.05 + 1e-12
+    assert (after[grid[:, 2] == 0, 2] == 0).all()
+
+
+def test_no_label_is_lost_where_a_line_meets_an_edge():
+    from reconstruct.shapes.cap import Cap
+
+    inside, low = labels(*Cap.sphere(np.array([0.0, 0, 0.01]), 0.03).mesh(0.006), 0.002)
+    layers, rows, columns = np.nonzero(inside)
+    points = low + 0.002 * np.column_stack([columns, rows, layers])
+    assert np.linalg.norm(points - [0, 0, 0.01], axis=1).max() < 0.0305
+    assert points[:, 2].min() > 0
+    assert inside.sum() * 0.002**3 == pytest.approx(
+        volume(*Cap.sphere(np.array([0.0, 0, 0.01]), 0.03).mesh(0.006)), rel=0.02
+    )
