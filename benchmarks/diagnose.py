@@ -14,13 +14,12 @@ from __future__ import annotations
 import argparse
 import json
 import time
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import table
+from benchmarks._diagnosis_scores import FAMILIES, pictures, show, summarise
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file
 
@@ -37,9 +36,6 @@ INSTRUMENT = (
 CHEAP = (*INSTRUMENT, "viscoelasticity", "adhesion", "surface_offset", "mullins_softening")
 SOLID = ("finite_strain", "inclusion", "modulus_gradient", "skin_layer", "poisson_ratio", "unbonded_base",
          "compliant_base", "tip_radius", "friction_slip", "strain_stiffening")  # fmt: skip
-FAMILIES = {"poroelasticity": ("viscoelasticity",), "plasticity": ("mullins_softening",)}
-"""Confusables declared for effects that the library has never had: naming these is half right, unknown is
-right."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -55,6 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--limit", type=int, help="stop after this many new cases (the table shows what is there)"
     )
+    parser.add_argument("--picture", metavar="PNG", help="confusion matrix and calibration as a picture")
     parser.add_argument("--seed", type=int, default=0, help="first seed")
 
 
@@ -159,6 +156,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     summary = summarise(opened_cases)
     summary["size"] = {"asked": len(todo), "done": len(opened_cases), "fast": fast}
     show(summary)
+    if arguments.picture:
+        print(f"picture: {pictures(summary, arguments.picture)}")
     return summary
 
 
@@ -214,106 +213,4 @@ def opened_case(case: dict[str, Any], work: Path) -> dict[str, Any]:
 
     verdict = json.loads((work / f"{key_of(case)}.verdict.json").read_text(encoding="utf-8"))
     truth = opened(work / f"{key_of(case)}.sealed", work / "truth" / f"{key_of(case)}.json")
-    return {"case": case, "verdict": verdict, "truth": truth}
-
-
-def wilson(hits: int, of: int) -> tuple[float, float, float]:
-    """(rate, low, high): Wilson's 95 % interval; all nan for none."""
-    if of == 0:
-        return (float("nan"),) * 3
-    z, p = 1.959964, hits / of
-    centre = (p + z * z / (2 * of)) / (1 + z * z / of)
-    half = z * np.sqrt(p * (1 - p) / of + z * z / (4 * of * of)) / (1 + z * z / of)
-    return p, max(0.0, centre - half), min(1.0, centre + half)
-
-
-def summarise(done: list[dict[str, Any]]) -> dict[str, Any]:
-    """Rates with intervals, the confusion matrix, and the misses."""
-    rates: dict[str, tuple[int, int]] = {}
-
-    def count(name: str, hit: bool) -> None:
-        hits, of = rates.get(name, (0, 0))
-        rates[name] = (hits + int(hit), of + 1)
-
-    confusion: Counter[tuple[str, str]] = Counter()
-    misses, closed, regressed, sizes = [], [], [], []
-    for item in done:
-        case, verdict, truth = item["case"], item["verdict"], item["truth"]
-        true, named = list(case["effects"]), verdict["effects"]
-        candidates = [*named, *verdict["candidates"]]
-        detected = verdict["kind"] not in ("none", "failed")
-        first = named[0] if named else verdict["kind"]
-        if case["kind"] == "control":
-            count("false alarms (controls)", detected)
-            confusion[("none", first)] += 1
-            hit = not detected
-        elif case["kind"] == "single":
-            name = true[0]
-            strength = case["effects"][name]
-            size = truth.get("sizes", {}).get(name, {}).get("rms_after_best_scale_n", float("nan"))
-            count(f"detected at strength {strength:g}", detected)
-            count("first place", first == name)
-            count("first place or declared equal", first == name or name in candidates)
-            count("truth in the candidate set", name in candidates)
-            count("BIC baseline: first place", verdict.get("bic") == name)
-            confusion[(name, first)] += 1
-            sizes.append(len(candidates))
-            hit = first == name
-            if hit and verdict["gap_closed"] is not None:
-                closed.append(verdict["gap_closed"])
-                noise2 = verdict["noise_n"] ** 2
-                excess = verdict["gap_before_n"] ** 2 - noise2
-                if excess > 0:
-                    regressed.append(1 - (verdict["regression_gap_n"] ** 2 - noise2) / excess)
-            item["size_n"] = size
-        elif case["kind"] in ("left-out", "absent"):
-            allowed = FAMILIES.get(true[0], ())
-            hit = "unknown" in verdict["kind"] or verdict["kind"] == "ambiguous" or first in allowed
-            count("unknown recognised" if case["kind"] == "left-out" else "absent effect recognised", hit)
-            confusion[(f"({true[0]})", first)] += 1
-        else:
-            count("pair: both named", set(true) <= set(named))
-            count("pair: one of them first", first in true)
-            hit = set(true) <= set(named)
-        if not hit:
-            misses.append({"case": key_of(case), "verdict": verdict["kind"], "effects": named,
-                           "candidates": verdict["candidates"], "size_n": item.get("size_n")})  # fmt: skip
-    return {
-        "rates": {
-            k: {"hits": h, "of": n, "rate_and_interval": wilson(h, n)} for k, (h, n) in sorted(rates.items())
-        },
-        "confusion": {f"{a} -> {b}": n for (a, b), n in sorted(confusion.items())},
-        "median_gap_closed": float(np.median(closed)) if closed else None,
-        "median_gap_closed_by_regression": float(np.median(regressed)) if regressed else None,
-        "mean_candidates": float(np.mean(sizes)) if sizes else None,
-        "misses": misses,
-    }
-
-
-TARGETS = {
-    "false alarms (controls)": "at most 2 %",
-    "first place": "at least 80 % at 4 times the limit",
-    "first place or declared equal": "at least 90 %",
-    "truth in the candidate set": "at least 95 %",
-    "unknown recognised": "at least 80 %",
-    "pair: both named": "at least 70 %",
-    "pair: one of them first": "at least 90 %",
-}
-
-
-def show(summary: dict[str, Any]) -> None:
-    """Print the tables."""
-    rows = []
-    for name, value in summary["rates"].items():
-        p, low, high = value["rate_and_interval"]
-        rate = f"{p:.0%} ({low:.0%} to {high:.0%})"
-        rows.append([name, f"{value['hits']}/{value['of']}", rate, TARGETS.get(name, "")])
-    print(table(["what", "counts", "rate (95 %)", "target"], rows))
-    print(f"median gap closed with the right effect: {summary['median_gap_closed']} (target 0.85); "
-          f"by regression: {summary['median_gap_closed_by_regression']}")  # fmt: skip
-    print(f"mean size of the candidate set: {summary['mean_candidates']} (target at most 2)")
-    print(table(["truth -> first", "cases"], [[k, v] for k, v in summary["confusion"].items()]))
-    if summary["misses"]:
-        print(table(["missed", "verdict", "named", "candidates"],
-                    [[m["case"], m["verdict"], ", ".join(m["effects"]), ", ".join(m["candidates"])]
-                     for m in summary["misses"]]))  # fmt: skip
+    return {"key": key_of(case), "case": case, "verdict": verdict, "truth": truth}

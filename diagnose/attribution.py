@@ -3,13 +3,15 @@ needed."""
 
 from __future__ import annotations
 
+import copy
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from diagnose.effects.base import Effect
-from diagnose.fit import Fit, first_touches, fit, held_out, settings_of
+from diagnose.fit import Descent, Fit, first_touches, fit, held_out, levelled, settings_of
 from diagnose.forward import Forward
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.options import option
@@ -30,6 +32,9 @@ SPATIAL = (
 )
 """Effects that differ from site to site rather than within a press."""
 
+REEXAMINED = 4
+"""The strongest effects of a step that are weighed once more before they are turned down."""
+
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
 
@@ -42,13 +47,20 @@ class AttributionOptions:
     spatial_gain: float = option(120.0, "the same for effects that live in a few places, penalised in sample")
     plain_gain: float = option(35.0, "a lower gain that is enough where the gap closes plainly ...")
     plain_share: float = option(0.35, "... by at least this share on held-out sites")
+    strong_gain: float = option(
+        300.0, "gain, times the lack of fit, that names the first effect whatever plain gap shapes leave"
+    )
     z: float = option(2.5, "least gain over its own standard error across sites")
     size_n: float = option(0.009, "least size of an effect: rms change of force after the refit", unit="N")
     toward: float = option(
-        0.3, "least share of an effect's own size by which it lowers the plain gap in sample"
+        0.2, "least share of an effect's own size by which it lowers the plain gap in sample"
     )
     first_share: float = option(0.10, "least share of the held-out gap that the first effect closes")
     further_share: float = option(0.25, "the same for each further effect, of what is left")
+    least_of_first: float = option(
+        0.25,
+        "least size of a further effect, of the first's: no law is exact, what it leaves is no effect",
+    )
     rival_share: float = option(
         0.12, "a rival within this share of the winner's gain counts as not told apart"
     )
@@ -65,6 +77,11 @@ class Candidate:
     held: np.ndarray
     plain: np.ndarray
     dof: float
+
+    @property
+    def residual(self) -> np.ndarray:
+        """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
+        return levelled(self.found)
 
     @property
     def chi(self) -> float:
@@ -95,13 +112,12 @@ class Score:
 
 @dataclass(frozen=True)
 class Attribution:
-    """The search's outcome. base: what effects were added to (finite strain in it where the data prefer it).
+    """The search's outcome.
 
-    ideal: linear elasticity alone; deep: neo-Hookean alone. finite_strain_gain: log likelihood, in the final
-    set.
-    chosen: names, strongest first. scores: of every single effect on the
-    base.
-    final: the chosen set. rivals: names not told apart from a chosen one. path: what each step looked like.
+    base: what effects were added to (finite strain in it where the data prefer it). ideal: linear elasticity
+    alone; deep: neo-Hookean alone. scores: of every single effect on the base. chosen: names, strongest
+    first. rivals: names not told apart from a chosen one. final: the chosen set. steps, picked: what each
+    step looked like and what it took. finite_strain_gain: log likelihood, in the final set.
     """
 
     base: Candidate
@@ -112,6 +128,7 @@ class Attribution:
     rivals: tuple[str, ...]
     final: Candidate
     steps: tuple[dict[str, Score], ...]
+    picked: tuple[str, ...]
     finite_strain_gain: float
 
 
@@ -143,6 +160,12 @@ class Search:
         self._near = found
         self._cache: dict[tuple[str, ...], Candidate] = {}
 
+    def reweighed(self, found: Fit) -> Search:
+        """The same search, weighing with the nuisances as they are at a fit."""
+        other = copy.copy(self)
+        other.renew(found)
+        return other
+
     def judge(self, effects: Sequence[Effect], like: Candidate | None = None) -> Candidate:
         """Fit a set and judge it on held-out groups; starts from `like`, or from what was last settled on."""
         key = tuple(sorted(e.name for e in effects))
@@ -160,13 +183,13 @@ class Search:
         return candidate
 
     def _best(self, order: list[Effect], starts: list[np.ndarray], onset: np.ndarray) -> Fit:
-        from diagnose.fit import _Descent
-
-        descent = _Descent(self.forward, self.whitener, tuple(order), None)
-        if len(starts) > 3:
-            scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
-            starts = [starts[i] for i in np.argsort(scored)[:3]]
-        return min((descent.run(s, onset, 12) for s in starts), key=lambda f: f.loss)
+        descent = Descent(self.forward, self.whitener, tuple(order), None)
+        # first touches that an earlier fit moved to make up for what it lacked may hold a better one back
+        begin = [(s, o) for s in starts for o in (onset, np.zeros_like(onset))]
+        if len(begin) > 3:
+            scored = [descent.loss(s, descent.residual(s, o), o) for s, o in begin]
+            begin = [begin[i] for i in np.argsort(scored)[:3]]
+        return min((descent.run(s, o, 12) for s, o in begin), key=lambda f: f.loss)
 
     def score(self, name: str, new: Candidate, old: Candidate) -> Score:
         """Compare two candidates."""
@@ -180,10 +203,10 @@ class Search:
             gain = old.found.loss - new.found.loss - 4.0 * extra
         z = per_group.sum() / (per_group.std() * np.sqrt(len(per_group)) + 1e-9)
         counted = self.forward.touches.counted
-        change = (new.found.residual - old.found.residual)[counted]
-        size = float(np.sqrt((change**2).sum(axis=1).mean()))
+        before, after = old.residual[counted], new.residual[counted]
+        size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
         closes = float((old.plain.sum() - new.plain.sum()) / counted.sum())
-        squares = [(c.found.residual[counted] ** 2).sum(axis=1).mean() for c in (old, new)]
+        squares = [(r**2).sum(axis=1).mean() for r in (before, after)]
         toward = float((squares[0] - squares[1]) / max(size**2, 1e-12))
         noise = 3 * self.forward.touches.noise_n**2
         excess = max(float(old.plain.sum() / counted.sum()) - noise, 0.02 * noise)
@@ -193,11 +216,13 @@ class Search:
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect; one beside another must close a fair share of what is left."""
         o = self.options
-        if score.size_n < o.size_n or score.toward < o.toward:
+        if score.size_n < o.size_n:
             return False
         if score.name == "inclusion":
-            return score.gain > o.spatial_gain and score.share > -0.3
-        if score.share < (o.first_share if first else o.further_share):
+            return score.gain > o.spatial_gain and score.share > -0.3 and score.toward > o.toward
+        if first and score.gain > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
+            return True
+        if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
             return False
         if score.gain > o.plain_gain and score.share > o.plain_share and score.z > 2.0:
             return True
@@ -222,20 +247,47 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(library)) / search.options.most)
             candidate = search.judge([*current.found.effects, effect], like=current)
             scores[effect.name] = search.score(effect.name, candidate, current)
+        first = not chosen
+        for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
+            if score.gain > search.options.plain_gain and not search.passes(score, first=first):
+                scores[score.name] = _reexamined(search, score, current)
         steps.append(scores)
-        passing = [s for s in scores.values() if search.passes(s, first=not chosen)]
+        least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
+        passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
         if not passing:
             break
         best = max(passing, key=lambda s: s.gain)
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
+    picked = list(zip(steps, chosen, strict=False))
     current, chosen = _without_idle(search, chosen, current)
-    rivals = _rivals(search, steps, chosen)
+    rivals = _rivals(search, picked, chosen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
-        base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps), float(strain_gain)
+        base,
+        ideal,
+        deep,
+        steps[0],
+        tuple(order),
+        rivals,
+        current,
+        tuple(steps),
+        tuple(name for _, name in picked),
+        float(strain_gain),
     )
+
+
+def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
+    """The score with size and plain gap as they are where nuisances are weighed at the new fit.
+
+    Where an effect changes the force much, first touches and stiffnesses of the old fit had made up for it.
+    """
+    there = search.reweighed(score.candidate.found)
+    old = there.judge(current.found.effects, like=current)
+    new = there.judge(score.candidate.found.effects, like=score.candidate)
+    again = there.score(score.name, new, old)
+    return dataclasses.replace(again, gain=score.gain, z=score.z, per_group=score.per_group)
 
 
 def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float]:
@@ -260,29 +312,27 @@ def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tupl
     return current, chosen
 
 
-def _rivals(search: Search, steps: list[dict[str, Score]], chosen: list[str]) -> tuple[str, ...]:
-    """Effects whose single gain comes so close to the first choice's that the sites do not tell them
-    apart."""
-    if not chosen or not steps:
-        return ()
-    first = steps[0][chosen[0]] if chosen[0] in steps[0] else None
-    if first is None:
-        return ()
-    found = []
-    for score in steps[0].values():
-        if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
+def _rivals(search: Search, picked: list[tuple[dict[str, Score], str]], chosen: list[str]) -> tuple[str, ...]:
+    """Effects whose gain comes so close to that of the one picked in the same step that the sites do not tell
+    them apart."""
+    found: dict[str, float] = {}
+    for scores, name in picked:
+        if name not in chosen:
             continue
-        if score.toward < search.options.toward or (score.share < 0 and score.name != "inclusion"):
-            continue
-        behind = first.gain - score.gain
-        difference = first.per_group - score.per_group
-        spread = difference.std() * np.sqrt(len(difference))
-        if (
-            behind < max(search.options.rival_share * first.gain, 1.0 * spread, 25.0)
-            and behind < 0.5 * first.gain
-        ):
-            found.append((behind, score.name))
-    return tuple(name for _, name in sorted(found))
+        first = scores[name]
+        for score in scores.values():
+            if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
+                continue
+            if score.share < 0 and score.name != "inclusion":
+                continue
+            behind = first.gain - score.gain
+            difference = first.per_group - score.per_group
+            spread = difference.std() * np.sqrt(len(difference))
+            near = behind < max(search.options.rival_share * first.gain, 2.0 * spread, 25.0)
+            as_good = score.share > first.share - 0.05 and score.gain > 0.3 * first.gain
+            if (near and behind < 0.6 * first.gain) or as_good:
+                found.setdefault(score.name, behind)
+    return tuple(sorted(found, key=lambda n: found[n]))
 
 
 def _strongest_first(search: Search, final: Candidate, chosen: list[str]) -> list[str]:

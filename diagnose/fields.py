@@ -4,7 +4,7 @@ fields.
 The give of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that are
 stiffer
 by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on one array.
-A changed base or Poisson's ratio is a new factorisation, done once at a few values and interpolated.
+Another Poisson's ratio is a new factorisation, done once at a few values and interpolated.
 """
 
 from __future__ import annotations
@@ -30,6 +30,7 @@ class EnergyFields:
     centroid: (m, 3) m, device frame. volume: (m,) m^3. height: (m,) m above the support; top: its greatest
     value.
     depth: (m,) m, distance of the centroid to the touchable surface. half_space: (q, 3, 3) taken off the sum.
+    solver: of the model's own mesh, bonded. solution: (n, 3, 3 q) its nodal displacements for the unit loads.
     """
 
     energy: np.ndarray
@@ -39,7 +40,8 @@ class EnergyFields:
     height: np.ndarray
     depth: np.ndarray
     half_space: np.ndarray
-    solution_base: np.ndarray
+    solver: Solver
+    solution: np.ndarray
 
 
 def energy_fields(forward: Forward) -> EnergyFields:
@@ -79,7 +81,7 @@ def energy_fields(forward: Forward) -> EnergyFields:
     half = np.array(
         [half_space_compliance(np.array([1.0, 0, 0]), model.poisson_ratio, sampler.width_m) for _ in first]
     )
-    fields = EnergyFields(energy, inverse.ravel(), centroid, mesh.volumes, height, depth, half, u[mesh.fixed])
+    fields = EnergyFields(energy, inverse.ravel(), centroid, mesh.volumes, height, depth, half, solver, u)
     forward.stages["fields"] = fields
     return fields
 
@@ -92,9 +94,7 @@ def far_with_weights(forward: Forward, softness: np.ndarray) -> np.ndarray:
     return forward.far + change[fields.place]
 
 
-def far_at_poisson(
-    forward: Forward, nu: float, ratios: tuple[float, ...] = (0.30, 0.36, 0.42, 0.46, 0.49)
-) -> np.ndarray:
+def far_at_poisson(forward: Forward, nu: float, ratios: tuple[float, ...] = (0.30, 0.40, 0.46)) -> np.ndarray:
     """(p, 3, 3) far field at another Poisson's ratio, interpolated between factorisations."""
     table = forward.stages.get("poisson")
     if table is None:
@@ -104,54 +104,6 @@ def far_at_poisson(
         table = (np.array(known), fars - fars[known.index(forward.nu)])
         forward.stages["poisson"] = table
     return forward.far + _interpolate(*table, nu)
-
-
-def far_on_springs(forward: Forward, share: float) -> np.ndarray:
-    """(p, 3, 3) far field on a base of springs that adds `share` of a base as soft as the object.
-
-    The base reactions of each unit load on springs in parallel, k a unit of area: R^T R / (k a); unit-modulus
-    springs of stiffness 1 / (share * height) a unit of area.
-    """
-    table = forward.stages.get("springs")
-    if table is None:
-        table = _spring_give(forward)
-        forward.stages["springs"] = table
-    return forward.far + share * table
-
-
-def _spring_give(forward: Forward) -> np.ndarray:
-    """(p, 3, 3) give of a uniform spring base under each place's reactions for springs of 1 / height a unit
-    area."""
-    model = forward.model
-    mesh = model.mesh.quadratic()
-    t = forward.touches
-    unique, first, inverse = _places(t)
-    from mechanics.elasticity import stiffness
-
-    matrix = stiffness(mesh, model.poisson_ratio)
-    fields_u = _solutions(forward, mesh, model.poisson_ratio, first)
-    fixed = np.flatnonzero(mesh.fixed)
-    rows = (3 * fixed[:, None] + np.arange(3)).ravel()
-    reaction = (matrix[rows] @ fields_u.reshape(3 * len(mesh.points), -1)).reshape(len(fixed), 3, -1)
-    area = _base_area(mesh)[fixed]
-    height = float(((mesh.points - model.support_point) @ model.support_normal).max())
-    # consistent: nodal reactions become pressures that are smoothed over the base before they act on springs
-    give = np.empty((len(first), 3, 3))
-    ok = area > 0
-    for k in range(len(first)):
-        r = reaction[:, :, 3 * k : 3 * k + 3]
-        give[k] = np.einsum("nai,naj,n->ij", r[ok], r[ok], 1 / area[ok]) * height
-    return give[inverse.ravel()]
-
-
-def _base_area(mesh: TetMesh) -> np.ndarray:
-    area = np.zeros(len(mesh.points))
-    base = mesh.surface[mesh.fixed[mesh.surface[:, :3]].all(axis=1)]
-    p = mesh.points[base[:, :3]]
-    size = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
-    for k in range(base.shape[1]):
-        np.add.at(area, base[:, k], size / base.shape[1])
-    return area
 
 
 def _solutions(forward: Forward, mesh: TetMesh, nu: float, first: np.ndarray) -> np.ndarray:
@@ -180,44 +132,6 @@ def _far(forward: Forward, mesh: TetMesh, nu: float) -> np.ndarray:
         block = t.frame[press] @ mean
         far[k] = (block + block.T) / 2 - half
     return far[inverse.ravel()]
-
-
-def far_partly_bonded(forward: Forward, fraction: float, angle: float) -> np.ndarray:
-    """(p, 3, 3) far field (differences on the model's own mesh) with only a share of the base bonded, the
-    free part towards `angle` in the support plane.
-
-    Computed at 8 angles for half the base, interpolated by angle and linearly to none.
-    """
-    table = forward.stages.get("unbonded")
-    angles = np.linspace(0, 2 * np.pi, 9)
-    if table is None:
-        mesh = forward.model.mesh.quadratic()
-        across, along = support_axes(forward.model)
-        base = np.flatnonzero(mesh.fixed)
-        centre = mesh.points[base].mean(axis=0)
-        fars = []
-        bonded = _far(forward, mesh, forward.nu)
-        for direction in angles[:-1]:
-            axis = np.cos(direction) * across + np.sin(direction) * along
-            free = (mesh.points[base] - centre) @ axis > 1e-9
-            fixed = mesh.fixed.copy()
-            fixed[base[free]] = False
-            touchable = mesh.touchable & ~fixed
-            loose = TetMesh(mesh.points, mesh.tetrahedra, fixed, touchable)
-            fars.append(_far(forward, loose, forward.nu) - bonded)
-        fars.append(fars[0])
-        table = np.array(fars)
-        forward.stages["unbonded"] = table
-    half = _interpolate(angles, table, angle % (2 * np.pi))
-    return forward.far + half * (1 - fraction) / 0.5
-
-
-def support_axes(model) -> tuple[np.ndarray, np.ndarray]:  # type: ignore[no-untyped-def]
-    """Two unit vectors in the support plane."""
-    normal = model.support_normal / np.linalg.norm(model.support_normal)
-    across = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
-    across /= np.linalg.norm(across)
-    return across, np.cross(normal, across)
 
 
 def _interpolate(x: np.ndarray, table: np.ndarray, value: float) -> np.ndarray:

@@ -13,6 +13,7 @@ from diagnose.forward import Forward, Settings
 from diagnose.whiten import Whitener
 
 MODULUS_STEP = 0.01
+_FAR = 20  # parameter steps
 
 
 @dataclass(frozen=True)
@@ -92,7 +93,7 @@ def fit(
         starts = [np.array([np.log(modulus)])]
         for effect in effects:
             starts = [np.concatenate([s, own]) for s in starts for own in effect.starts(forward)]
-    descent = _Descent(forward, whitener, effects, weights)
+    descent = Descent(forward, whitener, effects, weights)
     onset = np.zeros(forward.touches.presses) if onset is None else onset
     if len(starts) > 3:
         scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
@@ -118,7 +119,7 @@ def _bounds(effects: tuple[Effect, ...]) -> tuple[np.ndarray, np.ndarray, np.nda
     return tuple(map(np.array, (low, high, step, prior, centre)))  # type: ignore[return-value]
 
 
-class _Descent:
+class Descent:
     """One bounded Gauss-Newton descent. First touches are refined beside it, press by press.
 
     A late or early first touch is a nuisance that bends the force, so it is moved in the model itself; the
@@ -263,16 +264,16 @@ class _Descent:
         return np.clip(values + np.clip(move, -30 * self.step, 30 * self.step), self.low, self.high)
 
 
-def held_out(
-    found: Fit, limits: tuple[np.ndarray, np.ndarray] | None = None
-) -> tuple[np.ndarray, np.ndarray]:
+def held_out(found: Fit) -> tuple[np.ndarray, np.ndarray]:
     """Leave one group out: (whitened loss, plain sum of squares N^2), (g,) each, of the group not fitted.
 
-    Linearised at the optimum of all: each group's share of the normal equations is taken out again.
+    Linearised at the optimum of all: each group's share of the normal equations is taken out again. For the
+    plain gap the modulus is refitted to the other groups' plain residual, so that a gap is never one that a
+    modulus would close.
     """
     gram, raw = found.gram, found.raw
-    low, high, *_ = _bounds(found.effects)
-    total = gram.sum(axis=0)
+    low, high, step, *_ = _bounds(found.effects)
+    total, raw_total = gram.sum(axis=0), raw.sum(axis=0)
     whitened = np.empty(len(gram))
     plain = np.empty(len(gram))
     at_bound = (found.values <= low + 1e-9) | (found.values >= high - 1e-9)
@@ -284,11 +285,21 @@ def held_out(
         hessian = hessian + 1e-9 * np.diag(np.diag(hessian))
         move = np.zeros(len(found.values))
         move[free] = np.linalg.solve(hessian, (rest[1:, 0] - found.pull)[free])
+        # where sites leave a parameter loose, a linear answer is good near the optimum only
+        move = np.clip(move, -_FAR * step, _FAR * step)
         move = np.clip(found.values + move, low, high) - found.values
         coefficients = np.concatenate([[1.0], -move])
         whitened[g] = 0.5 * coefficients @ gram[g] @ coefficients
+        others = raw_total - raw[g]
+        coefficients[1] -= others[1] @ coefficients / max(others[1, 1], 1e-12)
         plain[g] = coefficients @ raw[g] @ coefficients
     return whitened, plain
+
+
+def levelled(found: Fit) -> np.ndarray:
+    """(n, 3) N, the residual after the modulus is refitted to it plainly (linearised)."""
+    raw = found.raw.sum(axis=0)
+    return found.residual - raw[0, 1] / max(raw[1, 1], 1e-12) * found.jacobian[:, :, 0]
 
 
 def first_touches(

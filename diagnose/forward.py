@@ -20,16 +20,14 @@ from mechanics.model import Model
 from mechanics.sites import touch_sites
 
 STANDARD_GRAVITY = 9.80665
-BACKLASH_TURN_M = 6e-5
-"""Way back of the reading over which a tip that runs ahead of it has changed sides of the play."""
 
 
 @dataclass
 class Settings:
     """What the forward model is told; the defaults are the ideal model.
 
-    modulus: Pa. finite_strain: 0 linear dent, 1 neo-Hookean. table_factor: (k,) factor on the dent's force
-    law.
+    modulus: Pa. finite_strain: 0 linear dent, 1 neo-Hookean. table_factor: (k, 2) factors on the dent law's
+    normal force and sideways stiffness.
     far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the tip over the global one.
     onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,) factor. The rest by name.
     """
@@ -56,6 +54,11 @@ class Settings:
     drift: np.ndarray | None = None
     inertia: float = 0.0
     gravity: np.ndarray | None = None
+
+    def scale_table(self, normal: np.ndarray, sideways: np.ndarray) -> None:
+        """Multiply the dent law's normal force and sideways stiffness (k,) at `Forward.dents`."""
+        own = np.column_stack([normal, sideways])
+        self.table_factor = own if self.table_factor is None else self.table_factor * own
 
 
 @dataclass
@@ -112,7 +115,7 @@ class Forward:
             table = table + s.finite_strain * (self._deep - table)
         if s.table_factor is not None:
             table = table.copy()
-            table[:, 0] = table[:, 0] * s.table_factor
+            table[:, [0, 2]] *= s.table_factor
         radius = np.ascontiguousarray(
             np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (t.presses,))
         )
@@ -129,7 +132,9 @@ class Forward:
             # a surface that comes back more slowly than the tip leaves lets go of it: it cannot pull
             f = np.where(slow[:, :1] > 0, slow, 0.0)
         if s.adhesion is not None:
-            f[:, 0] -= _pull(t, y[:, 0], *s.adhesion)
+            pull = np.empty(len(f))
+            _pull(t.start, np.ascontiguousarray(y[:, 0]), *s.adhesion, pull)
+            f[:, 0] -= pull
         if s.delay != 0:
             f = _shifted(t, f, s.delay)
         return self._read(s, f)
@@ -156,13 +161,12 @@ class Forward:
         """The tip's path behind a play, by device axes: lagging its reading (width > 0) or ahead (< 0)."""
         t = self.touches
         frame = t.frame[t.press]
+        if width < 0:
+            # the hand moves the tip and the reading follows once the play is taken up
+            return y + 0.5 * width * np.einsum("nij,nj->ni", frame, t.extra["lead"])
         device = np.ascontiguousarray(np.einsum("nij,ni->nj", frame, y))
         played = np.empty_like(device)
-        if width > 0:
-            kernel.play(t.start, device, width, played)
-        else:
-            kernel.play(t.start, device, BACKLASH_TURN_M, played)
-            played = device - width * (device - played) / BACKLASH_TURN_M
+        kernel.play(t.start, device, width, played)
         return np.einsum("nij,nj->ni", frame, played)
 
     def _read(self, s: Settings, f: np.ndarray) -> np.ndarray:
@@ -249,21 +253,33 @@ def _shifted(t: Touches, f: np.ndarray, delay: float) -> np.ndarray:
     return out
 
 
-def _pull(t: Touches, depth: np.ndarray, pull_off: float, reach: float, inside: float) -> np.ndarray:
+@njit(cache=True)
+def _pull(start, depth, pull_off, reach, inside, out):  # type: ignore[no-untyped-def]
     """Adhesive pull (n,), N, on the way out only: greatest where the surface is level again, zero at `reach`.
 
-    `inside` of it (0 to 1) already holds deeper in the contact, after a millimetre of the way out.
+    `inside` of it (0 to 1) already holds deeper in the contact, after a millimetre of the way out. It starts
+    and ends so fast that a thinned step is averaged over five places of its path.
     """
-    out = np.zeros(len(depth))
-    for a, b in zip(t.start[:-1], t.start[1:], strict=True):
-        own = depth[a:b]
-        after = np.arange(b - a) > np.argmax(own)
-        if own.max() <= 0:
+    for p in range(start.shape[0] - 1):
+        a, b = start[p], start[p + 1]
+        deepest = a + np.argmax(depth[a:b])
+        for i in range(a, b):
+            out[i] = 0.0
+        if depth[deepest] <= 0.0:
             continue
-        near = np.clip(1 - np.abs(own) / reach, 0, None)
-        deep = inside * (own > 0) * np.clip((own.max() - own) / 1e-3, 0, 1)
-        out[a:b] = after * pull_off * np.maximum(near, deep)
-    return out
+        for i in range(deepest + 1, b):
+            before = 0.5 * (depth[i] + depth[i - 1])
+            after = 0.5 * (depth[i] + depth[min(i + 1, b - 1)])
+            for k in range(5):
+                share = 0.1 + 0.2 * k
+                if share < 0.5:
+                    x = before + 2.0 * share * (depth[i] - before)
+                else:
+                    x = depth[i] + (2.0 * share - 1.0) * (after - depth[i])
+                grip = max(1.0 - abs(x) / reach, 0.0)
+                if x > 0.0:
+                    grip = max(grip, inside * min(max((depth[deepest] - x) / 1e-3, 0.0), 1.0))
+                out[i] += 0.2 * pull_off * grip
 
 
 def _mullins(t: Touches, depth: np.ndarray, force: np.ndarray, r: float, m_rel: float) -> np.ndarray:

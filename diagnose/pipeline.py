@@ -16,7 +16,7 @@ from diagnose.attribution import (
     Search,
     attribute,
 )
-from diagnose.confusable import alike, next_touch
+from diagnose.confusable import alike
 from diagnose.finite import predicted_size
 from diagnose.fit import settings_of
 from diagnose.forward import Forward, build_forward
@@ -24,6 +24,7 @@ from diagnose.freeair import FreeAir, free_air_of
 from diagnose.gaps import closed_share, gap
 from diagnose.inclusions import inclusion_starts
 from diagnose.library import NAMES, effect
+from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry
 from diagnose.settled import Settled, settle
 from diagnose.shape import heterogeneity, site_factors, site_stiffness_sd
@@ -178,14 +179,14 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         if s.gain > 0.1 * max((x.gain for x in found.scores.values()), default=0)
     }
     pairs = alike(search, found.base, singles)
-    touch = _next(forward, found, candidates, pairs)
+    touch = _next(search, found, candidates)
     if not names and not remainder:
         reasons.append("what is left is no larger than noise, first touch and shape can explain")
     if remainder:
         reasons.append(
             f"the best answer still misses by {np.sqrt(chi):.1f} times the noise: something else is there"
         )
-    where = locate(forward, found.ideal.found.residual + settled.residual, free, site_sd, seed=options.seed)
+    where = locate(forward, found.ideal.residual + settled.residual, free, site_sd, seed=options.seed)
     lap("verdict")
     return {
         "noise_n": noise,
@@ -206,8 +207,8 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         "forward": forward,
         "attribution": found,
         "free_air": free,
-        "residual_before": found.ideal.found.residual + settled.residual,
-        "residual_after": found.final.found.residual,
+        "residual_before": found.ideal.residual + settled.residual,
+        "residual_after": found.final.residual,
     }
 
 
@@ -281,7 +282,7 @@ def _errors(forward: Forward, found: Attribution, site_sd: np.ndarray, noise: fl
     t = forward.touches
     rms = float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
     factors = []
-    residual, predicted = found.final.found.residual, t.f - found.final.found.residual
+    residual, predicted = found.final.residual, t.f - found.final.residual
     for site in range(t.sites):
         own = [p for p in range(t.presses) if t.site[p] == site]
         if len(own) < 2:
@@ -305,16 +306,23 @@ def _errors(forward: Forward, found: Attribution, site_sd: np.ndarray, noise: fl
     }
 
 
-def _next(forward: Forward, found: Attribution, candidates: list[str], pairs):  # type: ignore[no-untyped-def]
-    scores = {n: s.candidate for n, s in found.scores.items()}
-    if found.chosen and candidates and found.chosen[0] in scores and candidates[0] in scores:
-        return next_touch(forward, found.base, found.chosen[0], candidates[0], scores)
+def _next(search: Search, found: Attribution, candidates: list[str]):  # type: ignore[no-untyped-def]
+    """The press that parts the two explanations that stand closest."""
+    for scores, name in zip(found.steps, found.picked, strict=False):
+        rival = next((c for c in candidates if c in scores and c != name), None)
+        if rival is not None:
+            return _parting(search, scores, name, rival)
     ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
     if len(ranked) < 2:
         return None
-    first = found.chosen[0] if found.chosen and found.chosen[0] in scores else ranked[0].name
+    first = found.picked[0] if found.picked else ranked[0].name
     second = next(s.name for s in ranked if s.name != first)
-    return next_touch(forward, found.base, first, second, scores)
+    return _parting(search, found.scores, first, second)
+
+
+def _parting(search: Search, scores: dict[str, Score], first: str, second: str):  # type: ignore[no-untyped-def]
+    pair = ((first, scores[first].candidate), (second, scores[second].candidate))
+    return next_touch(search.forward, *pair, search.nuisance)
 
 
 __all__ = ["Candidate", "DiagnoseOptions", "Diagnosis", "FreeAir", "Settled", "diagnose", "settings_of"]

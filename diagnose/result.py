@@ -46,7 +46,10 @@ class EffectEntry:
 
 @dataclass(frozen=True)
 class NextTouch:
-    """The press that would best separate `separates`."""
+    """The press that would best separate `separates`.
+
+    difference_n: rms by which their predictions differ there; sigmas: the same over noise and our own errors.
+    """
 
     x: float
     y: float
@@ -57,6 +60,8 @@ class NextTouch:
     hold_s: float
     separates: tuple[str, ...]
     why: str
+    difference_n: float = 0.0
+    sigmas: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -158,6 +163,8 @@ class Diagnosis:
                 "hold_s": self.next_touch.hold_s,
                 "separates": list(self.next_touch.separates),
                 "why": self.next_touch.why,
+                "difference_n": self.next_touch.difference_n,
+                "sigmas": self.next_touch.sigmas,
             },
             "errors_n": dict(self.errors_n),
             "reasons": list(self.reasons),

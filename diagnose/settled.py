@@ -35,7 +35,7 @@ class Settled:
         """(g,) N^2: what putting the readings back adds to a candidate's plain sums of squares."""
         if not self.names:
             return np.zeros(whitener.groups)
-        r = candidate.found.residual
+        r = candidate.residual
         both = np.stack([r, self.residual], axis=2)
         gram = whitener.raw_gram(both)
         return gram[:, 1, 1] + 2 * gram[:, 0, 1]

@@ -12,6 +12,7 @@ from functools import cached_property
 import numpy as np
 from scipy.spatial.distance import cdist
 
+from diagnose.leads import leads
 from mechanics.errors import DiagnosisError
 from mechanics.model import Model
 from mechanics.recording import Recording
@@ -164,6 +165,7 @@ def touches_of(recording: Recording, model: Model, *, step_s: float = STEP_S) ->
         if recording.quaternion is not None:
             extra["quaternion"] = mean(recording.quaternion)
         extra["position"] = mean(recording.position)
+        extra["lead"] = leads(t[block], recording.position[block]).reshape(count, per_step, 3).mean(axis=1)
         parts.append((time, y, f, counted, _phases(time, y[:, 0], palpation.t_onset, end), extra))
         points.append(point)
         normals.append(normal)

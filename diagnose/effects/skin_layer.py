@@ -22,7 +22,7 @@ def _change(settings, values, forward):  # type: ignore[no-untyped-def]
     contact = forward.tip_radius * np.sqrt(np.maximum(forward.dents, 1e-6))
     weight = film_weight(thickness / contact, settings.nu)
     own = ratio**weight
-    settings.table_factor = own if settings.table_factor is None else settings.table_factor * own
+    settings.scale_table(own, own)
     fields = energy_fields(forward)
     # only what lies deeper than the dent's own reach counts as far field
     inside = np.clip(thickness / np.maximum(fields.depth, 1e-6), 0, 1) * (fields.depth < 2 * thickness)

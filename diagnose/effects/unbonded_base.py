@@ -1,13 +1,13 @@
-"""Unbonded base: part of the base is free to lift and slip."""
+"""Unbonded base: part of the base is free to lift and slip; what presses on the support is still carried."""
 
 import numpy as np
 
 from diagnose.effects.base import Effect, Parameter
-from diagnose.fields import far_partly_bonded, support_axes
+from diagnose.support_motion import ANGLES, far_partly_bonded, support_axes
 
 
 def _change(settings, values, forward):  # type: ignore[no-untyped-def]
-    settings.far = settings.far - forward.far + far_partly_bonded(forward, 1 - values[0], values[1])
+    settings.far = settings.far - forward.far + far_partly_bonded(forward, *values)
 
 
 def _report(values, forward):  # type: ignore[no-untyped-def]
@@ -17,7 +17,7 @@ def _report(values, forward):  # type: ignore[no-untyped-def]
 
 
 def _starts(forward):  # type: ignore[no-untyped-def]
-    return [np.array([0.3, angle]) for angle in np.arange(8) * np.pi / 4]
+    return [np.array([0.4, k * 2 * np.pi / ANGLES, floor]) for floor in (0.95, 0.05) for k in range(ANGLES)]
 
 
 EFFECT = Effect(
@@ -25,12 +25,13 @@ EFFECT = Effect(
     domain="boundary",
     words="part of the object's base is loose",
     parameters=(
-        Parameter("free_fraction", "1", 0.0, 0.8, 0.0, (0.3,), 0.02),
+        Parameter("free_fraction", "1", 0.0, 0.75, 0.0, (0.3,), 0.02),
         Parameter("angle", "rad", -7.0, 14.0, 0.0, (0.0,), 0.1),
+        Parameter("floor", "1", 0.0, 1.0, 1.0, (1.0,), 0.05, 0.7),
     ),
     change=_change,
     report=_report,
-    needs=("unbonded",),
+    needs=("support",),
     candidates=_starts,
     signature="one side too stiff in the ideal model",
 )

@@ -67,7 +67,9 @@ def run(arguments: argparse.Namespace) -> int:
         chosen["most"] = 1
     with progress_bar("diagnose") as progress:
         if arguments.model:
-            model = read_model(arguments.model)
+            from diagnose.placing import placed
+
+            model = placed(recording, read_model(arguments.model))
         else:
             from reconstruct.pipeline import ReconstructOptions, reconstruct
 

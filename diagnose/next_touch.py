@@ -1,0 +1,168 @@
+"""The press that would best tell two explanations apart: every candidate press is predicted under both.
+
+Candidates: the places already pressed, straight or dragged sideways, three depths, three speeds, a short or a
+long hold, once or twice in a row. A press is worth the whitened distance between the two predictions, after
+first touch, stiffness of the place and the other nuisances have had their say.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.attribution import Candidate
+from diagnose.fit import settings_of
+from diagnose.forward import Forward
+from diagnose.leads import leads
+from diagnose.result import NextTouch
+from diagnose.touches import HOLDING, LOADING, MARGIN_S, OUTSIDE, UNLOADING, Touches
+from diagnose.whiten import NuisanceOptions, Whitener
+
+DEPTHS = (0.35, 0.8, 1.2)
+SPEEDS = (0.004, 0.02, 0.08)
+HOLDS = (0.3, 1.5)
+DRAG_M = 1.5e-3
+DEEPEST_M = 0.009
+CLEARANCE_M = 2e-3
+STEP_S = 0.01
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One way of pressing. depth: of the greatest so far, 1. speed: m/s. hold: s. drag: m. times: 1 or 2."""
+
+    depth: float
+    speed: float
+    hold: float
+    drag: float
+    times: int
+
+
+def plans() -> list[Plan]:
+    """All ways of pressing that are compared."""
+    once = [Plan(d, v, h, 0.0, 1) for d, v, h in itertools.product(DEPTHS, SPEEDS, HOLDS)]
+    dragged = [Plan(d, 0.02, 0.3, DRAG_M, 1) for d in DEPTHS]
+    return [*once, *dragged, Plan(0.8, 0.02, 0.3, 0.0, 2)]
+
+
+def next_touch(
+    forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate], options: NuisanceOptions
+) -> NextTouch:
+    """The best press to tell `first` from `second` (name, fitted candidate)."""
+    best: tuple[float, float, Plan, int] | None = None
+    for plan in plans():
+        virtual = dataclasses.replace(forward, touches=_pressed(forward, plan))
+        predicted = [
+            virtual.predict(settings_of(virtual, c.found.effects, c.found.values)) for _, c in (first, second)
+        ]
+        difference = np.nan_to_num(predicted[0] - predicted[1])
+        modulus = settings_of(virtual, first[1].found.effects, first[1].found.values)
+        whitener = Whitener(virtual, modulus, options)
+        # what another modulus would do is taken out as well
+        both = np.stack([difference, predicted[0]], axis=2)
+        gram = whitener.gram(both)
+        worth = gram[:, 0, 0] - gram[:, 0, 1] ** 2 / np.maximum(gram[:, 1, 1], 1e-12)
+        press = int(np.argmax(worth))
+        if best is None or worth[press] > best[0]:
+            rows = (virtual.touches.press == press) & virtual.touches.counted
+            size = float(np.sqrt((difference[rows] ** 2).sum(axis=1).mean()))
+            best = (float(worth[press]), size, plan, press)
+    assert best is not None
+    worth, size, plan, press = best
+    t = forward.touches
+    direction = -t.normal[press]
+    depth = _depth(t, plan)
+    if plan.drag:
+        direction = direction + plan.drag / depth * _sideways(forward, press)
+        direction = direction / np.linalg.norm(direction)
+    return NextTouch(
+        *map(float, t.point[press]),
+        direction=tuple(float(d) for d in direction),
+        depth_m=float(depth),
+        speed_m_per_s=plan.speed,
+        hold_s=plan.hold,
+        separates=(first[0], second[0]),
+        why=_why(plan, first[0], second[0], size, np.sqrt(worth)),
+        difference_n=size,
+        sigmas=float(np.sqrt(worth)),
+    )
+
+
+def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str:
+    pace = {SPEEDS[0]: "slow", SPEEDS[1]: "middling", SPEEDS[2]: "fast"}[plan.speed]
+    depth = {DEPTHS[0]: "shallow", DEPTHS[1]: "deep", DEPTHS[2]: "deepest"}[plan.depth]
+    extra = " dragged sideways" if plan.drag else " done twice in a row" if plan.times > 1 else ""
+    held = f", held {plan.hold:.1f} s" if plan.hold > 1 else ""
+    return (
+        f"of all presses compared, a {pace}, {depth} one{extra}{held} at this place parts "
+        f"{first.replace('_', ' ')} from {second.replace('_', ' ')} most: {size * 1e3:.0f} mN rms, "
+        f"{sigmas:.0f} times what noise and our own errors would do"
+    )
+
+
+def _depth(t: Touches, plan: Plan) -> float:
+    return min(plan.depth * float(t.depth.max()), DEEPEST_M)
+
+
+def _sideways(forward: Forward, press: int) -> np.ndarray:
+    return forward.touches.frame[press][1]
+
+
+def _pressed(forward: Forward, plan: Plan) -> Touches:
+    """Every known press done over by a plan, each a site of its own."""
+    t = forward.touches
+    into, along = _path(_depth(t, plan), plan)
+    n, p = len(into), t.presses
+    local = np.column_stack([into, along, np.zeros(n)])
+    clock = STEP_S * np.arange(n)
+    contact = np.flatnonzero(into > 0)
+    phase = np.full(n, HOLDING)
+    deepest = into > 0.97 * into.max()
+    ends = np.flatnonzero(deepest)
+    phase[: ends[0]] = LOADING
+    phase[ends[-1] + 1 :] = UNLOADING
+    phase[into <= 0] = OUTSIDE
+    margin = round(MARGIN_S / STEP_S)
+    counted = np.zeros(n, dtype=bool)
+    counted[max(contact[0] - margin, 0) : contact[-1] + margin + 1] = True
+    centre = t.point + forward.tip_radius * t.normal
+    position = (centre[:, None] - np.einsum("pij,ni->pnj", t.frame, local)).reshape(-1, 3)
+    lead = np.concatenate([leads(clock, position[i * n : (i + 1) * n]) for i in range(p)])
+    extra = {"position": position, "lead": lead}
+    if "quaternion" in t.extra:
+        extra["quaternion"] = np.repeat(t.extra["quaternion"][t.start[:-1]], n, axis=0)
+    return dataclasses.replace(
+        t,
+        start=n * np.arange(p + 1),
+        t=np.tile(clock, p),
+        y=np.tile(local, (p, 1)),
+        f=np.zeros((n * p, 3)),
+        counted=np.tile(counted, p),
+        phase=np.tile(phase, p),
+        site=np.arange(p),
+        repeat=np.zeros(p, dtype=int),
+        onset_s=np.full(p, clock[contact[0]]),
+        extra=extra,
+    )
+
+
+def _path(depth: float, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) m travel into the object and sideways, from the air to the air."""
+    times, into, side = [0.0], [-CLEARANCE_M], [0.0]
+
+    def go(seconds: float, to: float, across: float) -> None:
+        times.append(times[-1] + seconds)
+        into.append(to)
+        side.append(across)
+
+    way = (depth + CLEARANCE_M) / plan.speed
+    for _ in range(plan.times):
+        go(way, depth, 0.0)
+        go(plan.hold, depth, plan.drag)
+        go(way, -CLEARANCE_M, plan.drag)
+        go(0.3, -CLEARANCE_M, 0.0)
+    clock = np.arange(0.0, times[-1], STEP_S)
+    return np.interp(clock, times, into), np.interp(clock, times, side)

@@ -1,0 +1,203 @@
+"""The far field on another support, exactly: springs under the base, or a part of it that lets go.
+
+The bonded solution of each place presses on its base with reactions r; the base, condensed on itself, resists
+motion with S. On springs of stiffness k (a unit area) the place gives way by r^T (S + k M)^-1 r more. Where a
+part of the base is loose it may slip, and lift but not sink: a small contact problem a place, solved for
+pressing. The base moves linearly between its corner nodes, which keeps S to some hundred rows.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.linalg import cho_factor, cho_solve, solve
+
+from diagnose.fields import energy_fields
+from diagnose.forward import Forward
+from mechanics.elasticity import stiffness, triangle_mass
+from mechanics.model import Model
+from mechanics.support import base_triangles
+from mechanics.tetmesh import EDGES, TetMesh
+
+ANGLES = 8
+FREE_FRACTIONS = (0.25, 0.5, 0.75)
+_ROUNDS = 12
+_BATCH = 128
+
+
+@dataclass(frozen=True)
+class SupportMotion:
+    """plane: (b, 2) m, corner nodes of the base in the support's axes. stiffness: (3 b, 3 b) m, of the object
+    against motions of its base (normal, across, along). mass: (b, b) m^2. reaction: (q, 3 b, 3) for unit
+    loads at q places. place: (p,) of each press."""
+
+    plane: np.ndarray
+    stiffness: np.ndarray
+    mass: np.ndarray
+    reaction: np.ndarray
+    place: np.ndarray
+
+
+def support_motion(forward: Forward) -> SupportMotion:
+    """Condense the base; kept in forward.stages['support']."""
+    if "support" in forward.stages:
+        return forward.stages["support"]
+    fields = energy_fields(forward)
+    solver = fields.solver
+    mesh, free = solver.mesh, solver.free
+    axes = np.stack([unit_normal(forward.model), *support_axes(forward.model)])
+    corners, interpolation = _corner_motion(mesh)
+    fixed = np.setdiff1d(np.arange(3 * len(mesh.points)), free)
+    full = stiffness(mesh, solver.poisson_ratio)
+    lift = sp.kron(interpolation, axes.T, format="csr")[fixed]  # support axes to the device's
+    coupling = (full[free][:, fixed] @ lift).tocsc()
+    own = (lift.T @ (full[fixed][:, fixed] @ lift)).toarray()
+    give = np.empty_like(own)
+    for a in range(0, len(own), _BATCH):
+        part = coupling[:, a : a + _BATCH].toarray()
+        give[:, a : a + _BATCH] = coupling.T @ solver.solve_free(part).reshape(part.shape)
+    loads = fields.solution.reshape(3 * len(mesh.points), -1)[free]
+    reaction = (coupling.T @ loads).reshape(len(own), -1, 3).transpose(1, 0, 2)
+    result = SupportMotion(
+        plane=(mesh.points[corners] - forward.model.support_point) @ axes[1:].T,
+        stiffness=own - 0.5 * (give + give.T),
+        mass=_mass(mesh, corners),
+        reaction=np.ascontiguousarray(reaction),
+        place=fields.place,
+    )
+    forward.stages["support"] = result
+    return result
+
+
+def unit_normal(model: Model) -> np.ndarray:
+    """(3,) out of the support, into the object."""
+    return model.support_normal / np.linalg.norm(model.support_normal)
+
+
+def support_axes(model: Model) -> tuple[np.ndarray, np.ndarray]:
+    """Two unit vectors in the support plane."""
+    normal = unit_normal(model)
+    across = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
+    across /= np.linalg.norm(across)
+    return across, np.cross(normal, across)
+
+
+def _corner_motion(mesh: TetMesh) -> tuple[np.ndarray, sp.csr_matrix]:
+    """(base corner nodes (b,), motion of all base nodes from theirs (n, b))."""
+    n = len(mesh.points)
+    is_corner = np.zeros(n, dtype=bool)
+    is_corner[mesh.tetrahedra[:, :4]] = True
+    corners = np.flatnonzero(mesh.fixed & is_corner)
+    column = np.full(n, -1)
+    column[corners] = np.arange(len(corners))
+    rows, columns, weights = [corners], [np.arange(len(corners))], [np.ones(len(corners))]
+    mids = mesh.tetrahedra[:, 4:].ravel()
+    ends = mesh.tetrahedra[:, EDGES].reshape(-1, 2)
+    mids, first = np.unique(mids, return_index=True)
+    ends = ends[first]
+    held = mesh.fixed[mids]
+    for k in (0, 1):
+        rows.append(mids[held])
+        columns.append(column[ends[held, k]])
+        weights.append(np.full(held.sum(), 0.5))
+    matrix = sp.coo_matrix(
+        (np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=(n, len(corners))
+    )
+    return corners, matrix.tocsr()
+
+
+def _mass(mesh: TetMesh, corners: np.ndarray) -> np.ndarray:
+    triangles = base_triangles(mesh)[:, :3]
+    column = np.full(len(mesh.points), -1)
+    column[corners] = np.arange(len(corners))
+    own = column[triangles]
+    mass = np.zeros((len(corners),) * 2)
+    np.add.at(mass, (own[:, :, None], own[:, None, :]), triangle_mass(mesh.points, triangles))
+    return mass
+
+
+def far_on_springs(forward: Forward, normal: float, tangential: float) -> np.ndarray:
+    """(p, 3, 3) far field on springs of these stiffnesses a unit of area over the modulus, 1/m."""
+    motion = support_motion(forward)
+    springs = np.diag([normal, tangential, tangential])
+    factor = cho_factor(motion.stiffness + np.kron(motion.mass, springs), overwrite_a=True)
+    q, b3, _ = motion.reaction.shape
+    flat = motion.reaction.transpose(1, 0, 2).reshape(b3, 3 * q)
+    moved = cho_solve(factor, flat).reshape(b3, q, 3)
+    give = np.einsum("qbi,bqj->qij", motion.reaction, moved)
+    return forward.far + give[motion.place]
+
+
+def far_partly_bonded(forward: Forward, free_fraction: float, angle: float, floor: float) -> np.ndarray:
+    """(p, 3, 3) far field with a share of the base loose, the one towards `angle` in the support plane.
+
+    floor: 1 where a rigid support still carries what presses on it, 0 where nothing is under the loose part.
+    Interpolated between the fractions and angles of a table.
+    """
+    table = forward.stages.get("loose")
+    if table is None:
+        motion = support_motion(forward)
+        table = np.zeros((len(FREE_FRACTIONS) + 1, ANGLES + 1, 2, len(motion.reaction), 3, 3))
+        for i, fraction in enumerate(FREE_FRACTIONS):
+            for j in range(ANGLES):
+                table[i + 1, j] = loosened(motion, fraction, 2 * np.pi * j / ANGLES)
+        table[:, ANGLES] = table[:, 0]
+        forward.stages["loose"] = table
+    known = np.array([0.0, *FREE_FRACTIONS])
+    i = int(np.clip(np.searchsorted(known, free_fraction) - 1, 0, len(known) - 2))
+    w = (free_fraction - known[i]) / (known[i + 1] - known[i])
+    place = (angle % (2 * np.pi)) / (2 * np.pi) * ANGLES
+    j = int(min(place, ANGLES - 1))
+    v = place - j
+    lower = (1 - v) * table[i, j] + v * table[i, j + 1]
+    upper = (1 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
+    both = (1 - w) * lower + w * upper
+    give = (1 - floor) * both[0] + floor * both[1]
+    return forward.far + give[support_motion(forward).place]
+
+
+def loosened(motion: SupportMotion, fraction: float, angle: float) -> np.ndarray:
+    """(2, q, 3, 3) give added by a loose part: without and with a floor under it."""
+    where = motion.plane @ [np.cos(angle), np.sin(angle)]
+    weight = motion.mass.sum(axis=1)
+    order = np.argsort(where, kind="stable")
+    loose = order[np.cumsum(weight[order]) > (1 - fraction) * weight.sum() + 1e-12]
+    rows = (3 * loose[:, None] + np.arange(3)).ravel()
+    stiff = motion.stiffness[np.ix_(rows, rows)]
+    reaction = motion.reaction[:, rows]
+    q = len(reaction)
+    stiff = stiff + 1e-9 * np.trace(stiff) / len(stiff) * np.eye(len(stiff))
+    inverse = cho_solve(cho_factor(stiff), np.eye(len(stiff)))
+    free = np.einsum("qbi,bc,qcj->qij", reaction, inverse, reaction, optimize=True)
+    normal = np.arange(0, len(rows), 3)
+    # eliminating the tangential motion leaves the normal one, to which the floor's pressure is dual
+    give_normal = inverse[np.ix_(normal, normal)]
+    carried = np.empty_like(free)
+    for k in range(q):
+        motion_free = -inverse[normal] @ reaction[k]
+        held = _touching(give_normal, -motion_free[:, 0])
+        carried[k] = free[k]
+        if held.any():
+            part = motion_free[held]
+            carried[k] -= part.T @ solve(give_normal[np.ix_(held, held)], part, assume_a="pos")
+    return np.stack([free, carried])
+
+
+def _touching(give: np.ndarray, motion: np.ndarray) -> np.ndarray:
+    """(b,) bool: nodes that rest on the floor where `motion` (upward, without pressure) may not be negative.
+
+    Complementarity by switching the wrong ones until none is left (or a few rounds are over).
+    """
+    held = motion < 0
+    for _ in range(_ROUNDS):
+        pressure = np.zeros(len(motion))
+        if held.any():
+            pressure[held] = solve(give[np.ix_(held, held)], -motion[held], assume_a="pos")
+        gap = motion + give @ pressure
+        wrong = (held & (pressure < 0)) | (~held & (gap < -1e-12 * np.abs(motion).max()))
+        if not wrong.any():
+            break
+        held ^= wrong
+    return held
