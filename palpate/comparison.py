@@ -5,8 +5,7 @@ Every model is fitted to the same training presses and predicts the same held-ou
 same first touches, at the same places with the same normals; of the model only the geometry is used.
 
 - fem: one Young's modulus (least squares; the force of a path is proportional to it) and the dent law, linear
-or
-  neo-Hookean, that fits the training presses best.
+  or neo-Hookean, that fits the training presses best.
 - kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
   interpolated to the held-out place by radial basis functions (render.one_d), force along the normal.
 """
@@ -174,6 +173,28 @@ def compare(
         predicted=predicted,
         regions=tuple(found),
     )
+
+
+def verdict(result: Comparison) -> str:
+    """Who wins where, and by how much."""
+    names = list(result.rmse_n)
+    others = [n for n in names if n != "fem"]
+    best = min(others, key=lambda n: result.rmse_n[n])
+    ratio = result.rmse_n[best] / result.rmse_n["fem"]
+    words = (
+        f"FEM errs {ratio:.1f} times less than {best}, the better 1D model"
+        if ratio >= 1
+        else f"{best} errs {1 / ratio:.1f} times less than FEM"
+    )
+    wins = {n: result.wins(n) for n in others}
+    lost = [r.region.name for r in result.regions if min(r.rmse_n[n] for n in others) < r.rmse_n["fem"]]
+    words += f"; of {len(result.presses)} presses FEM predicts {result.wins('fem')} best"
+    words += "".join(f", {n} {count}" for n, count in wins.items() if count)
+    if lost:
+        words += f"; a 1D model wins in {', '.join(lost)}"
+    elif not any(wins.values()):
+        words += "; a 1D model wins nowhere here"
+    return words
 
 
 def gather(exploration: Exploration, model: Model, site_m: float, progress: Progress = silent) -> Presses:

@@ -87,6 +87,8 @@ def as_json(result: Comparison) -> dict[str, Any]:
 
 def lines(result: Comparison) -> list[str]:
     """The table and the verdict in words."""
+    from palpate.comparison import verdict
+
     names = list(result.rmse_n)
     text = [f"{'held out':<22}{'presses':>8}  " + "".join(f"{name:>26}" for name in names)]
 
@@ -101,25 +103,3 @@ def lines(result: Comparison) -> list[str]:
     for r in result.regions:
         text.append(row(r.region.name, int(r.region.members.sum()), r.rmse_n, r.relative_rmse, r.bias))
     return [*text, f"sensor noise {result.noise_n:.3f} N; {verdict(result)}"]
-
-
-def verdict(result: Comparison) -> str:
-    """Who wins where, and by how much."""
-    names = list(result.rmse_n)
-    others = [n for n in names if n != "fem"]
-    best = min(others, key=lambda n: result.rmse_n[n])
-    ratio = result.rmse_n[best] / result.rmse_n["fem"]
-    words = (
-        f"FEM errs {ratio:.1f} times less than {best}, the better 1D model"
-        if ratio >= 1
-        else f"{best} errs {1 / ratio:.1f} times less than FEM"
-    )
-    wins = {n: result.wins(n) for n in others}
-    lost = [r.region.name for r in result.regions if min(r.rmse_n[n] for n in others) < r.rmse_n["fem"]]
-    words += f"; of {len(result.presses)} presses FEM predicts {result.wins('fem')} best"
-    words += "".join(f", {n} {count}" for n, count in wins.items() if count)
-    if lost:
-        words += f"; a 1D model wins in {', '.join(lost)}"
-    elif not any(wins.values()):
-        words += "; a 1D model wins nowhere here"
-    return words

@@ -1,5 +1,4 @@
-"""The comparison's page and pictures: errors by press, predicted against measured, stiffness across the
-top."""
+"""The comparison's page and pictures: errors by press, predicted against measured, stiffness by place."""
 
 from __future__ import annotations
 
@@ -10,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from palpate.comparison import MODELS, Comparison, stiffness_along
+from palpate.comparison import MODELS, Comparison, stiffness_along, verdict
 from palpate.report.page import Page
 
 COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f", "measured": "#c1121f"}
@@ -19,10 +18,9 @@ DEPTH_M = 0.004
 
 def write_report(path: Path | str, result: Comparison, name: str) -> Path:
     """One self-contained page; returns its path."""
-    from palpate.commands.compare import verdict
-
     page = Page(f"Who predicts the next touch: {name}")
-    page.lead(verdict(result)[:1].upper() + verdict(result)[1:] + ".")
+    words = verdict(result)
+    page.lead(words[:1].upper() + words[1:] + ".")
     page.paragraph(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
         f"paths. Errors are rms force vectors in N; the sensor's noise alone is {result.noise_n:.3f} N. The "
