@@ -112,7 +112,7 @@ def _timed(kernel, model, state, arrays, parameters, path, ticks, start, wait, c
             pose[IN_POSITION + i] = path[(start + tick) % path.shape[0], i]
             pose[IN_TIP + i] = pose[IN_POSITION + i]
         pose[IN_SEQUENCE] = start + tick
-        deadline = arrays.counts[DEADLINE]
+        deadline = arrays.shared.counts[DEADLINE]
         pose[IN_TIME] = deadline * 1e-9
         put_pose(arrays, pose)
         if wait:
@@ -124,7 +124,7 @@ def _timed(kernel, model, state, arrays, parameters, path, ticks, start, wait, c
         ended = compiled_now_ns(arrays.timespec)
         account(arrays, parameters, deadline, began, ended)
         if not wait:
-            arrays.counts[DEADLINE] = ended
+            arrays.shared.counts[DEADLINE] = ended
 
 
 class Measured(NamedTuple):
@@ -156,7 +156,7 @@ class Load:
             no_support(),
         )
         self.program: Program = make_program(renderer, self.arrays, parameters)
-        self.arrays.control[ENABLE] = 1
+        self.arrays.shared.control[ENABLE] = 1
         self._path = path
         self._done = 0
         self._cpu_s = self._wall_s = 0.0
@@ -194,7 +194,7 @@ class Load:
 
     def run(self, ticks: int, *, wait: bool) -> None:
         """More ticks, in the thread that calls."""
-        self.arrays.counts[DEADLINE] = time.perf_counter_ns() + 2 * PERIOD_NS
+        self.arrays.shared.counts[DEADLINE] = time.perf_counter_ns() + 2 * PERIOD_NS
         wall, cpu = time.perf_counter(), time.thread_time()
         self._call(ticks, wait)
         self._wall_s += time.perf_counter() - wall

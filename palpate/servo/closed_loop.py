@@ -122,7 +122,7 @@ def _run(
         pose[IN_SEQUENCE] = tick
         put_pose(arrays, pose)
         one_tick(kernel, model, state, arrays, parameters, now, now)
-        arrays.counts[TICKS] += 1
+        arrays.shared.counts[TICKS] += 1
         for i in range(3):
             out[tick, i] = position[i]
             out[tick, 3 + i] = arrays.outbox[OUT_FORCE + i]
@@ -189,7 +189,7 @@ def closed_loop(
         no_support(),
     )
     program = make_program(renderer, arrays, parameters)
-    arrays.control[ENABLE] = 1
+    arrays.shared.control[ENABLE] = 1
     n = len(intended) - 1
     out = np.zeros((n, 10))
     step = HandImpedance(
@@ -218,5 +218,5 @@ def closed_loop(
         out[:, 9],
         float(arrays.passivity.energies[DISSIPATED]),
         compliance,
-        float(arrays.counts[CONTACT_TICKS]) / n,
+        float(arrays.shared.counts[CONTACT_TICKS]) / n,
     )

@@ -133,7 +133,7 @@ class DeviceThread:
         return wanted and settled and not raw.force_enabled
 
     def _follow_enable(self) -> None:
-        wanted = int(self._arrays.control[ENABLE])
+        wanted = int(self._arrays.shared.control[ENABLE])
         if wanted == self._enabled:
             return
         self._enabled = wanted
@@ -154,13 +154,13 @@ class DeviceThread:
         try:
             if self._on_start is not None:
                 self._on_start()
-            while self._arrays.control[STOP] == 0:
-                sleep_to_read(int(self._arrays.counts[DEADLINE]) - self._read_ahead_ns)
+            while self._arrays.shared.control[STOP] == 0:
+                sleep_to_read(int(self._arrays.shared.counts[DEADLINE]) - self._read_ahead_ns)
                 self.read_pose()
                 self.send_command(fresh=self._await_tick(poll))
         except Exception as error:  # whatever a driver raises must end in zero force, with its reason
             self.words.append(f"the device failed: {error}")
-            self._arrays.control[STOP] = 1
+            self._arrays.shared.control[STOP] = 1
         finally:
             self._release()
 

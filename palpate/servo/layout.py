@@ -10,7 +10,7 @@ import math
 import mmap
 import os
 import tempfile
-from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
@@ -67,8 +67,7 @@ _FIELDS: tuple[tuple[str, str, tuple[int, ...]], ...] = (
 )
 
 
-@dataclass(frozen=True)
-class SharedArrays:
+class SharedArrays(NamedTuple):
     """Views of the shared block; shapes and meanings above."""
 
     control: np.ndarray

@@ -49,9 +49,9 @@ def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
 def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
     """Tick until told to stop or swap; `wake` is a file descriptor told after each tick, -1 for none."""
     for _ in range(most_ticks):
-        if arrays.control[STOP] != 0 or arrays.control[SWAP] != 0:
+        if arrays.shared.control[STOP] != 0 or arrays.shared.control[SWAP] != 0:
             return
-        deadline = arrays.counts[DEADLINE]
+        deadline = arrays.shared.counts[DEADLINE]
         compiled_sleep_until(arrays.timespec, deadline)
         started = compiled_now_ns(arrays.timespec)
         one_tick(kernel, model, state, arrays, parameters, started, deadline)
@@ -161,15 +161,15 @@ class ServoLoop:
     def start(self, first_deadline_ns: int | None = None) -> None:
         """Begin ticking, a period from now."""
         period = self._program.parameters.period_ns
-        self.arrays.counts[DEADLINE] = first_deadline_ns or time.perf_counter_ns() + 2 * period
-        self.arrays.counts[STATUS] = 1
+        self.arrays.shared.counts[DEADLINE] = first_deadline_ns or time.perf_counter_ns() + 2 * period
+        self.arrays.shared.counts[STATUS] = 1
         self._thread.start()
 
     def swap(self, program: Program, timeout_s: float = 1.0) -> bool:
         """Go on with another program between two ticks; False where the loop did not answer."""
         self._swapped.clear()
         self._pending = program
-        self.arrays.control[SWAP] = 1
+        self.arrays.shared.control[SWAP] = 1
         return self._swapped.wait(timeout_s)
 
     def join(self, timeout_s: float | None = None) -> bool:
@@ -181,10 +181,10 @@ class ServoLoop:
         try:
             if self._on_start is not None:
                 self._on_start()
-            while self.arrays.control[STOP] == 0:
+            while self.arrays.shared.control[STOP] == 0:
                 if self._pending is not None:
                     self._program, self._pending = self._pending, None
-                    self.arrays.control[SWAP] = 0
+                    self.arrays.shared.control[SWAP] = 0
                     self._swapped.set()
                 if COMPILED:
                     renderer, kernel, loop, state, parameters = self._program
@@ -201,12 +201,12 @@ class ServoLoop:
                     portable_tick(self._program, self.arrays)
                     self.ticked.set()
         finally:
-            self.arrays.counts[STATUS] = 0
+            self.arrays.shared.counts[STATUS] = 0
 
 
 def portable_tick(program: Program, arrays: TickArrays) -> None:
     """One tick driven from Python, for platforms whose sleep the compiled loop cannot call."""
-    deadline = int(arrays.counts[DEADLINE])
+    deadline = int(arrays.shared.counts[DEADLINE])
     sleep_until(deadline)
     started = time.perf_counter_ns()
     run_tick(program, arrays, started, deadline)
@@ -215,19 +215,7 @@ def portable_tick(program: Program, arrays: TickArrays) -> None:
 
 def run_tick(program: Program, arrays: TickArrays, now_ns: int, deadline_ns: int) -> None:
     """One tick at a time that is handed in: what the compiled loop does between two deadlines."""
-    renderer, state = program.renderer, program.state
-    before(arrays)
-    renderer.kernel(renderer.parameters, state, arrays.tips)
-    after(
-        arrays,
-        program.parameters,
-        state.forces,
-        state.points,
-        state.normals,
-        state.depths,
-        state.touching,
-        state.stiffness,
-        state.radii_m,
-        now_ns,
-        deadline_ns,
+    renderer = program.renderer
+    one_tick.py_func(
+        renderer.kernel, renderer.parameters, program.state, arrays, program.parameters, now_ns, deadline_ns
     )

@@ -163,7 +163,7 @@ class ServoProcess:
             while not self._loop.join(0.1):
                 pass
         finally:
-            self._arrays.control[STOP] = 1
+            self._arrays.shared.control[STOP] = 1
             pump.join(3.0)
             for word in pump.words:
                 self._tell({"word": word})
@@ -181,8 +181,8 @@ class ServoProcess:
             except Exception as error:  # a command that fails must not end the loop that holds the device
                 self._tell({"failed": name, "why": str(error)})
         if self.job.options.on_orphan == "stop":
-            self._arrays.control[ENABLE] = 0
-            self._arrays.control[STOP] = 1
+            self._arrays.shared.control[ENABLE] = 0
+            self._arrays.shared.control[STOP] = 1
 
     def _obey(self, name: str, value: Any) -> None:
         assert self._loop is not None

@@ -76,21 +76,9 @@ class TickParameters(NamedTuple):
 
 
 class TickArrays(NamedTuple):
-    """Everything that a tick reads and writes; made once by `tick_arrays`."""
+    """Everything that a tick reads and writes, made by `tick_arrays`; the parent sees `shared` as well."""
 
-    control: np.ndarray
-    counts: np.ndarray
-    ring_head: np.ndarray
-    ring: np.ndarray
-    snapshot_version: np.ndarray
-    snapshot: np.ndarray
-    compute_bins: np.ndarray
-    compute_extremes: np.ndarray
-    lateness_bins: np.ndarray
-    lateness_extremes: np.ndarray
-    reason_counts: np.ndarray
-    energies: np.ndarray
-    peak: np.ndarray
+    shared: SharedArrays
     inbox_version: np.ndarray
     inbox: np.ndarray
     outbox_version: np.ndarray
@@ -116,7 +104,7 @@ def tick_arrays(shared: SharedArrays, offsets_m: np.ndarray, workspace_centre_m:
     inbox[IN_SEQUENCE] = -1.0
     inbox[IN_POSITION:IN_TIP_VELOCITY] = np.nan
     return TickArrays(
-        **vars(shared),
+        shared=shared,
         inbox_version=np.zeros(1, dtype=np.int64),
         inbox=inbox,
         outbox_version=np.zeros(1, dtype=np.int64),
@@ -179,7 +167,7 @@ def after(arrays, parameters, felt, points, normals, depths, touching, stiffness
         wanted[i] = 0.0
         for j in range(3):
             wanted[i] += pose[IN_FORCE_MAP + 3 * i + j] * rendered[j]
-    enable = arrays.control[ENABLE]
+    enable = arrays.shared.control[ENABLE]
     position = pose[IN_POSITION : IN_POSITION + 3]
     fresh = pose[IN_SEQUENCE] != arrays.previous[0]
     arrays.previous[0] = pose[IN_SEQUENCE]
@@ -203,7 +191,7 @@ def after(arrays, parameters, felt, points, normals, depths, touching, stiffness
         reasons |= PASSIVITY
 
     begin_write(arrays.outbox_version)
-    arrays.outbox[OUT_TICK] = arrays.counts[TICKS]
+    arrays.outbox[OUT_TICK] = arrays.shared.counts[TICKS]
     arrays.outbox[OUT_TIME] = now_ns * 1e-9
     arrays.outbox[OUT_FORCE] = command[0]
     arrays.outbox[OUT_FORCE + 1] = command[1]
@@ -227,10 +215,10 @@ def _elapsed(arrays, parameters, deadline_ns):
 @njit(cache=True, nogil=True)
 def _publish(arrays, reasons, contacts, now_ns, deadline_ns, period_ns):
     """The tick's row in the ring and the statistics."""
-    pose, command, counts = arrays.pose, arrays.safety.force, arrays.counts
+    pose, command, counts = arrays.pose, arrays.safety.force, arrays.shared.counts
     if counts[STARTED] == 0:
         counts[STARTED] = deadline_ns
-    row = arrays.ring[arrays.ring_head[0] % RING_ROWS]
+    row = arrays.shared.ring[arrays.shared.ring_head[0] % RING_ROWS]
     row[0] = (deadline_ns - counts[STARTED]) // period_ns
     row[1] = deadline_ns * 1e-9
     force2, command2 = 0.0, 0.0
@@ -246,28 +234,28 @@ def _publish(arrays, reasons, contacts, now_ns, deadline_ns, period_ns):
     row[18] = reasons
     row[19] = pose[IN_BUTTONS]
     row[20] = contacts
-    row[21] = arrays.control[ENABLE]
+    row[21] = arrays.shared.control[ENABLE]
     row[22] = (now_ns - deadline_ns) * 1e-9
     row[23] = arrays.previous[2]
     fence()
-    arrays.ring_head[0] += 1
+    arrays.shared.ring_head[0] += 1
     if contacts:
         counts[CONTACT_TICKS] += 1
-    for k in range(arrays.reason_counts.size):
+    for k in range(arrays.shared.reason_counts.size):
         if reasons & (1 << k):
-            arrays.reason_counts[k] += 1
-    arrays.peak[0] = max(arrays.peak[0], force2**0.5)
-    arrays.peak[1] = max(arrays.peak[1], command2**0.5)
+            arrays.shared.reason_counts[k] += 1
+    arrays.shared.peak[0] = max(arrays.shared.peak[0], force2**0.5)
+    arrays.shared.peak[1] = max(arrays.shared.peak[1], command2**0.5)
     for k in range(arrays.passivity.energies.size):
-        arrays.energies[k] = arrays.passivity.energies[k]
+        arrays.shared.energies[k] = arrays.passivity.energies[k]
 
 
 @njit(cache=True, nogil=True)
 def _publish_tips(arrays, forces, points, normals, depths, touching, stiffness):
     """The newest row and every tip's contact, for a window."""
-    block = arrays.snapshot
-    begin_write(arrays.snapshot_version)
-    row = arrays.ring[(arrays.ring_head[0] - 1) % RING_ROWS]
+    block = arrays.shared.snapshot
+    begin_write(arrays.shared.snapshot_version)
+    row = arrays.shared.ring[(arrays.shared.ring_head[0] - 1) % RING_ROWS]
     for k in range(row.size):
         block[k] = row[k]
     block[HEAD_WIDTH - 1] = forces.shape[0]
@@ -281,19 +269,19 @@ def _publish_tips(arrays, forces, points, normals, depths, touching, stiffness):
         block[at + 12] = depths[t]
         block[at + 13] = touching[t]
         block[at + 14] = stiffness[t]
-    end_write(arrays.snapshot_version)
+    end_write(arrays.shared.snapshot_version)
 
 
 @njit(cache=True, nogil=True)
 def account(arrays, parameters, deadline_ns, started_ns, ended_ns):
     """Count the tick and set the next deadline: absolute, in phase; those that passed wholly are missed."""
-    counts = arrays.counts
+    counts = arrays.shared.counts
     counts[TICKS] += 1
     lateness = started_ns - deadline_ns
     if lateness > parameters.late_ns:
         counts[LATE] += 1
-    count(arrays.compute_bins, arrays.compute_extremes, ended_ns - started_ns)
-    count(arrays.lateness_bins, arrays.lateness_extremes, lateness)
+    count(arrays.shared.compute_bins, arrays.shared.compute_extremes, ended_ns - started_ns)
+    count(arrays.shared.lateness_bins, arrays.shared.lateness_extremes, lateness)
     arrays.previous[2] = (ended_ns - started_ns) * 1e-9
     following = deadline_ns + parameters.period_ns
     if ended_ns >= following + parameters.period_ns:

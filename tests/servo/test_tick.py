@@ -51,8 +51,8 @@ class FakeServo:
             support or no_support(),
         )
         self.program = make_program(ElasticPlane(stiffness), self.arrays, parameters)
-        self.arrays.counts[DEADLINE] = START
-        self.arrays.control[ENABLE] = 1
+        self.arrays.shared.counts[DEADLINE] = START
+        self.arrays.shared.control[ENABLE] = 1
         self.sequence = 0
 
     def pose(self, position, time_s, **cells) -> None:
@@ -68,7 +68,7 @@ class FakeServo:
         put_pose(self.arrays, pose)
 
     def tick(self, late_ns: int = 0, compute_ns: int = 10_000) -> np.ndarray:
-        deadline = int(self.arrays.counts[DEADLINE])
+        deadline = int(self.arrays.shared.counts[DEADLINE])
         run_tick(self.program, self.arrays, deadline + late_ns, deadline)
         account(
             self.arrays,
@@ -81,7 +81,7 @@ class FakeServo:
 
     def press(self, depth_m: float, ticks: int, **cells) -> np.ndarray:
         for _ in range(ticks):
-            self.pose([0.0, 0.0, 0.005 - depth_m], self.arrays.counts[DEADLINE] * 1e-9, **cells)
+            self.pose([0.0, 0.0, 0.005 - depth_m], self.arrays.shared.counts[DEADLINE] * 1e-9, **cells)
             force = self.tick()
         return force
 
@@ -107,9 +107,9 @@ def test_a_rendered_force_reaches_the_device_after_the_ramp():
 def test_deadlines_are_absolute_and_do_not_drift_with_lateness():
     servo = FakeServo()
     for k in range(1000):
-        assert servo.arrays.counts[DEADLINE] == START + k * PERIOD
+        assert servo.arrays.shared.counts[DEADLINE] == START + k * PERIOD
         servo.tick(late_ns=(k * 37_001) % 300_000)
-    counts = servo.arrays.counts
+    counts = servo.arrays.shared.counts
     assert counts[TICKS] == 1000 and counts[MISSED] == 0
     assert counts[LATE] == sum((k * 37_001) % 300_000 > 200_000 for k in range(1000))
 
@@ -118,8 +118,8 @@ def test_a_stall_is_counted_as_missed_ticks_and_the_loop_stays_in_phase():
     servo = FakeServo()
     servo.tick()
     servo.tick(late_ns=7_400_000)
-    assert servo.arrays.counts[MISSED] == 6
-    assert (servo.arrays.counts[DEADLINE] - START) % PERIOD == 0
+    assert servo.arrays.shared.counts[MISSED] == 6
+    assert (servo.arrays.shared.counts[DEADLINE] - START) % PERIOD == 0
     rows, _ = ring_rows(servo.shared, 0)
     servo.tick()
     after, head = ring_rows(servo.shared, len(rows))
@@ -141,7 +141,7 @@ def test_a_device_that_stops_talking_gets_zero_after_20_ms():
 def test_a_pose_that_is_no_number_gets_zero_and_contact_comes_back_ramped(bad):
     servo = FakeServo()
     servo.press(0.002, 600)
-    servo.pose([0.0, bad, 0.003], servo.arrays.counts[DEADLINE] * 1e-9)
+    servo.pose([0.0, bad, 0.003], servo.arrays.shared.counts[DEADLINE] * 1e-9)
     assert (servo.tick() == 0).all()
     assert 0 < servo.press(0.002, 1)[2] < 0.01
     np.testing.assert_allclose(servo.press(0.002, 600)[2], 1.0)
@@ -152,14 +152,14 @@ def test_a_fault_zeroes_until_enabled_anew():
     servo.press(0.002, 600)
     assert (servo.press(0.002, 1, fault=1.0) == 0).all()
     assert (servo.press(0.002, 1000) == 0).all()
-    servo.arrays.control[ENABLE] = 2
+    servo.arrays.shared.control[ENABLE] = 2
     np.testing.assert_allclose(servo.press(0.002, 600)[2], 1.0)
 
 
 def test_a_clock_that_jumps_back_zeroes_the_force():
     servo = FakeServo()
     servo.press(0.002, 600)
-    servo.pose([0.0, 0.0, 0.003], servo.arrays.counts[DEADLINE] * 1e-9 + 3600.0)
+    servo.pose([0.0, 0.0, 0.003], servo.arrays.shared.counts[DEADLINE] * 1e-9 + 3600.0)
     assert (servo.tick() == 0).all()
     assert "clock" in servo.reasons
     assert (servo.press(0.002, 100) == 0).all()
