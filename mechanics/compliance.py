@@ -14,6 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as la
+import scipy.sparse as sp
 
 from mechanics import pardiso
 from mechanics.elasticity import stiffness
@@ -80,15 +81,20 @@ def condense(
         method = "schur" if pardiso.available() and backend in (None, "pardiso") else "columns"
     k = len(wanted)
     result = np.empty((k, k))
-    first = int(_CONDENSED * k) if method == "schur" else 0
-    if first:
-        _condense_first(mesh, poisson_ratio, modulus_ratio, free, place, first, result, progress)
-    solver = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend)
+    first = 0
+    if method == "schur":
+        first = int(_CONDENSED * k)
+        matrix = stiffness(mesh, poisson_ratio, modulus_ratio)[free][:, free].tocsr()
+        _condense_first(matrix, place[:first], result, progress)
+        solve = pardiso.Pardiso(matrix).solve
+        del matrix
+    else:
+        solve = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend).solve_free
     for start in range(first, k, _COLUMNS):
         part = slice(start, min(start + _COLUMNS, k))
         loads = np.zeros((len(free), part.stop - part.start), order="F")
         loads[place[part], np.arange(loads.shape[1])] = 1.0
-        result[part] = solver.solve_free(loads)[place].T
+        result[part] = solve(loads)[place].T
         progress("compliance columns", 0.5 * bool(first) + (1 - 0.5 * bool(first)) * part.stop / k)
     result[:first, first:] = result[first:, :first].T
     _symmetrise(result[first:, first:])
@@ -96,29 +102,18 @@ def condense(
     return Compliance(nodes, result)
 
 
-def _condense_first(
-    mesh: TetMesh,
-    poisson_ratio: float,
-    modulus_ratio: np.ndarray | None,
-    free: np.ndarray,
-    place: np.ndarray,
-    first: int,
-    result: np.ndarray,
-    progress: Progress,
-) -> None:
-    """Fill result[:first, :first] by the Schur complement on the unknowns place[:first] and its inverse.
+def _condense_first(matrix: sp.csr_matrix, place: np.ndarray, result: np.ndarray, progress: Progress) -> None:
+    """Fill the first block of the result by the Schur complement on the unknowns `place` and its inverse.
 
     The complement is written to the front of the result's own memory, packed; the library holds another
     copy until it is freed.
     """
-    full = stiffness(mesh, poisson_ratio, modulus_ratio)
-    matrix = full[free][:, free].tocsr()
-    del full
     progress("static condensation", 0.05)
+    first = len(place)
     packed = result.reshape(-1)[: first * first].reshape(first, first)
     packed[:] = 0.0
     try:
-        pardiso.Pardiso(matrix, schur=place[:first], out=packed).free()
+        pardiso.Pardiso(matrix, schur=place, out=packed).free()
     except ArithmeticError as error:
         raise MeshError(f"the stiffness cannot be condensed ({error}): is every part held?") from error
     progress("dense inverse", 0.3)
