@@ -7,7 +7,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from mechanics.options import option
 from mechanics.recording import Recording
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval, runs
+from reconstruct.delay import force_delay
 from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
 from reconstruct.presses import Contact, Signals, fitted_contact, paper_contact
 from reconstruct.tool_weight import tool_weight
@@ -23,6 +24,7 @@ from reconstruct.tool_weight import tool_weight
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW, _HIGH, _PEAK = 5.0, 10.0, 12.0  # in standard deviations of the noise
+_DELAY_ROUNDS = 4
 
 
 @dataclass(frozen=True)
@@ -43,22 +45,27 @@ class ContactOptions:
     )
     least_duration_s: float = option(0.05, "a press must last so long", unit="s")
     least_palpations: int = option(4, "fewer usable presses are an error", flag="--least-palpations")
+    correct_delay: bool = option(
+        True, "shift a force that reads late (first against last touch); never in the paper's mode",
+        flag="--correct-delay",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True)
 class Exploration:
     """Everything read off a recording before any shape: both phases, filtered signals, noise.
 
-    position, force: (n, 3) low-passed, force on the tool with the free-air force taken off. free_air:
-    (n, 3) N.
-    noise_n: standard deviation of the raw force an axis. rejected: (t, reason) of contacts not used.
-    threshold_n:
-    tau. method: 'noise' or 'paper'.
+    position, force: (n, 3) low-passed, force on the tool with the free-air force taken off. raw_force: (n, 3)
+    N, the same without the low-pass. free_air: (n, 3) N. noise_n: standard deviation of the raw force an
+    axis. rejected: (t, reason) of contacts not used. threshold_n: tau. method: 'noise' or 'paper'. delay_s:
+    how late the recording's force reads; force, raw_force and free_air are shifted earlier by so much.
+    delay_error_s: its standard error.
     """
 
     recording: Recording
     position: np.ndarray
     force: np.ndarray
+    raw_force: np.ndarray
     free_air: np.ndarray
     noise_n: float
     boundary: Boundary
@@ -66,6 +73,8 @@ class Exploration:
     rejected: tuple[tuple[float, str], ...]
     threshold_n: float
     method: str
+    delay_s: float = 0.0
+    delay_error_s: float = 0.0
 
     @property
     def points(self) -> np.ndarray:
@@ -100,7 +109,52 @@ def explore(
         raise OptionError(
             f"--contact-threshold is {options.contact_threshold_n} N; it must be greater than 0"
         )
-    signals, free_air, spread = _signals(recording, (filter_options or FilterOptions()).cutoff_hz)
+    cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
+    given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary)
+    found, signals = _explored(recording, given)
+    if method == "paper" or not options.correct_delay:
+        return found
+    delay = 0.0
+    for _ in range(_DELAY_ROUNDS):
+        step = force_delay(signals, found.contacts)
+        if not step.certain:
+            break
+        delay += round(step.seconds * recording.sample_rate_hz) / recording.sample_rate_hz
+        found, signals = _explored(read_earlier(recording, delay), given)
+    return _with_delay(found, recording, delay, step.error_s) if delay else found
+
+
+@dataclass(frozen=True)
+class _Given:
+    method: str
+    contact: ContactOptions
+    boundary: BoundaryOptions
+    cutoff_hz: float
+    known_base: Boundary | None
+
+
+def read_earlier(recording: Recording, delay_s: float) -> Recording:
+    """The recording with its force shifted earlier by `delay_s`, to whole samples; the ends are repeated."""
+    rows = np.arange(len(recording.t)) + round(delay_s * recording.sample_rate_hz)
+    return replace(recording, force_on_tool=recording.force_on_tool[np.clip(rows, 0, len(rows) - 1)])
+
+
+def _with_delay(found: Exploration, recording: Recording, delay_s: float, error_s: float) -> Exploration:
+    """As found on the shifted force; first touches carry what the delay's error moves them by."""
+    half = round(0.015 * recording.sample_rate_hz)
+    contacts = []
+    for c in found.contacts:
+        path = found.position[max(c.start - half, 0) : c.start + half] @ c.normal
+        moved = error_s * np.ptp(path) / max(len(path) - 1, 1) * recording.sample_rate_hz
+        contacts.append(replace(c, onset_error_m=float(np.hypot(c.onset_error_m, moved))))
+    return replace(
+        found, recording=recording, contacts=tuple(contacts), delay_s=delay_s, delay_error_s=error_s
+    )
+
+
+def _explored(recording: Recording, given: _Given) -> tuple[Exploration, Signals]:
+    method, options, boundary = given.method, given.contact, given.known_base
+    signals, free_air, spread = _signals(recording, given.cutoff_hz)
     magnitude = signals.magnitude
     low = _LOW * spread
     high = options.contact_threshold_n or (PAPER_THRESHOLD_N if method == "paper" else _HIGH * spread)
@@ -114,16 +168,14 @@ def explore(
     if boundary is None:
         radius = recording.tip_radius_m
         interval = find_interval(recording.t, signals.position, touching, recording.boundary_phase, radius)
-        boundary = find_boundary(
-            signals.position, signals.force, touching, interval, radius, boundary_options or BoundaryOptions()
-        )
+        boundary = find_boundary(signals.position, signals.force, touching, interval, radius, given.boundary)
         start = interval[1]
     touching[:start] = False
     least_peak = options.least_peak_n or (high if method == "paper" else _PEAK * signals.noise_n)
     contacts: list[Contact] = []
     rejected: list[tuple[float, str]] = []
-    found = runs(touching)
-    for a, b in found:
+    touches = runs(touching)
+    for a, b in touches:
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
@@ -137,13 +189,14 @@ def explore(
         why = f" (the first not used, at {rejected[0][0]:.1f} s, {rejected[0][1]})" if rejected else ""
         hint = "lower --contact-threshold or press harder" if method == "paper" else "press at more places"
         raise ContactError(
-            f"{len(contacts)} usable palpations among {len(found)} contacts of phase II{why}; at least "
+            f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    return Exploration(
+    found = Exploration(
         recording=recording,
         position=signals.position,
         force=signals.force,
+        raw_force=signals.raw_force,
         free_air=free_air,
         noise_n=signals.noise_n,
         boundary=boundary,
@@ -152,6 +205,7 @@ def explore(
         threshold_n=high,
         method=method,
     )
+    return found, signals
 
 
 def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, float]:

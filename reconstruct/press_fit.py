@@ -63,7 +63,6 @@ def press_data(exploration: Exploration) -> PressData:
     """Block means (4 ms) of every press from 30 ms before first touch to loss of touch, free-air force
     off."""
     recording = exploration.recording
-    force = recording.force_on_tool - exploration.free_air
     block = max(1, round(_BLOCK_S * recording.sample_rate_hz))
     lead = int(_LEAD_S * recording.sample_rate_hz)
     moved, pushed, starts = [], [], [0]
@@ -75,7 +74,7 @@ def press_data(exploration: Exploration) -> PressData:
         size = min(block, b - a)
         part = slice(a, a + rows * size)
         moved.append(recording.position[part].reshape(rows, size, 3).mean(axis=1) - contact.centre)
-        pushed.append(force[part].reshape(rows, size, 3).mean(axis=1))
+        pushed.append(exploration.raw_force[part].reshape(rows, size, 3).mean(axis=1))
         starts.append(starts[-1] + rows)
     prior = np.array([2 * max(c.onset_error_m, 2e-5) for c in exploration.contacts])
     return PressData(

@@ -85,6 +85,8 @@ def explore_cylinder(
     without_phase: bool = False,
     tool_mass_kg: float = 0.0,
     lift: bool = False,
+    unlike_speeds: bool = False,
+    adhesion_n: float = 0.0,
     seed: int = 0,
 ) -> tuple[Recording, np.ndarray]:
     """(recording, times of first touch)."""
@@ -120,19 +122,24 @@ def explore_cylinder(
     presses = [(p, n, depth * (0.7 + 0.3 * random.random())) for p, n in zip(points, normals, strict=True)]
     if support_press:
         presses.insert(3, (np.array([0.09, 0.02, 0.0]), np.array([0, 0, 1.0]), 0.0005))
-    for point, normal, deep in presses:
+    for number, (point, normal, deep) in enumerate(presses):
         start = point + (TIP + 0.02) * normal
         away = here + np.array([0, 0, 0.05])
         over = np.array([*(1.8 * start[:2]), HEIGHT + 0.05])
         for a, b in ((here, away), (away, over), (over, start)):
             add(a + smooth(250)[:, None] * (b - a))
-        travel = np.concatenate([smooth(500), np.ones(200), 1 - smooth(400)]) * (0.02 + deep)
+        slow = 1.0 + 0.25 * (number % 7) if unlike_speeds else 1.0
+        down, up = smooth(round(500 * slow)), 1 - smooth(round(400 * slow))
+        travel = np.concatenate([down, np.ones(200), up]) * (0.02 + deep)
         side = np.cross(normal, [0.3, 0.5, 0.8])
         path = start - travel[:, None] * (normal + 0.08 * side)
         inside = travel - 0.02
         push = hertz_with_give(np.maximum(inside, 0), modulus, give)
         if point[2] == 0:
             push = np.maximum(inside, 0) * 4000
+        if adhesion_n:
+            held = (np.arange(len(inside)) > len(down)) & (inside > -0.0015) & (inside < 0.001)
+            push -= adhesion_n * held * np.minimum(1, (inside + 0.0015) / 0.001)
         onsets.append((count() + int(np.argmax(inside > 0))) / RATE)
         add(path, push[:, None] * normal)
         here = path[-1]

@@ -61,7 +61,9 @@ def exploration(
     )
     recording = Recording(np.arange(len(force)) / 1000, position, force, 1000.0, TIP, poisson_ratio=NU)
     zero = np.zeros_like(force)
-    return Exploration(recording, position, force, zero, noise, None, tuple(contacts), (), 0.1, "noise")
+    return Exploration(
+        recording, position, force, force, zero, noise, None, tuple(contacts), (), 0.1, "noise"
+    )
 
 
 def test_modulus_law_and_onset_are_recovered(block):

@@ -40,7 +40,9 @@ def pressed(deep: float = 0.011) -> Exploration:
         )  # fmt: skip
     position, force = np.vstack(positions), np.vstack(forces)
     recording = Recording(np.arange(len(force)) / 1000, position, force, 1000.0, 0.005)
-    return Exploration(recording, position, force, 0 * force, 0.012, None, tuple(contacts), (), 1.0, "paper")
+    return Exploration(
+        recording, position, force, force, 0 * force, 0.012, None, tuple(contacts), (), 1.0, "paper"
+    )
 
 
 def test_the_global_and_every_single_modulus_are_recovered():

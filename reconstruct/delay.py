@@ -1,0 +1,94 @@
+"""How late the force reads, from first touch and loss of touch together.
+
+A force that reads tau late moves first touch deeper by tau times the speed of approach, and loss of touch
+further out by tau times the speed of withdrawal. Their difference, over presses of unlike speed, gives tau;
+what does not depend on the speed (adhesion, relaxation, backlash) is a constant beside it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from reconstruct.onset import fit_rise
+from reconstruct.presses import Contact, Signals
+
+_TAIL_S = 0.15
+_AWAY_M = 0.004
+_SPEED_S = 0.03
+_FIT_SAMPLES = 120
+_SIDEWAYS_M = 0.001
+_LEAST_PRESSES = 8
+_CERTAIN = 5.0
+_LEAST_S = 0.003
+
+
+@dataclass(frozen=True)
+class Delay:
+    """seconds: how late the force reads (negative: early). error_s: its standard error. presses: used."""
+
+    seconds: float
+    error_s: float
+    presses: int
+
+    @property
+    def certain(self) -> bool:
+        """Whether it is beyond five standard errors and 3 ms: less moves first touch within its own error."""
+        return abs(self.seconds) > max(_CERTAIN * self.error_s, _LEAST_S)
+
+
+def force_delay(signals: Signals, contacts: Sequence[Contact]) -> Delay:
+    """How late the force reads; zero with an infinite error where fewer than 8 presses can tell.
+
+    Presses that end over 1 mm beside their first touch are left out: a dragged surface lets go elsewhere.
+    """
+    rows = [row for c in contacts if (row := _gap_and_speed(signals, c)) is not None]
+    if len(rows) < _LEAST_PRESSES:
+        return Delay(0.0, np.inf, len(rows))
+    gap, error, speed = np.array(rows).T
+    system = np.column_stack([np.ones_like(speed), speed])
+    least = max(float(np.median(error)), 1e-5)
+    weight = np.ones_like(gap)
+    for _ in range(20):
+        right = weight / np.maximum(error, least) ** 2
+        normal = (system * right[:, None]).T @ system
+        constant, seconds = np.linalg.solve(normal, (system * right[:, None]).T @ gap)
+        rest = gap - constant - seconds * speed
+        scatter = max(1.4826 * float(np.median(np.abs(rest))), least)
+        weight = np.clip(1 - (rest / (4.7 * scatter)) ** 2, 0, None) ** 2
+    spread = np.linalg.inv((system * weight[:, None]).T @ system)[1, 1]
+    return Delay(float(seconds), float(scatter * np.sqrt(spread)), len(rows))
+
+
+def _gap_and_speed(signals: Signals, contact: Contact) -> tuple[float, float, float] | None:
+    """Depth of first touch less that of loss of touch, its error (m), and both speeds' sum (m/s)."""
+    rate, normal = signals.recording.sample_rate_hz, contact.normal
+    until = min(len(signals.position), contact.end + int(_TAIL_S * rate))
+    moved = signals.position[contact.peak : until] - contact.centre
+    travel = -moved @ normal
+    push = signals.raw_force[contact.peak : until] @ normal
+    first = int(np.flatnonzero(travel >= 0.9 * travel.max())[-1])
+    away = np.flatnonzero(travel[first:] < -_AWAY_M)
+    part = slice(first, first + int(away[0]) if len(away) else None)
+    moved, travel, push = moved[part], travel[part], push[part]
+    block = max(1, len(travel) // _FIT_SAMPLES)
+    count = len(travel) // block
+    if count < 10:
+        return None
+    rise = fit_rise(
+        travel[: count * block].reshape(count, block).mean(axis=1),
+        push[: count * block].reshape(count, block).mean(axis=1),
+        signals.noise_n / np.sqrt(block),
+        guess_m=0.0,
+    )
+    lost = int(np.argmin(np.abs(travel - rise.u0_m)))
+    beside = float(np.linalg.norm(moved[lost] + travel[lost] * normal))
+    half = int(_SPEED_S * rate / 2)
+    approach = -(signals.position[max(contact.start - half, 0) : contact.start + half]) @ normal
+    withdrawal = travel[max(lost - half, 0) : lost + half]
+    speeds = [np.ptp(x) * rate / max(len(x) - 1, 1) for x in (approach, withdrawal)]
+    if beside > _SIDEWAYS_M or min(speeds) <= 0:
+        return None
+    return -rise.u0_m, float(np.hypot(rise.u0_error_m, contact.onset_error_m)), sum(speeds)

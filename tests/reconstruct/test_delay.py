@@ -1,0 +1,47 @@
+"""A force that reads late: found, corrected, and never seen where the force is on time."""
+
+import numpy as np
+import pytest
+from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
+
+from reconstruct.contacts import ContactOptions, explore, read_earlier
+
+
+@pytest.fixture(scope="module")
+def on_time():
+    return explore_cylinder(unlike_speeds=True)[0]
+
+
+def shift_of_first_touch(exploration) -> float:
+    """Median distance (m) by which the tip's centres lie nearer than its radius: first touch found late."""
+    q = TILTED.object(np.array([c.centre for c in exploration.contacts]))
+    q = np.column_stack([np.hypot(q[:, 0], q[:, 1]) - RADIUS, q[:, 2] - HEIGHT])
+    return float(np.median(TIP - q.max(axis=1)))
+
+
+@pytest.mark.parametrize("delay", [0.02, 0.008, -0.01])
+def test_a_delay_is_found_and_first_touch_comes_out_right(on_time, delay):
+    late = read_earlier(on_time, -delay)
+    exploration = explore(late)
+    assert exploration.delay_s == pytest.approx(delay, abs=max(4 * exploration.delay_error_s, 0.001))
+    assert exploration.delay_error_s < 0.002
+    assert abs(shift_of_first_touch(exploration)) < 1e-4
+    left = explore(late, contact_options=ContactOptions(correct_delay=False))
+    assert left.delay_s == 0 and abs(shift_of_first_touch(left)) > 2 * abs(shift_of_first_touch(exploration))
+    assert exploration.recording is late
+
+
+def test_a_force_on_time_is_left_alone(on_time):
+    exploration = explore(on_time)
+    assert exploration.delay_s == 0 and exploration.delay_error_s == 0
+
+
+def test_adhesion_which_delays_the_loss_of_touch_at_any_speed_is_no_delay():
+    exploration = explore(explore_cylinder(unlike_speeds=True, adhesion_n=0.1)[0])
+    assert exploration.delay_s == 0
+
+
+def test_the_papers_mode_takes_the_force_as_it_is(on_time):
+    options = ContactOptions(contact_threshold_n=0.3)
+    late = read_earlier(on_time, -0.02)
+    assert explore(late, method="paper", contact_options=options).delay_s == 0
