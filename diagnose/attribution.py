@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import dataclasses
+import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,6 +14,7 @@ import numpy as np
 from diagnose.effects.base import Effect
 from diagnose.fit import Descent, Fit, first_touches, fit, held_out, levelled, settings_of
 from diagnose.forward import Forward
+from diagnose.solved_again import solve_inclusion
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.options import option
 from mechanics.progress import Progress, silent
@@ -32,8 +34,14 @@ SPATIAL = (
 )
 """Effects that differ from site to site rather than within a press."""
 
+ANEW = 0.8
+"""A fit from unmoved first touches replaces the usual one where its loss is this much less."""
+
 REEXAMINED = 4
 """The strongest effects of a step that are weighed once more before they are turned down."""
+
+IN_TIME = ("time_delay", "viscoelasticity", "backlash", "adhesion", "mullins_softening")
+"""Effects that are also tried two at a time where none helps alone."""
 
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
@@ -184,12 +192,19 @@ class Search:
 
     def _best(self, order: list[Effect], starts: list[np.ndarray], onset: np.ndarray) -> Fit:
         descent = Descent(self.forward, self.whitener, tuple(order), None)
+
+        def best(onset: np.ndarray, most: int) -> Fit:
+            scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
+            return min(
+                (descent.run(starts[i], onset, 12) for i in np.argsort(scored)[:most]), key=lambda f: f.loss
+            )
+
+        found = best(onset, 3)
         # first touches that an earlier fit moved to make up for what it lacked may hold a better one back
-        begin = [(s, o) for s in starts for o in (onset, np.zeros_like(onset))]
-        if len(begin) > 3:
-            scored = [descent.loss(s, descent.residual(s, o), o) for s, o in begin]
-            begin = [begin[i] for i in np.argsort(scored)[:3]]
-        return min((descent.run(s, o, 12) for s, o in begin), key=lambda f: f.loss)
+        if found.loss > self.options.unknown_chi * self.dof / 2:
+            anew = best(np.zeros_like(onset), 2)
+            found = anew if anew.loss < ANEW * found.loss else found
+        return found
 
     def score(self, name: str, new: Candidate, old: Candidate) -> Score:
         """Compare two candidates."""
@@ -217,6 +232,9 @@ class Search:
         """Whether a score names its effect; one beside another must close a fair share of what is left."""
         o = self.options
         if score.size_n < o.size_n:
+            return False
+        if score.name == "surface_offset" and not first:
+            # a delay or a play has already moved the first touches that the surface was fitted to
             return False
         if score.name == "inclusion":
             return score.gain > o.spatial_gain and score.share > -0.3 and score.toward > o.toward
@@ -255,6 +273,12 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
         if not passing:
+            pair = None if step + 2 > search.options.most else _paired(search, library, current)
+            if pair is None:
+                break
+            chosen += [n for n in pair.found.names if n not in current.found.names]
+            search.renew(pair.found)
+            current, strain_gain = _with_strain(search, pair.found.effects)
             break
         best = max(passing, key=lambda s: s.gain)
         chosen.append(best.name)
@@ -262,6 +286,8 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
     picked = list(zip(steps, chosen, strict=False))
     current, chosen = _without_idle(search, chosen, current)
+    if "inclusion" in chosen:
+        current = _solved_again(search, current)
     rivals = _rivals(search, picked, chosen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
@@ -276,6 +302,34 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         tuple(name for _, name in picked),
         float(strain_gain),
     )
+
+
+def _paired(search: Search, library: Sequence[Effect], current: Candidate) -> Candidate | None:
+    """Two effects in time that close the gap only together: memory and delay bend loops opposite ways."""
+    if current.chi < search.options.unknown_chi:
+        return None
+    able = [e for e in library if e.name in IN_TIME and e.name not in current.found.names]
+    found = []
+    for one, two in itertools.combinations(able, 2):
+        candidate = search.judge([*current.found.effects, one, two], like=current)
+        score = search.score(f"{one.name}+{two.name}", candidate, current)
+        if candidate.chi < 0.5 * current.chi and score.gain > 2 * search.options.gain and score.share > 0:
+            found.append(candidate)
+    return min(found, key=lambda c: c.found.loss, default=None)
+
+
+def _solved_again(search: Search, current: Candidate) -> Candidate:
+    """The set with its lump solved anew; as it was where that fits worse."""
+    first = current
+    for _ in range(2):
+        solve_inclusion(search.forward, current.found.of("inclusion"))
+        search.renew(current.found)
+        current = search.judge(current.found.effects, like=current)
+    if current.found.loss < first.found.loss + search.options.plain_gain:
+        return current
+    del search.forward.stages["inclusion_scale"]
+    search.renew(first.found)
+    return first
 
 
 def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
@@ -306,7 +360,8 @@ def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tupl
         if len(chosen) < 2:
             break
         without = search.judge([e for e in current.found.effects if e.name != name])
-        if not search.passes(search.score(name, current, without), first=False):
+        score = search.score(name, current, without)
+        if score.gain < search.options.strong_gain * current.chi and not search.passes(score, first=False):
             chosen.remove(name)
             current = without
     return current, chosen

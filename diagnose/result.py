@@ -15,10 +15,10 @@ from diagnose.where import Where
 
 _SENTENCES = {
     "none": "the gap is noise; no effect is missing",
-    "effect": "{effects} explains the gap",
-    "ambiguous": "{effects} explains the gap best, but these touches cannot rule out {candidates}",
+    "effect": "{effects} {explain} the gap",
+    "ambiguous": "{effects} {explain} the gap best, but these touches cannot rule out {candidates}",
     "unknown": "there is a gap, and no effect known here explains it",
-    "effect+unknown": "{effects} explains part of the gap; something unknown remains",
+    "effect+unknown": "{effects} {explain} part of the gap; something unknown remains",
 }
 
 
@@ -98,7 +98,9 @@ class Diagnosis:
     def summary(self) -> str:
         """The verdict in one sentence."""
         return _SENTENCES[self.kind].format(
-            effects=_listed(self.effects), candidates=_listed(self.candidates)
+            effects=_listed(self.effects),
+            candidates=_listed(self.candidates),
+            explain="explains" if len(self.effects) == 1 else "explain",
         )
 
     def words(self) -> list[str]:

@@ -23,13 +23,18 @@ def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float)
     return 1 / (1 + np.exp(np.clip((distance - radius) / (0.35 * blur), -40, 40)))
 
 
-def _change(settings, values, forward):  # type: ignore[no-untyped-def]
+def first_order(values, forward):  # type: ignore[no-untyped-def]
+    """(p, 3, 3) 1/m, change of each press's give, unit modulus, to first order in the ball's own energy."""
     fields = energy_fields(forward)
     blur = float(np.cbrt(np.median(fields.volume))) * 1.5
     share = inside(fields.centroid, values[:3], values[3], blur)
-    settings.far = (
-        settings.far + far_with_weights(forward, 1 + share * (softness(np.exp(values[4])) - 1)) - forward.far
-    )
+    return far_with_weights(forward, 1 + share * (softness(np.exp(values[4])) - 1)) - forward.far
+
+
+def _change(settings, values, forward):  # type: ignore[no-untyped-def]
+    change = first_order(values, forward)
+    scale = forward.stages.get("inclusion_scale")
+    settings.far = settings.far + (change if scale is None else change * scale[:, None, None])
 
 
 def _starts(forward):  # type: ignore[no-untyped-def]

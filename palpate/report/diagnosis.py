@@ -26,32 +26,46 @@ AXIS_WORDS = {
 }
 
 
+ERROR_WORDS = {
+    "sensor": "noise of the force sensor",
+    "repeatability": "repeats at one place",
+    "shape": "shape where nobody touched",
+    "model": "everything that the final model leaves",
+}
+
+
 def write_report(path: Path | str, recording: Recording, model: Model, result: Diagnosis) -> Path:
     """Write one self-contained HTML page; returns its path."""
     page = Page(f"Where simulation and reality part: {recording.name}")
     page.lead(result.summary[0].upper() + result.summary[1:] + ".")
-    page.paragraph(_how_far(result))
+    page.paragraph(f"Where: {_where(result)}")
+    page.paragraph(f"Which: {_which(result)}")
+    page.paragraph(f"How far: {_how_far(result)}")
     page.figure(first_picture(model, result), _caption(result))
-    page.heading("Which effect")
+    page.heading("The effects that were tried")
+    page.paragraph(
+        "Each effect was added alone to the model (with finite strain in it where that fits better) and the "
+        "gap measured on places that the fit had not seen. Best first."
+    )
     page.table(
-        ["effect", "what it means", "probability", "gap with it alone (N)", "closed", "parameters"],
+        ["effect", "what it means", "probability", "gap left (mN)", "share closed", "parameters"],
         [
             [
-                e.name,
+                e.name.replace("_", " "),
                 effect(e.name).words,
                 f"{e.probability:.2f}",
-                f"{e.gap_after_n:.4f}",
-                "-" if e.gap_closed is None else f"{e.gap_closed:.0%}",
-                _short(e.parameters),
+                f"{e.gap_after_n * 1e3:.0f}",
+                _share(e.gap_closed),
+                _short(e.parameters) if e.probability > 0.01 else "",
             ]
             for e in result.entries[:8]
         ],
     )
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
-    page.heading("Where")
+    page.heading("What the gap follows")
     page.table(
-        ["the gap follows", "share of it", "p (family-wise)"],
+        ["the gap follows", "share of it", "chance (family-wise p)"],
         [[AXIS_WORDS[a.axis], f"{a.share:.0%}", f"{a.p:.2g}"] for a in result.where.axes],
     )
     page.figure(
@@ -59,15 +73,19 @@ def write_report(path: Path | str, recording: Recording, model: Model, result: D
         "The presses with the largest gap: measured, ideal model, model with the effect.",
     )
     page.heading("Our own errors")
-    page.table(["source", "N rms"], [[k, f"{v:.4f}"] for k, v in result.errors_n.items()])
+    page.paragraph(
+        "What the comparison itself gets wrong, as rms force over the contact samples. A gap below these is "
+        "no evidence of anything."
+    )
+    page.table(["source", "mN rms"], [[ERROR_WORDS[k], f"{v * 1e3:.1f}"] for k, v in result.errors_n.items()])
     if result.next_touch is not None:
         touch = result.next_touch
-        page.heading("Next touch")
+        page.heading("The touch that would tell most")
         page.paragraph(
             f"To tell {' from '.join(n.replace('_', ' ') for n in touch.separates)}: press at "
-            f"({touch.x * 1e3:.0f}, {touch.y * 1e3:.0f}, {touch.z * 1e3:.0f}) mm, "
-            f"{touch.depth_m * 1e3:.1f} mm deep at "
-            f"{touch.speed_m_per_s * 1e3:.0f} mm/s, hold {touch.hold_s:.1f} s ({touch.why})."
+            f"({touch.x * 1e3:.0f}, {touch.y * 1e3:.0f}, {touch.z * 1e3:.0f}) mm along "
+            f"({', '.join(f'{d:.2f}' for d in touch.direction)}), {touch.depth_m * 1e3:.1f} mm deep at "
+            f"{touch.speed_m_per_s * 1e3:.0f} mm/s, and hold {touch.hold_s:.1f} s: {touch.why}."
         )
     if result.confusable:
         page.paragraph(
@@ -78,29 +96,69 @@ def write_report(path: Path | str, recording: Recording, model: Model, result: D
             + "."
         )
     if result.left_out:
-        page.paragraph(f"The fast setting left out: {', '.join(result.left_out)}.")
+        page.paragraph(
+            f"The fast setting left out: {', '.join(n.replace('_', ' ') for n in result.left_out)}."
+        )
     return page.write(path)
+
+
+def _where(result: Diagnosis) -> str:
+    axis = result.where.leading
+    x, y, z, rms = result.where.worst[0]
+    return (
+        f"the gap follows {AXIS_WORDS[axis.axis]} most ({axis.share:.0%} of it). It is largest at "
+        f"({x * 1e3:.0f}, {y * 1e3:.0f}, {z * 1e3:.0f}) mm: {rms * 1e3:.0f} mN there."
+    )
+
+
+def _which(result: Diagnosis) -> str:
+    if not result.effects:
+        words = "no effect. " + (
+            "What is left is no larger than noise, first touch and shape explain."
+            if result.kind == "none"
+            else "There is a gap, but nothing that this program knows explains it."
+        )
+        return words
+    parts = []
+    parameters = {e.name: e.parameters for e in result.entries}
+    for name in result.effects:
+        keys = _short(parameters.get(name, {}))
+        parts.append(f"{name.replace('_', ' ')} ({effect(name).words}{'; ' + keys if keys else ''})")
+    words = "; ".join(parts) + "."
+    if result.candidates:
+        also = ", ".join(n.replace("_", " ") for n in result.candidates)
+        words += f" These touches cannot rule out: {also}."
+    if "unknown" in result.kind:
+        words += " Something that this program does not know remains."
+    return words
 
 
 def _how_far(result: Diagnosis) -> str:
     text = (
-        f"The ideal model (modulus refitted) misses the measured force by {result.gap_before_n * 1e3:.0f} mN "
+        f"the ideal model (modulus refitted) misses the measured force by {result.gap_before_n * 1e3:.0f} mN "
         f"rms on places that it was not fitted to; the sensor's noise is {result.noise_n * 1e3:.0f} mN."
     )
     if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
         low, high = result.gap_closed_ci95
         text += (
-            f" With the effect it misses by {result.gap_after_n * 1e3:.0f} mN: {result.gap_closed:.0%} of "
-            f"what exceeds the noise is closed (95 % interval {low:.0%} to {high:.0%})."
+            f" With what was found it misses by {result.gap_after_n * 1e3:.0f} mN: {result.gap_closed:.0%} "
+            f"of what exceeds the noise is closed (95 % interval {low:.0%} to {high:.0%})."
         )
     return text
+
+
+def _share(value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.0%}" if value >= 0 else "none (worse)"
 
 
 def _caption(result: Diagnosis) -> str:
     axis = result.where.leading
     return (
-        "Left: the gap at each place that was pressed. Middle: the mean gap along depth and speed. "
-        f"It follows {AXIS_WORDS[axis.axis]} most. Right: how much of the gap each effect alone closes."
+        "Left: the gap at each place that was pressed. Middle: the mean gap along depth and along speed "
+        f"(pressing positive, leaving negative); it follows {AXIS_WORDS[axis.axis]} most. Right: how much of "
+        "the gap each effect alone closes."
     )
 
 
@@ -111,20 +169,16 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
     figure = Figure(figsize=(13, 4.2), layout="constrained")
     left, middle, right = figure.subplots(1, 3, width_ratios=[1.25, 1, 1])
     _object(left, model, result)
-    x, mean, error = result.where.curves["speed of pressing (mm/s)"]
-    d, dmean, derror = result.where.curves["depth (mm)"]
-    middle.errorbar(d, dmean * 1e3, derror * 1e3, marker="o", color="#1d3557", label="against depth (mm)")
-    fastest = max(float(np.abs(x).max()), 1e-9)
-    label = f"against speed (full scale {fastest:.0f} mm/s)"
-    scaled = x / fastest * d.max()
-    middle.errorbar(scaled, mean * 1e3, error * 1e3, marker="s", color="#e76f51", label=label)
+    d, mean, error = result.where.curves["depth (mm)"]
+    middle.errorbar(d, mean * 1e3, error * 1e3, marker="o", color="#1d3557", label="along depth (lower axis)")
     middle.axhline(0, color="#999999", lw=0.8)
-    middle.set(
-        xlabel="depth (mm), or speed scaled",
-        ylabel="measured - ideal (mN)",
-        title="the gap along depth and speed",
-    )
-    middle.legend(fontsize=8, frameon=False)
+    middle.set(xlabel="depth (mm)", ylabel="measured - ideal (mN)", title="the gap along depth and speed")
+    upper = middle.twiny()
+    v, mean, error = result.where.curves["speed of pressing (mm/s)"]
+    upper.errorbar(v, mean * 1e3, error * 1e3, marker="s", color="#e76f51", label="along speed (upper axis)")
+    upper.set_xlabel("speed of pressing (mm/s)", color="#e76f51")
+    handles = [ax.get_legend_handles_labels() for ax in (middle, upper)]
+    middle.legend(*(a + b for a, b in zip(*handles, strict=True)), fontsize=8, frameon=False)
     entries = [e for e in result.entries if e.gap_closed is not None][:7]
     colours = ["#2a9d8f" if e.name in result.effects else "#c9c9c9" for e in entries]
     values = [float(np.clip(e.gap_closed or 0.0, -0.5, 1.0)) for e in entries]

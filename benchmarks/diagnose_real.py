@@ -1,0 +1,90 @@
+"""Diagnosis on measured tissue: indentations of meat, a ramp and a hold, from a folder that is not shipped.
+
+The set: github.com/SarahIaquinta/perineal_indentation (GPL-3.0), converted to CSVs with the columns t_s,
+force_N, indent_mm, tool_gap_mm at 10 Hz. Every piece is another animal's, so each force is scaled to 1 N at
+3 mm of its ramp, and the pieces become places on one slab. The indenter's shape is not stated; a sphere of
+5 mm is taken. What can be judged: whether the hold's decay is called viscoelasticity, and what its terms are.
+"""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.box_mesh import box_mesh
+from mechanics.errors import RecordingError
+from mechanics.model import Model
+from mechanics.palpation import Palpation
+from mechanics.recording import Recording
+
+SUMMARY = "diagnosis of measured meat indentations (ramp and hold)"
+RADIUS_M = 0.005
+SPACING_M = 0.05
+FREE_S = 1.0
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Folder, session, how many pieces."""
+    parser.add_argument("--data", required=True, help="folder with the CSVs of the pieces")
+    parser.add_argument("--session", default="230331", help="the pieces whose names begin so")
+    parser.add_argument("--pieces", type=int, default=16, help="at most so many")
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Diagnose the pieces as one recording and print the verdict."""
+    from diagnose.pipeline import DiagnoseOptions, diagnose
+    from diagnose.whiten import NuisanceOptions
+
+    pieces = sorted(Path(arguments.data).glob(f"{arguments.session}_[RF]*.csv"))[: arguments.pieces]
+    if len(pieces) < 6:
+        raise RecordingError(f"--data {arguments.data} holds {len(pieces)} pieces of session "
+                             f"{arguments.session}; at least 6 are needed")  # fmt: skip
+    recording, model = slab(pieces)
+    # pieces differ in thickness and grain: a tenth each
+    nuisance = NuisanceOptions(site_stiffness=0.1, onset_m=0.5e-3, law=0.1)
+    result = diagnose(recording, model, DiagnoseOptions(fast=True), nuisance=nuisance)
+    print(f"{len(pieces)} pieces")
+    print("\n".join(result.words()))
+    return {**result.as_json(), "pieces": len(pieces)}
+
+
+def slab(pieces: list[Path]) -> tuple[Recording, Model]:
+    """(recording, model): the pieces side by side on a slab as thick as they are in the median."""
+    tables = [np.loadtxt(p, delimiter=",", skiprows=1) for p in pieces]
+    height = float(np.median([t[0, 3] for t in tables])) * 1e-3
+    times, centres, forces, palpations = [], [], [], []
+    clock = 0.0
+    for k, table in enumerate(tables):
+        t, force, depth = table[:, 0], table[:, 1] - np.median(table[:4, 1]), table[:, 2] * 1e-3
+        force = force / np.interp(3e-3, depth[: depth.argmax()], force[: depth.argmax()])
+        x = (k - (len(tables) - 1) / 2) * SPACING_M
+        touched = np.flatnonzero(force > 0.02)[0]
+        surface = depth[touched]
+        peak = int(force.argmax())
+        lift = np.arange(0.1, FREE_S, 0.1)
+        times.append(clock + np.concatenate([t, t[-1] + lift]))
+        z = height + RADIUS_M - np.concatenate([depth - surface, np.full(len(lift), -5e-3)])
+        centres.append(np.column_stack([np.full_like(z, x), np.zeros_like(z), z]))
+        pressed = np.concatenate([force, np.zeros(len(lift))])
+        forces.append(np.column_stack([np.zeros_like(z), np.zeros_like(z), pressed]))
+        palpations.append(
+            Palpation(
+                clock + t[touched], clock + t[peak], x, 0.0, height, 0.0, 0.0, 1.0, depth[peak] - surface
+            )
+        )
+        clock += t[-1] + FREE_S
+    recording = Recording(
+        t=np.concatenate(times), position=np.concatenate(centres), force_on_tool=np.concatenate(forces),
+        sample_rate_hz=10.0, tip_radius_m=RADIUS_M, poisson_ratio=0.49, force_noise_std_n=0.005,
+        object_name="meat",
+    )  # fmt: skip
+    length = SPACING_M * (len(tables) + 1)
+    mesh = box_mesh((round(length / 0.01), 5, 2), (length, 0.05, height)).quadratic()
+    model = Model(
+        mesh=mesh, young_modulus_pa=2e4, poisson_ratio=0.49, tip_radius_m=RADIUS_M, mesh_size_m=0.01,
+        support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), palpations=tuple(palpations),
+    )  # fmt: skip
+    return recording, model
