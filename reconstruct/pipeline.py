@@ -27,7 +27,7 @@ from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
-from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
+from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface, shape_table
 from reconstruct.uniaxial import palpation_rows, profiles
 
 DEFAULT_POISSON_RATIO = 0.49
@@ -133,6 +133,9 @@ def reconstruct_fully(
     progress("1D models", 0.95)
     one_d = (fit_paper if paper else fit_robust)(profiles(exploration, where.normals))
     clock.lap("1D models")
+    tables = {"shape": shape_table(surface)}
+    if sites is not None:
+        tables["linear_range"] = linear_range(sites, recording.tip_radius_m).table()
     model = Model(
         mesh=mesh,
         young_modulus_pa=modulus,
@@ -144,8 +147,8 @@ def reconstruct_fully(
         support_normal=exploration.boundary.support_normal,
         shape_uncertainty_m=meshing.shape_uncertainty_m if paper else uncertainty_at(mesh, surface),
         palpations=palpation_rows(exploration, where.points, where.normals, one_d, each),
-        provenance=_provenance(recording, options, surface, fit),
-        extra={} if sites is None else {"linear_range": linear_range(sites, recording.tip_radius_m).table()},
+        provenance=_provenance(exploration, options, surface, fit),
+        extra=tables,
     )
     progress("done", 1.0)
     return Reconstruction(
@@ -192,8 +195,9 @@ def _known_base(recording: Recording) -> Any:
 
 
 def _provenance(
-    recording: Recording, options: ReconstructOptions, surface: Surface, fit: ModulusFit | None
+    exploration: Exploration, options: ReconstructOptions, surface: Surface, fit: ModulusFit | None
 ) -> dict[str, Any]:
+    recording = exploration.recording
     about = {
         "recording": recording.name,
         "recording_sha256": recording.sha256,
@@ -203,6 +207,8 @@ def _provenance(
         "surface_reason": surface.reason,
         "options": _plain(dataclasses.asdict(options)),
     }
+    if exploration.delay_s:
+        about |= {"force_delay_s": exploration.delay_s, "force_delay_sd_s": exploration.delay_error_s}
     if fit is not None:
         about |= {"dent_law": fit.press.law, "modulus_reason": fit.reason}
     return about

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -198,6 +198,30 @@ def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:
         {"implicit": error},
         bounds(evidence),
     )
+
+
+def shape_table(surface: Surface) -> dict[str, Any]:
+    """What a model keeps of its surface ([shape] in model.toml): method and reason, volumes, deviations.
+
+    sd_median_m, sd_p95_m, sd_greatest_m: of the standard deviation over the vertices above the base.
+    hull_volume_m3, tangent_volume_m3: bounds of a convex object. held_out_m: by shape tried. parameters: of
+    the shape, in the support's frame.
+    """
+    height = (surface.vertices - surface.support_point) @ surface.support_normal
+    deviation = surface.uncertainty_m[height > 1e-6]
+    low, high = surface.bracket_m3
+    bounds = {"hull_volume_m3": low, "tangent_volume_m3": high}
+    return {
+        "surface": surface.method,
+        "reason": surface.reason,
+        "volume_m3": surface.volume_m3,
+        **{name: value for name, value in bounds.items() if np.isfinite(value)},
+        "sd_median_m": float(np.median(deviation)),
+        "sd_p95_m": float(np.percentile(deviation, 95)),
+        "sd_greatest_m": float(deviation.max()),
+        "held_out_m": dict(surface.held_out_m),
+        "parameters": dict(surface.parameters),
+    }
 
 
 def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = silent) -> list[Explained]:

@@ -109,6 +109,11 @@ def _words(result: Reconstruction) -> list[str]:
     if result.modulus:
         misfit = float((result.modulus.press.rms_n**2).mean() ** 0.5)
         lines.append(f"  {result.modulus.reason}; misfit of a press {misfit:.3f} N")
+    if exploration.delay_s:
+        lines.append(
+            f"the force reads {exploration.delay_s * 1e3:.0f} +- {exploration.delay_error_s * 1e3:.1f} ms "
+            "late (first against last touch); corrected before everything else"
+        )
     lines += [
         f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
         f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
@@ -127,6 +132,8 @@ def _figures(result: Reconstruction) -> dict[str, Any]:
         "palpations": len(exploration.contacts),
         "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
         "noise_n": exploration.noise_n,
+        "force_delay_s": exploration.delay_s,
+        "force_delay_sd_s": exploration.delay_error_s,
         "surface": {
             "method": result.surface.method,
             "reason": result.surface.reason,
