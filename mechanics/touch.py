@@ -188,6 +188,14 @@ def site_frame(normal: np.ndarray) -> np.ndarray:
     return np.stack([u, v, normal])
 
 
+def site_frames(normals: np.ndarray) -> np.ndarray:
+    """(k, 3, 3) of `site_frame` for normals (k, 3)."""
+    helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
+    u = np.cross(helper, normals)
+    u /= np.linalg.norm(u, axis=1, keepdims=True)
+    return np.stack([u, np.cross(normals, u), normals], axis=1)
+
+
 def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]:
     """(E*, 8 G / (2 - nu)), Pa: what the kernels want."""
     nu = poisson_ratio
@@ -248,7 +256,7 @@ def touch_forces(
     radii = np.broadcast_to(effective_radius(tip_radius_m, np.asarray(curvature, dtype=float)), (count,))
     plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
     out = np.zeros_like(displacement)
-    frames = np.array([site_frame(n) for n in np.asarray(normals, dtype=float)]).reshape(count, 3, 3)
+    frames = site_frames(np.asarray(normals, dtype=float).reshape(count, 3))
     fars = np.ascontiguousarray(np.asarray(far, dtype=float) / young_modulus_pa)
     _touch_paths(
         displacement, starts, frames, fars, table, np.ascontiguousarray(radii), plane_strain, stick, out
