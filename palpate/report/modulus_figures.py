@@ -96,14 +96,15 @@ def undamped_figure(models: dict[str, Model]) -> Figure:
     return figure
 
 
-def spatial_figure(model: Model) -> Figure:
-    """Figure 5: k_V over the surface from the side and from above; k_V, k_H and e over height on the side."""
+def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None = None) -> Figure:
+    """Figure 5: k_V over the surface from the side and from above, and of another sample (else this) aslant;
+    k_V, k_H and e over height on the side."""
     figure, axes = plt.subplots(2, 3, figsize=(13, 7.6), layout="constrained")
-    field = over_surface(model, column(model, "k_v"))
-    points = np.array([p.point for p in model.palpations])
-    for ax, elevation, title in zip(axes[0], (8.0, 89.0, 30.0), ("side", "top", "oblique"), strict=True):
-        draw_object(ax, model, field, label="$k_V$ [N/m]", elevation_deg=elevation, touches=points)
-        ax.set_title(f"$k_V$, {title}", fontsize=10)
+    aslant = (*(other or (name, model)), 30.0, "aslant")
+    views = [(name, model, 8.0, "side"), (name, model, 89.0, "top"), aslant]
+    for ax, (called, shown, elevation, view) in zip(axes[0], views, strict=True):
+        _coloured(ax, shown, "k_v", 1.0, "$k_V$ [N/m]", elevation)
+        ax.set_title(f"{called} {view}".strip(), fontsize=10)
     trends = {t.name: t for t in height_trends(model)}
     side, height = on_side(model), heights(model) * 1e3
     for ax, name, label, factor in zip(
@@ -124,22 +125,37 @@ def spatial_figure(model: Model) -> Figure:
     return figure
 
 
-def moduli_figure(models: dict[str, Model], model: Model) -> Figure:
-    """Figure 6: (a) moduli of single presses, * the global one; (b) their distribution over the surface."""
-    figure, axes = plt.subplots(1, 2, figsize=(11, 4.4), layout="constrained")
+def _coloured(
+    ax: Axes,
+    model: Model,
+    name: str,
+    factor: float,
+    label: str,
+    elevation_deg: float,
+    share: float | None = None,
+) -> None:
+    """The object coloured by a column of its palpations; share: half the colours' range over the median."""
+    values = column(model, name) * factor
+    used = np.isfinite(values)
+    limits = None if share is None else tuple(np.nanmedian(values) * np.array([1 - share, 1 + share]))
+    draw_object(
+        ax, model, over_surface(model, values), label=label, limits=limits, elevation_deg=elevation_deg,
+        touches=np.array([p.point for p in model.palpations])[used],
+    )  # fmt: skip
+
+
+def moduli_figure(models: dict[str, Model]) -> Figure:
+    """Figure 6: (a) moduli of single presses, * the global one; (b) where they hold, on two samples."""
+    shown = list(models.items())[:2]
+    figure, axes = plt.subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4), layout="constrained")
     stars = [m.young_modulus_pa / 1e3 for m in models.values()]
     spread(axes[0], [column(m, "e_pa") / 1e3 for m in models.values()], list(models), stars)
     axes[0].set(ylabel="Young's modulus [kPa]", ylim=(0, None))
     axes[0].tick_params(axis="x", labelrotation=15)
     axes[0].set_title("(a)", loc="left", fontsize=10)
-    each = column(model, "e_pa")
-    touched = np.array([p.point for p, e in zip(model.palpations, each, strict=True) if np.isfinite(e)])
-    around = (0.75 * np.nanmedian(each) / 1e3, 1.25 * np.nanmedian(each) / 1e3)
-    draw_object(
-        axes[1], model, over_surface(model, each) / 1e3, label="e of single presses [kPa]", limits=around,
-        touches=touched,
-    )  # fmt: skip
-    axes[1].set_title("(b)", loc="left", fontsize=10)
+    for ax, (name, model) in zip(axes[1:], shown, strict=True):
+        _coloured(ax, model, "e_pa", 1e-3, "e of single presses [kPa]", 25.0, share=0.25)
+        ax.set_title(f"(b) {name}", loc="left", fontsize=10)
     return figure
 
 

@@ -10,6 +10,7 @@ from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
 from mechanics.model import Model
+from palpate.report.differences import differences
 from palpate.report.exploration_figures import exploration_figures
 from palpate.report.modulus_figures import (
     Trend,
@@ -57,7 +58,10 @@ def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Mod
     _one_d(page, result)
     page.heading("Where the parameters hold")
     page.figure(
-        figures["figure-5"], "Figure 5: k_V over the surface; k_V, k_H and e over height on the side."
+        figures["figure-5"],
+        "Figure 5: k_V over the surface (radial basis functions through the presses, dots); below k_V, "
+        "k_H and e "
+        "over height on the side, the line is the global modulus.",
     )
     _trends(page, height_trends(result.model))
     page.heading("Modulus")
@@ -68,6 +72,9 @@ def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Mod
     if "figure-depth" in figures:
         page.figure(figures["figure-depth"], "Global modulus from samples up to a greatest depth.")
     _point_load(page, result)
+    page.heading("Where this differs from the paper, and why")
+    for words in differences(result):
+        page.paragraph(words)
     _speed(page, result)
     return page.write(path)
 
@@ -76,8 +83,10 @@ def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figu
     models = {result.exploration.recording.name: result.model, **beside}
     figures = exploration_figures(result)
     figures["figure-4"] = undamped_figure(models)
-    figures["figure-5"] = spatial_figure(result.model)
-    figures["figure-6"] = moduli_figure(models, result.model)
+    figures["figure-5"] = spatial_figure(
+        result.model, result.exploration.recording.name, next(iter(beside.items()), None)
+    )
+    figures["figure-6"] = moduli_figure(models)
     report = result.meshing.report
     quality, axes = plt.subplots(1, 3, figsize=(12, 2.8), layout="constrained")
     quality_histogram(axes[0], report.radius_edge_ratio, "radius-edge ratio", 2.0)

@@ -47,8 +47,9 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
         known = truth.get("young_modulus_pa", float("nan")) / 1e3 if mine else float("nan")
         each = column(model, "e_pa") / 1e3
         low, high = np.array(model.young_modulus_ci95_pa) / 1e3
+        shape = truth.get("shape", "") if mine else model.extra.get("shape", {}).get("surface", "")
         rows.append([
-            name, str(truth.get("shape", "")) if mine else "", known, model.young_modulus_pa / 1e3,
+            name, str(shape), known, model.young_modulus_pa / 1e3,
             f"{low:.2f} to {high:.2f}", f"{np.nanmin(each):.1f} to {np.nanmax(each):.1f}",
         ])  # fmt: skip
     return header, rows
