@@ -13,11 +13,19 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
+from mechanics.dent import dent_law
 from mechanics.recording import read_recording
 from scenes.laboratory.comparison import block_shape, compare, cylinder_shape
 from scenes.laboratory.solid import Material, Solid
 from scenes.laboratory.specimen import Fineness, Specimen
-from scenes.laboratory.verification import box, hertz_ratio, patch_test, straight_press, tangent_error
+from scenes.laboratory.verification import (
+    box,
+    dent_force,
+    hertz_ratio,
+    patch_test,
+    straight_press,
+    tangent_error,
+)
 from scenes.phantoms import phantom
 
 SUMMARY = "verification of the virtual laboratory, and comparison with another simulator"
@@ -67,6 +75,17 @@ def _verification() -> dict[str, float]:
             setattr(material, key, value)
         note(f"tangent against differences, {name}", tangent_error(material, Solid(mesh, material)), "1e-7")
     note("force / Hertz - 1", hertz_ratio() - 1, "0.015")
+    depths = np.array([1.0, 2.0, 3.0, 4.0, 6.0])
+    known = dent_law("linear").force(1e-3 * depths, 1e6, 0.49, 0.005)
+    force = dent_force(depths)
+    for depth, ratio in zip(depths, force / known, strict=True):
+        note(
+            f"sticking sphere, linear, {depth:g} mm deep: force / axisymmetric solution - 1",
+            ratio - 1,
+            "0.03",
+        )
+    change = float(np.abs(dent_force(depths, step=1.0) / force - 1).max())
+    note("the same with load steps of 1 mm instead of 0.2 mm: greatest change", change, "0.005")
     thing, point, normal = phantom("cylinder"), np.array([40.0, 0.0, 40.0]), np.array([1.0, 0.0, 0.0])
     depths = np.array([0.3, 0.7, 1.2, 1.8, 2.5, 3.3, 4.1, 5.0])
     finite = Specimen(finite=True)

@@ -48,10 +48,13 @@ SHAPES, SLOPES = _shapes(POINTS[:, 0], POINTS[:, 1])
 class Grip:
     """Contact state of every quadrature point at a converged load step: anchors relative to the sphere's
     centre.
+
+    expected: points that a predicted step brings to the sphere; their anchors are where they would meet it.
     """
 
     def __init__(self, points: int) -> None:
         self.active = np.zeros(points, dtype=np.bool_)
+        self.expected = np.zeros(points, dtype=np.bool_)
         self.anchor = np.zeros((points, 3))
         self.relative = np.full((points, 3), 1e6)
 
@@ -66,7 +69,8 @@ class Grip:
     def copy(self) -> Grip:
         """An independent copy."""
         twin = Grip(0)
-        twin.active, twin.anchor, twin.relative = self.active.copy(), self.anchor.copy(), self.relative.copy()
+        for name in ("active", "expected", "anchor", "relative"):
+            setattr(twin, name, getattr(self, name).copy())
         return twin
 
 
@@ -87,6 +91,26 @@ class SphereContact:
         grip.relative = x - centre
         return grip
 
+    def clear_of(self, centre: np.ndarray, grip: Grip) -> np.ndarray:
+        """The nearest centre that clears the untouched object, straight away from what is touched now."""
+        out = -grip.anchor[grip.active].sum(axis=0)
+        out /= np.linalg.norm(out)
+        r = np.einsum("qa,fax->fqx", SHAPES, self.points[self.faces]).reshape(-1, 3) - centre
+        along = r @ out
+        inside = along**2 - (r**2).sum(axis=1) + self.radius**2
+        way = along[inside > 0] + np.sqrt(inside[inside > 0])
+        return centre + max(0.0, way.max(initial=0.0)) * out
+
+    def expect(self, displacement: np.ndarray, centre: np.ndarray, held: Grip) -> None:
+        """Give the points that `displacement` brings into the sphere the places where they meet it.
+
+        With these anchors a point sticks within the load step in which it arrives, as if the step were small.
+        Only where the tip sticks: a sliding tip's arrivals find their places by sliding.
+        """
+        if self.friction < 0.0:
+            x = np.einsum("qa,fax->fqx", SHAPES, (self.points + displacement)[self.faces]).reshape(-1, 3)
+            _expect(x - centre, self.radius, held.active, held.expected, held.anchor, held.relative)
+
     def evaluate(
         self, displacement: np.ndarray, centre: np.ndarray, old: Grip, tangent: bool, arrivals: bool = True
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray, Grip]:
@@ -102,7 +126,7 @@ class SphereContact:
         new = Grip(self.weights.size)
         total = _evaluate(
             self.points, displacement, self.faces, self.weights, centre, self.radius, self.friction,
-            old.active, old.anchor, old.relative, new.active, new.anchor, new.relative,
+            old.active, old.expected, old.anchor, old.relative, new.active, new.anchor, new.relative,
             tangent, arrivals, forces, stiffness,
         )  # fmt: skip
         return forces, stiffness, total, new
@@ -125,9 +149,19 @@ def _meeting(before, after, radius):
 
 
 @numba.njit(cache=True)
+def _expect(relative, radius, active, expected, anchor, old_relative):
+    for k in range(len(relative)):
+        r = relative[k]
+        expected[k] = not active[k] and r[0] ** 2 + r[1] ** 2 + r[2] ** 2 < radius * radius
+        if expected[k]:
+            anchor[k] = _meeting(old_relative[k], r, radius)
+
+
+@numba.njit(cache=True)
 def _evaluate(
     points, u, faces, weights, centre, radius, friction,
-    old_active, old_anchor, old_relative, active, anchor, relative, tangent, arrivals, forces, stiffness,
+    old_active, expected, old_anchor, old_relative, active, anchor, relative,
+    tangent, arrivals, forces, stiffness,
 ):  # fmt: skip
     total = np.zeros(3)
     block = np.empty((3, 3))
@@ -143,15 +177,16 @@ def _evaluate(
             relative[k] = r
             distance = np.sqrt(r[0] ** 2 + r[1] ** 2 + r[2] ** 2)
             fresh = not old_active[k]
-            if fresh and (distance >= radius or not arrivals):
+            sticks = not fresh or expected[k]
+            if fresh and (not arrivals or (distance >= radius and not sticks)):
                 continue
             hold = old_anchor[k]
-            if fresh:
-                # a point slides freely in the load step in which it arrives, and is anchored where it met the
-                # sphere for the next: a trial anchor that follows the iterations would spoil Newton's
-                # convergence
+            if not sticks:
+                # a point that nobody expected slides freely in the load step in which it arrives, and is
+                # anchored for the next where it met the sphere: a trial anchor that follows the iterations
+                # would spoil Newton's convergence
                 hold = _meeting(old_relative[k], r, radius)
-            m = hold / radius if friction < 0.0 and not fresh else r / distance
+            m = hold / radius if friction < 0.0 and sticks else r / distance
             along = m[0] * r[0] + m[1] * r[1] + m[2] * r[2]
             overlap = radius - along
             # a held point may pull while Newton iterates: the solver lets go of it once the rest has settled
@@ -163,7 +198,7 @@ def _evaluate(
             out = m[0] * slip[0] + m[1] * slip[1] + m[2] * slip[2]
             slip -= out * m
             size = np.sqrt(slip[0] ** 2 + slip[1] ** 2 + slip[2] ** 2)
-            grip = 0.0 if fresh else 1.0
+            grip = 1.0 if sticks else 0.0
             sliding = friction >= 0.0 and size > friction * overlap and not fresh and not carried
             if sliding:
                 grip = friction * overlap / max(size, 1e-12)
@@ -185,7 +220,7 @@ def _evaluate(
                         unit = 1.0 if i == j else 0.0
                         side = unit - m[i] * m[j]
                         value = m[i] * m[j] + grip * side
-                        if fresh:
+                        if not sticks:
                             value -= overlap / distance * side
                         if sliding and size > 1e-12:
                             value -= grip * slip[i] * slip[j] / (size * size)

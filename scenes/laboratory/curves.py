@@ -16,6 +16,7 @@ import numpy as np
 
 from mechanics.files import atomic_file
 from mechanics.progress import Progress, silent
+from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import cache_folder, coarse_mesh
 from scenes.laboratory.solver import LabError
 from scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
@@ -25,7 +26,7 @@ LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.
 """States that are kept of a straight press, as shares of its greatest depth."""
 
 LINEAR_STEP_MM = 0.2
-"""Longest load step of a small-strain path; between kept states it is cut up (milliseconds each)."""
+"""Longest load step on the condensed object, where a step costs milliseconds."""
 
 
 @dataclass(frozen=True)
@@ -90,7 +91,7 @@ def solve(
         fineness=fineness,
         cache=cache,
     )
-    longest = np.inf if specimen.finite else LINEAR_STEP_MM
+    longest = LINEAR_STEP_MM if isinstance(problem, LinearProblem) else np.inf
     for job in jobs:
         start = place + specimen.tip_radius * job.normal
         state = problem.rest(start + 1e-3 * job.normal)

@@ -71,11 +71,18 @@ class LinearProblem:
     def advance(
         self, state: LinearState, centre: np.ndarray, step_s: float = 0.0, depth: int = 0
     ) -> LinearState:
-        """Move the tip's centre to `centre`; halves the step where the contact does not settle."""
+        """Move the tip's centre to `centre`; halves the step where the contact does not settle.
+
+        A sticking tip that finds no equilibrium in an eighth of a step loses its hold.
+        """
         centre = np.asarray(centre, float)
         found = self._newton(state, centre)
         if found is not None:
             return found
+        if depth == 3 and self._contact.friction < 0.0 and state.grip.active.any():
+            found = self._pressed_anew(state, centre)
+            if found is not None:
+                return found
         if depth >= 9:
             raise LabError(
                 f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep"
@@ -83,11 +90,21 @@ class LinearProblem:
         middle = self.advance(state, (state.centre + centre) / 2, step_s, depth + 1)
         return self.advance(middle, centre, step_s, depth + 1)
 
+    def _pressed_anew(self, state: LinearState, centre: np.ndarray) -> LinearState | None:
+        """The tip has lost its hold: the dragged surface springs back and meets it afresh at `centre`."""
+        away = self._contact.clear_of(centre, state.grip)
+        found: LinearState | None = self.rest(away)
+        for share in np.linspace(0, 1, 1 + int(np.ceil(np.linalg.norm(away - centre) / 0.2))):
+            found = found and self._newton(found, away + share * (centre - away))
+        return found
+
     def _newton(self, state: LinearState, centre: np.ndarray) -> LinearState | None:
         """u + C f(u) = 0, where the contact's forces f live on the few nodes that touch."""
         u = state.displacement
         held = state.grip.copy()
         arrivals = not held.active.any()
+        if arrivals:
+            self._contact.expect(u, centre, held)
         step, last, cut, least = np.zeros_like(u), u, 1.0, np.inf
         for iteration in range(90):
             forces, face_k, force, grip = self._contact.evaluate(u, centre, held, True, arrivals)
@@ -105,7 +122,6 @@ class LinearProblem:
                 u = last + cut * step
                 continue
             least = size if arrivals else np.inf
-            arrivals = True
             on, stiffness = self._touching(face_k)
             if len(on):
                 inner = np.eye(len(on)) + self._compliance[np.ix_(on, on)] @ stiffness
@@ -115,6 +131,9 @@ class LinearProblem:
             step = -r.reshape(-1, 3) * min(calm, 5.0 / max(np.abs(r).max(), 1e-12))
             last, cut = u, 1.0
             u = u + step
+            if not arrivals:
+                arrivals = True
+                self._contact.expect(u, centre, held)
         return None
 
     def _touching(self, face_k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

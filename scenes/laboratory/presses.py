@@ -30,12 +30,13 @@ class Protocol:
 
 
 PROTOCOLS = {
+    "brief": Protocol(6, 3, 1, 1, 3.0, 6.0),
     "sparse": Protocol(14, 4, 2, 1, 3.0, 7.0),
     "ordinary": Protocol(24, 9, 4, 3, 2.5, 8.0),
     "dense": Protocol(46, 18, 8, 6, 1.5, 9.0),
     "deep": Protocol(16, 8, 3, 2, 4.0, 12.0),
 }
-"""Named protocols; `sparse`, `ordinary` and `dense` differ in the number of touches, `deep` goes to 12 mm."""
+"""Named protocols; `brief` to `dense` differ in the number of touches, `deep` goes to 12 mm."""
 
 RIM_MM, FLOOR_MM = 9.0, 13.0
 """Rims are not touched within this distance, and sites lie at least this high above the support."""

@@ -4,7 +4,7 @@ mm^2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -131,7 +131,10 @@ class Problem:
     def advance(
         self, state: State, centre: np.ndarray, step_s: float = 0.0, guess: np.ndarray | None = None
     ) -> State:
-        """Move the tip's centre to `centre` within `step_s` seconds; halves the step where Newton fails."""
+        """Move the tip's centre to `centre` within `step_s` seconds; halves the step where Newton fails.
+
+        A sticking tip that finds no equilibrium in a quarter of a step loses its hold.
+        """
         return self._advance(state, np.asarray(centre, float), step_s, guess, 0)
 
     def _advance(
@@ -142,6 +145,10 @@ class Problem:
             found = self._newton(state, centre, step_s, None)
         if found is not None:
             return found
+        if depth == 2 and self.contact.friction < 0.0 and state.grip.active.any():
+            found = self._pressed_anew(state, centre, step_s)
+            if found is not None:
+                return found
         if depth >= 5:
             raise LabError(
                 f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep or "
@@ -149,6 +156,15 @@ class Problem:
             )
         middle = self._advance(state, (state.centre + centre) / 2, step_s / 2, None, depth + 1)
         return self._advance(middle, centre, step_s / 2, None, depth + 1)
+
+    def _pressed_anew(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
+        """The tip has lost its hold: the dragged surface springs back and meets it afresh at `centre`."""
+        away = self.contact.clear_of(centre, state.grip)
+        found: State | None = replace(self.rest(away), history=state.history)
+        for share in np.linspace(0, 1, 1 + int(np.ceil(np.linalg.norm(away - centre) / 0.5))):
+            found = found and self._newton(found, away + share * (centre - away), step_s, None)
+            step_s = 0.0
+        return found
 
     def _newton(
         self, state: State, centre: np.ndarray, step_s: float, guess: np.ndarray | None
@@ -158,6 +174,8 @@ class Problem:
         # without a guess the points already held carry the object along before new ones may arrive
         held = state.grip.copy()
         arrivals = guess is not None or not held.active.any()
+        if arrivals:
+            contact.expect(u, centre, held)
         last, cut, last_norm, touching = u, 1.0, np.inf, held.active
         step = np.zeros_like(u)
         for iteration in range(40):
@@ -180,7 +198,7 @@ class Problem:
                     return State(u, centre.copy(), force, energy, history, grip, None, iteration)
             # close to the end the last tangent serves once more, where the contact has settled
             reuse = arrivals and norm < 0.02 * last_norm and np.array_equal(grip.active, touching)
-            last_norm, touching, arrivals = norm, grip.active, True
+            last_norm, touching = norm, grip.active
             if not reuse:
                 self._factor.refresh(self._assemble(cell_k, face_k, u))
                 self.factorisations += 1
@@ -192,6 +210,9 @@ class Problem:
                 return None
             last, cut = u, 1.0
             u = u + step * min(1.0, 3.0 / longest)
+            if not arrivals:
+                arrivals = True
+                contact.expect(u, centre, held)
         return None
 
     def tip_stiffness(self, state: State) -> np.ndarray:

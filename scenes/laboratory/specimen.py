@@ -21,7 +21,7 @@ from scenes.laboratory.solver import Problem
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
 
-VERSION = 4
+VERSION = 5
 """Raised whenever solved curves would change."""
 
 

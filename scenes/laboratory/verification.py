@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from scenes.laboratory.contact import SphereContact
+from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import QuadraticMesh, quadratic
 from scenes.laboratory.refine import refine
 from scenes.laboratory.solid import Material, Solid
@@ -76,6 +77,26 @@ def hertz_ratio(depth: float = 0.5, radius: float = 50.0, finest: float = 0.5) -
         state = problem.advance(state, start - [0.0, 0.0, share * depth])
     stiffness = 1 / (1 - poisson**2)
     return float(state.force[2] / (4 / 3 * stiffness * np.sqrt(radius) * depth**1.5))
+
+
+def dent_force(depths: np.ndarray, radius: float = 5.0, finest: float = 3.0, step: float = 0.2) -> np.ndarray:
+    """Force (k,) E mm^2 of a sticking sphere at increasing `depths` mm in a large block, small strain, 0.49.
+
+    The block stands for a half-space: 60 radii wide and 40 high. step: longest load step, mm.
+    """
+    mesh = box(60 * radius, 40 * radius, finest, 0.5)
+    top = np.array([0.0, 0.0, 40 * radius])
+    near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 2.4 * radius
+    contact = SphereContact(mesh.points, mesh.faces[near], radius, None)
+    problem = LinearProblem(Solid(mesh, Material(len(mesh.cells), 0.49)), contact, ~np.repeat(mesh.fixed, 3))
+    start = top + [0.0, 0.0, radius]
+    state, force, before = problem.rest(start + [0.0, 0.0, 1e-3]), [], 0.0
+    for depth in depths:
+        for at in np.linspace(before, depth, 1 + int(np.ceil((depth - before) / step - 1e-9)))[1:]:
+            state = problem.advance(state, start - [0.0, 0.0, at])
+        force.append(float(state.force[2]))
+        before = depth
+    return np.array(force)
 
 
 def straight_press(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from mechanics.dent import dent_law
 from scenes.laboratory.contact import SphereContact
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.refine import boundary_faces
 from scenes.laboratory.solid import Material, Solid
 from scenes.laboratory.solver import Problem
-from scenes.laboratory.verification import box, hertz_ratio, patch_test, tangent_error
+from scenes.laboratory.verification import box, dent_force, hertz_ratio, patch_test, tangent_error
 
 LAWS = {
     "neo-hookean": {},
@@ -100,6 +101,24 @@ def test_small_dent_in_linear_box_equals_finite_strain() -> None:
     assert finite.force[2] == pytest.approx(linear.force[2], rel=0.02)
 
 
+def test_force_of_a_sticking_tip_does_not_hang_on_the_load_steps() -> None:
+    coarse = _pressed(4.0, None, linear=True, steps=3)[1][-1]
+    fine = _pressed(4.0, None, linear=True, steps=40)[1][-1]
+    assert coarse.force[2] == pytest.approx(fine.force[2], rel=0.01)
+
+
+def test_dragged_surface_springs_back_when_the_tip_leaves() -> None:
+    problem, states = _pressed(3.0, None, linear=True)
+    state, side = states[-1], np.array([3.2, 2.4, 0.0])
+    for share in np.linspace(0.05, 1, 20):
+        state = problem.advance(state, states[-1].centre + share * side)
+    dragged = state.force
+    assert np.hypot(dragged[0], dragged[1]) > 0.3 * dragged[2]
+    for lift in np.linspace(0.2, 6.0, 30):
+        state = problem.advance(state, states[-1].centre + side + [0, 0, lift])
+    assert not state.force.any() and np.abs(state.displacement).max() < 1e-9
+
+
 def test_energy_stored_is_the_work_done() -> None:
     _, states = _pressed(3.0, None, linear=True, steps=24)
     depth = np.array([0.0] + [45.0 - s.centre[2] for s in states])
@@ -141,3 +160,10 @@ def test_sticking_tip_drags_harder_than_a_sliding_one() -> None:
 @pytest.mark.slow
 def test_small_dent_is_hertz() -> None:
     assert hertz_ratio() == pytest.approx(1.0, abs=0.015)
+
+
+@pytest.mark.slow
+def test_deep_dent_is_the_one_of_an_axisymmetric_solution() -> None:
+    depths = np.array([2.0, 3.0, 4.0, 6.0])
+    known = dent_law("linear").force(1e-3 * depths, 1e6, 0.49, 0.005)
+    assert dent_force(depths) / known == pytest.approx(np.ones(4), abs=0.025)
