@@ -28,7 +28,7 @@ from scenes.phantoms import phantom
 from scenes.scene import Scene
 from scenes.virtual_presses import palpate_model
 
-VERSION = 3
+VERSION = 4
 DEFAULT_TIP_RADIUS_M = 0.005
 
 

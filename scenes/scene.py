@@ -23,8 +23,6 @@ from typing import Any
 
 from devices.mapper import MapperOptions
 from mechanics.errors import SceneError
-from mechanics.model import Model
-from mechanics.progress import Progress, silent
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import PHANTOMS, Region
 
@@ -66,12 +64,6 @@ class Scene:
     beside: str = ""
     colour: str = "displacement"
     friction: float | None = None
-
-    def model(self, progress: Progress = silent, *, cache: Path | None = None) -> Model:
-        """The scene's MODEL, on disk: built once and kept in the cache folder (scenes.build.cache_folder)."""
-        from scenes.build import model_of
-
-        return model_of(self, progress, cache=cache)
 
 
 def scene_names() -> list[str]:

@@ -35,6 +35,7 @@ from palpate.arguments import (
 from palpate.servo import SafetyOptions, ServoOptions
 from palpate.window.session import TouchSession
 from render.registry import names
+from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene, load_scene
 
@@ -89,7 +90,7 @@ def run(arguments: argparse.Namespace) -> int:
     _check(arguments, name)
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar("touch"))
-        model = scene.model(lambda stage, share: bar(stage, 0.5 * share))
+        model = model_of(scene, lambda stage, share: bar(stage, 0.5 * share))
         channel = None
         if name == "mouse":
             channel = PoseChannel.create()

@@ -22,11 +22,12 @@ class Recorder:
         self._rows: list[np.ndarray] = []
         self._next = int(servo.arrays.ring_head[0])
 
-    def collect(self) -> None:
-        """Take what came since the last time."""
+    def collect(self) -> np.ndarray:
+        """Take what came since the last time, and return those rows."""
         rows, self._next = self._servo.history(self._next)
         if len(rows):
             self._rows.append(rows)
+        return rows
 
     def recording(self, tip_radius_m: float, object_name: str = "object") -> Recording:
         """What was collected; raises RecordingError where there is nothing."""

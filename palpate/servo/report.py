@@ -91,7 +91,8 @@ class ServoReport:
             f"lateness median {late['median']:.1f}  p99 {late['p99']:.1f}  p99.9 {late['p99.9']:.1f}  "
             f"max {late['max']:.1f} us",
             f"in contact {100 * self.contact_share:.0f} % of the time, greatest force "
-            f"{self.peak_force_n:.2f} N, energy given back at most {1000 * self.energy_given_back_j:.3f} mJ",
+            f"{self.peak_rendered_n:.2f} N rendered, {self.peak_force_n:.2f} N sent, "
+            f"energy given back at most {1000 * self.energy_given_back_j:.3f} mJ",
         ]
         return "\n".join([*lines, *self.words])
 

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista
-from scipy.spatial import cKDTree
 
 from mechanics.model import Model
-from mechanics.tetmesh import vertex_normals
-from palpate.window.session import Frame, View
+from palpate.window.frames import Frame, View
 from render.base import Renderer
 from scenes.phantoms import Region
 
-ARROW_M_PER_N = 0.02
+ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
@@ -30,19 +28,17 @@ class ObjectPicture:
         *,
         place: tuple[int, int] = (0, 0),
         label: str = "",
-        colour: str = "displacement",
     ) -> None:
         self._plotter = plotter
+        self._radius = tip_radius_m
         self._place = place
         plotter.subplot(*place)
         points, triangles = renderer.surface
         self._rest = np.array(points, dtype=float)
         self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
         self._surface["displacement (mm)"] = np.zeros(len(points))
-        self._stiffness: np.ndarray | None = None
         self._actor: pyvista.Actor | None = None
         self._title = f"{label}  " if label else ""
-        self._colour = ""
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
@@ -57,35 +53,37 @@ class ObjectPicture:
         )
         self._ball.SetVisibility(False)
         self._arrow.SetVisibility(False)
-        self.colour_by(colour)
+        self.colour_by_displacement()
 
     @property
     def rest_surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, 3) m and triangles (k, 3) of the undeformed surface."""
         return self._rest, self._surface.regular_faces
 
-    def colour_by(self, what: str, stiffness_n_per_m: np.ndarray | None = None) -> None:
-        """'displacement', or 'stiffness' with (n,) N/m a point (displacement until they are there)."""
-        if stiffness_n_per_m is not None:
-            self._stiffness = stiffness_n_per_m
-        stiff = what == "stiffness" and self._stiffness is not None
-        name = "stiffness (N/m)" if stiff else "displacement (mm)"
-        if stiff:
-            self._surface[name] = self._stiffness
-        if name == self._colour and not stiff:
-            return
-        self._colour = name
+    def colour_by_displacement(self) -> None:
+        """As far as each point has moved, mm."""
+        self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
+
+    def colour_by_stiffness(self, stiffness_n_per_m: np.ndarray) -> None:
+        """(n,) N/m a point; the colours span all but the outermost two per cent."""
+        name = "stiffness (N/m)"
+        self._surface[name] = stiffness_n_per_m
+        self._colour_by(name, "viridis", tuple(np.percentile(stiffness_n_per_m, [2, 98])))
+
+    def _colour_by(self, name: str, colours: str, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
+        opacity = 1.0
         if self._actor is not None:
+            opacity = self._actor.prop.opacity
             self._plotter.remove_actor(self._actor, render=False)
             self._plotter.remove_scalar_bar(self._bar, render=False)
         self._bar = f"{self._title}{name}"
-        limits = tuple(np.percentile(self._stiffness, [2, 98])) if stiff else DISPLACEMENT_RANGE_MM
         self._actor = self._plotter.add_mesh(
             self._surface,
             scalars=name,
-            cmap="viridis" if stiff else "YlOrRd",
+            cmap=colours,
             clim=limits,
+            opacity=opacity,
             ambient=0.35,
             diffuse=0.75,
             scalar_bar_args={
@@ -95,9 +93,9 @@ class ObjectPicture:
                 "n_labels": 4,
                 "fmt": "%.0f",
                 "color": "black",
-                "width": 0.5,
+                "width": 0.42,
                 "height": 0.06,
-                "position_x": 0.47,
+                "position_x": 0.56,
                 "position_y": 0.02,
             },
             render=False,
@@ -126,7 +124,8 @@ class ObjectPicture:
         size = float(np.linalg.norm(force))
         self._arrow.SetVisibility(size > LEAST_ARROW_N)
         if size > LEAST_ARROW_N:
-            self._arrow.SetUserMatrix(_arrow_matrix(frame.tip_m, force, ARROW_M_PER_N * size))
+            start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
+            self._arrow.SetUserMatrix(_arrow_matrix(start, force, ARROW_M_PER_N * size))
 
 
 def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> object:
@@ -145,24 +144,3 @@ def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> 
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
     plane = pyvista.Plane(center=middle, direction=model.support_normal, i_size=size, j_size=size)
     plotter.add_mesh(plane, color="#d9dee5", lighting=False)
-
-
-def local_stiffness(renderer: Renderer, tip_radius_m: float, depth_m: float = 0.003) -> np.ndarray:
-    """(n,) N/m: force over depth of a straight press to `depth_m` at each point of the renderer's surface."""
-    points, triangles = renderer.surface
-    normals = vertex_normals(np.asarray(points, dtype=float), np.asarray(triangles))
-    every = max(1, len(points) // 2500)
-    chosen = np.arange(0, len(points), every)
-    values = np.empty(len(chosen))
-    depths = np.concatenate([[-0.002], np.linspace(0.0, depth_m, 7)])
-    for i, k in enumerate(chosen):
-        state = renderer.start([tip_radius_m], dt_s=10.0)
-        for depth in depths:
-            tip = points[k] + (tip_radius_m - depth) * normals[k]
-            forces = renderer.step(state, np.ascontiguousarray(tip[None]))[1]
-        values[i] = max(float(forces[0] @ normals[k]), 0.0) / depth_m
-    if every == 1:
-        return values
-    distance, near = cKDTree(points[chosen]).query(points, k=4)
-    weight = 1.0 / np.maximum(distance, 1e-6)
-    return (weight * values[near]).sum(axis=1) / weight.sum(axis=1)

@@ -1,4 +1,4 @@
-"""The touch window: pictures side by side, live plots below, a mouse that is a tip, keys.
+"""The touch window: pictures side by side, live plots below; palpate.window.controls moves the tip.
 
 One timer drives everything: `tick` writes the mouse's pose for the servo process, reads its newest state,
 moves what is drawn. The servo never waits for a picture.
@@ -7,7 +7,6 @@ moves what is drawn. The servo never waits for a picture.
 from __future__ import annotations
 
 import time
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,19 +15,21 @@ import vtk
 
 from devices.channel import PoseChannel
 from palpate.window.charts import LiveCharts
+from palpate.window.controls import Controls
+from palpate.window.frames import Frame
 from palpate.window.keys import help_text
-from palpate.window.picture import ObjectPicture, local_stiffness
+from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import Pointer
-from palpate.window.session import MODULUS_STEP, Frame, TouchSession
+from palpate.window.session import TouchSession
+from palpate.window.stiffness import StiffnessMap
+from palpate.window.words import heading, hint, status
+from render.base import Renderer
 from scenes.phantoms import Region
 from scenes.scene import Scene
 
 PERIOD_MS = 16
 SIZE = (1280, 800)
-INCLUSION_RADIUS_M = 0.008
-INCLUSION_RATIO = 8.0
-STEP_M = 0.002
-BESIDES = ("hunt-crossley", "kelvin-voigt")
+CHARTS_SHARE = 0.28
 
 
 class TouchWindow:
@@ -47,48 +48,58 @@ class TouchWindow:
         self.scene = scene
         self.frames = 0
         self.closed = False
+        self.notice = ""
         self._ended = False
         self._channel = channel
-        self._colour = scene.colour
-        self._moved = False
         self._last_s = time.perf_counter()
         self._end_s = float("inf")
+        self._map = StiffnessMap(session.worker, session.servo.tip_radius_m)
+        self._coloured = scene.colour == "stiffness"
         self.plotter = pyvista.Plotter(
             off_screen=off_screen,
             window_size=list(size),
             shape=(2, 2),
-            row_weights=[0.72, 0.28],
-            groups=[(1, slice(None))] if self._sides == 2 else [(0, slice(None)), (1, slice(None))],
+            row_weights=[1.0 - CHARTS_SHARE, CHARTS_SHARE],
+            groups=[(1, slice(None))] if self.sides == 2 else [(0, slice(None)), (1, slice(None))],
             title=f"Palpate: {scene.title}",
             border=False,
         )
         self.plotter.set_background("#f4f6f8", all_renderers=True)
         # smoothing edges costs more than all the rest where there is no graphics card
         self.plotter.render_window.SetMultiSamples(0)
-        self._pictures = [self._picture(side) for side in range(self._sides)]
+        self._headings: list[pyvista.Text] = []
+        self.pictures = [self._picture(side) for side in range(self.sides)]
         self.plotter.subplot(1, 0)
         self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names)
         self.plotter.subplot(0, 0)
         self._status = self._text("", (0.01, 0.985), "top")
+        self._hint = self._text(hint(mouse=channel is not None), (0.01, 0.02), "bottom", size=11)
         self._help = self._text(help_text(), (0.01, 0.02), "bottom", font="courier")
         self._help.SetVisibility(False)
-        points, triangles = self._pictures[0].rest_surface
+        points, triangles = self.pictures[0].rest_surface
         model = session.model
         radius = session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, model.support_point, model.support_normal)
         self._look()
-        self._listen()
-        if self._colour == "stiffness":
-            self._show_stiffness()
+        self.controls = Controls(self)
 
     @property
-    def _sides(self) -> int:
+    def sides(self) -> int:
+        """How many pictures there are."""
         return 2 if self.session.beside_name else 1
+
+    @property
+    def picture_renderers(self) -> list[vtk.vtkRenderer]:
+        """Where an object is drawn."""
+        return [self.plotter.renderers[side] for side in range(self.sides)]
 
     @property
     def _names(self) -> tuple[str, ...]:
         beside = self.session.beside_name
         return (self.session.renderer_name, beside) if beside else (self.session.renderer_name,)
+
+    def _drawing(self) -> tuple[Renderer, ...]:
+        return tuple(self.session.drawing(name) for name in self._names)
 
     def _text(
         self, text: str, place: tuple[float, float], anchor: str, *, size: int = 12, font: str = "arial"
@@ -105,8 +116,9 @@ class TouchWindow:
     def _picture(self, side: int) -> ObjectPicture:
         self.plotter.subplot(0, side)
         name = self._names[side]
-        if self._sides == 2:
-            self._text(name, (0.80, 0.985), "top", size=15)
+        over = self._text(heading(name, felt=side == 0), (0.98, 0.985), "top", size=14)
+        over.prop.justification_horizontal = "right"
+        self._headings.append(over)
         session = self.session
         return ObjectPicture(
             self.plotter,
@@ -129,142 +141,27 @@ class TouchWindow:
         self.plotter.subplot(0, 0)
         self.plotter.camera_position = [tuple(eye), tuple(middle), tuple(up)]
         self.plotter.camera.clipping_range = (0.05 * distance, 5.0 * distance)
-        if self._sides == 2:
+        if self.sides == 2:
             self.plotter.renderers[1].camera = self.plotter.renderers[0].camera
 
-    def _listen(self) -> None:
-        style = vtk.vtkInteractorStyleTrackballCamera()
-        interactor = self.plotter.iren.interactor
-        # two quick presses would give the mouse to a chart, and pyvista's keys change the picture
-        self.plotter.iren.untrack_click_position("left")
-        self.plotter.iren.clear_key_event_callbacks()
-        # through pyvista, which sets what it knows of again when the window is shown
-        self.plotter.iren.style = style
-        self._style, self._interactor = style, interactor
-        # an observer on the style replaces what the style would do with that event
-        for event, action in (
-            ("LeftButtonPressEvent", lambda *_: self.press(True)),
-            ("LeftButtonReleaseEvent", lambda *_: self.press(False)),
-            ("RightButtonPressEvent", lambda *_: self._turn(True)),
-            ("RightButtonReleaseEvent", lambda *_: self._turn(False)),
-            ("MouseWheelForwardEvent", lambda *_: self.wheel(1)),
-            ("MouseWheelBackwardEvent", lambda *_: self.wheel(-1)),
-            ("MouseMoveEvent", lambda *_: self._mouse_moved()),
-            ("CharEvent", lambda *_: None),
-            ("KeyPressEvent", lambda *_: self.key(interactor.GetKeySym())),
-        ):
-            style.AddObserver(event, action)
+    def toggle_colour(self) -> None:
+        """Colour by displacement, or by local stiffness as soon as that is computed."""
+        self._coloured = not self._coloured
+        self._map.forget()
+        if not self._coloured:
+            for picture in self.pictures:
+                picture.colour_by_displacement()
 
-    def _turn(self, on: bool) -> None:
-        self._style.FindPokedRenderer(*self._interactor.GetEventPosition())
-        (self._style.StartRotate if on else self._style.EndRotate)()
+    def toggle_help(self) -> None:
+        """Show every key, or not."""
+        self._help.SetVisibility(not self._help.GetVisibility())
+        self._hint.SetVisibility(not self._help.GetVisibility())
 
-    def _mouse_moved(self) -> None:
-        self.point(*self._interactor.GetEventPosition())
-        self._style.OnMouseMove()
-
-    def point(self, x: int, y: int) -> None:
-        """The mouse is over pixel (x, y), counted from the lower left."""
-        for side in range(self._sides):
-            renderer = self.plotter.renderers[side]
-            if renderer.IsInViewport(x, y):
-                self.pointer.point_along(_unproject(renderer, x, y, 0.0), _unproject(renderer, x, y, 1.0))
-                self._moved = True
-                return
-
-    def press(self, on: bool) -> None:
-        """The left button went down or up."""
-        self.pointer.pressing = on
-
-    def wheel(self, steps: int) -> None:
-        """Depth of a press; with Ctrl held, the distance of the eye."""
-        if self._interactor.GetControlKey():
-            self.plotter.camera.Dolly(1.1**steps)
-            return
-        self.pointer.deeper(steps)
-
-    def key(self, symbol: str) -> None:
-        """A key by VTK's symbol; see palpate.window.keys."""
-        session = self.session
-        actions = {
-            "space": session.toggle_force,
-            "Tab": session.next_renderer,
-            "b": self._next_beside,
-            "plus": lambda: session.scale_modulus(MODULUS_STEP),
-            "equal": lambda: session.scale_modulus(MODULUS_STEP),
-            "KP_Add": lambda: session.scale_modulus(MODULUS_STEP),
-            "minus": lambda: session.scale_modulus(1 / MODULUS_STEP),
-            "KP_Subtract": lambda: session.scale_modulus(1 / MODULUS_STEP),
-            "f": session.next_friction,
-            "c": self._toggle_colour,
-            "i": self._toggle_inclusion,
-            "r": self._toggle_recording,
-            "p": self._save_picture,
-            "h": lambda: self._help.SetVisibility(not self._help.GetVisibility()),
-            "q": self.close,
-            "Escape": self.close,
-        }
-        moves = {
-            "Left": (-1, 0, 0),
-            "Right": (1, 0, 0),
-            "Up": (0, 1, 0),
-            "Down": (0, -1, 0),
-            "Prior": (0, 0, 1),
-            "Next": (0, 0, -1),
-        }
-        if symbol in actions:
-            actions[symbol]()
-        elif symbol in moves and session.inclusion is not None:
-            step = STEP_M * np.array(moves[symbol], dtype=float)
-            centre = tuple(np.array(session.inclusion.centre_m) + step)
-            self._set_inclusion(replace(session.inclusion, centre_m=centre))
-
-    def _next_beside(self) -> None:
-        if self._sides == 2:  # the layout stays as it began
-            now = self.session.beside_name
-            self.session.set_beside(BESIDES[(BESIDES.index(now) + 1) % 2] if now in BESIDES else BESIDES[0])
-
-    def _toggle_colour(self) -> None:
-        self._colour = "displacement" if self._colour == "stiffness" else "stiffness"
-        if self._colour == "stiffness":
-            self._show_stiffness()
-        else:
-            for picture in self._pictures:
-                picture.colour_by("displacement")
-
-    def _show_stiffness(self) -> None:
-        """Press every place of the renderers' surfaces, once; takes about a second."""
-        radius = self.session.servo.tip_radius_m
-        for picture, name in zip(self._pictures, self._names, strict=True):
-            picture.colour_by("stiffness", local_stiffness(self.session.drawing(name), radius))
-
-    def _toggle_inclusion(self) -> None:
-        if self.session.inclusion is not None:
-            self._set_inclusion(None)
-            return
-        target = self.pointer.target
-        normal = self.session.model.support_normal if target is None else target.normal
-        point = self.pointer.tip_m if target is None else target.point
-        centre = point - 2.0 * INCLUSION_RADIUS_M * normal
-        self._set_inclusion(
-            Region("inclusion", tuple(map(float, centre)), INCLUSION_RADIUS_M, INCLUSION_RATIO)
-        )
-
-    def _set_inclusion(self, region: Region | None) -> None:
+    def set_inclusion(self, region: Region | None) -> None:
+        """Draw it there, and let it be felt there as soon as that is computed."""
         self.session.place_inclusion(region)
-        for picture in self._pictures:
+        for picture in self.pictures:
             picture.show_inclusion(region)
-
-    def _toggle_recording(self) -> None:
-        session = self.session
-        if session.recording:
-            session.end_recording()
-        else:
-            name = f"touch-{time.strftime('%Y%m%d-%H%M%S')}.csv.gz"
-            session.begin_recording(Path(name))
-
-    def _save_picture(self) -> None:
-        self.plotter.screenshot(f"touch-{time.strftime('%Y%m%d-%H%M%S')}.png")
 
     def tick(self) -> Frame | None:
         """One frame: pose out, state in, pictures moved. Returns what was drawn."""
@@ -275,34 +172,28 @@ class TouchWindow:
         self._last_s = now
         frame = self.session.frame()
         if frame is not None:
-            for picture, view in zip(self._pictures, frame.views, strict=False):
-                picture.update(frame, view)
-            self._charts.update(self.session.trace)
-            self._status.input = self._words(frame)
-            self.frames += 1
+            self._draw(frame)
         if now > self._end_s or not self.session.servo.alive:
             self.close()
         return frame
 
-    def _words(self, frame: Frame) -> str:
-        session = self.session
-        sizes = "   ".join(f"{v.name} {np.linalg.norm(v.force_n):.2f} N" for v in frame.views)
-        friction = "sticks" if session.friction in (None, float("inf")) else f"friction {session.friction:g}"
-        lines = [
-            f"{self.scene.title}   {session.young_modulus_pa / 1000:.1f} kPa, {friction}",
-            f"{sizes}   depth {1000 * frame.depth_m:.1f} mm   {frame.stiffness_n_per_m:.0f} N/m here",
-            f"press {1000 * self.pointer.press_depth_m:.1f} mm   H: keys" if self._channel else "H: keys",
-        ]
-        if frame.recorded_s is not None:
-            around = f", base traced {100 * session.traced:.0f} %"
-            lines.append(f"recording {frame.recorded_s:.0f} s{around}")
-        lines += [word for word in (frame.busy, frame.reason) if word]
-        return "\n".join(lines)
+    def _draw(self, frame: Frame) -> None:
+        for picture, view in zip(self.pictures, frame.views, strict=False):
+            picture.update(frame, view)
+        if self._coloured and self.session.inclusion_felt:
+            maps = self._map.of(self._drawing())
+            for picture, stiffness in zip(self.pictures, maps, strict=False):
+                picture.colour_by_stiffness(stiffness)
+        self._charts.update(self.session.trace)
+        self._status.input = status(self.session, self.scene, self.pointer, frame, self.notice)
+        for side, (over, name) in enumerate(zip(self._headings, self._names, strict=True)):
+            over.input = heading(name, felt=side == 0)
+        self.frames += 1
 
     def run(self, seconds: float | None = None, *, screenshot: Path | None = None) -> None:
         """Show until closed or the time is up."""
         self._end_s = time.perf_counter() + seconds if seconds else float("inf")
-        interactor = self._interactor
+        interactor = self.controls.interactor
         self.plotter.show(interactive_update=True, auto_close=False)
         interactor.AddObserver("TimerEvent", lambda *_: self._timed(screenshot))
         interactor.CreateRepeatingTimer(PERIOD_MS)
@@ -319,16 +210,8 @@ class TouchWindow:
             self._ended = True
             if screenshot is not None:
                 self.plotter.screenshot(str(screenshot))
-            self._interactor.TerminateApp()
+            self.controls.interactor.TerminateApp()
 
     def close(self) -> None:
         """End `run` at the next frame."""
         self.closed = True
-
-
-def _unproject(renderer: vtk.vtkRenderer, x: int, y: int, depth: float) -> np.ndarray:
-    """(3,) m, the scene's point under a pixel; depth 0 at the near plane, 1 at the far one."""
-    renderer.SetDisplayPoint(x, y, depth)
-    renderer.DisplayToWorld()
-    point = np.array(renderer.GetWorldPoint())
-    return point[:3] / point[3]

@@ -18,7 +18,7 @@ HERE = Path(__file__).resolve().parent
 def test_hid_drivers_through_a_real_kernel(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The conformance suite for the SpaceMouse, the stick and the wheel, their emulators behind /dev/uhid."""
     try:
-        machine = Machine(Path(os.environ.get("PALPATE_KERNEL_TOOLS", "/")))
+        machine = Machine(Path(os.environ.get("PALPATE_KERNEL_TOOLS", "/")).resolve())
     except Missing as missing:
         pytest.skip(f"{missing}: {HERE / 'kernel/fetch.sh'} FOLDER, then set PALPATE_KERNEL_TOOLS=FOLDER")
     monkeypatch.chdir(HERE.parents[1])

@@ -65,13 +65,19 @@ def test_no_screen_is_said(
 def test_tracing_counts_the_way_around(block: Model) -> None:
     tracing = BaseTracing(block)
     angle = np.linspace(0, np.pi, 200)
-    half = 0.06 * np.column_stack([np.cos(angle), np.sin(angle), np.full(200, 0.0048 / 0.06)])
-    tracing.add(half)
+    along = np.column_stack([np.cos(angle), np.sin(angle)])
+    along *= 0.045 / np.abs(along).max(axis=1)[:, None]  # around the square foot, a tip's radius off it
+    half = np.column_stack([along, np.full(200, 0.0048)])
+    ticks = np.arange(200)
+    tracing.add(half, ticks)
     assert tracing.share == pytest.approx(0.5, abs=0.03) and not tracing.done
-    tracing.add(half * [-1, -1, 2])  # above the support: does not count
-    assert not tracing.done
-    tracing.add(half * [-1, -1, 1])
-    assert tracing.done
+    tracing.add(half * [-1, -1, 2], 200 + ticks)  # above the support: does not count
+    tracing.add(half * [-1.2, -1.2, 1], 400 + ticks)  # away from the foot: does not count either
+    assert tracing.share == pytest.approx(0.5, abs=0.03) and tracing.last == 199
+    tracing.add(half * [-1, -1, 1], 600 + ticks)
+    assert tracing.done and (tracing.first, tracing.last) == (0, 799)
+    tracing.add(half, 800 + ticks)
+    assert tracing.last == 799, "what comes after the way around is palpation"
 
 
 @pytest.fixture

@@ -1,0 +1,241 @@
+"""Mouse and keys of the touch window: what they do to the tip, the inclusion, the session and the view."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+import pyvista
+import vtk
+
+from palpate.window.pointer import Pointer
+from palpate.window.session import MODULUS_STEP, TouchSession
+from scenes.phantoms import Region
+
+INCLUSION_RADIUS_M = 0.008
+INCLUSION_RATIO = 8.0
+STEP_M = 0.002
+BESIDES = ("hunt-crossley", "kelvin-voigt")
+MOVES = {
+    "Left": (-1, 0, 0),
+    "Right": (1, 0, 0),
+    "Up": (0, 1, 0),
+    "Down": (0, -1, 0),
+    "Prior": (0, 0, 1),
+    "Next": (0, 0, -1),
+}
+"""Key symbols that move the inclusion, in steps along the scene's axes."""
+
+
+class Controlled(Protocol):
+    """What the controls need of a window."""
+
+    session: TouchSession
+    plotter: pyvista.Plotter
+    pointer: Pointer
+    notice: str
+
+    @property
+    def picture_renderers(self) -> list[vtk.vtkRenderer]:
+        """Where an object is drawn."""
+
+    def set_inclusion(self, region: Region | None) -> None:
+        """Draw it there and let it be felt there."""
+
+    def toggle_colour(self) -> None:
+        """By displacement, or by local stiffness."""
+
+    def toggle_help(self) -> None:
+        """Show it, or not."""
+
+    def close(self) -> None:
+        """End."""
+
+
+class Controls:
+    """Listens to a window's interactor; every method may also be called by a script."""
+
+    def __init__(self, window: Controlled) -> None:
+        self._window = window
+        self._session = window.session
+        self._dragged: tuple[np.ndarray, np.ndarray] | None = None
+        plotter = window.plotter
+        self.interactor = plotter.iren.interactor
+        self._style = vtk.vtkInteractorStyleTrackballCamera()
+        # two quick presses would give the mouse to a chart, and pyvista's keys change the picture
+        plotter.iren.untrack_click_position("left")
+        plotter.iren.clear_key_event_callbacks()
+        # through pyvista, which sets what it knows of again when the window is shown
+        plotter.iren.style = self._style
+        # an observer on the style replaces what the style would do with that event
+        for event, action in (
+            ("LeftButtonPressEvent", lambda *_: self._left(True)),
+            ("LeftButtonReleaseEvent", lambda *_: self._left(False)),
+            ("MiddleButtonPressEvent", lambda *_: self.grab()),
+            ("MiddleButtonReleaseEvent", lambda *_: self.let_go()),
+            ("RightButtonPressEvent", lambda *_: self._turn(True)),
+            ("RightButtonReleaseEvent", lambda *_: self._turn(False)),
+            ("MouseWheelForwardEvent", lambda *_: self.wheel(1)),
+            ("MouseWheelBackwardEvent", lambda *_: self.wheel(-1)),
+            ("MouseMoveEvent", lambda *_: self._moved()),
+            ("CharEvent", lambda *_: None),
+            ("KeyPressEvent", lambda *_: self.key(self.interactor.GetKeySym())),
+        ):
+            self._style.AddObserver(event, action)
+
+    def _left(self, down: bool) -> None:
+        if down and self.interactor.GetShiftKey():
+            self.grab()
+        elif not down and self._dragged is not None:
+            self.let_go()
+        else:
+            self.press(down)
+
+    def press(self, on: bool) -> None:
+        """The tip goes in, or comes out again."""
+        self._window.pointer.pressing = on
+
+    def _turn(self, on: bool) -> None:
+        self._style.FindPokedRenderer(*self.interactor.GetEventPosition())
+        (self._style.StartRotate if on else self._style.EndRotate)()
+
+    def _moved(self) -> None:
+        x, y = self.interactor.GetEventPosition()
+        if self._dragged is not None:
+            self._drag(x, y)
+        else:
+            self.point(x, y)
+        self._style.OnMouseMove()
+
+    def point(self, x: int, y: int) -> None:
+        """The mouse is over pixel (x, y), counted from the lower left."""
+        renderer = self._under(x, y)
+        if renderer is not None:
+            self._window.pointer.point_along(unproject(renderer, x, y, 0.0), unproject(renderer, x, y, 1.0))
+
+    def _under(self, x: int, y: int) -> vtk.vtkRenderer | None:
+        pictures = self._window.picture_renderers
+        return next((renderer for renderer in pictures if renderer.IsInViewport(x, y)), None)
+
+    def wheel(self, steps: int) -> None:
+        """Depth of a press; with Ctrl held the distance of the eye; with a ball in hand its distance."""
+        if self.interactor.GetControlKey():
+            self._window.plotter.camera.Dolly(1.1**steps)
+        elif self._dragged is not None:
+            away = np.array(self._window.plotter.camera.direction)
+            centre, start = self._dragged
+            self._dragged = centre + steps * STEP_M * away, start
+            self._drag(*self.interactor.GetEventPosition())
+        else:
+            self._window.pointer.deeper(steps)
+
+    def grab(self) -> None:
+        """Take the inclusion in hand: the mouse drags it in a plane parallel to the picture."""
+        region = self._session.inclusion
+        renderer = self._under(*self.interactor.GetEventPosition())
+        if region is None or renderer is None:
+            return
+        centre = np.array(region.centre_m)
+        self._dragged = centre, self._in_plane(renderer, centre, *self.interactor.GetEventPosition())
+
+    def let_go(self) -> None:
+        """Leave the inclusion where it is."""
+        self._dragged = None
+
+    def _in_plane(self, renderer: vtk.vtkRenderer, centre: np.ndarray, x: int, y: int) -> np.ndarray:
+        """(3,) m, the point under a pixel as far from the eye as `centre`."""
+        renderer.SetWorldPoint(*centre, 1.0)
+        renderer.WorldToDisplay()
+        return unproject(renderer, x, y, renderer.GetDisplayPoint()[2])
+
+    def _drag(self, x: int, y: int) -> None:
+        renderer = self._under(x, y)
+        region = self._session.inclusion
+        if renderer is None or region is None:
+            return
+        centre, start = self._dragged
+        moved = centre + self._in_plane(renderer, centre, x, y) - start
+        self._window.set_inclusion(replace(region, centre_m=tuple(map(float, moved))))
+
+    def key(self, symbol: str) -> None:
+        """A key by VTK's symbol; see palpate.window.keys."""
+        action = self._actions().get(symbol)
+        if action is not None:
+            action()
+        elif symbol in MOVES and self._session.inclusion is not None:
+            centre = np.array(self._session.inclusion.centre_m) + STEP_M * np.array(MOVES[symbol])
+            moved = replace(self._session.inclusion, centre_m=tuple(map(float, centre)))
+            self._window.set_inclusion(moved)
+
+    def _actions(self) -> dict[str, Callable[[], object]]:
+        session, window = self._session, self._window
+
+        def stiffer() -> None:
+            session.scale_modulus(MODULUS_STEP)
+
+        def softer() -> None:
+            session.scale_modulus(1.0 / MODULUS_STEP)
+
+        return {
+            "space": session.toggle_force,
+            "Tab": session.next_renderer,
+            "b": self._next_beside,
+            "plus": stiffer,
+            "equal": stiffer,
+            "KP_Add": stiffer,
+            "minus": softer,
+            "KP_Subtract": softer,
+            "f": session.next_friction,
+            "c": window.toggle_colour,
+            "i": self._toggle_inclusion,
+            "r": self._toggle_recording,
+            "p": self._save_picture,
+            "h": window.toggle_help,
+            "q": window.close,
+            "Escape": window.close,
+        }
+
+    def _next_beside(self) -> None:
+        now = self._session.beside_name
+        if now:  # the layout stays as it began
+            self._session.set_beside(BESIDES[(BESIDES.index(now) + 1) % 2] if now in BESIDES else BESIDES[0])
+
+    def _toggle_inclusion(self) -> None:
+        if self._session.inclusion is not None:
+            self._dragged = None
+            self._window.set_inclusion(None)
+            return
+        pointer = self._window.pointer
+        target = pointer.target
+        normal = self._session.model.support_normal if target is None else target.normal
+        point = pointer.tip_m if target is None else target.point
+        centre = point - 2.0 * INCLUSION_RADIUS_M * normal
+        region = Region("inclusion", tuple(map(float, centre)), INCLUSION_RADIUS_M, INCLUSION_RATIO)
+        self._window.set_inclusion(region)
+
+    def _toggle_recording(self) -> None:
+        if self._session.recording is not None:
+            self._window.notice = f"wrote {self._session.end_recording()}"
+        else:
+            self._session.begin_recording(Path(f"{_stamp()}.csv.gz"))
+
+    def _save_picture(self) -> None:
+        path = f"{_stamp()}.png"
+        self._window.plotter.screenshot(path)
+        self._window.notice = f"saved {path}"
+
+
+def _stamp() -> str:
+    return f"touch-{time.strftime('%Y%m%d-%H%M%S')}"
+
+
+def unproject(renderer: vtk.vtkRenderer, x: int, y: int, depth: float) -> np.ndarray:
+    """(3,) m, the scene's point under a pixel; depth 0 at the near plane, 1 at the far one."""
+    renderer.SetDisplayPoint(x, y, depth)
+    renderer.DisplayToWorld()
+    point = np.array(renderer.GetWorldPoint())
+    return point[:3] / point[3]

@@ -1,0 +1,36 @@
+"""What one picture of a session shows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class View:
+    """One renderer's side of a frame: force on the tool (3,) N and the surface's displacement (n, 3) m."""
+
+    name: str
+    force_n: np.ndarray
+    displacement_m: np.ndarray
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Of the first tip: tip_m (3,), depth_m in the object, stiffness in N/m, 0 in air.
+
+    reason: why the commanded force is not the rendered one, in plain words. busy: what the worker does, or
+    why it failed. recorded_s: how long a recording runs, None without one.
+    """
+
+    time_s: float
+    tip_m: np.ndarray
+    depth_m: float
+    touching: bool
+    stiffness_n_per_m: float
+    force_enabled: bool
+    reason: str
+    views: tuple[View, ...]
+    busy: str
+    recorded_s: float | None

@@ -1,0 +1,145 @@
+"""A stiff ball that is moved about inside an object: a low-rank change of the compliance, no new precompute.
+
+The change is exact for the model's own mesh (mechanics.inclusion), under the patches of both of the servo's
+tables, and interpolated to the contact surface; a table made from the start has a finer mesh under the skin.
+"""
+
+from __future__ import annotations
+
+import shutil
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import scipy.sparse as sp
+
+from mechanics import inclusion
+from mechanics.model import Model
+from mechanics.nearest import closest_on_triangles
+from mechanics.patch import PatchSampler
+from mechanics.progress import Progress, silent
+from mechanics.solver import Solver
+from mechanics.support import support_of
+from palpate.servo import Servo
+from render.base import Renderer
+from render.fem import FemRenderer
+from scenes.inclusions import modulus_ratio
+from scenes.phantoms import Region
+
+
+@dataclass(frozen=True)
+class FieldChange:
+    """The far field and the mutual table of a changed object, in a file, for renderers in any process."""
+
+    path: Path
+
+    def changed(self, renderer: Renderer) -> Renderer:
+        """The renderer on the changed object; one-dimensional ones know nothing of what is inside."""
+        if not isinstance(renderer, FemRenderer):
+            return renderer
+        with np.load(self.path) as arrays:
+            return renderer.with_field(arrays["far"], arrays["blocks"] if len(arrays["blocks"]) else None)
+
+
+class MovingInclusion:
+    """model: the object without the ball; renderer: of that object, at any modulus."""
+
+    def __init__(self, model: Model, renderer: FemRenderer) -> None:
+        compliance = renderer.compliance
+        self._mesh = model.mesh.quadratic()
+        support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
+        self._solver = Solver(self._mesh, model.poisson_ratio, model.modulus_ratio, support=support)
+        wide = PatchSampler(self._mesh, float(compliance.patch_width_m[0])).matrix(compliance.points)
+        narrow = PatchSampler(self._mesh, float(compliance.own_width_m[0])).matrix(compliance.own_points)
+        self._outputs = sp.vstack([wide, narrow], format="csr")
+        self._mutual = 3 * len(compliance.points)  # rows of the wide patches
+        self._plain_far = renderer.parameters.far
+        self._blocks = compliance.blocks
+        self._touched = np.flatnonzero(np.abs(self._plain_far).any(axis=(1, 2)))
+        vertices = renderer.surface[0][self._touched]
+        points, triangles = compliance.own_points, compliance.own_triangles
+        triangle, self._weights = closest_on_triangles(vertices, points, triangles)
+        self._corners = triangles[triangle]
+        self._region: inclusion.Region | None = None
+
+    def write(self, region: Region | None, path: Path, progress: Progress = silent) -> FieldChange:
+        """The change that a ball makes, None: the plain object. Solves only for elements not met before."""
+        far, blocks = self._plain_far, self._blocks
+        if region is not None:
+            far, blocks = self._changed(modulus_ratio(self._mesh, [region]), progress)
+        with open(path, "wb") as file:
+            np.savez(file, far=far, blocks=blocks)
+        return FieldChange(path)
+
+    def _changed(self, ratio: np.ndarray, progress: Progress) -> tuple[np.ndarray, np.ndarray]:
+        elements = np.flatnonzero(ratio != 1.0)
+        if not len(elements):  # outside the object
+            return self._plain_far, self._blocks
+        if self._region is None:
+            self._region = inclusion.Region(self._solver, elements, self._outputs, progress=progress)
+        else:
+            self._region.extend(elements, progress)
+        basis, change = self._region.change(ratio[self._region.elements])
+        own = basis[self._mutual :].reshape(-1, 3, basis.shape[1])
+        less = (own @ change.astype(own.dtype)) @ own.transpose(0, 2, 1)
+        far = np.array(self._plain_far)
+        far[self._touched] -= np.einsum("vc,vcab->vab", self._weights, less[self._corners])
+        blocks = self._blocks
+        if len(blocks):
+            wide, t = basis[: self._mutual], self._mutual // 3
+            moved = ((wide @ change.astype(wide.dtype)) @ wide.T).reshape(t, 3, t, 3)
+            blocks = blocks - moved.transpose(0, 2, 1, 3)
+        return far, blocks
+
+
+class InclusionMover:
+    """Where the ball is wanted, and where it is felt: of places that follow one another quickly, the newest.
+
+    wanted: set at any time, None for no ball. model: the object without it.
+    """
+
+    def __init__(self, model: Model) -> None:
+        self.wanted: Region | None = None
+        self._placed: Region | None = None
+        self._model = model
+        self._moving: MovingInclusion | None = None
+        self._change: FieldChange | None = None
+        shared = Path("/dev/shm")  # where files cost no disk
+        self._folder = Path(
+            tempfile.mkdtemp(prefix="palpate-touch-", dir=shared if shared.is_dir() else None)
+        )
+        self._count = 0
+
+    @property
+    def settled(self) -> bool:
+        """Whether it is felt where it is wanted."""
+        return self._placed == self.wanted
+
+    def follow(self, servo: Servo, drawing: FemRenderer) -> FemRenderer:
+        """Compute the newest wanted place and let it be felt; returns `drawing` on the changed object.
+
+        Where that fails, the ball is wanted where it is felt.
+        """
+        wanted, before = self.wanted, self._change
+        self._count += 1
+        try:
+            self._moving = self._moving or MovingInclusion(self._model, drawing)
+            self._change = self._moving.write(wanted, self._folder / f"field-{self._count}.npz")
+            self.apply(servo)
+        except Exception:
+            self.wanted = self._placed
+            raise
+        if before is not None:
+            before.path.unlink()
+        self._placed = wanted
+        return self._change.changed(drawing)
+
+    def apply(self, servo: Servo) -> None:
+        """To a renderer that the servo has got anew."""
+        if self._change is not None:
+            servo.change(self._change)
+
+    def close(self) -> None:
+        """Remove what was written."""
+        shutil.rmtree(self._folder, ignore_errors=True)

@@ -1,0 +1,75 @@
+"""A session's recording: what the servo recorded, with what is known of the object it was made on."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.model import Model
+from mechanics.recording import write_recording
+from palpate.servo import Servo
+from palpate.servo.recorder import Recorder
+from palpate.window.tracing import BaseTracing
+from scenes.phantoms import Region
+
+MARGIN_S = 0.05
+
+
+class SessionRecording:
+    """Runs from when it is made; `collect` at every frame, `write` once."""
+
+    def __init__(self, servo: Servo, model: Model, path: Path) -> None:
+        self.path = path
+        self._servo = servo
+        self._model = model
+        self._recorder = Recorder(servo)
+        self._tracing = BaseTracing(model)
+        self._first: int | None = None
+        self._last = 0
+
+    def _seconds(self, tick: int) -> float:
+        """Of the recording, at a tick."""
+        return 0.0 if self._first is None else (tick - self._first) * self._servo.options.period_ns * 1e-9
+
+    @property
+    def seconds(self) -> float:
+        """How long it runs."""
+        return self._seconds(self._last)
+
+    @property
+    def traced(self) -> float:
+        """The share of the way around the base that was traced on the support."""
+        return self._tracing.share
+
+    def collect(self) -> None:
+        """Take over what the servo's ring holds."""
+        rows = self._recorder.collect()
+        rows = rows[np.isfinite(rows["tip"]).all(axis=1)]
+        if len(rows):
+            self._first = int(rows["tick"][0]) if self._first is None else self._first
+            self._last = int(rows["tick"][-1])
+            self._tracing.add(rows["tip"], rows["tick"])
+
+    def write(self, title: str, young_modulus_pa: float, inclusion: Region | None) -> Path:
+        """Write it; young_modulus_pa, inclusion: what was rendered at the end.
+
+        Where the base was traced, the recording states when; else the model's own base stands in.
+        """
+        self.collect()
+        recording = self._recorder.recording(self._servo.tip_radius_m, title)
+        base, phase = self._model.path, None
+        if self._tracing.done:
+            start, end = (self._seconds(tick) for tick in (self._tracing.first, self._tracing.last))
+            base, phase = None, (max(0.0, start - MARGIN_S), end + MARGIN_S)
+        recording = replace(
+            recording,
+            poisson_ratio=self._model.poisson_ratio,
+            base_model=None if base is None else base.resolve(),
+            boundary_phase=phase,
+        )
+        truth = {"young_modulus_pa": young_modulus_pa, "effects": sorted(self._model.effects)}
+        if inclusion is not None:
+            truth["inclusion"] = {k: v for k, v in asdict(inclusion).items() if k != "name"}
+        return write_recording(self.path, recording, truth=truth)

@@ -1,0 +1,101 @@
+"""A touch window with a hand on its mouse and keys: real events into VTK's interactor, off-screen."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from palpate.window.frames import Frame
+from palpate.window.window import CHARTS_SHARE, TouchWindow
+
+FRAME_S = 0.005
+
+
+class Driven:
+    """Shows the window; every method is something that a person does, or waits as one does."""
+
+    def __init__(self, window: TouchWindow) -> None:
+        self.window = window
+        self.session = window.session
+        self._pause = threading.Event()
+        window.plotter.show(interactive_update=True, auto_close=False)
+
+    @property
+    def interactor(self):
+        return self.window.controls.interactor
+
+    def mouse(self, x: float, y: float) -> None:
+        """x, y: shares of the first picture."""
+        width, height = self.window.plotter.window_size
+        self.pixel(x * width / self.window.sides, (CHARTS_SHARE + (1.0 - CHARTS_SHARE) * y) * height)
+
+    def pixel(self, x: float, y: float) -> None:
+        self.interactor.SetEventPosition(round(x), round(y))
+        self.interactor.InvokeEvent("MouseMoveEvent")
+
+    def mouse_at(self, point_m: np.ndarray) -> None:
+        """Over a place of the scene, as the first picture shows it."""
+        renderer = self.window.picture_renderers[0]
+        renderer.SetWorldPoint(*point_m, 1.0)
+        renderer.WorldToDisplay()
+        self.pixel(*renderer.GetDisplayPoint()[:2])
+
+    def button(self, down: bool, which: str = "Left") -> None:
+        self.interactor.InvokeEvent(f"{which}Button{'Press' if down else 'Release'}Event")
+
+    def wheel(self, steps: int) -> None:
+        for _ in range(abs(steps)):
+            self.interactor.InvokeEvent(f"MouseWheel{'Forward' if steps > 0 else 'Backward'}Event")
+
+    def key(self, symbol: str) -> None:
+        self.interactor.SetKeySym(symbol)
+        self.interactor.InvokeEvent("KeyPressEvent")
+        self.session.worker.wait()
+
+    def until(self, condition: Callable[[Frame], bool], frames: int = 4000) -> Frame:
+        """Frames go by until `condition(frame)`; a frame that never comes fails the test."""
+        frame = None
+        for _ in range(frames):
+            frame = self.window.tick()
+            if frame is not None and condition(frame):
+                return frame
+            self._pause.wait(FRAME_S)
+        raise AssertionError(f"the window never came to this; its last frame: {frame}")
+
+    def wait(self, seconds: float) -> None:
+        """Frames go by for a time."""
+        end = time.perf_counter() + seconds
+        self.until(lambda frame: time.perf_counter() > end, frames=1_000_000)
+
+    def inclusion_settled(self) -> None:
+        """Frames go by until the inclusion is felt where it is wanted."""
+        self.until(lambda frame: self.session.inclusion_felt and not self.session.worker.busy, frames=20_000)
+        assert self.session.worker.failure == ""
+
+    def look_from(self, azimuth: float) -> None:
+        """Turn the view with the right button until the eye stands at this angle about the vertical, rad."""
+        width, height = self.window.plotter.window_size
+
+        def off() -> float:
+            camera = self.window.picture_renderers[0].GetActiveCamera()
+            eye = np.subtract(camera.GetPosition(), camera.GetFocalPoint())
+            return float(np.angle(np.exp(1j * (azimuth - np.arctan2(eye[1], eye[0])))))
+
+        for _ in range(20):  # the hand takes hold again before the mouse leaves the picture
+            x = 0.5 * width / self.window.sides
+            self.pixel(x, 0.6 * height)
+            self.button(True, "Right")
+            for _ in range(15):
+                x -= np.clip(60.0 * off(), -15.0, 15.0) * width / 1280.0
+                self.pixel(x, 0.6 * height)
+            self.button(False, "Right")
+            if abs(off()) < 0.05:
+                return
+        raise AssertionError(f"the right button does not turn the view: {off():.2f} rad to go")
+
+    def picture(self) -> np.ndarray:
+        self.window.plotter.render()
+        return self.window.plotter.screenshot(return_img=True)

@@ -1,0 +1,50 @@
+"""A ball that moves by a low-rank change, against the object condensed anew with the ball in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.model import Model
+from palpate.window.inclusion import MovingInclusion
+from render.base import Renderer
+from render.registry import create
+from scenes.inclusions import modulus_ratio
+from scenes.phantoms import Region
+
+
+def force(renderer: Renderer, x: float, y: float, depth: float = 0.004) -> float:
+    """N, of a press onto the block's top."""
+    heights = 0.045 + 0.002 - np.linspace(0.0, 0.002 + depth, 13)
+    path = np.column_stack([np.full(13, x), np.full(13, y), heights])
+    return float(renderer.follow(renderer.start(), path[:, None], np.full(13, 0.01))[-1, 0, 2])
+
+
+def test_a_ball_that_came_by_dragging_is_felt_as_one_from_the_start(block: Model, tmp_path: Path) -> None:
+    plain = create("fem", block)
+    moving = MovingInclusion(block, plain)
+    balls = [Region("ball", (x, -0.002, 0.022), 0.008, 8.0) for x in (-0.02, -0.012, 0.003)]
+    for number, ball in enumerate(balls):
+        felt = moving.write(ball, tmp_path / f"{number}.npz").changed(plain)
+    ratio = modulus_ratio(block.mesh, [balls[-1]])
+    anew = create("fem", block.replaced(modulus_ratio=ratio, path=None))
+    for x, y in ((0.003, -0.002), (0.01, 0.01)):
+        stiffer = force(felt, x, y) / force(plain, x, y) - 1.0
+        wanted = force(anew, x, y) / force(plain, x, y) - 1.0
+        # the block's elements are 13 mm, those of the tables made anew halved under the skin
+        assert 0.03 < wanted and 0.6 * wanted < stiffer < 1.1 * wanted
+    assert np.allclose(felt.compliance.blocks, anew.compliance.blocks, rtol=1e-4, atol=1e-3)
+    gone = moving.write(None, tmp_path / "gone.npz").changed(felt)
+    assert force(gone, 0.003, -0.002) == force(plain, 0.003, -0.002)
+    fresh = MovingInclusion(block, plain).write(balls[-1], tmp_path / "fresh.npz").changed(plain)
+    assert np.allclose(fresh.parameters.far, felt.parameters.far, rtol=1e-3, atol=1e-2), (
+        "the way is forgotten"
+    )
+
+
+def test_one_dimensional_renderers_know_of_no_inside(block: Model, tmp_path: Path) -> None:
+    moving = MovingInclusion(block, create("fem", block))
+    change = moving.write(Region("ball", (0.0, 0.0, 0.024), 0.008, 8.0), tmp_path / "ball.npz")
+    one_d = create("hunt-crossley", block)
+    assert change.changed(one_d) is one_d
