@@ -34,8 +34,7 @@ SPEC = DeviceSpec(
 FALCON = {"max_force_n": 8.0, "max_stiffness_n_per_m": 3000.0, "workspace_radius_m": 0.04}
 INSTALL = (
     "install the Force Dimension SDK (forcedimension.com, software) and set FDSDK to its folder, or put "
-    "libdhd "
-    "into ~/.local/lib"
+    "libdhd into ~/.local/lib"
 )
 FOLDERS = ("$FDSDK", "$FORCEDIM_SDK", "~/.local/lib", "/usr/local/lib", "/usr/lib")
 WATCHDOG_TICKS = 160
@@ -88,8 +87,7 @@ class ForceDimensionWire:
         if number < 0:
             raise DeviceError(
                 f"no Force Dimension device opens ({self._why()}): connect and power it, close other "
-                "programs; "
-                "on Linux install the SDK's udev rules"
+                "programs; on Linux install the SDK's udev rules"
             )
         self._id = number
         name = (self._library.dhdGetSystemName(number) or b"").decode(errors="replace")

@@ -4,11 +4,11 @@ A driver supplies a `Wire` (blocking calls); `ThreadedDevice` makes a device of 
 every wire:
 
 * force goes out only after `enable_force`, and zero goes out before the wire is released, whatever happened;
-* no fresh `send_force` for `STALE_FORCE_S`: zero goes out (the caller has stalled; devices.safety cannot
-know); * a reading with a fault, or not calibrated, disables force as well;
-* a wire that raises counts as unplugged: force is disabled, states say `connected=False`, and the
-thread tries
-  again, waiting longer each time; force then needs a new `enable_force`.
+* no fresh `send_force` for `STALE_FORCE_S`: zero goes out (the caller has stalled, which devices.safety
+  cannot know);
+* a reading with a fault, or not calibrated, disables force as well;
+* a wire that raises counts as unplugged: force is disabled, states say `connected=False`, and the thread
+  tries again, waiting longer each time; force then needs a new `enable_force`.
 """
 
 from __future__ import annotations

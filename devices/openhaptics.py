@@ -122,8 +122,7 @@ class OpenHapticsWire:
         if handle == INVALID_HANDLE or error:
             raise DeviceError(
                 f"no Touch device opens ({_words(error)}): connect and power it, run the maker's "
-                "configuration tool, "
-                "close other programs"
+                "configuration tool, close other programs"
             )
         self._handle, self._error = handle, 0
         self._order = (float("-inf"), None)
