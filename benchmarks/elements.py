@@ -42,7 +42,7 @@ def patch_load(mesh: TetMesh) -> np.ndarray:
     return force
 
 
-def give(mesh: TetMesh, nu: float, mean_dilatation: bool) -> tuple[float, int]:
+def give(mesh: TetMesh, nu: float, mean_dilatation: bool | None) -> tuple[float, int]:
     """(compliance of the patch for unit modulus 1/m, degrees of freedom)."""
     solver = Solver(mesh, nu, mean_dilatation=mean_dilatation)
     force = patch_load(mesh)

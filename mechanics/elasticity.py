@@ -18,6 +18,9 @@ _POINTS = np.full((4, 4), _B) + (_A - _B) * np.eye(4)
 _WEIGHTS = np.full(4, 0.25)
 _CHUNK = 4000
 
+NEARLY_INCOMPRESSIBLE = 0.495
+"""Poisson's ratio beyond which the plain quadratic element is 2 to 4 % too stiff on 10 mm (decision 10)."""
+
 
 def lame_parameters(young_modulus: float, poisson_ratio: float) -> tuple[float, float]:
     """(lambda, mu) of an isotropic solid, in the unit of the modulus."""
@@ -51,14 +54,16 @@ def shape_derivatives(order: int, barycentric: np.ndarray) -> np.ndarray:
 
 
 def element_stiffness(
-    corners: np.ndarray, order: int, poisson_ratio: float, *, mean_dilatation: bool = False
+    corners: np.ndarray, order: int, poisson_ratio: float, *, mean_dilatation: bool | None = None
 ) -> np.ndarray:
     """Element matrices for unit Young's modulus: (m, k, 3, k, 3) with k = 4 or 10 nodes, in metres.
 
     K[i, a, j, b] = integral of lambda B_ia B_jb + mu (B_ib B_ja + delta_ab B_i . B_j), B the shape
     gradients. `mean_dilatation` replaces the divergence by its mean over the element (B-bar), which
-    weakens locking.
+    keeps quadratic elements from locking; None: above NEARLY_INCOMPRESSIBLE.
     """
+    if mean_dilatation is None:
+        mean_dilatation = order == 2 and poisson_ratio > NEARLY_INCOMPRESSIBLE
     lam, mu = lame_parameters(1.0, poisson_ratio)
     gradients, volumes = barycentric_gradients(corners)
     points, weights = (_POINTS, _WEIGHTS) if order == 2 else (np.full((1, 4), 0.25), np.ones(1))
@@ -86,7 +91,7 @@ def stiffness(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
-    mean_dilatation: bool = False,
+    mean_dilatation: bool | None = None,
 ) -> sp.csr_matrix:
     """Stiffness for unit Young's modulus: symmetric (3n, 3n), m (newtons a metre a pascal), nothing fixed.
 

@@ -29,7 +29,7 @@ class Solver:
         modulus_ratio: np.ndarray | None = None,
         *,
         backend: str | None = None,
-        mean_dilatation: bool = False,
+        mean_dilatation: bool | None = None,
         support: Support | None = None,
     ) -> None:
         self.mesh = mesh

@@ -20,20 +20,12 @@ from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.refine import typical_edge
-from mechanics.sites import (
-    PATCH_WIDTH_IN_EDGES,
-    SURFACE_EDGE_M,
-    mean_curvature,
-    patch_width,
-    touch_solver,
-)
+from mechanics.sites import SURFACE_EDGE_M, mean_curvature, patch_width, touch_solver
 from mechanics.solver import Solver
-from mechanics.spread import spaced_corners, spread
 from mechanics.support import Support
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 WIDE_PATCH_M = 0.008  # of the mutual give of a large surface, whatever its elements
-_SOLVED_EVERY_M = 0.005  # on a surface with nearer corners the give of the others is spread from these
 _CORNERS = 32  # patches solved at once
 
 
@@ -124,29 +116,16 @@ def surface_compliance(
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
-    finer = low_rank_error is None or typical_edge(mesh) > _SOLVED_EVERY_M
-    fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support) if finer else coarse
+    if typical_edge(mesh) > SURFACE_EDGE_M:
+        del coarse
+        fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support)
+    else:  # what touch_solver would factorise once more
+        fine = coarse
     own_nodes, own_triangles = _corners(fine.mesh)
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
-    own_width = patch_width(fine.mesh) if finer else PATCH_WIDTH_IN_EDGES * SURFACE_EDGE_M
-
-    def own_at(places: np.ndarray) -> np.ndarray:
-        return own_blocks(
-            fine, own_points[places], own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f)
-        )
-
-    if finer:
-        own = own_at(np.arange(len(own_points)))
-    else:
-        factor = tables["factor"]
-        known = np.einsum("iar,ibr->iab", factor, factor, optimize=True).astype(float)
-        for i, normal in enumerate(own_normals):
-            known[i] += half_space_compliance(normal, poisson_ratio, own_width)
-            known[i] -= half_space_compliance(normal, poisson_ratio, width)
-        places = spaced_corners(own_points, own_normals, _SOLVED_EVERY_M)
-        # what the wide patch misses: nothing but near an edge or the base, and smooth
-        own = known + spread(own_points, own_normals, places, own_at(places) - known[places])
+    own_width = patch_width(fine.mesh)
+    own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f))
     return SurfaceCompliance(
         nodes=nodes,
         points=points,
