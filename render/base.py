@@ -16,6 +16,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.model import Model
+from render.surface import ContactSurface
 
 
 class State(Protocol):
@@ -42,6 +43,7 @@ class Renderer(ABC):
 
     name: str
     model: Model
+    contact: ContactSurface
     parameters: Any
     kernel: Callable[[Any, Any, np.ndarray], None]
     path_kernel: Callable[[Any, Any, np.ndarray, np.ndarray, np.ndarray], None]
@@ -74,9 +76,9 @@ class Renderer(ABC):
         return copy
 
     @property
-    @abstractmethod
     def surface(self) -> tuple[np.ndarray, np.ndarray]:
         """Points (n, 3) m and outward triangles (k, 3) of the surface that is touched and drawn."""
+        return self.contact.arrays.vertices, self.contact.arrays.triangles
 
     @abstractmethod
     def displacement_of(

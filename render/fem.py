@@ -63,6 +63,7 @@ class FemRenderer(Renderer):
             poisson_ratio=np.array([model.poisson_ratio]),
             friction=np.array([rendered_friction(model, self.options)]),
             series_compliance=np.zeros(1),
+            edition=np.zeros(1, dtype=np.int64),
             effects=effect_arrays(model, self.options),
         )
 
@@ -87,13 +88,12 @@ class FemRenderer(Renderer):
             raise OptionError("a changed field must have the shape of the renderer's own")
         changed = self._with(far=np.array(far))
         if blocks is not None:
-            changed.parameters = changed.parameters._replace(blocks=np.array(blocks, dtype=np.float32))
-            changed.compliance = replace(self.compliance, blocks=np.array(blocks, dtype=np.float32))
+            table = np.array(blocks, dtype=np.float32)
+            changed.parameters = changed.parameters._replace(
+                blocks=table, edition=self.parameters.edition + 1
+            )
+            changed.compliance = replace(self.compliance, blocks=table)
         return changed
-
-    @property
-    def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.contact.arrays.vertices, self.contact.arrays.triangles
 
     def displacement_of(
         self,

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from numba import njit
-
 from mechanics.effects.adhesion import adhesive_pull
 from mechanics.effects.mullins_softening import dent_energy, softening
 from mechanics.effects.viscoelasticity import prony_step
 from mechanics.touch import touch_remember
-from render.contact import foot, release
+from render.contact import release
+from render.kernels import part
+from render.walking import foot
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def forget(state, i):
     """A new touch of tip i remembers nothing of the last one (what the material felt stays in `felt`)."""
     for k in range(4):
@@ -23,7 +23,7 @@ def forget(state, i):
             state.prony[i, branch, k] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def conclude(p, state, tips, i):
     """Write tip i's memories and its force; let go of it where nothing presses and nothing pulls."""
     grip, out, normal = state.grip, state.solution[i], state.normals[i]
@@ -53,7 +53,7 @@ def conclude(p, state, tips, i):
         release(grip, i, tips[i])
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _force(p, state, i, depth):
     """The force that is rendered: softened, with its memory, never pulling but for adhesion."""
     force, normal, e = state.forces[i], state.normals[i], p.effects
@@ -73,7 +73,7 @@ def _force(p, state, i, depth):
         force[k] = (force[k] if push > 0.0 else 0.0) - pull * normal[k]
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def _softened(p, state, i, depth):
     t, weights = state.grip.triangle[i], state.grip.weights[i]
     energy, greatest = dent_energy(depth), 0.0

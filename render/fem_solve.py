@@ -4,17 +4,20 @@ walking."""
 from __future__ import annotations
 
 import numpy as np
-from numba import njit
 
-from mechanics.mutual import between_block, between_mixed, mix_factor
 from mechanics.touch import touch_solve
-from render.contact import place, turn_frame, walk
+from render.fem_coupling import carry
+from render.frames import turn_frame
+from render.kernels import part
+from render.walking import place, walk
 
 SLIPS = 12
-CAUTION = 0.9
+CAUTION, SECANT_CAUTION = 0.9, 0.98
+LEAST_N, SLIPPED = 1e-9, 1e-4
+CONVERGED_N = 1e-5
 
 
-@njit(cache=True, error_model="numpy")
+@part
 def settle(p, state, i):
     """At the anchor of tip i: point, normal, frame, far field in that frame (m/N), effective radius."""
     grip = state.grip
@@ -52,76 +55,62 @@ def settle(p, state, i):
     state.curvature[i] = curvature
 
 
-@njit(cache=True, error_model="numpy")
-def couple(p, state, i, m):
-    """Blocks between tip i and the tips before it, m/N; rows act on forces on the object."""
-    grip, n = state.grip, state.nodes
-    t = grip.triangle[i]
-    state.fresh[i] = 0
-    for a in range(3):
-        total = 0.0
-        for corner in range(3):
-            total += grip.weights[i, corner] * p.parent_weights[t, corner, a]
-        total /= np.sqrt(p.young_modulus_pa[0])
-        if n[i, a] != p.parents[t, a] or state.node_weights[i, a] != total:
-            state.fresh[i] = 1
-        n[i, a] = p.parents[t, a]
-        state.node_weights[i, a] = total
-    if state.fresh[i] and state.mixed.shape[2]:
-        mix_factor(p.factor, n[i], state.node_weights[i], state.mixed[i])
-    for j in range(i):
-        if grip.triangle[j] < 0 or (state.fresh[i] == 0 and state.fresh[j] == 0):
-            continue  # a pair that stuck where it was keeps its block
-        block = state.blocks[i, j]
-        if state.mixed.shape[2]:
-            between_mixed(state.mixed[i], state.mixed[j], block)
-        else:
-            between_block(p.blocks, n[i], state.node_weights[i], n[j], state.node_weights[j], block)
-        for r in range(3):
-            for c in range(3):
-                state.blocks[j, i, c, r] = block[r, c]
-
-
-@njit(cache=True, error_model="numpy")
-def solve_one(p, state, tips, i, m):
-    """One Gauss-Seidel update of tip i: its force for the others' forces held; returns the change, N."""
+@part
+def solve_one(p, state, tips, i):
+    """One Gauss-Seidel update: the force of tip i where the others' forces stand as they are; tells them."""
     grip, frame, out = state.grip, state.frames[i], state.solution[i]
     d, local, move = state.vectors[3], state.vectors[4], state.vectors[5]
     plane_strain = p.young_modulus_pa[0] / (1.0 - p.poisson_ratio[0] ** 2)
     stick = 4.0 * p.young_modulus_pa[0] / ((1.0 + p.poisson_ratio[0]) * (2.0 - p.poisson_ratio[0]))
     mu = p.friction[0]
+    fu = fv = fn = dent = a = du = dv = tangent = 0.0
+    length = before = 0.0
     for slip in range(SLIPS):
         for k in range(3):
             d[k] = tips[i, k] - state.points[i, k] - state.radii_m[i] * state.normals[i, k]
-            for j in range(m):
-                if j != i and grip.triangle[j] >= 0:
-                    for c in range(3):
-                        d[k] += state.blocks[i, j, k, c] * state.elastic[j, c]
+            d[k] += state.carried[k, i]
         for r in range(3):
             local[r] = frame[r, 0] * d[0] + frame[r, 1] * d[1] + frame[r, 2] * d[2]
         fu, fv, fn, dent, a, du, dv, tangent = touch_solve(
             state.memory[i], local, state.local_far[i], p.table, state.radius[i], plane_strain, stick
         )
+        state.memory[i, 1] = dent  # where the next solution starts from
         pull = np.sqrt(fu * fu + fv * fv)
-        if not (pull > mu * fn) or fn <= 0.0:
+        excess = pull - mu * fn
+        if not excess > 0.0 or fn <= 0.0:
             break
-        if slip == SLIPS - 1 or pull - mu * fn <= 1e-9 + 1e-6 * mu * fn:
+        if slip == SLIPS - 1 or excess <= LEAST_N + SLIPPED * mu * fn:
             fu *= mu * fn / pull
             fv *= mu * fn / pull
             break
         # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho.
         # a little less than that, so that the force comes down onto the cone and is never left inside it
-        give = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
-        length = CAUTION * give * (pull - mu * fn) / max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
+        if slip > 0 and excess < 0.5 * before:
+            length *= SECANT_CAUTION * excess / (before - excess)
+        else:
+            give = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
+            length = CAUTION * give * excess / max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
+        before = excess
         for k in range(3):
             move[k] = -length * (fu * frame[0, k] + fv * frame[1, k]) / pull
         grip.triangle[i] = walk(p.surface, grip.triangle[i], grip.weights[i], move)
         settle(p, state, i)
-    change = 0.0
     for k in range(3):
-        force = fu * frame[0, k] + fv * frame[1, k] + fn * frame[2, k]
-        change = max(change, abs(force - state.elastic[i, k]))
-        state.elastic[i, k] = force
+        move[k] = fu * frame[0, k] + fv * frame[1, k] + fn * frame[2, k] - state.elastic[i, k]
+        state.elastic[i, k] += move[k]
+        state.carried_before[k, i] = state.carried[k, i]
+    if tips.shape[0] > 1:
+        carry(state.links[i], state.carried, move[0], move[1], move[2])
     out[0], out[1], out[2], out[3] = fu, fv, fn, dent
     out[4], out[5], out[6], out[7] = a, du, dv, tangent
-    return change
+
+
+@part
+def unsettled(p, state, i):
+    """Whether the others have moved the place of tip i by what changes its force by more than CONVERGED_N."""
+    # E times the radius bounds the sideways stiffness, and the normal one before it touches
+    least = CONVERGED_N / (state.solution[i, 7] + p.young_modulus_pa[0] * state.radius[i])
+    for k in range(3):
+        if abs(state.carried[k, i] - state.carried_before[k, i]) > least:
+            return True
+    return False

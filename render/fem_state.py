@@ -19,7 +19,8 @@ class FemParameters(NamedTuple):
     far: (v, 3, 3) 1/m. curvature: (v,) 1/m. parents: (k, 3) compliance nodes that interpolate over a
     triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor:
     (n, 3, r) in their place, see SurfaceCompliance. table: dent law.
-    young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each.
+    young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition: (1,) int64,
+    that of the table.
     """
 
     surface: SurfaceArrays
@@ -34,6 +35,7 @@ class FemParameters(NamedTuple):
     poisson_ratio: np.ndarray
     friction: np.ndarray
     series_compliance: np.ndarray
+    edition: np.ndarray
     effects: EffectArrays
 
 
@@ -43,8 +45,12 @@ class FemState(NamedTuple):
     grip: where each tip is held. frames: (m, 3, 3) rows u, v, n. elastic: (m, 3) N, quasi-static forces on
     the tools. memory: (m, STATE_SIZE) of the sticks. prony: (m, k, 3) N and before: (m, 3) N of
     viscoelasticity. deepest: (m,) m of this touch. felt: (v,) greatest load of each fine vertex (Mullins).
-    blocks: (m, m, 3, 3) m/N between contacts. mixed: (m, 3, r) the factor at each contact. The others are
-    scratch.
+    Between contacts (render.fem_coupling): nodes (m, 3), node_weights (m, 3) interpolate at each tip; moved
+    (m, 2) whether nodes or weights changed this tick; corners (m, m, 9, 9) 1/m, blocks of the corners of
+    pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N, [j, c, k, i] the displacement
+    of tip i's place along k for a unit force on the object at tip j along c; carried (3, m) m, by how
+    much the others move each place, with the sign turned, and carried_before that of its last
+    solution; edition of the table. The others are scratch.
     """
 
     forces: np.ndarray
@@ -63,12 +69,17 @@ class FemState(NamedTuple):
     deepest: np.ndarray
     felt: np.ndarray
     memory: np.ndarray
-    blocks: np.ndarray
-    mixed: np.ndarray
-    solution: np.ndarray
     nodes: np.ndarray
     node_weights: np.ndarray
-    fresh: np.ndarray
+    moved: np.ndarray
+    corners: np.ndarray
+    mixed: np.ndarray
+    links: np.ndarray
+    carried: np.ndarray
+    carried_before: np.ndarray
+    edition: np.ndarray
+    solution: np.ndarray
+    flat: np.ndarray
     local_far: np.ndarray
     radius: np.ndarray
     curvature: np.ndarray
@@ -96,12 +107,17 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         deepest=np.zeros(m),
         felt=np.zeros(len(parameters.surface.vertices)),
         memory=np.zeros((m, STATE_SIZE)),
-        blocks=np.zeros((m, m, 3, 3)),
-        mixed=np.zeros((m, 3, parameters.factor.shape[2])),
-        solution=np.zeros((m, 8)),
-        nodes=np.zeros((m, 3), dtype=np.int64),
+        nodes=np.full((m, 3), -2, dtype=np.int64),
         node_weights=np.zeros((m, 3)),
-        fresh=np.ones(m, dtype=np.int64),
+        moved=np.zeros((m, 2), dtype=np.int64),
+        corners=np.zeros((m, m, 9, 9), dtype=np.float32),
+        mixed=np.zeros((m, 3, parameters.factor.shape[2])),
+        links=np.zeros((m, 3, 3, m)),
+        carried=np.zeros((3, m)),
+        carried_before=np.zeros((3, m)),
+        edition=parameters.edition.copy(),
+        solution=np.zeros((m, 8)),
+        flat=np.zeros(9),
         local_far=np.zeros((m, 3, 3)),
         radius=np.zeros(m),
         curvature=np.zeros(m),

@@ -109,10 +109,6 @@ class OneDRenderer(Renderer):
             raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
         return self._with(scale=np.array([young_modulus_pa / self.model.young_modulus_pa]))
 
-    @property
-    def surface(self) -> tuple[np.ndarray, np.ndarray]:
-        return self.contact.arrays.vertices, self.contact.arrays.triangles
-
     def displacement_of(
         self,
         points: np.ndarray,

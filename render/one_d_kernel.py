@@ -10,12 +10,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from render.base import Grip, new_grip
 from render.bvh import STACK
-from render.contact import approach, foot, lose, release
+from render.contact import approach, lose, release
+from render.kernels import kernel
 from render.surface import SurfaceArrays
+from render.walking import foot
 
 RATE_FILTER_S = 0.01  # positions come in steps of some 30 um: a raw difference is no velocity
 _NEWTON = 20
@@ -69,7 +70,7 @@ def new_one_d_state(radii: np.ndarray, dt_s: float) -> OneDState:
     )
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def law_force(k, b, r, s, depth, rate):
     """(force N, stiffness N/m) along the normal at a depth, m, and its rate, m/s; never pulls."""
     if not depth > 0.0:
@@ -79,7 +80,7 @@ def law_force(k, b, r, s, depth, rate):
     return max(elastic + damping * rate, 0.0), r * elastic / depth + max(s * damping / depth * rate, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _through_spring(k, b, r, s, depth, rate, compliance):
     """`law_force` behind a spring in series: depth = u + compliance f(u)."""
     if compliance == 0.0:
@@ -99,7 +100,7 @@ def _through_spring(k, b, r, s, depth, rate, compliance):
     return force, stiffness / (1.0 + compliance * stiffness)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def one_d_step(p, state, tips):
     """One tick: tips (m, 3) m; writes the state's forces on the tools, N. See render.base.Renderer.step."""
     grip = state.grip
@@ -147,10 +148,12 @@ def one_d_step(p, state, tips):
             state.forces[i, c] = force * normal[c] if force > 0.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def one_d_path(p, state, steps_s, path, forces):
     """`one_d_step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
     for i in range(path.shape[0]):
         state.dt_s[0] = steps_s[i]
         one_d_step(p, state, path[i])
-        forces[i] = state.forces
+        for t in range(path.shape[1]):
+            for k in range(3):
+                forces[i, t, k] = state.forces[t, k]

@@ -16,8 +16,8 @@ from mechanics.errors import OptionError, RecordingError
 from mechanics.files import atomic_file
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
-from render.contact import foot
 from render.surface import SurfaceArrays
+from render.walking import foot
 
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 _MARCH = 400

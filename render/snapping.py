@@ -15,9 +15,10 @@ import numpy as np
 
 from mechanics.model import Model
 from render.bvh import STACK, closest_triangle
-from render.contact import outside, place
+from render.contact import outside
 from render.options import RenderOptions
 from render.surface import ContactSurface, SurfaceArrays, contact_surface, with_vertices
+from render.walking import place
 
 REACH_M = 0.012  # correlation length of shape errors: about a mesh edge
 DOUBT_M = 1e-3  # their size

@@ -69,8 +69,8 @@ def kernel_pointer(renderer: Any, state: Any) -> Any:
     """
     kernel = renderer.kernel
     signature = types.void(typeof(renderer.parameters), typeof(state), types.float64[:, ::1])
-    fastmath = kernel.targetoptions.get("fastmath", False)
-    return cfunc(signature, cache=_is_ours(renderer), fastmath=fastmath)(kernel.py_func)
+    options = {k: v for k, v in kernel.targetoptions.items() if k in ("fastmath", "error_model", "_nrt")}
+    return cfunc(signature, cache=_is_ours(renderer), **options)(kernel.py_func)
 
 
 class Program(NamedTuple):

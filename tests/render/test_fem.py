@@ -242,6 +242,63 @@ def test_a_tip_that_starts_inside_is_left_alone_until_it_is_out(cylinder_rendere
     assert not force[:200].any() and force[-1] > 0.05
 
 
+@pytest.mark.parametrize("below", [0.0, 1e-6])
+def test_a_tip_that_starts_at_first_touch_gets_no_sudden_force(block_renderer, below):
+    first = np.array([0.0, 0.0, 0.08 + TIP - below])
+    down_from_there = first - np.linspace(0, 3e-3, 100)[:, None] * [0, 0, 1.0]
+    out_and_in = first + np.concatenate([np.linspace(0, 1e-4, 5), np.linspace(1e-4, -3e-3, 100)])[:, None] * [
+        0,
+        0,
+        1,
+    ]
+    inside = run(block_renderer, down_from_there)[0][:, 0, 2]
+    assert not inside.any()  # it was never seen outside
+    assert run(block_renderer, np.vstack([down_from_there, out_and_in]))[0][-1, 0, 2] > 0.1
+
+
+def test_a_tip_that_let_go_remembers_nothing(cylinder_renderer):
+    sideways = np.linspace(0, 1e-3, 100)[:, None] * [1, 0, 0]
+    press = down((0.005, 0, 0.08), 3e-3)
+    stuck = press[-1] + sideways
+    leave = np.linspace(stuck[-1], stuck[-1] + [0, 0, 6e-3], 200)
+    force, state = run(cylinder_renderer, np.vstack([press, stuck, leave, leave[-1] + 0 * press[:2]]))
+    assert abs(force[299, 0, 0]) > 0.05  # it was held back while it stuck
+    assert not force[-1].any() and state.touching[0] == 0 and state.grip.triangle[0] == -1
+    again = np.vstack([press, stuck, leave, press[:1] + [0, 0, 4e-3], press])
+    assert run(cylinder_renderer, again)[0][-1, 0] == pytest.approx(
+        run(cylinder_renderer, press)[0][-1, 0], rel=1e-6
+    )
+
+
+def test_a_tip_that_lifts_off_while_dragged_sideways_feels_nothing_above_the_surface(cylinder_renderer):
+    renderer = cylinder_renderer.with_friction(0.5)
+    press = down((0.0, 0, 0.08), 2e-3)
+    lift = press[-1] + np.linspace(0, 1, 400)[:, None] * [8e-3, 0, 4e-3]
+    state = renderer.start([TIP])
+    for tip in np.vstack([press, lift]):
+        _, force = renderer.step(state, np.ascontiguousarray(tip[None]))
+        if tip[2] > 0.08 + TIP + 1e-5:
+            assert not force.any() and state.depths[0] == 0 and state.stiffness[0] == 0
+    assert state.grip.triangle[0] == -1
+
+
+def test_contacts_that_stay_feel_a_changed_table(thin_renderer):
+    side = down((0, 0.003, 0.03), 1.5e-3, normal=(0, 1, 0))
+    tips = np.ascontiguousarray(np.stack([side[-1], side[-1] * [1, -1, 1]]))
+    renderer = thin_renderer
+    state = renderer.start([TIP, TIP])
+    for pair in np.stack([side, side * [1, -1, 1]], axis=1):
+        renderer.step(state, np.ascontiguousarray(pair))
+    before = state.forces.copy()
+    changed = renderer.with_field(renderer.parameters.far, 0.0 * renderer.parameters.blocks)
+    _, alone = changed.step(state, tips)
+    fresh = changed.start([TIP, TIP])
+    for pair in np.stack([side, side * [1, -1, 1]], axis=1):
+        changed.step(fresh, np.ascontiguousarray(pair))
+    assert np.abs(alone - before).max() > 0.05 * np.abs(before).max()
+    assert alone == pytest.approx(fresh.forces, abs=0.02 * np.abs(before).max())
+
+
 def test_the_drawn_surface_follows_the_tip_and_the_base_stays(cylinder_renderer):
     _, state = run(cylinder_renderer, down((0, 0, 0.08), 4e-3))
     points, _ = cylinder_renderer.surface
