@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
+from numba import njit
 
 from devices.safety import SafetyOptions, reason_words, safety_parameters
 from devices.simulated import SPEC
+from palpate.servo import loop as loops
 from palpate.servo.elastic_plane import ElasticPlane
-from palpate.servo.layout import DEADLINE, ENABLE, LATE, MISSED, TICKS, total_bytes, views
-from palpate.servo.loop import make_program, run_tick
+from palpate.servo.layout import DEADLINE, ENABLE, LATE, MISSED, STATUS, STOP, TICKS, total_bytes, views
+from palpate.servo.loop import ServoLoop, make_program, one_tick, run_tick
 from palpate.servo.report import report, ring_rows, snapshot
 from palpate.servo.source import no_support
 from palpate.servo.tick import (
@@ -203,3 +207,51 @@ def test_the_ring_holds_the_last_seconds_and_tells_where_to_go_on():
     servo.tick()
     more, head = ring_rows(servo.shared, head)
     assert len(more) == 1 and head == 10_001
+
+
+@njit
+def _one_compiled_tick(kernel, model, state, arrays, parameters, now_ns):
+    one_tick(kernel, model, state, arrays, parameters, now_ns, now_ns)
+
+
+def test_the_loop_of_other_platforms_does_the_same_ticks(monkeypatch):
+    compiled, portable = FakeServo(), FakeServo()
+    monkeypatch.setattr(loops, "sleep_until", lambda deadline_ns: None)
+    for k in range(700):
+        now = START + k * PERIOD
+        for servo in (compiled, portable):
+            servo.pose([0.0, 0.0, 0.005 - 0.002 * np.sin(k / 100.0)], now * 1e-9)
+        monkeypatch.setattr(loops, "time", SimpleNamespace(perf_counter_ns=lambda now=now: now))
+        loops.portable_tick(portable.program, portable.arrays)
+        program = compiled.program
+        _one_compiled_tick(
+            program.kernel,
+            program.renderer.parameters,
+            program.state,
+            compiled.arrays,
+            program.parameters,
+            now,
+        )
+        assert (portable.arrays.outbox[OUT_FORCE:] == compiled.arrays.outbox[OUT_FORCE:]).all()
+    assert portable.arrays.outbox[OUT_FORCE + 2] != 0
+    assert portable.shared.counts[TICKS] == 700 and portable.shared.counts[MISSED] == 0
+
+
+def test_the_loop_of_other_platforms_runs_swaps_and_stops(monkeypatch):
+    monkeypatch.setattr(loops, "COMPILED", False)
+    servo = FakeServo()
+    loop = ServoLoop(servo.program, servo.arrays)
+    assert loop.wake_descriptor == -1
+    loop.start()
+    try:
+        assert loop.ticked.wait(20.0)
+        stiffer = servo.program._replace(renderer=ElasticPlane(800.0))
+        assert loop.swap(stiffer, timeout_s=20.0) and loop.program is stiffer
+        before = int(servo.shared.counts[TICKS])
+        loop.ticked.clear()
+        assert loop.ticked.wait(20.0)
+        assert servo.shared.counts[TICKS] >= before
+    finally:
+        servo.shared.control[STOP] = 1
+        assert loop.join(20.0)
+    assert servo.shared.counts[STATUS] == 0
