@@ -3,7 +3,8 @@
 Every combination of hand, modulus, rate, quantisation and delay is pressed, held, let go and tapped; what
 counts is the greatest net energy that the hand ever got back (aim: at most 1 mJ), and what staying stable
 cost: the share of the force that the controller changed, and the share of its stiffness that the plane lost
-to the virtual coupling. The same grid without controller and coupling stands beside it.
+to the virtual coupling. The same grid without controller and coupling stands beside it. A smaller second grid
+drags one tip and two with friction over a dome of silicone (benchmarks/_stability_objects.py).
 """
 
 from __future__ import annotations
@@ -15,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks import _stability_objects
 from benchmarks.timing import table
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
 from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from palpate.servo.elastic_plane import ElasticPlane
-from render.coupling import stiffness_distortion
 from render.passivity import PassivityOptions
 
 SUMMARY = "energy given back by the closed loop over hands, moduli, rates, quantisation and delay"
@@ -44,6 +45,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     ):
         shown = ",".join(f"{value:g}" for value in default)
         parser.add_argument(flag, type=numbers, default=default, help=f"{words} (default: {shown})")
+    parser.add_argument("--no-dome", action="store_true", help="leave the grid on the dome out")
 
 
 def plane_stiffness_n_per_m(young_modulus_pa: float) -> float:
@@ -117,30 +119,28 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 "given_back_unguarded_j": off.given_back_j,
                 "given_back_j": on.given_back_j,
                 "force_distortion": on.force_distortion,
-                "stiffness_lost": stiffness_distortion(
-                    plane_stiffness_n_per_m(modulus), on.compliance_m_per_n
-                ),
+                "stiffness_lost": on.stiffness_lost,
             }
         )
-    result = {"aim_j": AIM_J, "cases": cases, "by": {}}
+    result: dict[str, Any] = {"aim_j": AIM_J, "cases": cases}
+    by = ("delay_s", "rate_hz", "young_modulus_pa", "mass_kg", "stiffness_n_per_m", "quantisation_m")
+    result["by"] = _report("pressed and tapped plane", cases, by)
+    if not arguments.no_dome:
+        result["dome_cases"] = _stability_objects.cases()
+        by = ("delay_s", "young_modulus_pa", "mass_kg", "friction", "tips", "quantisation_m")
+        result["dome_by"] = _report("dome, dragged over", result["dome_cases"], by)
+    return result
+
+
+def _report(title: str, cases: list[dict[str, Any]], by: tuple[str, ...]) -> dict[str, list[Any]]:
     rows = [_summary("all", cases)]
-    for name in ("delay_s", "rate_hz", "young_modulus_pa", "mass_kg", "stiffness_n_per_m", "quantisation_m"):
+    for name in by:
         for value in sorted({case[name] for case in cases}):
             rows.append(_summary(f"{name} {value:g}", [c for c in cases if c[name] == value]))
-    result["by"] = {row[0]: row[1:] for row in rows}
-    header = [
-        "cases",
-        "number",
-        "worst unguarded mJ",
-        "over 1 mJ",
-        "worst mJ",
-        "over 1 mJ",
-        "force changed, median",
-        "force changed, p90",
-        "stiffness lost, median",
-    ]
+    header = [title, "number", "worst unguarded mJ", "over 1 mJ", "worst mJ", "over 1 mJ"]
+    header += ["force changed, median", "force changed, p90", "stiffness lost, median"]
     print(table(header, rows))
-    return result
+    return {row[0]: row[1:] for row in rows}
 
 
 def _summary(name: str, cases: list[dict[str, Any]]) -> list[Any]:

@@ -39,7 +39,12 @@ from palpate.servo.tick import (
     put_pose,
     tick_arrays,
 )
-from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
+from render.coupling import (
+    series_compliance_m_per_n,
+    stable_stiffness_n_per_m,
+    stiffest_n_per_m,
+    stiffness_distortion,
+)
 from render.passivity import DISSIPATED, PassivityOptions, passivity_parameters
 
 SUBSTEPS = 20
@@ -64,7 +69,8 @@ class Loop:
 class ClosedLoopResult:
     """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given so far.
 
-    damped_j: what the controller took; compliance_m_per_n: the coupling's.
+    damped_j: what the controller took; compliance_m_per_n: the coupling's at each tip, and stiffness_lost the
+    share that it takes of the stiffness of the object's stiffest place.
     """
 
     position: np.ndarray
@@ -73,6 +79,7 @@ class ClosedLoopResult:
     work_j: np.ndarray
     damped_j: float
     compliance_m_per_n: float
+    stiffness_lost: float
     contact_share: float
 
     @property
@@ -157,12 +164,14 @@ def closed_loop(
     passivity: PassivityOptions | None = None,
     safety: SafetyOptions | None = None,
     thrown_m_per_s: np.ndarray | None = None,
+    tip_offsets_m: np.ndarray | None = None,
     tremor_m: float = 0.0,
     seed: int = 0,
 ) -> ClosedLoopResult:
     """Run a hand that means to follow `intended_m` (n + 1, 3), one place a tick, for n ticks.
 
-    thrown_m_per_s: (3,) the hand's first velocity, for a free mass. tremor_m: rms of noise on each reading.
+    thrown_m_per_s: (3,) the hand's first velocity, for a free mass. tip_offsets_m: (m, 3) where on the tool
+    its tips are (one, in the middle). tremor_m: rms of noise on each reading.
     Force is enabled from the first tick; it ramps in, so begin out of contact.
     """
     loop = loop or Loop()
@@ -170,12 +179,14 @@ def closed_loop(
     intended = np.ascontiguousarray(intended_m, dtype=float)
     delay_ticks = loop.delay_s * loop.rate_hz
     known = delay_ticks if loop.known_delay else 0.0
-    compliance = 0.0
+    offsets = np.zeros((1, 3)) if tip_offsets_m is None else tip_offsets_m
+    compliance = stiffest = 0.0
     if loop.coupling:
-        limit = stable_stiffness_n_per_m(spec.max_stiffness_n_per_m, loop.rate_hz, known)
-        compliance = series_compliance_m_per_n(stiffest_n_per_m(renderer, spec.max_force_n), limit)
+        limit = stable_stiffness_n_per_m(spec.max_stiffness_n_per_m, loop.rate_hz, known) / len(offsets)
+        stiffest = stiffest_n_per_m(renderer, spec.max_force_n)
+        compliance = series_compliance_m_per_n(stiffest, limit)
     renderer = renderer.with_series_compliance(compliance)
-    arrays = tick_arrays(views(bytearray(total_bytes())), np.zeros((1, 3)), np.zeros(3))
+    arrays = tick_arrays(views(bytearray(total_bytes())), offsets, np.zeros(3))
     parameters = TickParameters(
         period_ns,
         period_ns,
@@ -218,5 +229,6 @@ def closed_loop(
         out[:, 9],
         float(arrays.passivity.energies[DISSIPATED]),
         compliance,
+        stiffness_distortion(stiffest, compliance),
         float(arrays.shared.counts[CONTACT_TICKS]) / n,
     )

@@ -86,6 +86,7 @@ class ServoProcess:
             spec.max_stiffness_n_per_m, options.rate_hz, self._device_delay_ticks()
         )
         limit /= max(self._mapping.force_scale * self._mapping.scale, 1e-12)
+        limit /= len(self._arrays.offsets)  # the tool's tips may all touch: their stiffnesses add up
         stiffest = stiffest_n_per_m(renderer, spec.max_force_n)
         compliance = series_compliance_m_per_n(stiffest, limit)
         if compliance > 0:
