@@ -31,8 +31,8 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
     rendered.
 
     Laws of material and contact go to [effects.NAME]; inclusions, gradients and skins into the elements'
-    moduli;
-    Poisson's ratio into the material; a loose part of the base into the fixed nodes.
+    moduli; Poisson's ratio into the material; a loose or springy base to [effects.NAME], where the
+    compliance reads it.
     """
     effects = {k: dict(v) for k, v in model.effects.items()}
     ratio = model.modulus_ratio.copy()
@@ -61,13 +61,10 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
             ratio = np.where(depth < keys["thickness_m"], ratio * keys["modulus_ratio"], ratio)
         elif name == "poisson_ratio":
             nu = float(keys["poisson_ratio"])
-        elif name == "unbonded_base":
-            mesh = _loosened(model, keys)
     ratio = np.clip(ratio, *MODULUS_LIMITS)
     provenance = {**model.provenance, "diagnosed_effects": list(diagnosis.effects)}
     better = dataclasses.replace(
         model,
-        mesh=mesh,
         young_modulus_pa=diagnosis.young_modulus_pa,
         young_modulus_ci95_pa=(float("nan"), float("nan")),
         poisson_ratio=nu,
@@ -77,17 +74,6 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
         path=None,
     )
     return better, kept
-
-
-def _loosened(model: Model, keys):  # type: ignore[no-untyped-def]
-    mesh = model.mesh
-    direction = np.array(keys["direction"], dtype=float)
-    base = np.flatnonzero(mesh.fixed)
-    along = (mesh.points[base] - mesh.points[base].mean(axis=0)) @ direction
-    loose = base[along > np.quantile(along, keys["bonded_fraction"])]
-    fixed = mesh.fixed.copy()
-    fixed[loose] = False
-    return dataclasses.replace(mesh, fixed=fixed)
 
 
 def corrected(recording: Recording, diagnosis: Diagnosis) -> Recording:

@@ -1,9 +1,8 @@
-"""Which effect: every one is fitted, judged on sites that it has not seen, and combined where two are
-needed."""
+"""Which effect: added one at a time, two at a time in time where one does not help, and taken off again where
+idle."""
 
 from __future__ import annotations
 
-import copy
 import dataclasses
 import itertools
 from collections.abc import Sequence
@@ -12,30 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.effects.base import Effect
-from diagnose.fit import Descent, Fit, first_touches, fit, held_out, levelled, settings_of
-from diagnose.forward import Forward
+from diagnose.judging import Candidate, Score, Search
 from diagnose.solved_again import solve_inclusion
-from diagnose.whiten import NuisanceOptions, Whitener
-from mechanics.options import option
 from mechanics.progress import Progress, silent
-
-SPATIAL = (
-    "inclusion",
-    "modulus_gradient",
-    "skin_layer",
-    "poisson_ratio",
-    "unbonded_base",
-    "compliant_base",
-    "tip_radius",
-    "tool_compliance",
-    "force_gain",
-    "surface_offset",
-    "strain_stiffening",
-)
-"""Effects that differ from site to site rather than within a press."""
-
-ANEW = 0.8
-"""A fit from unmoved first touches replaces the usual one where its loss is this much less."""
 
 REEXAMINED = 4
 """The strongest effects of a step that are weighed once more before they are turned down."""
@@ -45,77 +23,6 @@ IN_TIME = ("time_delay", "viscoelasticity", "backlash", "adhesion", "mullins_sof
 
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
-
-
-@dataclass(frozen=True)
-class AttributionOptions:
-    """When an effect is named. Calibrated on recordings without any effect; see docs/diagnosis.md."""
-
-    gain: float = option(150.0, "least gain in log likelihood over held-out sites that names an effect")
-    spatial_gain: float = option(120.0, "the same for effects that live in a few places, penalised in sample")
-    plain_gain: float = option(35.0, "a lower gain that is enough where the gap closes plainly ...")
-    plain_share: float = option(0.35, "... by at least this share on held-out sites")
-    strong_gain: float = option(
-        300.0, "gain, times the lack of fit, that names the first effect whatever plain gap shapes leave"
-    )
-    z: float = option(2.5, "least gain over its own standard error across sites")
-    size_n: float = option(0.009, "least size of an effect: rms change of force after the refit", unit="N")
-    toward: float = option(
-        0.2, "least share of an effect's own size by which it lowers the plain gap in sample"
-    )
-    first_share: float = option(0.10, "least share of the held-out gap that the first effect closes")
-    further_share: float = option(0.25, "the same for each further effect, of what is left")
-    least_of_first: float = option(
-        0.25,
-        "least size of a further effect, of the first's: no law is exact, what it leaves is no effect",
-    )
-    rival_share: float = option(
-        0.12, "a rival within this share of the winner's gain counts as not told apart"
-    )
-    most: int = option(3, "effects in one answer, at most")
-    unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
-    base."""
-
-    found: Fit
-    held: np.ndarray
-    plain: np.ndarray
-    dof: float
-
-    @property
-    def residual(self) -> np.ndarray:
-        """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
-        return levelled(self.found)
-
-    @property
-    def chi(self) -> float:
-        """Whitened mean square per component: about 1 where the noise model holds."""
-        return float(self.found.gram[:, 0, 0].sum() / self.dof)
-
-
-@dataclass(frozen=True)
-class Score:
-    """How much better a candidate is than what it was added to.
-
-    gain: log likelihood, deflated by its own lack of fit. z: gain over its standard error across sites.
-    size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
-    share: of the old excess over the noise.
-    toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
-    """
-
-    name: str
-    gain: float
-    z: float
-    size_n: float
-    closes: float
-    share: float
-    toward: float
-    per_group: np.ndarray
-    candidate: Candidate
 
 
 @dataclass(frozen=True)
@@ -138,113 +45,6 @@ class Attribution:
     steps: tuple[dict[str, Score], ...]
     picked: tuple[str, ...]
     finite_strain_gain: float
-
-
-class Search:
-    """Holds what all fits share: forward model, whitener, options, and a cache of fits by names."""
-
-    def __init__(
-        self,
-        forward: Forward,
-        modulus: float,
-        *,
-        nuisance: NuisanceOptions,
-        options: AttributionOptions,
-        site_sd: np.ndarray | None,
-        finite_strain: Effect,
-    ) -> None:
-        self.forward, self.options, self.nuisance, self.site_sd = forward, options, nuisance, site_sd
-        whitener = Whitener(forward, forward.ideal(modulus), nuisance, site_sd)
-        onset = first_touches(forward, whitener, modulus)
-        rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
-        self.finite_strain = finite_strain
-        self.renew(rough)
-
-    def renew(self, found: Fit) -> None:
-        """Weigh from now on with the nuisances as they are at a fit; earlier judgements are forgotten."""
-        settings = settings_of(self.forward, found.effects, found.values, found.onset)
-        self.whitener = Whitener(self.forward, settings, self.nuisance, self.site_sd)
-        self.dof = 3.0 * float(self.whitener.counts().sum())
-        self._near = found
-        self._cache: dict[tuple[str, ...], Candidate] = {}
-
-    def reweighed(self, found: Fit) -> Search:
-        """The same search, weighing with the nuisances as they are at a fit."""
-        other = copy.copy(self)
-        other.renew(found)
-        return other
-
-    def judge(self, effects: Sequence[Effect], like: Candidate | None = None) -> Candidate:
-        """Fit a set and judge it on held-out groups; starts from `like`, or from what was last settled on."""
-        key = tuple(sorted(e.name for e in effects))
-        if key in self._cache:
-            return self._cache[key]
-        near = self._near if like is None else like.found
-        starts = [np.array([near.values[0]])]
-        for effect in effects:
-            own = [near.of(effect.name)] if effect.name in near.names else effect.starts(self.forward)
-            starts = [np.concatenate([s, o]) for s in starts for o in own]
-        found = self._best(list(effects), starts, near.onset)
-        held, plain = held_out(found)
-        candidate = Candidate(found, held, plain, self.dof)
-        self._cache[key] = candidate
-        return candidate
-
-    def _best(self, order: list[Effect], starts: list[np.ndarray], onset: np.ndarray) -> Fit:
-        descent = Descent(self.forward, self.whitener, tuple(order), None)
-
-        def best(onset: np.ndarray, most: int) -> Fit:
-            scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
-            return min(
-                (descent.run(starts[i], onset, 12) for i in np.argsort(scored)[:most]), key=lambda f: f.loss
-            )
-
-        found = best(onset, 3)
-        # first touches that an earlier fit moved to make up for what it lacked may hold a better one back
-        if found.loss > self.options.unknown_chi * self.dof / 2:
-            anew = best(np.zeros_like(onset), 2)
-            found = anew if anew.loss < ANEW * found.loss else found
-        return found
-
-    def score(self, name: str, new: Candidate, old: Candidate) -> Score:
-        """Compare two candidates."""
-        extra = len(new.found.values) - len(old.found.values)
-        over = max(1.0, new.chi) * self.forward.touches.slowness
-        per_group = old.held - new.held
-        gain = float(per_group.sum())
-        if name in SPATIAL:
-            # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
-            per_group = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
-            gain = old.found.loss - new.found.loss - 4.0 * extra
-        z = per_group.sum() / (per_group.std() * np.sqrt(len(per_group)) + 1e-9)
-        counted = self.forward.touches.counted
-        before, after = old.residual[counted], new.residual[counted]
-        size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
-        closes = float((old.plain.sum() - new.plain.sum()) / counted.sum())
-        squares = [(r**2).sum(axis=1).mean() for r in (before, after)]
-        toward = float((squares[0] - squares[1]) / max(size**2, 1e-12))
-        noise = 3 * self.forward.touches.noise_n**2
-        excess = max(float(old.plain.sum() / counted.sum()) - noise, 0.02 * noise)
-        share = closes / excess
-        return Score(name, float(gain / over), float(z), size, closes, share, toward, per_group / over, new)
-
-    def passes(self, score: Score, *, first: bool = True) -> bool:
-        """Whether a score names its effect; one beside another must close a fair share of what is left."""
-        o = self.options
-        if score.size_n < o.size_n:
-            return False
-        if score.name == "surface_offset" and not first:
-            # a delay or a play has already moved the first touches that the surface was fitted to
-            return False
-        if score.name == "inclusion":
-            return score.gain > o.spatial_gain and score.share > -0.3 and score.toward > o.toward
-        if first and score.gain > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
-            return True
-        if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
-            return False
-        if score.gain > o.plain_gain and score.share > o.plain_share and score.z > 2.0:
-            return True
-        return score.gain > o.spatial_gain if score.name in SPATIAL else score.gain > o.gain and score.z > o.z
 
 
 def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:

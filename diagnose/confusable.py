@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.attribution import Candidate, Search
+from diagnose.judging import Candidate, Search
 
 ALIKE = 0.92
 """Cosine of the angle between two effects' residual patterns from which they are called confusable."""

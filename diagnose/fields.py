@@ -13,7 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.forward import Forward, _places
+from diagnose.forward import Forward, places_of
+from diagnose.stages import stored
 from mechanics.elasticity import element_stiffness
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES, typical_edge
@@ -50,7 +51,7 @@ def energy_fields(forward: Forward) -> EnergyFields:
         return forward.stages["fields"]
     t, model = forward.touches, forward.model
     mesh = model.mesh.quadratic()
-    unique, first, inverse = _places(t)
+    unique, first, inverse = places_of(t)
     solver = Solver(mesh, model.poisson_ratio)
     sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
     q = len(first)
@@ -98,10 +99,15 @@ def far_at_poisson(forward: Forward, nu: float, ratios: tuple[float, ...] = (0.3
     """(p, 3, 3) far field at another Poisson's ratio, interpolated between factorisations."""
     table = forward.stages.get("poisson")
     if table is None:
-        known = sorted({*ratios, forward.nu})
-        mesh = forward.model.mesh.quadratic()
-        fars = np.array([_far(forward, mesh, r) for r in known])
-        table = (np.array(known), fars - fars[known.index(forward.nu)])
+
+        def solve() -> dict[str, np.ndarray]:
+            known = sorted({*ratios, forward.nu})
+            mesh = forward.model.mesh.quadratic()
+            fars = np.array([_far(forward, mesh, r) for r in known])
+            return {"ratios": np.array(known), "far": fars - fars[known.index(forward.nu)]}
+
+        kept = stored("poisson", forward.model, forward.touches, solve)
+        table = (kept["ratios"], kept["far"])
         forward.stages["poisson"] = table
     return forward.far + _interpolate(*table, nu)
 
@@ -122,7 +128,7 @@ def _far(forward: Forward, mesh: TetMesh, nu: float) -> np.ndarray:
     """(p, 3, 3) local far field of a mesh whose nodes are the model's (its base may differ)."""
     sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
     t = forward.touches
-    unique, first, inverse = _places(t)
+    unique, first, inverse = places_of(t)
     u = _solutions(forward, mesh, nu, first)
     far = np.empty((len(first), 3, 3))
     half = half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m)

@@ -14,6 +14,7 @@ import numpy as np
 from numba import njit
 
 from diagnose import kernel
+from diagnose.stages import stored
 from diagnose.touches import OUTSIDE, Touches
 from mechanics.dent import dent_law, effective_radius, grid
 from mechanics.model import Model
@@ -189,25 +190,28 @@ class Forward:
 
 def build_forward(touches: Touches, model: Model, *, solver: Any = None) -> Forward:
     """Solve the far field at every press's place (one factorisation, three solves a place)."""
-    mesh = model.mesh.quadratic()
-    ratio = model.modulus_ratio if np.ptp(model.modulus_ratio) > 0 else None
-    unique, first, inverse = _places(touches)
-    sites = touch_sites(
-        mesh, touches.point[first], touches.normal[first], model.poisson_ratio, ratio, solver=solver
-    )
+    unique, first, inverse = places_of(touches)
+
+    def solve() -> dict[str, np.ndarray]:
+        ratio = model.modulus_ratio if np.ptp(model.modulus_ratio) > 0 else None
+        where = (touches.point[first], touches.normal[first])
+        sites = touch_sites(model.mesh.quadratic(), *where, model.poisson_ratio, ratio, solver=solver)
+        return {"far": sites.far, "curvature": sites.curvature}
+
+    sites = stored("sites", model, touches, solve)
     frame = touches.frame
-    far = np.einsum("pij,pjk,plk->pil", frame, sites.far[inverse], frame)
+    far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][inverse], frame)
     return Forward(
         touches,
         model,
         np.ascontiguousarray(far),
-        sites.curvature[inverse],
+        sites["curvature"][inverse],
         model.poisson_ratio,
         model.tip_radius_m,
     )
 
 
-def _places(touches: Touches, grain: float = 0.0008) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def places_of(touches: Touches, grain: float = 0.0008) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Presses of nearly the same place and normal share a solve."""
     key = np.round(np.hstack([touches.point / grain, touches.normal / 0.05])).astype(int)
     return np.unique(key, axis=0, return_index=True, return_inverse=True)

@@ -13,9 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.attribution import Candidate
 from diagnose.fit import settings_of
 from diagnose.forward import Forward
+from diagnose.judging import Candidate
 from diagnose.leads import leads
 from diagnose.result import NextTouch
 from diagnose.touches import HOLDING, LOADING, MARGIN_S, OUTSIDE, UNLOADING, Touches

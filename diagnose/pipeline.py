@@ -7,15 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.attribution import (
-    LINEAR_UNLESS,
-    Attribution,
-    AttributionOptions,
-    Candidate,
-    Score,
-    Search,
-    attribute,
-)
+from diagnose.attribution import LINEAR_UNLESS, Attribution, attribute
 from diagnose.confusable import alike
 from diagnose.finite import predicted_size
 from diagnose.fit import settings_of
@@ -23,6 +15,7 @@ from diagnose.forward import Forward, build_forward
 from diagnose.freeair import FreeAir, free_air_of
 from diagnose.gaps import closed_share, gap
 from diagnose.inclusions import inclusion_starts
+from diagnose.judging import AttributionOptions, Candidate, Score, Search
 from diagnose.library import NAMES, effect
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry
@@ -50,6 +43,8 @@ FINITE_STRAIN_LEAST = 0.85
 """Finite strain is named where it must be larger than this share of the noise ..."""
 FINITE_STRAIN_GAIN = 20.0
 """... and the neo-Hookean law fits better than the linear one by this log likelihood."""
+FINITE_STRAIN_BEYOND_SCALE = 0.65
+"""Share of its size that another modulus cannot take up; by it the asserted effects are put in order."""
 
 
 @dataclass(frozen=True)
@@ -146,8 +141,9 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
     remainder = chi > slack * search.options.unknown_chi
     if with_fs:
-        sizes = {n: found.steps[0][n].size_n for n in found.chosen if n in found.steps[0]}
-        place = next((i for i, n in enumerate(names) if sizes.get(n, np.inf) < deep_size), len(names))
+        sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
+        beyond = FINITE_STRAIN_BEYOND_SCALE * deep_size
+        place = next((i for i, n in enumerate(names) if sizes.get(n, np.inf) < beyond), len(names))
         names.insert(place, "finite_strain")
         reasons.append(
             f"the presses are deep enough that small-strain elasticity is off by about {deep_size:.3f} N"
@@ -273,7 +269,7 @@ def _probability(score: Score, search: Search, best: float, chosen: bool) -> flo
     over = 1 / (1 + np.exp(np.clip(-(score.gain - need) / max(0.25 * need, 1.0), -50, 50)))
     rank = np.exp(min(0.0, (score.gain - best) / max(0.1 * best, 20.0)))
     value = float(over * rank)
-    return float(np.clip(max(value, 0.9) if chosen else min(value, 0.6), 0.0, 0.99))
+    return float(np.clip(max(value, 0.9) if chosen else min(value, 0.25), 0.0, 0.99))
 
 
 def _errors(forward: Forward, found: Attribution, site_sd: np.ndarray, noise: float) -> dict[str, float]:

@@ -15,7 +15,8 @@ import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, solve
 
 from diagnose.fields import energy_fields
-from diagnose.forward import Forward
+from diagnose.forward import Forward, places_of
+from diagnose.stages import stored
 from mechanics.elasticity import stiffness, triangle_mass
 from mechanics.model import Model
 from mechanics.support import base_triangles
@@ -44,6 +45,13 @@ def support_motion(forward: Forward) -> SupportMotion:
     """Condense the base; kept in forward.stages['support']."""
     if "support" in forward.stages:
         return forward.stages["support"]
+    kept = stored("support", forward.model, forward.touches, lambda: _condensed(forward))
+    result = SupportMotion(**kept, place=places_of(forward.touches)[2].ravel())
+    forward.stages["support"] = result
+    return result
+
+
+def _condensed(forward: Forward) -> dict[str, np.ndarray]:
     fields = energy_fields(forward)
     solver = fields.solver
     mesh, free = solver.mesh, solver.free
@@ -60,15 +68,12 @@ def support_motion(forward: Forward) -> SupportMotion:
         give[:, a : a + _BATCH] = coupling.T @ solver.solve_free(part).reshape(part.shape)
     loads = fields.solution.reshape(3 * len(mesh.points), -1)[free]
     reaction = (coupling.T @ loads).reshape(len(own), -1, 3).transpose(1, 0, 2)
-    result = SupportMotion(
-        plane=(mesh.points[corners] - forward.model.support_point) @ axes[1:].T,
-        stiffness=own - 0.5 * (give + give.T),
-        mass=_mass(mesh, corners),
-        reaction=np.ascontiguousarray(reaction),
-        place=fields.place,
-    )
-    forward.stages["support"] = result
-    return result
+    return {
+        "plane": (mesh.points[corners] - forward.model.support_point) @ axes[1:].T,
+        "stiffness": own - 0.5 * (give + give.T),
+        "mass": _mass(mesh, corners),
+        "reaction": np.ascontiguousarray(reaction),
+    }
 
 
 def unit_normal(model: Model) -> np.ndarray:
@@ -139,11 +144,7 @@ def far_partly_bonded(forward: Forward, free_fraction: float, angle: float, floo
     table = forward.stages.get("loose")
     if table is None:
         motion = support_motion(forward)
-        table = np.zeros((len(FREE_FRACTIONS) + 1, ANGLES + 1, 2, len(motion.reaction), 3, 3))
-        for i, fraction in enumerate(FREE_FRACTIONS):
-            for j in range(ANGLES):
-                table[i + 1, j] = loosened(motion, fraction, 2 * np.pi * j / ANGLES)
-        table[:, ANGLES] = table[:, 0]
+        table = stored("loose", forward.model, forward.touches, lambda: {"give": _table(motion)})["give"]
         forward.stages["loose"] = table
     known = np.array([0.0, *FREE_FRACTIONS])
     i = int(np.clip(np.searchsorted(known, free_fraction) - 1, 0, len(known) - 2))
@@ -156,6 +157,16 @@ def far_partly_bonded(forward: Forward, free_fraction: float, angle: float, floo
     both = (1 - w) * lower + w * upper
     give = (1 - floor) * both[0] + floor * both[1]
     return forward.far + give[support_motion(forward).place]
+
+
+def _table(motion: SupportMotion) -> np.ndarray:
+    """(fractions + 1, angles + 1, 2, q, 3, 3) of `loosened`; nothing loose first, angles closed."""
+    table = np.zeros((len(FREE_FRACTIONS) + 1, ANGLES + 1, 2, len(motion.reaction), 3, 3))
+    for i, fraction in enumerate(FREE_FRACTIONS):
+        for j in range(ANGLES):
+            table[i + 1, j] = loosened(motion, fraction, 2 * np.pi * j / ANGLES)
+    table[:, ANGLES] = table[:, 0]
+    return table
 
 
 def loosened(motion: SupportMotion, fraction: float, angle: float) -> np.ndarray:

@@ -23,7 +23,7 @@ SUMMARY = "the sim-to-real gap: where, which effect, how far it shrinks"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, --model, --apply, --corrected, --report, options, --json, --seed."""
-    from diagnose.attribution import AttributionOptions
+    from diagnose.judging import AttributionOptions
     from diagnose.pipeline import DiagnoseOptions
     from diagnose.whiten import NuisanceOptions
 
@@ -52,7 +52,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, say it, and write what was asked for."""
     from diagnose.apply import corrected, improved
-    from diagnose.attribution import AttributionOptions
+    from diagnose.judging import AttributionOptions
     from diagnose.pipeline import DiagnoseOptions, diagnose
     from diagnose.whiten import NuisanceOptions
 

@@ -3,11 +3,14 @@ name."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from diagnose.apply import corrected, improved
 from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.placing import placed
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 
@@ -71,6 +74,41 @@ def test_bias_is_settled_in_free_air(bench):
     np.testing.assert_allclose(result.entries[0].parameters["bias_n"], [0.05, 0.0, -0.02], atol=0.003)
     axes = {a.axis: a for a in result.where.axes}
     assert axes["free_air"].p < 0.01
+
+
+def test_a_play_whose_reading_follows_the_tip_is_no_delay(bench):
+    def follow(t, x, f):  # type: ignore[no-untyped-def]
+        read = x.copy()
+        for i in range(1, len(x)):
+            read[i] = np.clip(read[i - 1], x[i] - 0.15e-3, x[i] + 0.15e-3)
+        return np.round(read / 3e-5) * 3e-5, f
+
+    result = diagnose(*bench.record(follow), FAST)
+    assert result.effects[0] == "backlash"
+    assert result.entries[0].parameters["width_m"] == pytest.approx(0.3e-3, rel=0.3)
+
+
+def test_a_model_meets_a_recording_that_it_was_not_made_from(bench):
+    recording, model = bench.record()
+    stranger = dataclasses.replace(
+        model, palpations=model.palpations[:3], provenance={"recording_sha256": "x"}
+    )
+    found = placed(recording, stranger)
+    assert len(found.palpations) == len(model.palpations)
+    off = [
+        np.linalg.norm(np.subtract(a.point, b.point))
+        for a, b in zip(found.palpations, model.palpations, strict=True)
+    ]
+    assert np.median(off) < 1e-3
+
+
+def test_the_next_touch_parts_the_two_that_stand_closest(delayed):
+    touch = delayed[2].next_touch
+    assert "time_delay" in touch.separates and touch.sigmas > 3 and touch.difference_n > 0
+    assert 0 < touch.depth_m <= 9e-3
+    assert np.linalg.norm(touch.direction) == pytest.approx(1.0)
+    places = np.array([p.point for p in delayed[1].palpations])
+    assert np.linalg.norm(places - [touch.x, touch.y, touch.z], axis=1).min() < 1e-6
 
 
 def test_without_its_name_the_delay_is_not_called_something_else_alone(bench):
