@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 _WINDOW_S = 8.0
 _SAMPLES = 300
@@ -26,7 +27,7 @@ def free_air_force(
             continue
         chosen = inside[np.linspace(0, len(inside) - 1, min(_SAMPLES, len(inside))).astype(int)]
         f = force[chosen]
-        gap = np.linalg.norm(f[:, None] - f[None], axis=2)
+        gap = cdist(f, f)
         neighbours = (gap < reach * spread_n).sum(axis=1)
         best = int(np.argmax(neighbours))
         if neighbours[best] < max(5, _SHARE * len(chosen)):

@@ -114,14 +114,18 @@ def explore(
     found, signals = _explored(recording, given)
     if method == "paper" or not options.correct_delay:
         return found
+    step = force_delay(signals, found.contacts)
+    if not step.certain:
+        return found
     delay = 0.0
     for _ in range(_DELAY_ROUNDS):
-        step = force_delay(signals, found.contacts)
-        if not step.certain:
+        samples = round(step.seconds * recording.sample_rate_hz)
+        if not samples:
             break
-        delay += round(step.seconds * recording.sample_rate_hz) / recording.sample_rate_hz
+        delay += samples / recording.sample_rate_hz
         found, signals = _explored(read_earlier(recording, delay), given)
-    return _with_delay(found, recording, delay, step.error_s) if delay else found
+        step = force_delay(signals, found.contacts)
+    return _with_delay(found, recording, delay, step.error_s)
 
 
 @dataclass(frozen=True)

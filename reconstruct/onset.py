@@ -10,10 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import least_squares
 
 _LEAST_GIVE = 1e-12
 _NEWTON_STEPS = 8
+_LEAST_SQUARES_STEPS = 60
+_SOFT = 3.0  # standard deviations
 
 
 @dataclass(frozen=True)
@@ -58,28 +59,46 @@ def fit_rise(travel: np.ndarray, force: np.ndarray, noise_n: float, *, guess_m: 
     low = np.array([travel.min() - 0.5 * reach, -25.0, start[2] - 6])
     high = np.array([guess_m + 0.5 * reach, 8.0, start[2] + 6])
 
-    def residual(p: np.ndarray) -> np.ndarray:
-        return (contact_law(travel - p[0], np.exp(p[2]), np.exp(p[1])) - force) / noise_n
+    p = np.clip(start, low + 1e-9, high - 1e-9)
+    residual, slopes = _residual(p, travel, force, noise_n)
+    cost, damping = _soft(residual)[0], 1e-3
+    for _ in range(_LEAST_SQUARES_STEPS):
+        weight = _soft(residual)[1]
+        normal = (slopes * weight[:, None]).T @ slopes
+        step = np.linalg.solve(
+            normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3), slopes.T @ (weight * residual)
+        )
+        trial = np.clip(p - step, low, high)
+        trial_residual, trial_slopes = _residual(trial, travel, force, noise_n)
+        trial_cost = _soft(trial_residual)[0]
+        if trial_cost > cost:
+            damping *= 6
+            if damping > 1e8:
+                break
+            continue
+        gained, damping = cost - trial_cost, damping / 6
+        p, residual, slopes, cost = trial, trial_residual, trial_slopes, trial_cost
+        if gained < 1e-6 * cost:
+            break
+    rms = float(np.sqrt(np.mean(residual**2)))
+    normal = (slopes * _soft(residual)[1][:, None]).T @ slopes
+    error = float(np.sqrt(np.linalg.pinv(normal)[0, 0])) * max(rms, 1.0)
+    return Rise(float(p[0]), error, float(np.exp(p[2])), float(np.exp(p[1])), rms * noise_n)
 
-    def jacobian(p: np.ndarray) -> np.ndarray:
-        give, dent = np.exp(p[1]), np.exp(-2 / 3 * p[2])
-        y = _cube_root(travel - p[0], dent, give)
-        # dF/du, of the same cubic; the other derivatives follow from du = y^3 dc + y^2 d(dent)
-        slope = 3 * y / np.maximum(3 * give * y + 2 * dent, 1e-30)
-        return np.column_stack([-slope, -slope * give * y**3, slope * 2 / 3 * dent * y**2]) / noise_n
 
-    fit = least_squares(
-        residual,
-        np.clip(start, low + 1e-9, high - 1e-9),
-        jac=jacobian,
-        bounds=(low, high),
-        x_scale=np.array([1e-3, 1.0, 1.0]),
-        loss="soft_l1",
-        f_scale=3.0,
-        xtol=1e-6,
-        ftol=1e-6,
-        max_nfev=40,
-    )
-    rms = float(np.sqrt(np.mean(residual(fit.x) ** 2)))
-    error = float(np.sqrt(np.linalg.pinv(fit.jac.T @ fit.jac)[0, 0])) * max(rms, 1.0)
-    return Rise(float(fit.x[0]), error, float(np.exp(fit.x[2])), float(np.exp(fit.x[1])), rms * noise_n)
+def _residual(
+    p: np.ndarray, travel: np.ndarray, force: np.ndarray, noise_n: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """Residuals (n,) in standard deviations and their derivatives (n, 3) by u0, ln c and ln h."""
+    give, dent = np.exp(p[1]), np.exp(-2 / 3 * p[2])
+    y = _cube_root(travel - p[0], dent, give)
+    # dF/du, of the same cubic; the other derivatives follow from du = y^3 dc + y^2 d(dent)
+    slope = 3 * y / np.maximum(3 * give * y + 2 * dent, 1e-30)
+    by = np.column_stack([-slope, -slope * give * y**3, slope * 2 / 3 * dent * y**2])
+    return (y**3 - force) / noise_n, by / noise_n
+
+
+def _soft(residual: np.ndarray) -> tuple[float, np.ndarray]:
+    """Cost and weights (n,) of the soft L1 loss at three standard deviations."""
+    root = np.sqrt(1 + (residual / _SOFT) ** 2)
+    return float(np.sum(root - 1)), 1 / root
