@@ -86,12 +86,10 @@ class FemRenderer(Renderer):
             blocks is not None and blocks.shape != self.parameters.blocks.shape
         ):
             raise OptionError("a changed field must have the shape of the renderer's own")
-        changed = self._with(far=np.array(far))
+        changed = self._with(far=np.array(far), edition=self.parameters.edition + 1)
         if blocks is not None:
             table = np.array(blocks, dtype=np.float32)
-            changed.parameters = changed.parameters._replace(
-                blocks=table, edition=self.parameters.edition + 1
-            )
+            changed.parameters = changed.parameters._replace(blocks=table)
             changed.compliance = replace(self.compliance, blocks=table)
         return changed
 
