@@ -10,16 +10,18 @@ costs seconds, and an interrupted run goes on where it stopped.
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 
 from mechanics.errors import OptionError
+from mechanics.files import atomic_file
 from mechanics.recording import write_recording
 from palpate.arguments import add_json, add_options, add_seed, emit_json, options_from, progress_bar, say
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.hand import HandOptions, cohort_hand
 from scenes.laboratory.sealing import write_sealed
-from scenes.laboratory.simulate import SimulateOptions, simulate
-from scenes.phantoms import PHANTOMS, phantom
+from scenes.laboratory.simulate import SimulateOptions, Simulation, simulate
+from scenes.phantoms import PHANTOMS, Phantom, phantom
 
 SUMMARY = "the virtual laboratory: a person's exploration of a phantom"
 
@@ -50,6 +52,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         action=argparse.BooleanOptionalAction,
         default=True,
         help="state each effect's size in newtons, which solves without it too (default: yes)",
+    )
+    parser.add_argument(
+        "--pictures",
+        metavar="PNG",
+        help="also draw the path, the force and every press beside the ideal object",
     )
     parser.add_argument("--workers", type=int, help="processes that solve touches (default: one a core)")
     add_options(parser, SimulateOptions)
@@ -101,6 +108,8 @@ def run(arguments: argparse.Namespace) -> int:
         path = write_recording(arguments.output, result.recording, truth=result.truth)
         if arguments.truth:
             emit_json({"truth": result.truth}, arguments.truth)
+    if arguments.pictures:
+        _draw(arguments, thing, options, hand, result)
     duration = float(result.recording.t[-1])
     summary = {
         "recording": str(path),
@@ -121,3 +130,22 @@ def run(arguments: argparse.Namespace) -> int:
             say(arguments, f"  {name}: {size['rms_n']:.4f} N, {refit:.4f} N after a refit of the modulus")
     emit_json(summary, arguments.json)
     return 0
+
+
+def _draw(
+    arguments: argparse.Namespace,
+    thing: Phantom,
+    options: SimulateOptions,
+    hand: HandOptions,
+    result: Simulation,
+) -> None:
+    from palpate.report.laboratory import simulation_figure
+
+    plain = replace(thing, regions=())
+    with progress_bar("the ideal object") as progress:
+        ideal = simulate(
+            plain, {}, options, hand=hand, seed=arguments.seed, workers=arguments.workers, progress=progress
+        )
+    with atomic_file(arguments.pictures) as path:
+        simulation_figure(result, ideal).savefig(path, dpi=110, format="png")
+    say(arguments, f"pictures: {arguments.pictures}")

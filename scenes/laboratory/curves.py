@@ -35,7 +35,8 @@ class Curve:
     tip.
 
     stiffness: (k, 3, 3) E mm, d(force on the tip)/d(tip position) with the contact as it is (negative
-    definite). times: (k,) s, for paths whose solid creeps, or None. energy: (k,) E mm^3.
+    definite; zero where there are times). times: (k,) s, for paths whose solid relaxes, or None.
+    energy: (k,) E mm^3.
     """
 
     travel: np.ndarray
@@ -106,7 +107,7 @@ def solve(
             for part, share in _parts(before, job.travel[k], longest):
                 state = problem.advance(state, start + part, share * span)
             force[k], energy[k] = state.force, state.energy
-            if np.linalg.norm(state.force) > 1e-6:
+            if job.times is None and np.linalg.norm(state.force) > 1e-6:
                 stiffness[k] = problem.tip_stiffness(state)
         yield Curve(job.travel, force, stiffness, energy, job.times)
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,8 +22,10 @@ from scenes.laboratory.hand import HandOptions, band_noise
 from scenes.laboratory.motion import Motion, motion
 from scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
 from scenes.laboratory.presses import PROTOCOLS, Touch, press_set
+from scenes.laboratory.relaxation import beyond_quasilinear
 from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.laboratory.tracing import RATE_HZ, trace
+from scenes.laboratory.truth import truth_of
 from scenes.phantoms import Phantom
 
 
@@ -41,19 +43,25 @@ class SimulateOptions:
     coloured_share: float = option(0.15, "share of the noise's power below 10 Hz, 0 to 1")
     position_resolution_m: float = option(3.0e-5, "step of the position reading", unit="m")
     frame: bool = option(False, "turn and shift the device frame at random (else the object's frame)")
+    relaxation: str = option(
+        "quasi-linear",
+        "viscoelasticity: a law on the elastic force, or solved in the solid for every touch",
+        choices=("quasi-linear", "solid"),
+    )
     finest_mm: float = option(3.0, "longest edge of the solid's elements next to the touch", unit="mm")
 
 
 @dataclass(frozen=True)
 class Simulation:
     """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device
-    frame.
+    frame; `motion` is the hand's true way, object frame.
     """
 
     recording: Recording
     truth: Mapping[str, Any]
     clean_n: np.ndarray
-    touches: tuple[Touch, ...] = field(default=())
+    touches: tuple[Touch, ...]
+    motion: Motion
 
 
 def simulate(
@@ -91,11 +99,11 @@ def simulate(
     plain = replace(phantom, regions=())
     touches = tuple(press_set(plain, options.protocol, options.presses))
     parameters = _parameters(plain, strengths, modulus, options, touches)
-    session = _Session(phantom, modulus, options, hand, touches, parameters, seed, workers, cache, progress)
+    session = Session(phantom, modulus, options, hand, touches, parameters, seed, workers, cache, progress)
     present = tuple(parameters)
     whole, clean = session.run(present)
-    truth = _truth(session, present, clean, whole, sizes, strengths)
-    return Simulation(session.recording(whole, clean, truth), truth, clean, touches)
+    truth = truth_of(session, present, clean, whole, sizes, strengths)
+    return Simulation(session.recording(whole, clean, truth), truth, clean, touches, session.way)
 
 
 def _parameters(
@@ -113,7 +121,7 @@ def _parameters(
     return out
 
 
-class _Session:
+class Session:
     """One hand on one object; runs the same exploration with any subset of its effects."""
 
     def __init__(
@@ -157,16 +165,13 @@ class _Session:
 
     def forces(self, present: Sequence[str], regions: bool) -> list[TouchForce]:
         """Solved touches with the effects `present`."""
-        phantom = replace(self.phantom, regions=())
-        for name in present:
-            change = effect(name).on_shape
-            if change is not None:
-                phantom = change(phantom, self.parameters[name])
         inside = [name for name in present if effect(name).in_solid or effect(name).on_shape]
         label = "solving " + (" + ".join(inside) if inside else "the ideal object")
         fineness = Fineness(finest=self.options.finest_mm)
         specimen = self.specimen(present, regions)
-        return touch_forces(phantom, specimen, self.touches, fineness=fineness, label=label, **self._keywords)
+        return touch_forces(
+            self._shape(present), specimen, self.touches, fineness=fineness, label=label, **self._keywords
+        )
 
     def motion(self, radius: float) -> Motion:
         """The same hand's way every time."""
@@ -194,6 +199,8 @@ class _Session:
             act = effect(name).on_force
             if act is not None:
                 force = act(force, way, normals, self.parameters[name])
+            if name == "viscoelasticity" and self.options.relaxation == "solid":
+                force = force + self._beyond_quasilinear(present, regions, way, normals)
         turn = self.rotation
         readings = Readings(
             way.t,
@@ -208,6 +215,30 @@ class _Session:
                 readings = act(readings, self.parameters[name])
         self.way = way
         return readings, readings.force
+
+    def _beyond_quasilinear(
+        self, present: Sequence[str], regions: bool, way: Motion, normals: np.ndarray
+    ) -> np.ndarray:
+        """(n, 3) N: what the relaxing solid answers beyond the quasi-linear law."""
+        p = self.parameters["viscoelasticity"]
+        straight = replace(way, stray=np.zeros_like(way.stray))
+        elastic = elastic_force(straight, self.forces(present, regions), self.modulus)
+        law = effect("viscoelasticity").on_force(elastic, way, normals, p)
+        relaxing = self.specimen(present, regions).without(prony=tuple(zip(p["g"], p["tau_s"], strict=True)))
+        keywords = {**self._keywords, "fineness": Fineness(finest=self.options.finest_mm)}
+        keywords["label"] = "solving the relaxing solid"
+        return beyond_quasilinear(
+            self._shape(present), relaxing, self.touches, way, law, self.modulus, keywords
+        )
+
+    def _shape(self, present: Sequence[str]) -> Phantom:
+        """The object's surface with the effects `present`."""
+        phantom = replace(self.phantom, regions=())
+        for name in present:
+            change = effect(name).on_shape
+            if change is not None:
+                phantom = change(phantom, self.parameters[name])
+        return phantom
 
     def _normals(self, way: Motion) -> np.ndarray:
         normals = np.zeros_like(way.position)
@@ -266,81 +297,3 @@ def _capped(force: np.ndarray, mu: float, normals: np.ndarray) -> np.ndarray:
     most = (mu + 0.35) * np.maximum(along, 0.0)
     factor = np.where(size > most, most / np.maximum(size, 1e-12), 1.0)
     return along[:, None] * normals + factor[:, None] * side
-
-
-def _truth(
-    session: _Session,
-    present: Sequence[str],
-    clean: np.ndarray,
-    whole: Readings,
-    sizes: bool,
-    strengths: Mapping[str, float],
-) -> dict[str, Any]:
-    mask = contact_samples(session.way)
-    noise = session.options.force_noise_std_n
-    truth: dict[str, Any] = {
-        "young_modulus_pa": float(session.modulus),
-        "shape": session.phantom.shape,
-        "effects": [],
-        "noise_rms_n": float(noise),
-        "force_rms_in_contact_n": _rms(clean[mask]),
-        "contact_samples": int(mask.sum()),
-        "simulator": "palpate virtual laboratory",
-        "press_set": session.options.presses,
-        "protocol": session.options.protocol,
-        "device_from_object_rotation": session.rotation.round(9).tolist(),
-        "device_from_object_shift_mm": (1e3 * session.shift).round(6).tolist(),
-        "strengths": dict(strengths),
-        "parameters": {name: dict(p) for name, p in session.parameters.items() if p},
-    }
-    names = list(present) + (["regions"] if session.phantom.regions else [])
-    if session.phantom.regions:
-        truth["regions"] = {
-            r.name: {"centre_m": list(r.centre_m), "radius_m": r.radius_m, "modulus_ratio": r.modulus_ratio}
-            for r in session.phantom.regions
-        }
-    if not sizes:
-        truth["effects"] = ["inclusion" if name == "regions" else name for name in names]
-        return truth
-    truth["sizes"] = {}
-    for name in names:
-        rest = [other for other in present if other != name]
-        readings, without = session.run(rest, regions=name != "regions")
-        moved = 1e3 * (whole.position - readings.position) @ session.rotation
-        if np.abs(moved).max() > 1e-6:
-            # what the ideal object would answer where the instrument says that the tip is
-            _, without = session.run(rest, moved=moved)
-        label = "inclusion" if name == "regions" else name
-        truth["sizes"][label] = size_of(clean[mask], without[mask])
-    session.run(present)
-    ranked = sorted(truth["sizes"], key=lambda n: -truth["sizes"][n]["rms_n"])
-    truth["effects"] = [name for name in ranked if truth["sizes"][name]["rms_n"] > noise]
-    if truth["effects"]:
-        truth["dominant_effect"] = truth["effects"][0]
-    return truth
-
-
-def contact_samples(way: Motion) -> np.ndarray:
-    """(n,) bool: from first touch to the loss of touch of every palpation, and 50 ms before and after."""
-    inside = (way.touch >= 0) & ((way.s > 0) | (way.leg == 1))
-    width = int(0.05 * RATE_HZ)
-    count = np.concatenate([[0], np.cumsum(inside)])
-    at = np.arange(len(inside))
-    low, high = np.maximum(at - width, 0), np.minimum(at + width + 1, len(inside))
-    return count[high] - count[low] > 0
-
-
-def size_of(with_effect: np.ndarray, without: np.ndarray) -> dict[str, float]:
-    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor
-    on `without`.
-    """
-    scale = float((with_effect * without).sum() / max((without * without).sum(), 1e-300))
-    return {
-        "rms_n": _rms(with_effect - without),
-        "rms_after_best_scale_n": _rms(with_effect - scale * without),
-        "best_scale": scale,
-    }
-
-
-def _rms(values: np.ndarray) -> float:
-    return float(np.sqrt((values**2).sum(axis=1).mean())) if len(values) else 0.0

@@ -11,9 +11,9 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from scenes.laboratory.laws import PAIRS, circled, erf, isochoric, norm
 from scenes.laboratory.mesh import GAUSS, QuadraticMesh, shape_gradients
 
-_PAIRS = np.array([[0, 0], [1, 1], [2, 2], [0, 1], [1, 2], [0, 2]])
 _UNIT_GRADIENTS = np.array([shape_gradients(*b) for b in GAUSS])
 
 
@@ -103,94 +103,6 @@ class Solid:
         return forces, stiffness, energy, new
 
 
-@numba.njit(cache=True, fastmath=False)
-def _isochoric(c, shear, c20, fibre, stress, moduli):
-    """Second Piola-Kirchhoff stress and moduli of the isochoric energy; returns (energy, J)."""
-    det = (
-        c[0] * (c[1] * c[2] - c[4] * c[4])
-        - c[3] * (c[3] * c[2] - c[4] * c[5])
-        + c[5] * (c[3] * c[4] - c[1] * c[5])
-    )
-    inverse = np.empty(6)
-    inverse[0] = (c[1] * c[2] - c[4] * c[4]) / det
-    inverse[1] = (c[0] * c[2] - c[5] * c[5]) / det
-    inverse[2] = (c[0] * c[1] - c[3] * c[3]) / det
-    inverse[3] = (c[4] * c[5] - c[3] * c[2]) / det
-    inverse[4] = (c[3] * c[5] - c[0] * c[4]) / det
-    inverse[5] = (c[3] * c[4] - c[1] * c[5]) / det
-    j = np.sqrt(det)
-    scale = det ** (-1.0 / 3.0)
-    trace = c[0] + c[1] + c[2]
-    first = scale * trace
-    c10 = 0.5 * shear
-    w1 = c10 * (1 + 2 * c20 * (first - 3))
-    w11 = 2 * c10 * c20
-    energy = c10 * (first - 3) * (1 + c20 * (first - 3))
-    d = np.empty(6)
-    for a in range(6):
-        d[a] = (scale if a < 3 else 0.0) - first / 3 * inverse[a]
-        stress[a] = 2 * w1 * d[a]
-    for a in range(6):
-        one_a = scale if a < 3 else 0.0
-        for b in range(a, 6):
-            one_b = scale if b < 3 else 0.0
-            value = -(one_a * inverse[b] + inverse[a] * one_b) / 3 + first / 9 * inverse[a] * inverse[b]
-            value += first / 3 * _circled(inverse, a, b)
-            moduli[a, b] = 4 * (w1 * value + w11 * d[a] * d[b])
-            moduli[b, a] = moduli[a, b]
-    if fibre[0] > 0.0:
-        m = np.empty(6)
-        m[0], m[1], m[2] = fibre[1] ** 2, fibre[2] ** 2, fibre[3] ** 2
-        m[3], m[4], m[5] = fibre[1] * fibre[2], fibre[2] * fibre[3], fibre[1] * fibre[3]
-        length = m[0] * c[0] + m[1] * c[1] + m[2] * c[2] + 2 * (m[3] * c[3] + m[4] * c[4] + m[5] * c[5])
-        k = fibre[0] * shear
-        e = scale * length - 1
-        energy += 0.5 * k * e * e
-        h = np.empty(6)
-        for a in range(6):
-            h[a] = scale * m[a] - scale * length / 3 * inverse[a]
-            stress[a] += 2 * k * e * h[a]
-        for a in range(6):
-            for b in range(6):
-                value = -scale / 3 * (m[a] * inverse[b] + inverse[a] * m[b])
-                value += scale * length / 9 * inverse[a] * inverse[b]
-                value += scale * length / 3 * _circled(inverse, a, b)
-                moduli[a, b] += 4 * k * (h[a] * h[b] + e * value)
-    return energy, j, inverse
-
-
-@numba.njit(cache=True)
-def _circled(s, a, b):
-    """(s_ik s_jl + s_il s_jk) / 2 in Voigt numbers."""
-    i, j = _PAIRS[a, 0], _PAIRS[a, 1]
-    k, m = _PAIRS[b, 0], _PAIRS[b, 1]
-    return 0.5 * (_at(s, i, k) * _at(s, j, m) + _at(s, i, m) * _at(s, j, k))
-
-
-@numba.njit(cache=True)
-def _at(s, i, j):
-    if i == j:
-        return s[i]
-    low, high = min(i, j), max(i, j)
-    if low == 0:
-        return s[3] if high == 1 else s[5]
-    return s[4]
-
-
-@numba.njit(cache=True)
-def _norm(s):
-    return np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2 + 2 * (s[3] ** 2 + s[4] ** 2 + s[5] ** 2))
-
-
-@numba.njit(cache=True)
-def _erf(x):
-    """Error function, Abramowitz & Stegun 7.1.26 (error below 1.5e-7)."""
-    t = 1 / (1 + 0.3275911 * abs(x))
-    tail = t * (0.254829592 + t * (-0.284496736 + t * (1.421413741 + t * (-1.453152027 + t * 1.061405429))))
-    value = 1 - tail * np.exp(-x * x)
-    return value if x >= 0 else -value
-
-
 @numba.njit(cache=True)
 def _evaluate(
     cells, u, gradients, weights, shear, bulk, c20, fibre, prony, plastic, mullins,
@@ -248,7 +160,7 @@ def _evaluate(
                     b_store[g, 4, column] = f[i, 1] * n2 + f[i, 2] * n1
                     b_store[g, 5, column] = f[i, 0] * n2 + f[i, 2] * n0
             for p in range(6):
-                i, k = _PAIRS[p, 0], _PAIRS[p, 1]
+                i, k = PAIRS[p, 0], PAIRS[p, 1]
                 inv_store[g, p] = f[0, i] * f[0, k] + f[1, i] * f[1, k] + f[2, i] * f[2, k]
         theta = deformed / volume
         pressure = bulk[e] * 0.5 * (theta - 1 / theta)
@@ -264,7 +176,7 @@ def _evaluate(
             w = weights[e, g]
             for p in range(6):
                 c[p] = inv_store[g, p]
-            energy, j, inverse = _isochoric(c, shear[e, g], c20, fibre, stress, moduli)
+            energy, j, inverse = isochoric(c, shear[e, g], c20, fibre, stress, moduli)
             total += w * energy
             factor = gain
             soft, slope = 1.0, 0.0
@@ -274,7 +186,7 @@ def _evaluate(
                 # damage counts from a tenth of the scale, so that rounding in a virgin solid does nothing
                 scale = mullins[1] * greatest + 1e-9
                 x = (greatest - energy) / scale
-                soft = 1 - _erf(x) / mullins[0]
+                soft = 1 - erf(x) / mullins[0]
                 if energy < greatest:
                     slope = 2 / np.sqrt(np.pi) * np.exp(-x * x) / (mullins[0] * scale)
             if branches > 0 or plastic[0] > 0.0:
@@ -304,7 +216,7 @@ def _evaluate(
                     new_plastic[e, g, p] = old_plastic[e, g, p] + plastic[0] * (
                         new_stress[e, g, p] - old_stress[e, g, p]
                     )
-                size = _norm(new_plastic[e, g])
+                size = norm(new_plastic[e, g])
                 limit = plastic[1] * shear[e, g]
                 if size > limit:
                     for p in range(6):
@@ -327,7 +239,7 @@ def _evaluate(
                 for p in range(6):
                     for s in range(6):
                         moduli[p, s] = factor * moduli[p, s] + pressure * j * (
-                            inverse[p] * inverse[s] - 2 * _circled(inverse, p, s)
+                            inverse[p] * inverse[s] - 2 * circled(inverse, p, s)
                         )
                 big[:] = b_store[g]
                 bd[:] = np.dot(moduli, big)

@@ -17,7 +17,8 @@ from scenes.laboratory.effects import REGISTRY, UNNAMED
 from scenes.laboratory.effects.contact import relaxed
 from scenes.laboratory.paths import Leg, TouchForce
 from scenes.laboratory.sealing import opened
-from scenes.laboratory.simulate import SimulateOptions, simulate, size_of
+from scenes.laboratory.simulate import SimulateOptions, simulate
+from scenes.laboratory.truth import size_of
 from scenes.phantoms import phantom
 
 CONTRACT = set(

@@ -7,6 +7,7 @@ import pytest
 
 from mechanics.dent import dent_law
 from scenes.laboratory.contact import SphereContact
+from scenes.laboratory.effects.contact import relaxed
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.refine import boundary_faces
 from scenes.laboratory.solid import Material, Solid
@@ -117,6 +118,47 @@ def test_dragged_surface_springs_back_when_the_tip_leaves() -> None:
     for lift in np.linspace(0.2, 6.0, 30):
         state = problem.advance(state, states[-1].centre + side + [0, 0, lift])
     assert not state.force.any() and np.abs(state.displacement).max() < 1e-9
+
+
+def _held(prony: tuple, *, linear: bool):
+    """Pressed 2 mm deep in 0.5 s, held for 1 s, lifted in 0.5 s: (times, normal forces)."""
+    mesh = box(60.0, 40.0, 3.0, 0.8)
+    solid = Solid(mesh, Material(len(mesh.cells), 0.49))
+    solid.material.prony = np.array(prony).reshape(-1, 2)
+    top = np.array([0.0, 0.0, 40.0])
+    near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 12.0
+    contact, free = SphereContact(mesh.points, mesh.faces[near], 5.0, None), ~np.repeat(mesh.fixed, 3)
+    problem = LinearProblem(solid, contact, free) if linear else Problem(solid, contact, free)
+    state, force = problem.rest(top + [0, 0, 5.0]), []
+    depth = np.concatenate([np.linspace(0.1, 2, 20), np.full(20, 2.0), np.linspace(1.9, 0, 20)])
+    times = np.concatenate(
+        [np.linspace(0.025, 0.5, 20), np.linspace(0.55, 1.5, 20), np.linspace(1.525, 2, 20)]
+    )
+    for k, d in enumerate(depth):
+        step = times[k] - (times[k - 1] if k else 0.0)
+        state = problem.advance(state, top + [0, 0, 5.0 - d], step)
+        force.append(state.force[2])
+    return times, np.array(force)
+
+
+def test_relaxing_solid_follows_the_quasilinear_law_while_the_contact_grows_and_leaves_earlier() -> None:
+    times, elastic = _held((), linear=True)
+    _, force = _held((0.5, 0.3), linear=True)
+    fine = np.arange(0, 2, 1e-3)
+    path = np.zeros((len(fine), 3))
+    path[:, 2] = np.interp(fine, np.concatenate([[0], times]), np.concatenate([[0], elastic]))
+    law = np.interp(times, fine, relaxed(path, [0.5], [0.3])[:, 2])
+    assert force[4:40] == pytest.approx(law[4:40], rel=0.02)
+    assert force[39] > 1.005 * elastic[39]
+    assert force[50:].sum() < 0.9 * elastic[50:].sum() and force.min() > -1e-6
+
+
+@pytest.mark.slow
+def test_relaxation_at_finite_strain_is_that_of_the_condensed_object() -> None:
+    small = [_held((0.5, 0.3), linear=True)[1], _held((), linear=True)[1]]
+    large = [_held((0.5, 0.3), linear=False)[1], _held((), linear=False)[1]]
+    use = slice(8, 50)
+    assert large[0][use] / large[1][use] == pytest.approx(small[0][use] / small[1][use], rel=0.04)
 
 
 def test_energy_stored_is_the_work_done() -> None:

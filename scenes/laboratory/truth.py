@@ -1,0 +1,97 @@
+"""What is true about a simulated recording: its effects, each with its size in newtons."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from scenes.laboratory.effects import Readings
+from scenes.laboratory.motion import Motion
+from scenes.laboratory.tracing import RATE_HZ
+
+if TYPE_CHECKING:
+    from scenes.laboratory.simulate import Session
+
+
+def truth_of(
+    session: Session,
+    present: Sequence[str],
+    clean: np.ndarray,
+    whole: Readings,
+    sizes: bool,
+    strengths: Mapping[str, float],
+) -> dict[str, Any]:
+    """The recording's [truth]: what was there, and each effect's size where `sizes` asks for it.
+
+    clean: (n, 3) N, the force of `whole` without noise. Effects smaller than the noise are not listed.
+    """
+    mask = contact_samples(session.way)
+    noise = session.options.force_noise_std_n
+    truth: dict[str, Any] = {
+        "young_modulus_pa": float(session.modulus),
+        "shape": session.phantom.shape,
+        "effects": [],
+        "noise_rms_n": float(noise),
+        "force_rms_in_contact_n": _rms(clean[mask]),
+        "contact_samples": int(mask.sum()),
+        "simulator": "palpate virtual laboratory",
+        "press_set": session.options.presses,
+        "protocol": session.options.protocol,
+        "device_from_object_rotation": session.rotation.round(9).tolist(),
+        "device_from_object_shift_mm": (1e3 * session.shift).round(6).tolist(),
+        "strengths": dict(strengths),
+        "parameters": {name: dict(p) for name, p in session.parameters.items() if p},
+    }
+    names = list(present) + (["regions"] if session.phantom.regions else [])
+    if session.phantom.regions:
+        truth["regions"] = {
+            r.name: {"centre_m": list(r.centre_m), "radius_m": r.radius_m, "modulus_ratio": r.modulus_ratio}
+            for r in session.phantom.regions
+        }
+    if not sizes:
+        truth["effects"] = ["inclusion" if name == "regions" else name for name in names]
+        return truth
+    truth["sizes"] = {}
+    for name in names:
+        rest = [other for other in present if other != name]
+        readings, without = session.run(rest, regions=name != "regions")
+        moved = 1e3 * (whole.position - readings.position) @ session.rotation
+        if np.abs(moved).max() > 1e-6:
+            # what the ideal object would answer where the instrument says that the tip is
+            _, without = session.run(rest, moved=moved)
+        label = "inclusion" if name == "regions" else name
+        truth["sizes"][label] = size_of(clean[mask], without[mask])
+    session.run(present)
+    ranked = sorted(truth["sizes"], key=lambda n: -truth["sizes"][n]["rms_n"])
+    truth["effects"] = [name for name in ranked if truth["sizes"][name]["rms_n"] > noise]
+    if truth["effects"]:
+        truth["dominant_effect"] = truth["effects"][0]
+    return truth
+
+
+def contact_samples(way: Motion) -> np.ndarray:
+    """(n,) bool: from first touch to the loss of touch of every palpation, and 50 ms before and after."""
+    inside = (way.touch >= 0) & ((way.s > 0) | (way.leg == 1))
+    width = int(0.05 * RATE_HZ)
+    count = np.concatenate([[0], np.cumsum(inside)])
+    at = np.arange(len(inside))
+    low, high = np.maximum(at - width, 0), np.minimum(at + width + 1, len(inside))
+    return count[high] - count[low] > 0
+
+
+def size_of(with_effect: np.ndarray, without: np.ndarray) -> dict[str, float]:
+    """Size of an effect from forces (k, 3) N: rms of the difference, also after the best factor
+    on `without`.
+    """
+    scale = float((with_effect * without).sum() / max((without * without).sum(), 1e-300))
+    return {
+        "rms_n": _rms(with_effect - without),
+        "rms_after_best_scale_n": _rms(with_effect - scale * without),
+        "best_scale": scale,
+    }
+
+
+def _rms(values: np.ndarray) -> float:
+    return float(np.sqrt((values**2).sum(axis=1).mean())) if len(values) else 0.0
