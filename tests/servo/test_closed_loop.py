@@ -7,12 +7,16 @@ import itertools
 import numpy as np
 import pytest
 
+from benchmarks._stability_objects import dome
+from benchmarks._stability_objects import one as one_on_dome
 from benchmarks.stability import one, plane_stiffness_n_per_m, press_hold_release
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
 from palpate.servo.closed_loop import Loop, closed_loop
 from palpate.servo.elastic_plane import ElasticPlane
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
+from render.fem import FemRenderer
+from render.options import RenderOptions
 from render.passivity import PassivityOptions
 
 GRASP = (12.0, 600.0)
@@ -73,6 +77,28 @@ def test_the_coupling_brings_the_stiffest_place_to_the_limit_exactly():
     coupled = plane.with_series_compliance(series_compliance_m_per_n(10_000.0, 3000.0))
     np.testing.assert_allclose(stiffest_n_per_m(coupled, 20.0), 3000.0)
     assert series_compliance_m_per_n(2000.0, 3000.0) == 0.0
+
+
+def test_two_tips_share_the_stiffness_that_the_device_renders_stably():
+    plane, offsets = ElasticPlane(10_000.0), np.array([[0.0, -0.006, 0.0], [0.0, 0.006, 0.0]])
+    hand, path = HandImpedance(0.2, *GRASP), press_hold_release(1000.0, times=1)
+    result = closed_loop(plane, SPEC, hand, path, tip_offsets_m=offsets)
+    felt = 2.0 / (1.0 / 10_000.0 + result.compliance_m_per_n)
+    np.testing.assert_allclose(felt, SPEC.max_stiffness_n_per_m)
+    assert result.given_back_j < 1e-3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tips", [1, 2])
+def test_no_hand_gets_more_than_a_millijoule_from_a_dome_dragged_over_with_friction(tips):
+    renderer = FemRenderer(dome(), RenderOptions(friction=0.5))
+    light = (0.05, 2.0, 200.0)
+    for modulus, delay, bound in ((30e3, 0.0, 0.0), (300e3, 0.002, 1e-2)):
+        stiff = renderer.with_modulus(modulus)
+        off = one_on_dome(stiff, light, Loop(1000.0, 5e-5, delay), tips, active=False)
+        on = one_on_dome(stiff, light, Loop(1000.0, 5e-5, delay), tips, active=True)
+        assert off.given_back_j >= bound
+        assert on.given_back_j < 1e-3 and on.contact_share > 0.2
 
 
 @pytest.mark.slow
