@@ -120,6 +120,7 @@ def _comparison(arguments: argparse.Namespace) -> dict[str, Any]:
             depth = -press.travel @ press.normal
             deep = depth > 1.5
             difference = along[deep] / theirs[deep] - 1
+            shallow = np.abs(along - theirs)[~deep].max(initial=0.0)
             rows.append(
                 [
                     shape,
@@ -127,6 +128,7 @@ def _comparison(arguments: argparse.Namespace) -> dict[str, Any]:
                     float(depth[-1]),
                     float(100 * difference.mean()),
                     float(100 * np.abs(difference).max()),
+                    float(1e3 * shallow),
                     float(1e3 * np.sqrt(((ours - press.force) ** 2).sum(axis=1).mean())),
                 ]
             )
@@ -139,6 +141,7 @@ def _comparison(arguments: argparse.Namespace) -> dict[str, Any]:
                 "depth [mm]",
                 "mean difference [%]",
                 "greatest [%]",
+                "greatest above 1.5 mm [mN]",
                 "rms of the vector [mN]",
             ],
             rows,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from scenes.laboratory.effects import Readings
+from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.tracing import RATE_HZ
 
@@ -55,14 +55,17 @@ def truth_of(
         return truth
     truth["sizes"] = {}
     for name in names:
-        rest = [other for other in present if other != name]
+        # nothing that needs finite strain can be kept without it: its size is that of the plain solid
+        gone = [n for n in present if effect(n).needs_finite] if name == "finite_strain" else []
+        with_it = session.run([n for n in present if n not in gone])[1] if gone else clean
+        rest = [other for other in present if other != name and other not in gone]
         readings, without = session.run(rest, regions=name != "regions")
         moved = 1e3 * (whole.position - readings.position) @ session.rotation
         if np.abs(moved).max() > 1e-6:
             # what the ideal object would answer where the instrument says that the tip is
             _, without = session.run(rest, moved=moved)
         label = "inclusion" if name == "regions" else name
-        truth["sizes"][label] = size_of(clean[mask], without[mask])
+        truth["sizes"][label] = size_of(with_it[mask], without[mask])
     session.run(present)
     ranked = sorted(truth["sizes"], key=lambda n: -truth["sizes"][n]["rms_n"])
     truth["effects"] = [name for name in ranked if truth["sizes"][name]["rms_n"] > noise]
