@@ -69,6 +69,8 @@ def _gap_and_speed(signals: Signals, contact: Contact) -> tuple[float, float, fl
     moved = signals.position[contact.peak : until] - contact.centre
     travel = -moved @ normal
     push = signals.raw_force[contact.peak : until] @ normal
+    if not travel.max() > 0.0:  # a touch from the side: the tip was never below its first place
+        return None
     first = int(np.flatnonzero(travel >= 0.9 * travel.max())[-1])
     away = np.flatnonzero(travel[first:] < -_AWAY_M)
     part = slice(first, first + int(away[0]) if len(away) else None)
