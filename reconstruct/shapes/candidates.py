@@ -63,6 +63,7 @@ def first_guesses(evidence: Evidence, seen: Seen) -> list[Shape]:
         found.append(Cap.sphere(np.array([*round_.centre, height - radius]), radius))
     for outline in outlines:
         found.append(Prism.of(outline, height, sloped=False, drafted=False))
+        found.append(Prism.of(outline, height, sloped=False, drafted=True))
         found.append(Prism.of(outline, height, sloped=True, drafted=True))
     if straight is None:
         long, short, turn = _extent(curve.vertices)

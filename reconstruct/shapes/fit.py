@@ -18,6 +18,7 @@ OUTLINE_ERROR_M = 0.0002
 
 _OUTLINE_POINTS = 48
 _ROBUST_M = 0.0003
+_WEAK = 3.0  # prior spreads: holds only what no touch can tell, such as the slope of a top touched once
 
 
 @dataclass(frozen=True)
@@ -78,7 +79,7 @@ def fit(shape: Shape, seen: Seen) -> tuple[Shape, float]:
     spread = np.array([p.spread for p in shape.parameters])
     low = np.array([p.low for p in shape.parameters])
     high = np.array([p.high for p in shape.parameters])
-    weak = 10 * spread
+    weak = _WEAK * spread
 
     def cost(x: np.ndarray) -> np.ndarray:
         at = np.clip(x[:-1] * spread, low, high)

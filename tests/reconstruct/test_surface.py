@@ -194,3 +194,19 @@ def test_the_labelled_recordings_meet_the_targets(shared_recordings):
         assert error["mean_m"] < MEAN_M, stem
         assert error["p95_m"] < P95_M, stem
         assert abs(error["volume_error"]) < VOLUME, stem
+
+
+def test_a_top_touched_at_one_place_is_level():
+    truth = phantom_truth("cylinder")
+    evidence, back = touch(truth, 2)
+    top = evidence.normals @ evidence.support_normal > 0.7
+    one = np.linalg.norm(evidence.centres - evidence.centres[top][0], axis=1) < 0.006
+    kept = ~top | one
+    few = replace(
+        evidence,
+        centres=evidence.centres[kept],
+        normals=evidence.normals[kept],
+        centre_error_m=evidence.centre_error_m[kept],
+    )
+    surface = reconstruct_surface(few, SurfaceOptions(surface="cylinder"))
+    assert deviation(truth, back(surface.vertices), surface.triangles)["p95_m"] < 0.001
