@@ -79,9 +79,11 @@ def test_a_factor_an_element_is_asked_for(box):
 @pytest.mark.slow
 @pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
 def test_a_nodule_is_felt_as_in_a_fine_reference():
-    """Contrast over nodules of 10 mm, 6 times as stiff: within 10 % of a fine solution of another library."""
-    arguments = argparse.Namespace(mesh_size=0.01, centre=[0.024], radius=0.01, ratio=6.0, depth=0.004)
-    for row in felt(arguments):
-        assert row["reference"] > 0.05
-        assert row["contrast"] == pytest.approx(row["reference"], rel=0.10)
-        assert row["plain_force_over_reference"] == pytest.approx(1, abs=0.03)
+    """A nodule of 10 mm, 6 times as stiff, its top 14 mm deep: contrast within 10 % of another library."""
+    arguments = argparse.Namespace(
+        mesh_size=0.01, surface_edge=[0.006], centre=[0.024], radius=0.01, ratio=6.0, depth=0.004
+    )
+    (row,) = felt(arguments)
+    assert row["reference"] > 0.05
+    assert row["contrast"] == pytest.approx(row["reference"], rel=0.10)
+    assert row["plain_force_over_reference"] == pytest.approx(1, abs=0.04)
