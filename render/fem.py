@@ -86,9 +86,10 @@ class FemRenderer(Renderer):
             blocks is not None and blocks.shape != self.parameters.blocks.shape
         ):
             raise OptionError("a changed field must have the shape of the renderer's own")
-        changed = self._with(far=np.array(far), edition=self.parameters.edition + 1)
+        # the compiled loop knows arrays in C order only
+        changed = self._with(far=np.array(far, order="C"), edition=self.parameters.edition + 1)
         if blocks is not None:
-            table = np.array(blocks, dtype=np.float32)
+            table = np.array(blocks, dtype=np.float32, order="C")
             changed.parameters = changed.parameters._replace(blocks=table)
             changed.compliance = replace(self.compliance, blocks=table)
         return changed
