@@ -98,10 +98,11 @@ def _trend(result: Reconstruction) -> str:
     if "e_pa" not in trends or "k_v" not in trends:
         return ""
     k, e = trends["k_v"], trends["e_pa"]
-    return (
-        "Height. As in the paper, the 1D stiffness of presses on the side depends on the place (k_V "
-        "changes by "
-        f"{100 * k.change:+.0f} % over the height, r = {k.pearson:+.2f}) and the modulus does not, or "
-        "much less "
-        f"({100 * e.change:+.1f} %, r = {e.pearson:+.2f})."
+    words = (
+        "Height. As in the paper, the 1D stiffness of presses on the side depends on the place (k_V changes by "
+        f"{100 * k.change:+.0f} % over the height, r = {k.pearson:+.2f})"
     )
+    of_e = f"({100 * e.change:+.1f} %, r = {e.pearson:+.2f})"
+    if abs(e.change) < 0.25 * abs(k.change):
+        return f"{words} and the modulus does not, or much less {of_e}."
+    return f"{words}. Here the modulus does so as well {of_e}, other than the paper's."

@@ -53,7 +53,8 @@ def touched_points(ax: Axes, exploration: Exploration) -> Axes:
 
 
 def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
-    """Figure 3(b): surface of the mesh, fixed base nodes, and the node nearest to each contact, numbered."""
+    """Figure 3(b): surface of the mesh, fixed base nodes, and the node nearest to each contact, with the number
+    of its first press."""
     model = result.model
     draw_object(ax, model, show_base=True, elevation_deg=22.0)
     view = view_axes(model.support_normal, 22.0, 35.0)
@@ -61,7 +62,8 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
     node = nearest_nodes(corners, result.exploration.points)
     seen = (corners.points[node] - model.mesh.points.mean(axis=0)) @ view.T * 1e3
     facing = np.array([p.normal for p in model.palpations]) @ view[2] > 0
-    for i in np.flatnonzero(facing):
+    first = np.unique(node, return_index=True)[1]
+    for i in first[facing[first]]:
         ax.plot(*seen[i, :2], "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
         ax.text(*seen[i, :2], str(i + 1), ha="center", va="center", fontsize=5.5)
     return ax

@@ -171,8 +171,10 @@ def depth_figure(fit: ModulusFit) -> Figure:
     if (~agrees).any():
         ax.plot(depth[~agrees], value[~agrees], "o", mfc="white", color=FORCE_COLOUR, label="does not")
     ax.plot(fit.press.depth_m * 1e3, fit.modulus_pa / 1e3, "*", ms=13, color=PEAK_COLOUR, label="chosen")
-    ax.set(xlabel="samples up to depth [mm]", ylabel="modulus [kPa]")
-    ax.legend(frameon=False, fontsize=8)
+    low, high = min(value.min(), fit.ci95_pa[0] / 1e3), max(value.max(), fit.ci95_pa[1] / 1e3)
+    room = 0.3 * (high - low)
+    ax.set(xlabel="samples up to depth [mm]", ylabel="modulus [kPa]", ylim=(low - room, high + 2 * room))
+    ax.legend(frameon=False, fontsize=8, ncols=2)
     return figure
 
 
