@@ -99,7 +99,8 @@ def _trend(result: Reconstruction) -> str:
         return ""
     k, e = trends["k_v"], trends["e_pa"]
     words = (
-        "Height. As in the paper, the 1D stiffness of presses on the side depends on the place (k_V changes by "
+        "Height. As in the paper, the 1D stiffness of presses on the side depends on the place (k_V "
+        "changes by "
         f"{100 * k.change:+.0f} % over the height, r = {k.pearson:+.2f})"
     )
     of_e = f"({100 * e.change:+.1f} %, r = {e.pearson:+.2f})"
