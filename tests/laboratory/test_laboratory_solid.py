@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import pytest
 
@@ -30,19 +32,27 @@ def _solid(**changes: object) -> Solid:
     return Solid(mesh, material)
 
 
-def _pressed(depth: float, friction: float | None, *, linear: bool, steps: int = 6):
-    """A sphere of radius 5 mm pressed into a box; returns (problem, states)."""
+TOP = np.array([0.0, 0.0, 40.0])
+
+
+@cache
+def _problem(friction: float | None, linear: bool, prony: tuple = ()) -> LinearProblem | Problem:
+    """A box under a sphere of radius 5 mm; problems keep no state between paths."""
     mesh = box(60.0, 40.0, 3.0, 0.8)
     solid = Solid(mesh, Material(len(mesh.cells), 0.49))
-    top = np.array([0.0, 0.0, 40.0])
-    near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 12.0
+    solid.material.prony = np.array(prony).reshape(-1, 2)
+    near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - TOP, axis=1) < 12.0
     contact = SphereContact(mesh.points, mesh.faces[near], 5.0, friction)
-    free = ~np.repeat(mesh.fixed, 3)
-    problem = LinearProblem(solid, contact, free) if linear else Problem(solid, contact, free)
-    state = problem.rest(top + [0, 0, 5.0])
+    return (LinearProblem if linear else Problem)(solid, contact, ~np.repeat(mesh.fixed, 3))
+
+
+def _pressed(depth: float, friction: float | None, *, linear: bool, steps: int = 6):
+    """A sphere of radius 5 mm pressed into a box; returns (problem, states)."""
+    problem = _problem(friction, linear)
+    state = problem.rest(TOP + [0, 0, 5.0])
     states = []
     for d in depth * (np.arange(1, steps + 1) / steps) ** 1.3:
-        state = problem.advance(state, top + [0, 0, 5.0 - d])
+        state = problem.advance(state, TOP + [0, 0, 5.0 - d])
         states.append(state)
     return problem, states
 
@@ -122,21 +132,15 @@ def test_dragged_surface_springs_back_when_the_tip_leaves() -> None:
 
 def _held(prony: tuple, *, linear: bool):
     """Pressed 2 mm deep in 0.5 s, held for 1 s, lifted in 0.5 s: (times, normal forces)."""
-    mesh = box(60.0, 40.0, 3.0, 0.8)
-    solid = Solid(mesh, Material(len(mesh.cells), 0.49))
-    solid.material.prony = np.array(prony).reshape(-1, 2)
-    top = np.array([0.0, 0.0, 40.0])
-    near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 12.0
-    contact, free = SphereContact(mesh.points, mesh.faces[near], 5.0, None), ~np.repeat(mesh.fixed, 3)
-    problem = LinearProblem(solid, contact, free) if linear else Problem(solid, contact, free)
-    state, force = problem.rest(top + [0, 0, 5.0]), []
+    problem = _problem(None, linear, prony)
+    state, force = problem.rest(TOP + [0, 0, 5.0]), []
     depth = np.concatenate([np.linspace(0.1, 2, 20), np.full(20, 2.0), np.linspace(1.9, 0, 20)])
     times = np.concatenate(
         [np.linspace(0.025, 0.5, 20), np.linspace(0.55, 1.5, 20), np.linspace(1.525, 2, 20)]
     )
     for k, d in enumerate(depth):
         step = times[k] - (times[k - 1] if k else 0.0)
-        state = problem.advance(state, top + [0, 0, 5.0 - d], step)
+        state = problem.advance(state, TOP + [0, 0, 5.0 - d], step)
         force.append(state.force[2])
     return times, np.array(force)
 
