@@ -86,12 +86,12 @@ class FemRenderer(Renderer):
             blocks is not None and blocks.shape != self.parameters.blocks.shape
         ):
             raise OptionError("a changed field must have the shape of the renderer's own")
-        # the compiled loop knows arrays in C order only
+        # the compiled loop knows only arrays in C order that may be written to
         changed = self._with(far=np.array(far, order="C"), edition=self.parameters.edition + 1)
         if blocks is not None:
             table = np.array(blocks, dtype=np.float32, order="C")
             changed.parameters = changed.parameters._replace(blocks=table)
-            changed.compliance = replace(self.compliance, blocks=table)
+            changed.compliance = replace(self.compliance, blocks=table.copy())
         return changed
 
     def displacement_of(
