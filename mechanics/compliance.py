@@ -78,6 +78,8 @@ def condense(
     place = np.searchsorted(free, wanted)
     if not len(wanted) or place.max() >= len(free) or (free[place] != wanted).any():
         raise MeshError("the mesh has no touchable node that is free to move")
+    if method not in (None, *METHODS):
+        raise OptionError(f"method is '{method}'; allowed are {', '.join(METHODS)}")
     if method is None:
         method = "schur" if pardiso.available() and backend in (None, "pardiso") else "columns"
     k = len(wanted)
@@ -200,7 +202,7 @@ def load_or_condense(
     if options.surface_edge_m != SURFACE_EDGE_M:
         form += ("surface edge", options.surface_edge_m)
     key = content_key(
-        "surface compliance 2",
+        "surface compliance 3",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,

@@ -13,7 +13,7 @@ from mechanics.progress import Progress, silent
 from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.solver import Solver
 from mechanics.support import Support
-from mechanics.tetmesh import TetMesh
+from mechanics.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
 PATCH_WIDTH_IN_MESH_SIZES = PATCH_WIDTH_IN_EDGES
@@ -146,8 +146,6 @@ def mean_curvature(
     A paraboloid fitted to the nodes within `reach_m` (None: 1.8 surface edges) whose triangles face the
     normal within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
     """
-    from mechanics.tetmesh import vertex_normals
-
     triangles = mesh.touchable_surface[:, :3]
     nodes = np.unique(triangles)
     facing = vertex_normals(mesh.points, triangles)[nodes]

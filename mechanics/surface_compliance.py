@@ -20,7 +20,7 @@ from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.refine import typical_edge
-from mechanics.sites import SURFACE_EDGE_M, mean_curvature, patch_width, touch_solver
+from mechanics.sites import SURFACE_EDGE_M, patch_width, touch_solver
 from mechanics.solver import Solver
 from mechanics.support import Support
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -33,25 +33,23 @@ _CORNERS = 32  # patches solved at once
 class SurfaceCompliance:
     """Device frame, SI units; the touchable surface with its rim at the base.
 
-    Coarse, t corners of the mesh: nodes (t,), points, normals (t, 3), curvature (t,) 1/m mean and convex
-    positive, triangles (f, 3) into them, blocks (t, t, 3, 3) float32, 1/m: displacement of the patch at i
-    for a unit force on the patch at j; symmetric as a whole. patch_width_m: (1,). A large surface has no
-    blocks (shape 0) but a factor (t, 3, r) float32: block (i, j) = factor[i] @ factor[j].T.
-    Fine, v corners: own_points, own_normals (v, 3), own_curvature (v,), own_triangles (g, 3) into them, own
-    (v, 3, 3), 1/m: displacement of the patch at i for a unit force on itself. own_width_m: (1,).
+    Coarse, t corners of the mesh: nodes (t,), points, normals (t, 3), triangles (f, 3) into them, blocks
+    (t, t, 3, 3) float32, 1/m: displacement of the patch at i for a unit force on the patch at j; symmetric as
+    a whole. patch_width_m: (1,). A large surface has no blocks (shape 0) but a factor (t, 3, r) float32:
+    block (i, j) = factor[i] @ factor[j].T.
+    Fine, v corners: own_points, own_normals (v, 3), own_triangles (g, 3) into them, own (v, 3, 3), 1/m:
+    displacement of the patch at i for a unit force on itself. own_width_m: (1,).
     poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.
     """
 
     nodes: np.ndarray
     points: np.ndarray
     normals: np.ndarray
-    curvature: np.ndarray
     triangles: np.ndarray
     blocks: np.ndarray
     patch_width_m: np.ndarray
     own_points: np.ndarray
     own_normals: np.ndarray
-    own_curvature: np.ndarray
     own_triangles: np.ndarray
     own: np.ndarray
     own_width_m: np.ndarray
@@ -133,13 +131,11 @@ def surface_compliance(
         nodes=nodes,
         points=points,
         normals=normals,
-        curvature=mean_curvature(mesh, points, normals),
         triangles=triangles,
         blocks=blocks,
         patch_width_m=np.array([width]),
         own_points=own_points,
         own_normals=own_normals,
-        own_curvature=mean_curvature(mesh, own_points, own_normals),
         own_triangles=own_triangles,
         own=own,
         own_width_m=np.array([own_width]),

@@ -36,6 +36,14 @@ def test_condensed_equals_full_solves(box, method, backend):
     assert compliance.float32_error < 1e-7
 
 
+def test_unknown_ways_are_refused(box):
+    mesh = box((2, 2, 2), (0.1, 0.1, 0.05))
+    with pytest.raises(OptionError, match="schur, columns"):
+        condense(mesh, 0.4, method="sparse")
+    with pytest.raises(OptionError, match="pardiso, superlu"):
+        Solver(mesh, 0.4, backend="cholmod")
+
+
 def test_nothing_to_touch_or_nothing_held_is_refused(box):
     mesh = box((2, 2, 2), (0.1, 0.1, 0.05))
     nobody = np.zeros(len(mesh.points), dtype=bool)

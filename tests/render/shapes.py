@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.model import Model
-from mechanics.sites import mean_curvature, patch_width
+from mechanics.sites import patch_width
 from mechanics.solver import Solver
 from mechanics.surface_compliance import SurfaceCompliance, patch_blocks
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -82,18 +82,15 @@ def quick_compliance(made: Model) -> SurfaceCompliance:
     width = patch_width(mesh)
     blocks = patch_blocks(Solver(mesh, made.poisson_ratio), points, width)
     every = np.arange(len(nodes))
-    curvature = mean_curvature(mesh, points, normals)
     return SurfaceCompliance(
         nodes=nodes,
         points=points,
         normals=normals,
-        curvature=curvature,
         triangles=local.reshape(-1, 3),
         blocks=blocks,
         patch_width_m=np.array([width]),
         own_points=points.copy(),
         own_normals=normals.copy(),
-        own_curvature=curvature.copy(),
         own_triangles=local.reshape(-1, 3).copy(),
         own=blocks[every, every].astype(float),
         own_width_m=np.array([width]),
