@@ -183,6 +183,7 @@ def test_the_labelled_recordings_meet_the_targets(shared_recordings):
         "silicone-1-cylinder": "cylinder",
         "silicone-2-block": "block",
         "silicone-3-halfsphere": "half-sphere",
+        "example-time-delay": "cylinder",
     }
     for stem, name in stems.items():
         recording = read_recording(shared_recordings / f"{stem}.toml")
