@@ -14,6 +14,14 @@ from palpate.window.window import CHARTS_SHARE, TouchWindow
 FRAME_S = 0.005
 
 
+def eventually(condition: Callable[[], bool], seconds: float = 20.0) -> bool:
+    """Whether a condition comes true before a generous limit; no frame goes by meanwhile."""
+    end = time.monotonic() + seconds
+    while time.monotonic() < end and not condition():
+        time.sleep(0.005)
+    return condition()
+
+
 class Driven:
     """Shows the window; every method is something that a person does, or waits as one does."""
 

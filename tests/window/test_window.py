@@ -16,7 +16,7 @@ from palpate.window.session import TouchSession
 from palpate.window.window import TouchWindow
 from scenes.scene import Scene
 
-from .driven import Driven
+from .driven import Driven, eventually
 
 SIZE = (640, 480)
 
@@ -194,8 +194,8 @@ def test_help_and_screenshot(driven: Driven, tmp_path: Path, monkeypatch: pytest
     assert len(list(tmp_path.glob("touch-*.png"))) == 1
 
 
-def test_the_servo_kept_ticking(driven: Driven) -> None:
-    """Whatever the window did, the loop in the other process ran on."""
-    report = driven.session.report()
-    assert report.ticks > 0 and report.missed_ticks < 0.2 * report.ticks
+def test_the_servo_never_waits_for_the_window(driven: Driven) -> None:
+    """While the window draws nothing, the loop in the other process runs on."""
+    before = driven.session.report().ticks
+    assert eventually(lambda: driven.session.report().ticks > before + 500)
     assert driven.session.servo.alive
