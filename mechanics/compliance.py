@@ -22,7 +22,6 @@ from mechanics.errors import MeshError, OptionError
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.sites import SURFACE_EDGE_M
 from mechanics.solver import Solver, free_dofs
 from mechanics.store import content_key, load_or_build
 from mechanics.support import support_of
@@ -159,22 +158,17 @@ def _symmetrise(matrix: np.ndarray, block: int = 512) -> None:
 
 @dataclass(frozen=True)
 class ComplianceOptions:
-    """The form of the table of how touches move one another, the elements for how a place gives itself."""
+    """In which form `load_or_condense` keeps how a touch at one place moves another."""
 
     form: str = option("auto", "dense, low-rank, or auto: low-rank for a large surface", choices=FORMS)
     largest_dense_bytes: float = option(1.5e8, "dense table beyond which auto takes low-rank", unit="bytes")
     low_rank_error: float = option(0.005, "relative error of a low-rank table")
-    surface_edge_m: float = option(
-        SURFACE_EDGE_M, "greatest edge of the surface's elements; smaller feels shallow nodules", unit="m"
-    )
 
     def __post_init__(self) -> None:
         if self.form not in FORMS:
             raise OptionError(f"form is '{self.form}'; allowed are {', '.join(FORMS)}")
         if not 1e-6 < self.low_rank_error < 0.2:
             raise OptionError(f"low_rank_error is {self.low_rank_error}; it must lie between 1e-6 and 0.2")
-        if not self.surface_edge_m > 0:
-            raise OptionError(f"surface_edge_m is {self.surface_edge_m}; it must be greater than 0")
 
     def error_of(self, mesh: TetMesh) -> float | None:
         """The low-rank error for a mesh, None where its table is to be dense."""
@@ -196,11 +190,8 @@ def load_or_condense(
     """
     support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
     held = () if support is None else dataclasses.astuple(support)
-    options = options or ComplianceOptions()
-    error = options.error_of(model.mesh)
-    form: tuple[object, ...] = () if error is None else ("low-rank", error)
-    if options.surface_edge_m != SURFACE_EDGE_M:
-        form += ("surface edge", options.surface_edge_m)
+    error = (options or ComplianceOptions()).error_of(model.mesh)
+    form = () if error is None else ("low-rank", error)
     key = content_key(
         "surface compliance 3",
         model.mesh.points,
@@ -220,7 +211,6 @@ def load_or_condense(
             model.modulus_ratio,
             support=support,
             low_rank_error=error,
-            surface_edge_m=options.surface_edge_m,
             progress=progress,
         )
         return made.arrays()

@@ -95,13 +95,12 @@ def surface_compliance(
     *,
     support: Support | None = None,
     low_rank_error: float | None = None,
-    surface_edge_m: float = SURFACE_EDGE_M,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
     """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None; support: None, bonded.
 
     low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
-    a patch of at least WIDE_PATCH_M. surface_edge_m: of the own table's elements (touch_solver).
+    a patch of at least WIDE_PATCH_M.
     """
     coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=support)
     nodes, triangles = _corners(coarse.mesh)
@@ -115,11 +114,9 @@ def surface_compliance(
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
-    if typical_edge(mesh) > surface_edge_m:
+    if typical_edge(mesh) > SURFACE_EDGE_M:
         del coarse
-        fine = touch_solver(
-            mesh, poisson_ratio, modulus_ratio, surface_edge_m=surface_edge_m, support=support
-        )
+        fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support)
     else:  # what touch_solver would factorise once more
         fine = coarse
     own_nodes, own_triangles = _corners(fine.mesh)
