@@ -63,6 +63,7 @@ class Controls:
         self._window = window
         self._session = window.session
         self._dragged: tuple[np.ndarray, np.ndarray] | None = None
+        self._turning = False
         plotter = window.plotter
         self.interactor = plotter.iren.interactor
         self._style = vtk.vtkInteractorStyleTrackballCamera()
@@ -100,6 +101,7 @@ class Controls:
         self._window.pointer.pressing = on
 
     def _turn(self, on: bool) -> None:
+        self._turning = on
         self._style.FindPokedRenderer(*self.interactor.GetEventPosition())
         (self._style.StartRotate if on else self._style.EndRotate)()
 
@@ -107,7 +109,7 @@ class Controls:
         x, y = self.interactor.GetEventPosition()
         if self._dragged is not None:
             self._drag(x, y)
-        else:
+        elif not self._turning:
             self.point(x, y)
         self._style.OnMouseMove()
 
@@ -115,7 +117,8 @@ class Controls:
         """The mouse is over pixel (x, y), counted from the lower left."""
         renderer = self._under(x, y)
         if renderer is not None:
-            self._window.pointer.point_along(unproject(renderer, x, y, 0.0), unproject(renderer, x, y, 1.0))
+            eye = np.array(renderer.GetActiveCamera().GetPosition())
+            self._window.pointer.point_along(eye, unproject(renderer, x, y, 1.0))
 
     def _under(self, x: int, y: int) -> vtk.vtkRenderer | None:
         pictures = self._window.picture_renderers

@@ -2,7 +2,8 @@
 
 The tip hovers over the place that the mouse points at, a little off the surface; while the button is held it
 goes in along the inward normal, and out again when it is let go. Over the support it comes down onto the
-support, and beside the object it slides along the foot, so that the base can be traced.
+support, and beside the object it slides along the foot, so that the base can be traced. To a place far from
+the last one it travels in free air, over the object where that stands in the way.
 """
 
 from __future__ import annotations
@@ -20,8 +21,11 @@ PRESS_SPEED_M_PER_S = 0.02
 RELEASE_SPEED_M_PER_S = 0.06
 BEAR_DOWN_M = 0.0003
 LEAN_M = 0.0003
+CLEAR_M = 0.001
 LEAST_PRESS_M, MOST_PRESS_M = 0.0005, 0.010
 MOST_SPEED_M_PER_S = 0.4
+LEAP_M, ARRIVED_M = 0.02, 0.002
+"""Farther than a leap from where it should be, the tip travels until it has arrived."""
 
 
 @dataclass(frozen=True)
@@ -61,6 +65,8 @@ class Pointer:
         middle = self._points.mean(axis=0)
         self._tip = middle + (top - (middle - self._support_point) @ self._up) * self._up
         self._depth = -HOVER_M
+        self._safe = top  # height over the support at which nothing is in the way
+        self._travelling = False
 
     @property
     def tip_m(self) -> np.ndarray:
@@ -83,6 +89,12 @@ class Pointer:
         target = self.target
         if target is None:
             return self._tip
+        reach = MOST_SPEED_M_PER_S * duration_s
+        away = float(np.linalg.norm(self._centre(target, self._depth) - self._tip))
+        self._travelling = away > (ARRIVED_M if self._travelling else LEAP_M)
+        if self._travelling:
+            self._depth = -HOVER_M
+            return self._go(self._way(self._centre(target, -HOVER_M)), reach)
         deepest = BEAR_DOWN_M if target.on_support else self.press_depth_m
         goal = deepest if self.pressing else -HOVER_M
         speed = PRESS_SPEED_M_PER_S if goal > self._depth else RELEASE_SPEED_M_PER_S
@@ -92,18 +104,42 @@ class Pointer:
         step = speed * duration_s
         self._depth += float(np.clip(goal - self._depth, -step, step))
         self._depth = min(self._depth, deepest)
-        centre = target.point + (self.radius - self._depth) * target.normal
-        if target.on_support:
-            centre = self._beside_the_object(centre)
-        move = centre - self._tip
-        reach = MOST_SPEED_M_PER_S * duration_s
+        return self._go(self._centre(target, self._depth), reach)
+
+    def _centre(self, target: Target, depth_m: float) -> np.ndarray:
+        centre = target.point + (self.radius - depth_m) * target.normal
+        if not target.on_support:
+            return centre
+        return self._beside(centre, self.radius + (CLEAR_M if depth_m < 0 else -LEAN_M))
+
+    def _go(self, to: np.ndarray, reach_m: float) -> np.ndarray:
+        move = to - self._tip
         distance = float(np.linalg.norm(move))
-        self._tip = self._tip + move * min(1.0, reach / max(distance, 1e-12))
+        self._tip = self._tip + move * min(1.0, reach_m / max(distance, 1e-12))
         return self._tip
 
-    def _beside_the_object(self, centre: np.ndarray) -> np.ndarray:
-        """Moved along the support until the tip leans on the foot and no further."""
-        gap_wanted = self.radius - LEAN_M
+    def _way(self, goal: np.ndarray) -> np.ndarray:
+        """The goal where the way there is free; else up, then across, until it is."""
+        if self._free(goal):
+            return goal
+        missing = self._safe - float((self._tip - self._support_point) @ self._up)
+        if missing > ARRIVED_M:
+            return self._tip + missing * self._up
+        return goal + (self._safe - float((goal - self._support_point) @ self._up)) * self._up
+
+    def _free(self, goal: np.ndarray) -> bool:
+        """Whether the tip meets nothing on the straight way, but where that begins and ends."""
+        length = float(np.linalg.norm(goal - self._tip))
+        steps = np.arange(1.5 * self.radius, length - 1.5 * self.radius, 0.5 * self.radius)
+        for step in steps:
+            centre = self._tip + step / length * (goal - self._tip)
+            closest, inside = self._closest(centre)
+            if inside or np.linalg.norm(centre - closest) < self.radius:
+                return False
+        return True
+
+    def _beside(self, centre: np.ndarray, gap_wanted: float) -> np.ndarray:
+        """Moved along the support until the tip's centre is this far from the foot."""
         for _ in range(8):
             closest, inside = self._closest(centre)
             away = centre - closest

@@ -87,3 +87,21 @@ def test_a_ray_into_the_sky_changes_nothing(pointer: Pointer) -> None:
     kept = pointer.target
     assert pointer.point_along(np.array([0, 0, 0.3]), np.array([0, 0, 0.9])) is None
     assert pointer.target is kept
+
+
+def test_travels_around_the_object_and_not_through_it(pointer: Pointer) -> None:
+    """From the foot on one side to the foot on the other, the button held or not."""
+    for pressing in (False, True):
+        pointer.pressing = False
+        down_at(pointer, -0.07, 0.005)
+        settle(pointer)
+        pointer.pressing = pressing
+        down_at(pointer, 0.07, 0.0)
+        for _ in range(240):
+            x, y, z = pointer.place(FRAME_S)
+            outside = np.maximum(np.abs([x, y]) - 0.04, 0.0)
+            assert np.hypot(np.linalg.norm(outside), max(z - 0.04, 0.0)) >= R - LEAN_M - 1e-6, (
+                "through the object"
+            )
+            assert z >= R - BEAR_DOWN_M - 1e-9, "through the support"
+        assert pointer.tip_m[0] == pytest.approx(0.07, abs=1e-6)
