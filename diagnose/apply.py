@@ -8,6 +8,7 @@ import dataclasses
 import numpy as np
 
 from diagnose.effects.inclusion import inside
+from diagnose.freeair import matrices
 from diagnose.library import effect
 from diagnose.result import Diagnosis
 from mechanics.model import Model
@@ -93,6 +94,10 @@ def corrected(recording: Recording, diagnosis: Diagnosis) -> Recording:
             force -= t[:, None] * np.array(keys["rate_n_per_s"])
         elif name == "tool_gravity_inertia":
             force += keys["mass_kg"] * _smooth_acceleration(recording)
+            if "weight_n" in keys and recording.quaternion is not None:
+                turned = matrices(recording.quaternion)
+                weight = np.array(keys["weight_n"])
+                force -= weight - turned @ (turned[0].T @ weight)
         elif name == "force_gain":
             force = force @ np.linalg.inv(np.array(keys["matrix"])).T
         elif name == "time_delay":

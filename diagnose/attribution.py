@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.effects.base import Effect
-from diagnose.judging import Candidate, Score, Search
+from diagnose.judging import Candidate, Score, Search, sideways_off
 from diagnose.solved_again import solve_inclusion
 from mechanics.progress import Progress, silent
 
@@ -72,6 +72,10 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
+        slip = scores.get("friction_slip")
+        if slip is not None and slip not in passing and sideways_off(search.forward, current):
+            if slip.gain > search.options.plain_gain and slip.share > search.options.further_share:
+                passing.append(slip)
         if not passing:
             pair = None if step + 2 > search.options.most else _paired(search, library, current)
             if pair is None:

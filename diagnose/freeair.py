@@ -35,6 +35,19 @@ class FreeAir:
     rate_se_n_per_s: float
     mass_kg: float
     mass_se_kg: float
+    turning: Turning | None = None
+
+
+@dataclass(frozen=True)
+class Turning:
+    """A force that turns with the tool, as a tared tool's weight does: R(t) tool_n in the device frame.
+
+    tool_n: (3,) N, tool frame; se_n: standard error of a component. first: (3, 3) R at the recording's start.
+    """
+
+    tool_n: np.ndarray
+    se_n: float
+    first: np.ndarray
 
 
 def free_air_of(recording: Recording, model: Model, noise_n: float) -> FreeAir | None:
@@ -55,10 +68,16 @@ def free_air_of(recording: Recording, model: Model, noise_n: float) -> FreeAir |
         return None
     times, means = np.array(times), np.array(means)
     clock = times - times.mean()
+    turning, carried = None, np.zeros_like(force)
+    turned = _orientations(recording, times, size)
+    if turned is not None:
+        turning = _turning(recording, turned, clock, means)
+        carried = np.einsum("nij,j->ni", matrices(recording.quaternion), turning.tool_n)
+        means = means - np.einsum("bij,j->bi", turned, turning.tool_n)
     rate_fit = clock @ means / (clock @ clock)
     left = means - means.mean(axis=0) - np.outer(clock, rate_fit)
     noise = max(float(np.sqrt((left**2).sum() / (3 * (len(times) - 2)))), noise_n / np.sqrt(size))
-    mass, mass_se = _mass(recording, free, noise_n)
+    mass, mass_se = _mass(recording, force - carried, free, noise_n)
     return FreeAir(
         t=times,
         force=means,
@@ -70,11 +89,46 @@ def free_air_of(recording: Recording, model: Model, noise_n: float) -> FreeAir |
         rate_se_n_per_s=noise / np.sqrt(clock @ clock),
         mass_kg=mass,
         mass_se_kg=mass_se,
+        turning=turning,
     )
 
 
+LEAST_TURN = 0.02
+"""Standard deviation of the rotation's entries from which a force that turns with the tool can be told."""
+
+
+def matrices(quaternion: np.ndarray) -> np.ndarray:
+    """(n, 3, 3) rotations, tool to device, of unit quaternions (n, 4) scalar first."""
+    from scipy.spatial.transform import Rotation
+
+    return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
+
+
+def _orientations(recording: Recording, times: np.ndarray, size: int) -> np.ndarray | None:
+    """(b, 3, 3) tool to device at block centres; None without orientations or where they hardly change."""
+    if recording.quaternion is None:
+        return None
+    at = np.clip(np.searchsorted(recording.t, times), 0, len(recording.t) - 1)
+    turned = matrices(recording.quaternion[at])
+    return turned if turned.std(axis=0).max() > LEAST_TURN else None
+
+
+def _turning(recording: Recording, turned: np.ndarray, clock: np.ndarray, means: np.ndarray) -> Turning:
+    """Least squares of block means on a constant, a drift, and a vector that turns with the tool."""
+    b = len(clock)
+    eye = np.eye(3)
+    columns = np.concatenate([np.tile(eye, (b, 1, 1)), clock[:, None, None] * eye, turned], axis=2).reshape(
+        3 * b, 9
+    )
+    solution, *_ = np.linalg.lstsq(columns, means.reshape(-1), rcond=None)
+    left = means.reshape(-1) - columns @ solution
+    covariance = np.linalg.pinv(columns.T @ columns)
+    spread = np.sqrt(left @ left / max(3 * b - 9, 1) * np.diag(covariance)[6:].max())
+    return Turning(solution[6:], float(spread), matrices(recording.quaternion[:1])[0])
+
+
 def _mass(
-    recording: Recording, free: np.ndarray, noise_n: float, width_s: float = 0.05
+    recording: Recording, read: np.ndarray, free: np.ndarray, noise_n: float, width_s: float = 0.05
 ) -> tuple[float, float]:
     """Mass whose inertia the free-air force shows, kg, and its standard error: force = -m a over 50 ms
     fits."""
@@ -90,7 +144,7 @@ def _mass(
         return 0.0, float("inf")
     windows = inner[:, None] + np.arange(-half, half + 1)
     acceleration = np.einsum("wkc,k->wc", recording.position[windows], second)
-    force = recording.force_on_tool[windows].mean(axis=1)
+    force = read[windows].mean(axis=1)
     acceleration = acceleration - acceleration.mean(axis=0)
     force = force - force.mean(axis=0)
     power = (acceleration**2).sum()

@@ -209,3 +209,21 @@ class Search:
         if score.gain > o.plain_gain and score.share > o.plain_share and score.z > 2.0:
             return True
         return score.gain > o.spatial_gain if score.name in SPATIAL else score.gain > o.gain and score.z > o.z
+
+
+SIDEWAYS_SHARE = 0.3
+"""Sideways misfit, of the predicted sideways force, from which sticking is in doubt (13 % where it holds)."""
+
+
+def sideways_off(forward: Forward, candidate: Candidate) -> float:
+    """Share by which a fit misses the sideways force where that is large and felt; else 0.
+
+    The nuisances trust the stick to a quarter only, press by press, so a fit may let that force go wrong.
+    """
+    t = forward.touches
+    residual = candidate.residual[t.counted, 1:]
+    predicted = t.f[t.counted, 1:] - residual
+    missed, force = (float(np.sqrt((x**2).sum(axis=1).mean())) for x in (residual, predicted))
+    if missed < np.sqrt(2) * t.raw_noise_n or missed < SIDEWAYS_SHARE * force:
+        return 0.0
+    return missed / force

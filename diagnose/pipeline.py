@@ -15,7 +15,7 @@ from diagnose.forward import Forward, build_forward
 from diagnose.freeair import FreeAir, free_air_of
 from diagnose.gaps import closed_share, gap
 from diagnose.inclusions import inclusion_starts
-from diagnose.judging import AttributionOptions, Candidate, Score, Search
+from diagnose.judging import AttributionOptions, Candidate, Score, Search, sideways_off
 from diagnose.library import NAMES, effect
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry
@@ -39,7 +39,7 @@ FAST_LEAVES_OUT = (
 )
 
 
-FINITE_STRAIN_LEAST = 0.85
+FINITE_STRAIN_LEAST = 0.7
 """Finite strain is named where it must be larger than this share of the noise ..."""
 FINITE_STRAIN_GAIN = 20.0
 """... and the neo-Hookean law fits better than the linear one by this log likelihood."""
@@ -139,7 +139,14 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     candidates = list(found.rivals)
     chi = found.final.chi
     slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
-    remainder = chi > slack * search.options.unknown_chi
+    misfit = chi > slack * search.options.unknown_chi
+    remainder = misfit
+    slipping = sideways_off(forward, found.final)
+    if slipping and "friction_slip" not in names:
+        # sticking is only trusted to a quarter, press by press, so a fit may let the sideways force go wrong
+        candidates = ["friction_slip", *candidates]
+        remainder = True
+        reasons.append(f"the sideways force is off by {slipping:.0%} of itself: the tip may slip")
     if with_fs:
         sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
         beyond = FINITE_STRAIN_BEYOND_SCALE * deep_size
@@ -178,7 +185,7 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     touch = _next(search, found, candidates)
     if not names and not remainder:
         reasons.append("what is left is no larger than noise, first touch and shape can explain")
-    if remainder:
+    if misfit:
         reasons.append(
             f"the best answer still misses by {np.sqrt(chi):.1f} times the noise: something else is there"
         )

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.forward import STANDARD_GRAVITY, Forward
-from diagnose.freeair import FreeAir
+from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
 from diagnose.result import EffectEntry
 
@@ -73,8 +73,26 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
             middle = free.t.mean()
             level = level - middle * free.rate_n_per_s
             level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
+    turning = free.turning
+    turns = turning is not None and np.linalg.norm(turning.tool_n) > max(
+        Z * turning.se_n, LEAST_MASS_KG * STANDARD_GRAVITY
+    )
+    if turns and "tool_gravity_inertia" not in excluded and "quaternion" in t.extra:
+        # a tare took the weight off as it lay in the tool at first; it stays where the tool turns
+        mass = float(np.linalg.norm(turning.tool_n)) / STANDARD_GRAVITY
+        weight = -turning.first @ turning.tool_n
+        turned = np.einsum("nij,j->ni", matrices(t.extra["quaternion"]), turning.tool_n)
+        parts["tool_gravity_inertia"] = weight + turned - mass * forward.acceleration
+        parameters["tool_gravity_inertia"] = {
+            "mass_kg": mass,
+            "tared": True,
+            "weight_n": weight.tolist(),
+        }
+        level = level - weight
+        level_se = float(np.hypot(level_se, turning.se_n))
+        reasons.append(f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared")
     heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
-    if heavy and "tool_gravity_inertia" not in excluded:
+    if heavy and not turns and "tool_gravity_inertia" not in excluded:
         weight = (
             -forward.model.support_normal / np.linalg.norm(forward.model.support_normal) * STANDARD_GRAVITY
         )

@@ -1,0 +1,43 @@
+"""What free air tells: a bias, and a tared tool's weight that shows where the tool turns."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from diagnose.apply import corrected
+from diagnose.freeair import free_air_of
+from diagnose.pipeline import DiagnoseOptions, diagnose
+
+
+@pytest.fixture(scope="module")
+def heavy(bench):  # type: ignore[no-untyped-def]
+    """(recording, model) whose 60 g tool turns by some 20 degrees and was tared as it began."""
+    recording, model = bench.record()
+    t = recording.t
+    turn = Rotation.from_euler("xy", np.column_stack([0.35 * np.sin(t / 3), 0.3 * np.sin(t / 5)]))
+    weight = np.array([0.0, 0.0, -0.06 * 9.80665])
+    force = recording.force_on_tool + weight - turn.apply(turn[0].inv().apply(weight)) + [0.0, 0.04, 0.0]
+    quaternion = turn.as_quat(scalar_first=True)
+    return dataclasses.replace(recording, quaternion=quaternion, force_on_tool=force), model
+
+
+def test_a_weight_that_turns_is_told_from_a_bias(heavy):
+    free = free_air_of(*heavy, 0.004)
+    assert np.linalg.norm(free.turning.tool_n) == pytest.approx(0.588, rel=0.05)
+    np.testing.assert_allclose(free.turning.first @ free.turning.tool_n, [0, 0, 0.588], atol=0.03)
+
+
+def test_it_is_named_and_taken_off(heavy):
+    recording, model = heavy
+    result = diagnose(recording, model, DiagnoseOptions(fast=True, bootstrap=100))
+    assert set(result.effects) == {"tool_gravity_inertia", "force_bias"}
+    keys = {e.name: e.parameters for e in result.entries}
+    assert keys["tool_gravity_inertia"]["mass_kg"] == pytest.approx(0.06, rel=0.05)
+    np.testing.assert_allclose(keys["force_bias"]["bias_n"], [0, 0.04, 0], atol=0.005)
+    clean = corrected(recording, result)
+    free = free_air_of(clean, model, 0.004)
+    assert np.abs(free.bias_n).max() < 0.01 and np.linalg.norm(free.turning.tool_n) < 0.03
