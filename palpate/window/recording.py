@@ -62,7 +62,7 @@ class SessionRecording:
         base, phase = self._model.path, None
         if self._tracing.done:
             start, end = (self._seconds(tick) for tick in (self._tracing.first, self._tracing.last))
-            base, phase = None, (max(0.0, start - MARGIN_S), end + MARGIN_S)
+            base, phase = None, (round(max(0.0, start - MARGIN_S), 3), round(end + MARGIN_S, 3))
         recording = replace(
             recording,
             poisson_ratio=self._model.poisson_ratio,
