@@ -19,7 +19,7 @@ class Crown:
     prism: Prism
     parameters: tuple[Parameter, ...]
     name: str = "crown"
-    complexity: int = 4
+    complexity: int = 5  # outline, slope, three bends
     faceted: bool = True
 
     @classmethod

@@ -220,3 +220,16 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
     found, _ = fit(sloped, seen)
     slopes = [p.value for p in found.parameters if p.label.startswith("slope")]
     assert np.hypot(*slopes) < 0.25
+
+
+def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_walls():
+    from reconstruct.shapes.prism import Prism
+    from reconstruct.surface import direction_score, try_shapes
+
+    truth = phantom_truth("bowl")
+    evidence, _ = touch(truth, 0)
+    tried = {e.name: e for e in try_shapes(evidence)}
+    dish = max((e for n, e in tried.items() if n.startswith("dish")), key=direction_score)
+    cylinder = tried["cylinder"]
+    assert isinstance(cylinder.shape, Prism)
+    assert direction_score(dish) > direction_score(cylinder) + 2
