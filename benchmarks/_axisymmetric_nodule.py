@@ -18,7 +18,7 @@ def _elasticity(u, v, w):  # type: ignore[no-untyped-def]
     r = w.x[0]
     nu = w.poisson_ratio
     lam, mu = w.modulus * nu / ((1 + nu) * (1 - 2 * nu)), w.modulus / (2 * (1 + nu))
-    hoop_u, hoop_v = u.value[0] / r, v.value[0] / r
+    hoop_u, hoop_v = u[0] / r, v[0] / r
     spread_u = u.grad[0, 0] + u.grad[1, 1] + hoop_u
     spread_v = v.grad[0, 0] + v.grad[1, 1] + hoop_v
     shear = (u.grad[0, 1] + u.grad[1, 0]) * (v.grad[0, 1] + v.grad[1, 0])
