@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.effects.base import Effect
-from diagnose.judging import Candidate, Score, Search, sideways_off
+from diagnose.judging import SPATIAL, Candidate, Score, Search, sideways_off
 from diagnose.solved_again import solve_inclusion
 from mechanics.progress import Progress, silent
 
@@ -72,10 +72,9 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
-        slip = scores.get("friction_slip")
-        if slip is not None and slip not in passing and sideways_off(search.forward, current):
-            if slip.gain > search.options.plain_gain and slip.share > search.options.further_share:
-                passing.append(slip)
+        off = sideways_off(search.forward, current)
+        if off:
+            passing = _not_blind_to_slip(search, passing, scores.get("friction_slip"), off)
         if not passing:
             pair = None if step + 2 > search.options.most else _paired(search, library, current)
             if pair is None:
@@ -122,6 +121,18 @@ def _paired(search: Search, library: Sequence[Effect], current: Candidate) -> Ca
     return min(found, key=lambda c: c.found.loss, default=None)
 
 
+def _not_blind_to_slip(search: Search, passing: list[Score], slip: Score | None, off: float) -> list[Score]:
+    """What may be named while the sideways force is off by a share: slip where it helps; of effects that
+    differ from place to place only those that mend it, or a sliding tip is taken for a soft place."""
+    kept = [
+        s for s in passing if s.name not in SPATIAL or sideways_off(search.forward, s.candidate) < 0.7 * off
+    ]
+    if slip is not None and slip not in kept:
+        if slip.gain > search.options.plain_gain and slip.share > search.options.further_share:
+            kept.append(slip)
+    return kept
+
+
 def _solved_again(search: Search, current: Candidate) -> Candidate:
     """The set with its lump solved anew; as it was where that fits worse."""
     first = current
@@ -164,6 +175,8 @@ def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tupl
         if len(chosen) < 2:
             break
         without = search.judge([e for e in current.found.effects if e.name != name])
+        if name == "friction_slip" and sideways_off(search.forward, without):
+            continue
         score = search.score(name, current, without)
         if score.gain < search.options.strong_gain * current.chi and not search.passes(score, first=False):
             chosen.remove(name)

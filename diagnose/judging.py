@@ -29,6 +29,9 @@ SPATIAL = (
 )
 """Effects that differ from site to site rather than within a press."""
 
+STEADY_Z = 2.0
+"""A further effect that differs from place to place gains by this many standard errors across sites."""
+
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
 
@@ -202,6 +205,10 @@ class Search:
             return False
         if score.name == "inclusion":
             return score.gain > o.spatial_gain and score.share > -0.3 and score.toward > o.toward
+        if not first and score.name in SPATIAL and score.z < STEADY_Z:
+            # one place that a law misses by far must not name a second effect; a lump lives in few places
+            if score.name != "inclusion" or score.candidate.chi > 1.5:
+                return False
         if first and score.gain > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
             return True
         if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
