@@ -10,6 +10,8 @@ import argparse
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from mechanics.errors import ModelError
 from mechanics.model import read_model, write_model
 from mechanics.recording import read_recording
@@ -96,6 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _words(result: Reconstruction) -> list[str]:
     model, exploration, surface = result.model, result.exploration, result.surface
+    quality = result.meshing.report
     low, high = model.young_modulus_ci95_pa
     not_used = [*exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
     lines = [
@@ -117,9 +120,18 @@ def _words(result: Reconstruction) -> list[str]:
     lines += [
         f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
         f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
-        f"l = {model.mesh_size_m * 1e3:g} mm",
+        f"l = {model.mesh_size_m * 1e3:g} mm; radius-edge ratio {_spread(quality.radius_edge_ratio)}, "
+        f"distance to the surface {_spread(1e3 * quality.surface_distance_m)} mm (50, 95, 100 %)",
     ]
     return lines
+
+
+def _percentiles(values: np.ndarray) -> dict[str, float]:
+    return {name: float(np.percentile(values, at)) for name, at in (("p50", 50), ("p95", 95), ("max", 100))}
+
+
+def _spread(values: np.ndarray) -> str:
+    return " / ".join(f"{v:.2f}" for v in _percentiles(values).values())
 
 
 def _figures(result: Reconstruction) -> dict[str, Any]:
@@ -138,6 +150,11 @@ def _figures(result: Reconstruction) -> dict[str, Any]:
             "method": result.surface.method,
             "reason": result.surface.reason,
             "volume_m3": result.surface.volume_m3,
+        },
+        "mesh": {
+            "radius_edge_ratio": _percentiles(result.meshing.report.radius_edge_ratio),
+            "surface_distance_m": _percentiles(result.meshing.report.surface_distance_m),
+            "volume_m3": result.meshing.report.volume_m3,
         },
         "press_modulus_pa": result.press_modulus_pa,
         "seconds": result.seconds,
