@@ -123,9 +123,7 @@ def cases(size: str, phantoms: list[str] | None, seed: int) -> list[dict[str, An
                     }
                 )
                 number += 1
-    # solving presses is what costs: the quick size touches fewer places
-    protocol = "sparse" if size == "quick" else "ordinary"
-    return [{**case, "protocol": protocol} for case in found]
+    return found
 
 
 def key_of(case: dict[str, Any]) -> str:
@@ -179,7 +177,7 @@ def judge(case: dict[str, Any], work: Path, fast: bool) -> dict[str, Any]:
     if not stem.exists():
         rng = np.random.default_rng(case["seed"])
         modulus = float(rng.uniform(15e3, 40e3))
-        options = SimulateOptions(young_modulus_pa=modulus, frame=True, protocol=case["protocol"])
+        options = SimulateOptions(young_modulus_pa=modulus, frame=True)
         made = simulate(phantom(case["phantom"]), case["effects"], options, seed=case["seed"], sizes=True)
         write_sealed(stem, made.recording, made.truth, work / "truth" / f"{key_of(case)}.json")
     try:

@@ -23,7 +23,9 @@ from mechanics.recording import Recording
 SUMMARY = "diagnosis of measured meat indentations (ramp and hold)"
 RADIUS_M = 0.005
 SPACING_M = 0.05
-FREE_S = 1.0
+FREE_S = 1.5
+RATE_HZ = 200.0
+NOISE_N = 0.005
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -53,32 +55,37 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def slab(pieces: list[Path]) -> tuple[Recording, Model]:
     """(recording, model): the pieces side by side on a slab as thick as they are in the median."""
-    tables = [np.loadtxt(p, delimiter=",", skiprows=1) for p in pieces]
+    tables = [_finer(np.loadtxt(p, delimiter=",", skiprows=1)) for p in pieces]
+    rng = np.random.default_rng(0)
     height = float(np.median([t[0, 3] for t in tables])) * 1e-3
     times, centres, forces, palpations = [], [], [], []
     clock = 0.0
     for k, table in enumerate(tables):
-        t, force, depth = table[:, 0], table[:, 1] - np.median(table[:4, 1]), table[:, 2] * 1e-3
+        early = round(0.3 * RATE_HZ)
+        t, force, depth = table[:, 0], table[:, 1] - np.median(table[:early, 1]), table[:, 2] * 1e-3
         force = force / np.interp(3e-3, depth[: depth.argmax()], force[: depth.argmax()])
         x = (k - (len(tables) - 1) / 2) * SPACING_M
         touched = np.flatnonzero(force > 0.02)[0]
+        # interpolated readings have lost their noise, and there is none in the air after a piece
+        force = force + rng.normal(0, NOISE_N, len(force))
         surface = depth[touched]
         peak = int(force.argmax())
-        lift = np.arange(0.1, FREE_S, 0.1)
+        lift = np.arange(1 / RATE_HZ, FREE_S, 1 / RATE_HZ)
+        t = t - t[0]
         times.append(clock + np.concatenate([t, t[-1] + lift]))
         z = height + RADIUS_M - np.concatenate([depth - surface, np.full(len(lift), -5e-3)])
         centres.append(np.column_stack([np.full_like(z, x), np.zeros_like(z), z]))
-        pressed = np.concatenate([force, np.zeros(len(lift))])
+        pressed = np.concatenate([force, rng.normal(0, NOISE_N, len(lift))])
         forces.append(np.column_stack([np.zeros_like(z), np.zeros_like(z), pressed]))
         palpations.append(
             Palpation(
                 clock + t[touched], clock + t[peak], x, 0.0, height, 0.0, 0.0, 1.0, depth[peak] - surface
             )
         )
-        clock += t[-1] + FREE_S
+        clock += t[-1] - t[0] + FREE_S
     recording = Recording(
         t=np.concatenate(times), position=np.concatenate(centres), force_on_tool=np.concatenate(forces),
-        sample_rate_hz=10.0, tip_radius_m=RADIUS_M, poisson_ratio=0.49, force_noise_std_n=0.005,
+        sample_rate_hz=RATE_HZ, tip_radius_m=RADIUS_M, poisson_ratio=0.49, force_noise_std_n=NOISE_N,
         object_name="meat",
     )  # fmt: skip
     length = SPACING_M * (len(tables) + 1)
@@ -88,3 +95,9 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
         support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), palpations=tuple(palpations),
     )  # fmt: skip
     return recording, model
+
+
+def _finer(table: np.ndarray) -> np.ndarray:
+    """The columns at RATE_HZ, straight between the machine's readings."""
+    t = np.arange(table[0, 0], table[-1, 0], 1 / RATE_HZ)
+    return np.column_stack([t, *(np.interp(t, table[:, 0], column) for column in table[:, 1:].T)])

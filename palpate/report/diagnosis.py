@@ -178,7 +178,9 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
     upper.errorbar(v, mean * 1e3, error * 1e3, marker="s", color="#e76f51", label="along speed (upper axis)")
     upper.set_xlabel("speed of pressing (mm/s)", color="#e76f51")
     handles = [ax.get_legend_handles_labels() for ax in (middle, upper)]
-    middle.legend(*(a + b for a, b in zip(*handles, strict=True)), fontsize=8, frameon=False)
+    middle.legend(
+        *(a + b for a, b in zip(*handles, strict=True)), fontsize=8, frameon=False, loc="lower right"
+    )
     entries = [e for e in result.entries if e.gap_closed is not None][:7]
     colours = ["#2a9d8f" if e.name in result.effects else "#c9c9c9" for e in entries]
     values = [float(np.clip(e.gap_closed or 0.0, -0.5, 1.0)) for e in entries]
