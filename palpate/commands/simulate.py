@@ -10,7 +10,6 @@ costs seconds, and an interrupted run goes on where it stopped.
 from __future__ import annotations
 
 import argparse
-from dataclasses import replace
 from pathlib import Path
 
 from mechanics.errors import OptionError
@@ -20,8 +19,8 @@ from palpate.arguments import add_json, add_options, add_seed, emit_json, option
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.hand import HandOptions, cohort_hand
 from scenes.laboratory.sealing import write_sealed
-from scenes.laboratory.simulate import SimulateOptions, Simulation, simulate
-from scenes.phantoms import PHANTOMS, Phantom, phantom
+from scenes.laboratory.simulate import SimulateOptions, simulate
+from scenes.phantoms import PHANTOMS, phantom
 
 SUMMARY = "the virtual laboratory: a person's exploration of a phantom"
 
@@ -99,6 +98,7 @@ def run(arguments: argparse.Namespace) -> int:
             hand=hand,
             seed=arguments.seed,
             sizes=arguments.sizes,
+            ideal=arguments.pictures is not None,
             workers=arguments.workers,
             progress=progress,
         )
@@ -109,7 +109,11 @@ def run(arguments: argparse.Namespace) -> int:
         if arguments.truth:
             emit_json({"truth": result.truth}, arguments.truth)
     if arguments.pictures:
-        _draw(arguments, thing, options, hand, result)
+        from palpate.report.laboratory import simulation_figure
+
+        with atomic_file(arguments.pictures) as picture:
+            simulation_figure(result).savefig(picture, dpi=110, format="png")
+        say(arguments, f"pictures: {arguments.pictures}")
     duration = float(result.recording.t[-1])
     summary = {
         "recording": str(path),
@@ -130,22 +134,3 @@ def run(arguments: argparse.Namespace) -> int:
             say(arguments, f"  {name}: {size['rms_n']:.4f} N, {refit:.4f} N after a refit of the modulus")
     emit_json(summary, arguments.json)
     return 0
-
-
-def _draw(
-    arguments: argparse.Namespace,
-    thing: Phantom,
-    options: SimulateOptions,
-    hand: HandOptions,
-    result: Simulation,
-) -> None:
-    from palpate.report.laboratory import simulation_figure
-
-    plain = replace(thing, regions=())
-    with progress_bar("the ideal object") as progress:
-        ideal = simulate(
-            plain, {}, options, hand=hand, seed=arguments.seed, workers=arguments.workers, progress=progress
-        )
-    with atomic_file(arguments.pictures) as path:
-        simulation_figure(result, ideal).savefig(path, dpi=110, format="png")
-    say(arguments, f"pictures: {arguments.pictures}")

@@ -11,17 +11,16 @@ from scenes.laboratory.simulate import Simulation
 _COLOURS = ("#c0392b", "#27ae60", "#2c6fbb")
 
 
-def simulation_figure(result: Simulation, ideal: Simulation | None = None) -> Figure:
-    """Four panels: path, force in time, one touch, force against depth; grey is the `ideal` object's answer.
-
-    ideal: the same hand (same seed) without effects.
+def simulation_figure(result: Simulation) -> Figure:
+    """Four panels: path, force in time, one touch, force against depth; grey is the ideal object's answer,
+    where the simulation holds it.
     """
     figure = Figure(figsize=(13, 9), layout="constrained")
     axes = figure.subplots(2, 2)
     _path(axes[0, 0], result)
-    _time(axes[0, 1], result, ideal)
-    _touch(axes[1, 0], result, ideal)
-    _curves(axes[1, 1], result, ideal)
+    _time(axes[0, 1], result)
+    _touch(axes[1, 0], result)
+    _curves(axes[1, 1], result)
     effects = ", ".join(f"{k} {v:g}" for k, v in result.truth["strengths"].items()) or "no effect"
     figure.suptitle(f"{result.recording.object_name}: {effects}")
     return figure
@@ -39,17 +38,17 @@ def _path(ax, result: Simulation) -> None:
     ax.legend(loc="upper right", markerscale=6, fontsize=8)
 
 
-def _time(ax, result: Simulation, ideal: Simulation | None) -> None:
+def _time(ax, result: Simulation) -> None:
     t = result.recording.t
     ax.plot(t, np.linalg.norm(result.recording.force_on_tool, axis=1), color="#2c6fbb", lw=0.5, label="read")
-    if ideal is not None:
-        difference = np.linalg.norm(result.clean_n - ideal.clean_n, axis=1)
+    if result.ideal_n is not None:
+        difference = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
         ax.plot(t, difference, color="#c0392b", lw=0.6, label="effect's share")
     ax.set(xlabel="time [s]", ylabel="|force| [N]", title="force in time")
     ax.legend(fontsize=8)
 
 
-def _touch(ax, result: Simulation, ideal: Simulation | None) -> None:
+def _touch(ax, result: Simulation) -> None:
     """The longest drag, or else the longest touch."""
     motion = result.motion
     length = np.bincount(motion.touch[motion.touch >= 0])
@@ -60,23 +59,23 @@ def _touch(ax, result: Simulation, ideal: Simulation | None) -> None:
     for i, colour in enumerate(_COLOURS):
         ax.plot(t, result.recording.force_on_tool[rows, i], color=colour, lw=0.4, alpha=0.5)
         ax.plot(t, result.clean_n[rows, i], color=colour, lw=1.2, label=f"f{'xyz'[i]}")
-        if ideal is not None:
-            ax.plot(t, ideal.clean_n[rows, i], color="#7f8c8d", lw=1, ls="--")
+        if result.ideal_n is not None:
+            ax.plot(t, result.ideal_n[rows, i], color="#7f8c8d", lw=1, ls="--")
     touch = result.touches[number]
     title = f"touch {number}: {touch.kind}, {touch.depth:g} mm deep"
     ax.set(xlabel="time [s]", ylabel="force on the tool [N]", title=title)
     ax.legend(fontsize=8)
 
 
-def _curves(ax, result: Simulation, ideal: Simulation | None) -> None:
-    pairs = [(result, "#2c6fbb")] if ideal is None else [(ideal, "#95a5a6"), (result, "#2c6fbb")]
-    for source, colour in pairs:
-        motion = source.motion
-        turn = np.array(source.truth["device_from_object_rotation"])
-        force = source.clean_n @ turn
-        for number, touch in enumerate(source.touches):
-            if touch.kind != "press":
-                continue
-            rows = (motion.touch == number) & (motion.s > -1.0)
-            ax.plot(motion.s[rows], force[rows] @ touch.normal, color=colour, lw=0.7)
+def _curves(ax, result: Simulation) -> None:
+    motion = result.motion
+    turn = np.array(result.truth["device_from_object_rotation"])
+    pairs = [(result.ideal_n, "#95a5a6"), (result.clean_n, "#2c6fbb")]
+    for force, colour in pairs:
+        if force is None:
+            continue
+        for number, touch in enumerate(result.touches):
+            if touch.kind == "press":
+                rows = (motion.touch == number) & (motion.s > -1.0)
+                ax.plot(motion.s[rows], force[rows] @ turn @ touch.normal, color=colour, lw=0.7)
     ax.set(xlabel="depth [mm]", ylabel="force along the normal [N]", title="presses, in and out")

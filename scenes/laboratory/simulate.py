@@ -54,7 +54,8 @@ class SimulateOptions:
 @dataclass(frozen=True)
 class Simulation:
     """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device
-    frame; `motion` is the hand's true way, object frame.
+    frame; `motion` is the hand's true way, object frame. `ideal_n` (n, 3): where asked for, what the ideal
+    object would have answered to the same way.
     """
 
     recording: Recording
@@ -62,6 +63,7 @@ class Simulation:
     clean_n: np.ndarray
     touches: tuple[Touch, ...]
     motion: Motion
+    ideal_n: np.ndarray | None = None
 
 
 def simulate(
@@ -72,6 +74,7 @@ def simulate(
     hand: HandOptions | None = None,
     seed: int = 0,
     sizes: bool = True,
+    ideal: bool = False,
     workers: int | None = None,
     cache: Path | None = None,
     progress: Progress = silent,
@@ -103,7 +106,9 @@ def simulate(
     present = tuple(parameters)
     whole, clean = session.run(present)
     truth = truth_of(session, present, clean, whole, sizes, strengths)
-    return Simulation(session.recording(whole, clean, truth), truth, clean, touches, session.way)
+    recording, way = session.recording(whole, clean, truth), session.way
+    plain_n = session.run((), regions=False)[1] if ideal else None
+    return Simulation(recording, truth, clean, touches, way, plain_n)
 
 
 def _parameters(
