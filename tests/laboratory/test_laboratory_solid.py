@@ -161,7 +161,8 @@ def test_relaxing_solid_follows_the_quasilinear_law_while_the_contact_grows_and_
 def test_relaxation_at_finite_strain_is_that_of_the_condensed_object() -> None:
     small = [_held((0.5, 0.3), linear=True)[1], _held((), linear=True)[1]]
     large = [_held((0.5, 0.3), linear=False)[1], _held((), linear=False)[1]]
-    use = slice(8, 50)
+    # just before separation the ratio compares small forces of surfaces that leave at different moments
+    use = slice(8, 46)
     assert large[0][use] / large[1][use] == pytest.approx(small[0][use] / small[1][use], rel=0.04)
 
 
