@@ -24,11 +24,12 @@ def local_stiffness(renderer: Renderer, tip_radius_m: float, depth_m: float = DE
     chosen = np.arange(0, len(points), every)
     values = np.empty(len(chosen))
     depths = np.concatenate([[-0.002], np.linspace(0.0, depth_m, 7)])
-    steps_s = np.full(len(depths), 10.0)
     for i, k in enumerate(chosen):
-        path = points[k] + (tip_radius_m - depths)[:, None] * normals[k]
-        forces = renderer.follow(renderer.start([tip_radius_m]), path[:, None], steps_s)
-        values[i] = max(float(forces[-1, 0] @ normals[k]), 0.0) / depth_m
+        state = renderer.start([tip_radius_m], dt_s=10.0)
+        # by steps, whose kernel the servo has compiled already
+        for tip in points[k] + (tip_radius_m - depths)[:, None] * normals[k]:
+            forces = renderer.step(state, tip[None])[1]
+        values[i] = max(float(forces[0] @ normals[k]), 0.0) / depth_m
     if every == 1:
         return values
     distance, near = cKDTree(points[chosen]).query(points, k=4)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from mechanics.model import Model
 from palpate.window.inclusion import MovingInclusion
@@ -17,10 +18,13 @@ from scenes.phantoms import Region
 def force(renderer: Renderer, x: float, y: float, depth: float = 0.004) -> float:
     """N, of a press onto the block's top."""
     heights = 0.045 + 0.002 - np.linspace(0.0, 0.002 + depth, 13)
-    path = np.column_stack([np.full(13, x), np.full(13, y), heights])
-    return float(renderer.follow(renderer.start(), path[:, None], np.full(13, 0.01))[-1, 0, 2])
+    state = renderer.start(dt_s=0.01)
+    for height in heights:
+        forces = renderer.step(state, np.array([[x, y, height]]))[1]
+    return float(forces[0, 2])
 
 
+@pytest.mark.slow
 def test_a_ball_that_came_by_dragging_is_felt_as_one_from_the_start(block: Model, tmp_path: Path) -> None:
     plain = create("fem", block)
     moving = MovingInclusion(block, plain)
