@@ -8,6 +8,8 @@ import pytest
 from mechanics.linear_range import linear_range
 from mechanics.sites import touch_sites
 from mechanics.solver import Solver
+from render.fem import FemRenderer
+from render.options import RenderOptions
 from render.press import press
 
 from . import shapes
@@ -26,9 +28,6 @@ def test_the_linear_range_scales_with_the_tip_on_a_half_space_and_marks_the_rend
     compliance = shapes.quick_compliance(made)
     force = {}
     for law in ("linear", "neo-hookean"):
-        from render.fem import FemRenderer
-        from render.options import RenderOptions
-
         renderer = FemRenderer(made, RenderOptions(dent_law=law), compliance=compliance)
         curve = press(renderer, at[0], [0, 0, -1], float(found.depth_m[0]), 0.05)
         force[law] = curve.force_at(curve.depth.max())[2]

@@ -1,0 +1,59 @@
+"""`palpate press` and the pytest fixture, as somebody uses them who tests a model of their own."""
+
+from __future__ import annotations
+
+import json
+
+import pytest
+
+from mechanics.model import write_model
+from palpate.cli import main
+from palpate.testing import press_model  # noqa: F401  (pytest finds the fixture by its name)
+from render.press import read_curve
+
+from . import shapes
+
+DOWN = ["--at", "0,0,0.03", "--direction", "0,0,-1", "--depth", "0.003", "--speed", "0.02"]
+
+
+@pytest.fixture(scope="module")
+def model_folder(tmp_path_factory):
+    """A block of 30 kPa, 60 x 60 x 30 mm, as a MODEL folder."""
+    made = shapes.model(shapes.block((0.06, 0.06, 0.03), (4, 4, 2)))
+    return str(write_model(tmp_path_factory.mktemp("models") / "block", made))
+
+
+def test_a_curve_that_was_stored_is_met_again_and_another_law_is_told(model_folder, tmp_path, capsys):
+    stored, result = str(tmp_path / "top.csv"), tmp_path / "result.json"
+    assert main(["press", model_folder, *DOWN, "-o", stored]) == 0
+    assert main(["press", model_folder, *DOWN, "--expect", stored, "--tolerance", "1e-6"]) == 0
+    assert "agrees" in capsys.readouterr().out
+    other = [*DOWN, "--dent-law", "hertz", "--expect", stored, "--tolerance", "0.01", "--json", str(result)]
+    assert main(["press", model_folder, *other]) == 1
+    found = json.loads(result.read_text())
+    assert found["passed"] is False and found["difference_n"] > 0.01
+    assert found["depth_m"] == pytest.approx(0.003, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        ([*DOWN, "--expect", "nowhere.csv"], "nowhere.csv"),
+        (["--at", "0,0,0.03", "--direction", "0,0,-1", "--depth", "-0.003"], "depth is -0.003"),
+        (["--at", "1,0,0.03", "--direction", "0,0,-1", "--depth", "0.003"], "does not meet"),
+    ],
+)
+def test_what_cannot_be_pressed_is_told_in_a_line(model_folder, capsys, arguments, words):
+    assert main(["press", model_folder, *arguments]) == 2
+    line = capsys.readouterr().err.strip()
+    assert words in line and "\n" not in line
+
+
+def test_the_fixture_presses_like_the_command(model_folder, tmp_path, press_model):  # noqa: F811
+    assert main(["press", model_folder, *DOWN, "-o", str(tmp_path / "top.csv")]) == 0
+    curve = press_model(
+        model_folder, at=(0, 0, 0.03), direction=(0, 0, -1), depth_m=0.003, speed_m_per_s=0.02
+    )
+    expected = read_curve(tmp_path / "top.csv")
+    assert curve.force_at(0.003) == pytest.approx(expected.force_at(0.003), abs=1e-8)
+    assert curve.force_at(0.003)[2] > 0.3
