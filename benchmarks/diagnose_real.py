@@ -76,7 +76,8 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
         z = height + RADIUS_M - np.concatenate([depth - surface, np.full(len(lift), -5e-3)])
         centres.append(np.column_stack([np.full_like(z, x), np.zeros_like(z), z]))
         pressed = np.concatenate([force, rng.normal(0, NOISE_N, len(lift))])
-        forces.append(np.column_stack([np.zeros_like(z), np.zeros_like(z), pressed]))
+        sideways = rng.normal(0, NOISE_N, (len(z), 2))
+        forces.append(np.column_stack([sideways, pressed]))
         palpations.append(
             Palpation(
                 clock + t[touched], clock + t[peak], x, 0.0, height, 0.0, 0.0, 1.0, depth[peak] - surface
