@@ -44,10 +44,12 @@ class Curve:
         return float(np.linalg.norm(self.force, axis=1).max())
 
     def force_at(self, depth_m: float) -> np.ndarray:
-        """(3,) N, on the way in, at a depth; raises OptionError beyond the deepest."""
+        """(3,) N, on the way in, at a depth; raises OptionError beyond the deepest by more than a sample."""
         last = int(np.argmax(self.depth)) + 1
-        if not 0 <= depth_m <= self.depth[:last].max():
-            raise OptionError(f"depth {depth_m} m is not on the curve: 0 to {self.depth[:last].max():.6g} m")
+        deepest = self.depth[last - 1]
+        # the turn lies between two samples
+        if not 0 <= depth_m <= deepest + np.abs(np.diff(self.depth)).max(initial=0.0):
+            raise OptionError(f"depth {depth_m} m is not on the curve: 0 to {deepest:.6g} m")
         return np.array([np.interp(depth_m, self.depth[:last], f) for f in self.force[:last].T])
 
 

@@ -6,6 +6,7 @@ import json
 
 import pytest
 
+from mechanics.errors import OptionError
 from mechanics.model import write_model
 from palpate.cli import main
 from palpate.testing import press_model  # noqa: F401  (pytest finds the fixture by its name)
@@ -51,9 +52,12 @@ def test_what_cannot_be_pressed_is_told_in_a_line(model_folder, capsys, argument
 
 def test_the_fixture_presses_like_the_command(model_folder, tmp_path, press_model):  # noqa: F811
     assert main(["press", model_folder, *DOWN, "-o", str(tmp_path / "top.csv")]) == 0
-    curve = press_model(
-        model_folder, at=(0, 0, 0.03), direction=(0, 0, -1), depth_m=0.003, speed_m_per_s=0.02
-    )
+    there = {"at": (0, 0, 0.03), "direction": (0, 0, -1)}
+    curve = press_model(model_folder, **there, depth_m=0.003, speed_m_per_s=0.02)
     expected = read_curve(tmp_path / "top.csv")
+    for depth in (0.001, 0.00137, 0.004):  # the turn need not be a sample, nor rounding kind
+        assert press_model(model_folder, **there, depth_m=depth).force_at(depth)[2] > 0
+    with pytest.raises(OptionError, match="not on the curve"):
+        curve.force_at(0.0031)
     assert curve.force_at(0.003) == pytest.approx(expected.force_at(0.003), abs=1e-8)
     assert curve.force_at(0.003)[2] > 0.3
