@@ -210,7 +210,7 @@ def pictures(summary: dict[str, Any], path: Path | str) -> Path:
         left.text(j, i, f"{counts[i, j]:.0f}", ha="center", va="center", fontsize=8)
     left.set_xticks(range(len(columns)), [c.replace("_", " ") for c in columns], rotation=60, ha="right")
     left.set_yticks(range(len(rows)), [r.replace("_", " ") for r in rows])
-    left.set(xlabel="named first", ylabel="what was sealed (in brackets: not in the library)")
+    left.set(xlabel="named first", ylabel="sealed (in brackets: not in the library)")
     bins = summary["calibration"]["bins"]
     right.plot([0, 1], [0, 1], color="#999999", lw=0.8)
     right.scatter([b["stated"] for b in bins], [b["true"] for b in bins],
