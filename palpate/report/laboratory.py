@@ -78,4 +78,4 @@ def _curves(ax, result: Simulation) -> None:
             if touch.kind == "press":
                 rows = (motion.touch == number) & (motion.s > -1.0)
                 ax.plot(motion.s[rows], force[rows] @ turn @ touch.normal, color=colour, lw=0.7)
-    ax.set(xlabel="depth [mm]", ylabel="force along the normal [N]", title="presses, in and out, at their true depth")
+    ax.set(xlabel="depth [mm]", ylabel="force along the normal [N]", title="presses, at their true depth")
