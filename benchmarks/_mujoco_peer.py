@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._servo_load import TIP_RADIUS_M, block_model
+from benchmarks._servo_load import TIP_RADIUS_M, block_model, renderer_of
 from benchmarks.compliance import block
 from benchmarks.timing import table
 from mechanics.tetmesh import TetMesh
@@ -83,8 +83,6 @@ def flex_forces(touchable: int, timestep_s: float) -> dict[str, Any]:
 
 def ours(touchable: int) -> dict[str, Any]:
     """The same presses through the FEM renderer on the block's quadratic mesh."""
-    from benchmarks.servo import renderer_of
-
     renderer, _ = renderer_of(touchable)
     mesh = block_model(touchable).mesh
     top = mesh.points.max(axis=0)

@@ -12,7 +12,7 @@ from numba import njit
 from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
-from mechanics.model import Model
+from mechanics.model import Model, read_model, write_model
 from palpate.servo.clock import compiled_now_ns, compiled_sleep_until, compiled_thread_cpu_ns
 from palpate.servo.histogram import BINS, Histogram, count
 from palpate.servo.layout import (
@@ -45,6 +45,7 @@ from palpate.servo.tick import (
     tick_arrays,
 )
 from render.passivity import PassivityOptions, passivity_parameters
+from scenes.build import cache_folder
 
 PERIOD_NS = 1_000_000
 LATE_NS = 200_000
@@ -138,6 +139,18 @@ class Measured(NamedTuple):
     missed: int
     cpu_s: float
     wall_s: float
+
+
+def renderer_of(touchable: int) -> tuple[Any, np.ndarray]:
+    """The FEM renderer of a block, its compliance kept in the cache folder; and the tool's path."""
+    import render
+    from render.options import RenderOptions
+
+    folder = cache_folder() / f"servo-benchmark-{touchable}"
+    if not (folder / "model.toml").exists():
+        write_model(folder, block_model(touchable))
+    model = read_model(folder)
+    return render.create("fem", model, options=RenderOptions(friction=FRICTION)), sliding_path(model, 20_000)
 
 
 class Load:

@@ -21,7 +21,7 @@ from mechanics.model import Model, read_model
 from mechanics.recording import Recording, read_recording
 from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.replay import contact_samples, replay_recording, rms_n
@@ -116,15 +116,12 @@ def _dent_forces(
     """Normal force over E, m^2, of a press with this dent law through the linear far field."""
     site = touch_sites(mesh, at[None], normal[None], 0.49)
     path = np.concatenate([[0.0], depths])[:, None] * -site.normals[0]
-    force = touch_forces(
+    force = forces_at(
+        site,
         path,
         np.array([0, len(path)]),
-        site.normals,
-        site.far,
         young_modulus_pa=1.0,
-        poisson_ratio=0.49,
         tip_radius_m=TIP_RADIUS_M,
-        curvature=site.curvature,
         law=law,
     )
     return force[1:] @ site.normals[0]

@@ -14,12 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._servo_load import FRICTION, LATE_NS, Load, Measured, block_model, sliding_path
+from benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
 from benchmarks.timing import table
-from mechanics.model import read_model, write_model
 from palpate.servo.free_air import FreeAir
 from palpate.servo.report import ring_rows, snapshot
-from scenes.build import cache_folder
 
 SUMMARY = "the 1 kHz tick: compute time by contacts and nodes, late ticks against an empty loop"
 AIMS_US = {1: 100.0, 16: 300.0}
@@ -33,18 +31,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--ticks", type=int, default=20_000, help="ticks a compute-time figure")
     parser.add_argument("--seconds", type=float, default=10.0, help="of each real-time loop, in 1 s slices")
     parser.add_argument("--no-peer", action="store_true", help="leave MuJoCo's flex out")
-
-
-def renderer_of(touchable: int) -> tuple[Any, np.ndarray]:
-    """The FEM renderer of a block, its compliance kept in the cache folder; and the tool's path."""
-    import render
-    from render.options import RenderOptions
-
-    folder = cache_folder() / f"servo-benchmark-{touchable}"
-    if not (folder / "model.toml").exists():
-        write_model(folder, block_model(touchable))
-    model = read_model(folder)
-    return render.create("fem", model, options=RenderOptions(friction=FRICTION)), sliding_path(model, 20_000)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:

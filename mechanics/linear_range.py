@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.sites import TouchSites
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 
 DEEPEST_IN_RADII = 2.5
 _STEPS = 250
@@ -50,15 +50,12 @@ def linear_range(sites: TouchSites, tip_radius_m: float, share: float = 0.1) -> 
     starts = np.arange(len(sites) + 1) * len(depths)
     normal = {}
     for law in ("linear", "neo-hookean"):
-        force = touch_forces(
+        force = forces_at(
+            sites,
             path,
             starts,
-            sites.normals,
-            sites.far,
             young_modulus_pa=1.0,
-            poisson_ratio=sites.poisson_ratio,
             tip_radius_m=tip_radius_m,
-            curvature=sites.curvature,
             law=law,
         ).reshape(len(sites), len(depths), 3)
         normal[law] = np.einsum("kni,ki->kn", force, sites.normals)

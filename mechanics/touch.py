@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
-from mechanics.sites import tangents
+from mechanics.sites import TouchSites, tangents
 
 _STIFFEST = 0.8  # of a contact's own give, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
@@ -262,3 +262,26 @@ def touch_forces(
         displacement, starts, frames, fars, table, np.ascontiguousarray(radii), plane_strain, stick, out
     )
     return out
+
+
+def forces_at(
+    sites: TouchSites,
+    displacement: np.ndarray,
+    starts: np.ndarray,
+    *,
+    young_modulus_pa: float,
+    tip_radius_m: float,
+    law: str | DentLaw,
+) -> np.ndarray:
+    """`touch_forces` of one touch at each of the k sites, with their normals, far fields and curvatures."""
+    return touch_forces(
+        displacement,
+        starts,
+        sites.normals,
+        sites.far,
+        young_modulus_pa=young_modulus_pa,
+        poisson_ratio=sites.poisson_ratio,
+        tip_radius_m=tip_radius_m,
+        curvature=sites.curvature,
+        law=law,
+    )

@@ -22,7 +22,7 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 from palpate.regions import Region, regions
 from reconstruct.casting import cast
 from reconstruct.contacts import Exploration, explore
@@ -216,15 +216,12 @@ def gather(exploration: Exploration, model: Model, site_m: float, progress: Prog
     path = np.concatenate(paths)
     press = np.repeat(np.arange(len(normals)), np.diff(starts))
     unit = {
-        law: touch_forces(
+        law: forces_at(
+            solved,
             path,
             np.array(starts),
-            normals,
-            solved.far,
             young_modulus_pa=1.0,
-            poisson_ratio=model.poisson_ratio,
             tip_radius_m=recording.tip_radius_m,
-            curvature=solved.curvature,
             law=law,
         )
         for law in LAWS
@@ -295,15 +292,12 @@ def stiffness_along(
     law = min(LAWS, key=lambda name: _rms(_scaled(presses.unit[name][seen], presses.force[seen])))
     steps = np.linspace(0.0, depth_m, 60)
     path = (-steps[None, :, None] * solved.normals[:, None, :]).reshape(-1, 3)
-    force = touch_forces(
+    force = forces_at(
+        solved,
         path,
         np.arange(len(places) + 1) * len(steps),
-        solved.normals,
-        solved.far,
         young_modulus_pa=modulus,
-        poisson_ratio=model.poisson_ratio,
         tip_radius_m=model.tip_radius_m,
-        curvature=solved.curvature,
         law=law,
     )
     deepest = force.reshape(len(places), len(steps), 3)[:, -1]

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.sites import TouchSites
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 from reconstruct.contacts import Exploration
 
 _BLOCK_S = 0.004
@@ -103,15 +103,12 @@ def fit_law(
     weight = np.where(used, 1.0 / (data.noise_n**2 + law_error**2 * squared_force / 3), 0.0)
 
     def unit(shift: np.ndarray) -> np.ndarray:
-        return touch_forces(
+        return forces_at(
+            sites,
             data.displacement + shift[press, None] * normals,
             data.starts,
-            sites.normals,
-            sites.far,
             young_modulus_pa=1.0,
-            poisson_ratio=sites.poisson_ratio,
             tip_radius_m=tip_radius_m,
-            curvature=sites.curvature,
             law=law,
         )
 

@@ -13,7 +13,7 @@ from mechanics.model import Model
 from mechanics.palpation import Palpation
 from mechanics.progress import Progress, silent
 from mechanics.sites import touch_sites
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 from reconstruct.one_d import Press, fit_robust
 
 SITES = 32
@@ -40,15 +40,12 @@ def palpate_model(
     depth = np.concatenate([ramp, ramp[::-1]])
     speed = np.concatenate([np.full(len(ramp), SPEED_M_PER_S), np.full(len(ramp), -SPEED_M_PER_S)])
     paths = (-depth[None, :, None] * normals[:, None, :]).reshape(-1, 3)
-    forces = touch_forces(
+    forces = forces_at(
+        touched,
         paths,
         np.arange(len(chosen) + 1) * len(depth),
-        touched.normals,
-        touched.far,
         young_modulus_pa=model.young_modulus_pa,
-        poisson_ratio=model.poisson_ratio,
         tip_radius_m=model.tip_radius_m,
-        curvature=touched.curvature,
         law="neo-hookean" if "finite_strain" in model.effects else "linear",
     ).reshape(len(chosen), -1, 3)
     push = np.einsum("ijk,ik->ij", forces, touched.normals)
