@@ -10,10 +10,13 @@ from scenes.laboratory.simulate import Simulation
 
 _COLOURS = ("#c0392b", "#27ae60", "#2c6fbb")
 
+PRESSES_SHOWN = 7
+"""Presses whose curves are drawn: more would hide one another."""
+
 
 def simulation_figure(result: Simulation) -> Figure:
-    """Four panels: path, force in time, one touch, force against depth; grey is the ideal object's answer,
-    where the simulation holds it.
+    """Four panels: path, force in time, one touch, force against depth; grey and dashed is what the ideal
+    object would answer to the same hand, where the simulation holds it.
     """
     figure = Figure(figsize=(13, 9), layout="constrained")
     axes = figure.subplots(2, 2)
@@ -68,14 +71,24 @@ def _touch(ax, result: Simulation) -> None:
 
 
 def _curves(ax, result: Simulation) -> None:
+    """Some presses spread over the depths, each at the depth that the instrument reads."""
     motion = result.motion
     turn = np.array(result.truth["device_from_object_rotation"])
-    pairs = [(result.ideal_n, "#95a5a6"), (result.clean_n, "#2c6fbb")]
-    for force, colour in pairs:
-        if force is None:
-            continue
-        for number, touch in enumerate(result.touches):
-            if touch.kind == "press":
-                rows = (motion.touch == number) & (motion.s > -1.0)
-                ax.plot(motion.s[rows], force[rows] @ turn @ touch.normal, color=colour, lw=0.7)
-    ax.set(xlabel="depth [mm]", ylabel="force along the normal [N]", title="presses, at their true depth")
+    shift = np.array(result.truth["device_from_object_shift_mm"])
+    read = (1e3 * result.recording.position - shift) @ turn
+    presses = [k for k, touch in enumerate(result.touches) if touch.kind == "press"]
+    presses.sort(key=lambda k: result.touches[k].depth)
+    shown = np.unique(np.linspace(0, len(presses) - 1, PRESSES_SHOWN).round().astype(int))
+    for k in shown:
+        normal = result.touches[presses[k]].normal
+        rows = np.flatnonzero((motion.touch == presses[k]) & (motion.s > -1.0))
+        depth = motion.s[rows] + (motion.position[rows] - read[rows]) @ normal
+        ax.plot(depth, result.clean_n[rows] @ turn @ normal, color="#2c6fbb", lw=0.9)
+        if result.ideal_n is not None:
+            ideal = result.ideal_n[rows] @ turn @ normal
+            ax.plot(motion.s[rows], ideal, color="#7f8c8d", lw=1.0, ls="--")
+    ax.set(
+        xlabel="depth as read (ideal: true depth) [mm]",
+        ylabel="force along the normal [N]",
+        title=f"{len(shown)} of {len(presses)} presses",
+    )

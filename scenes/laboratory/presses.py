@@ -19,7 +19,10 @@ from scenes.phantoms import Phantom
 
 @dataclass(frozen=True)
 class Protocol:
-    """How much a person explores: numbers of sites and of further touches, depths in mm."""
+    """How much a person explores: numbers of sites and of further touches, depths in mm.
+
+    thickness: no press is deeper than this share of the object's height.
+    """
 
     sites: int
     repeats: int
@@ -27,6 +30,7 @@ class Protocol:
     drags: int
     least_depth: float
     greatest_depth: float
+    thickness: float = 0.2
 
 
 PROTOCOLS = {
@@ -34,9 +38,9 @@ PROTOCOLS = {
     "sparse": Protocol(14, 4, 2, 1, 3.0, 7.0),
     "ordinary": Protocol(24, 9, 4, 3, 2.5, 8.0),
     "dense": Protocol(46, 18, 8, 6, 1.5, 9.0),
-    "deep": Protocol(16, 8, 3, 2, 4.0, 12.0),
+    "deep": Protocol(14, 4, 2, 1, 10.5, 12.0, 0.25),
 }
-"""Named protocols; `brief` to `dense` differ in the number of touches, `deep` goes to 12 mm."""
+"""Named protocols; `brief` to `dense` differ in the number of touches, `deep` passes 10 mm at every place."""
 
 RIM_MM, FLOOR_MM = 9.0, 13.0
 """Rims are not touched within this distance, and sites lie at least this high above the support."""
@@ -117,7 +121,7 @@ def press_set(phantom: Phantom, protocol: str, number: int) -> list[Touch]:
     rng = np.random.default_rng([number, plan.sites])
     points, normals = sites(phantom, plan.sites, rng)
     points, normals = np.round(points, 3), normals / np.linalg.norm(normals, axis=1)[:, None]
-    thickest = 0.2 * 1e3 * phantom.height_m
+    thickest = plan.thickness * 1e3 * phantom.height_m
     greatest = min(plan.greatest_depth, thickest)
     depths = np.round(rng.uniform(min(plan.least_depth, greatest), greatest, len(points)) * 4) / 4
     touches: list[Touch] = []

@@ -75,6 +75,17 @@ def test_touches_lie_on_the_surface_away_from_rims_and_floor(name: str) -> None:
         assert rim.min() > 0.9 * RIM_MM
 
 
+@pytest.mark.parametrize("name", ["cylinder", "block", "half-sphere"])
+def test_deep_exploration_passes_ten_millimetres_at_every_place(name: str) -> None:
+    touches = press_set(phantom(name), "deep", 0)
+    deepest: dict[int, float] = {}
+    for touch in touches:
+        if touch.kind == "press":
+            deepest[touch.site] = max(deepest.get(touch.site, 0.0), touch.depth)
+    assert len(deepest) >= 10
+    assert min(deepest.values()) > 10.0
+
+
 @pytest.mark.parametrize("name", ["cylinder", "half-sphere", "bean"])
 def test_traced_foot_keeps_the_tip_one_radius_from_the_wall(name: str) -> None:
     thing = phantom(name)

@@ -12,10 +12,8 @@ from mechanics.errors import OptionError, RecordingError
 from mechanics.recording import read_recording
 from palpate.cli import main
 from palpate.commands.simulate import effects_from
-from scenes.laboratory import simulate as module
 from scenes.laboratory.effects import REGISTRY, UNNAMED
 from scenes.laboratory.effects.contact import relaxed
-from scenes.laboratory.paths import Leg, TouchForce
 from scenes.laboratory.sealing import opened
 from scenes.laboratory.simulate import SimulateOptions, simulate
 from scenes.laboratory.truth import size_of
@@ -27,26 +25,6 @@ CONTRACT = set(
     "friction_slip adhesion tool_compliance force_bias force_drift force_gain tool_gravity_inertia "
     "time_delay backlash".split()
 )
-
-
-@pytest.fixture
-def springs(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Touches answered by a half space instead of the solver: what is tested here comes after the solid."""
-
-    def quick(thing, specimen, touches, **_):
-        forces = []
-        for touch in touches:
-            s = np.linspace(0, touch.depth, 12)
-            normal = 16 / 9 * np.sqrt(specimen.tip_radius) * s**1.5
-            stiffness = -2 * np.sqrt(specimen.tip_radius * s)[:, None, None] * np.eye(3)
-            leg = Leg(s, normal[:, None] * touch.normal, stiffness, from_touch=True)
-            side = Leg(
-                np.array([0.0, 9.0]), np.repeat(normal[-1] * touch.normal[None], 2, 0), stiffness[-2:], False
-            )
-            forces.append(TouchForce((leg, side, leg)))
-        return forces
-
-    monkeypatch.setattr(module, "touch_forces", quick)
 
 
 def _run(effects: dict[str, float] | None = None, seed: int = 3, **options):

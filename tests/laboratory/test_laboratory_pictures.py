@@ -1,0 +1,55 @@
+"""Pictures of a simulated recording show what was read beside what the ideal object would answer."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from palpate.cli import main
+from palpate.report.laboratory import PRESSES_SHOWN, simulation_figure
+from scenes.laboratory.simulate import SimulateOptions, simulate
+from scenes.phantoms import phantom
+
+
+def _figure(effects: dict[str, float]):
+    options = SimulateOptions(protocol="sparse", frame=True, position_resolution_m=0.0)
+    result = simulate(phantom("cylinder"), effects, options, seed=3, sizes=False, ideal=True)
+    return result, simulation_figure(result)
+
+
+def _pairs(axes) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(read, ideal) curves (k, 2) of each press drawn."""
+    curves = [np.column_stack(line.get_data()) for line in axes.lines]
+    return list(zip(curves[::2], curves[1::2], strict=True))
+
+
+def test_without_effect_every_press_lies_on_the_ideal_objects(springs) -> None:
+    _, figure = _figure({})
+    pairs = _pairs(figure.axes[3])
+    assert len(pairs) == PRESSES_SHOWN
+    for read, ideal in pairs:
+        assert read == pytest.approx(ideal, abs=1e-5)
+
+
+def test_soft_tool_shows_as_presses_that_read_deeper(springs) -> None:
+    result, figure = _figure({"tool_compliance": 1})
+    for read, ideal in _pairs(figure.axes[3]):
+        deepest = int(ideal[:, 1].argmax())
+        assert read[deepest, 0] - ideal[deepest, 0] == pytest.approx(1e3 * ideal[deepest, 1] / 1200, rel=0.02)
+        assert read[:, 1] == pytest.approx(ideal[:, 1], abs=1e-5)
+
+
+def test_force_in_time_shows_the_effects_share(springs) -> None:
+    result, figure = _figure({"force_bias": 2})
+    share = figure.axes[1].lines[1].get_ydata()
+    assert share == pytest.approx(np.full(len(share), 0.1), rel=1e-3)
+
+
+def test_command_draws_a_picture(springs, tmp_path: Path) -> None:
+    picture = tmp_path / "c.png"
+    arguments = ["simulate", "cylinder", "-o", str(tmp_path / "c.csv.gz"), "--protocol", "brief"]
+    assert main([*arguments, "--effect", "time_delay=1", "--pictures", str(picture)]) == 0
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert picture.stat().st_size > 50_000
