@@ -29,8 +29,12 @@ SPATIAL = (
 )
 """Effects that differ from site to site rather than within a press."""
 
+EVERYWHERE = ("tip_radius", "tool_compliance", "strain_stiffening", "poisson_ratio", "force_gain")
+"""Those of them that every site feels: one site alone that a wrong surface bends cannot speak for them."""
+
 STEADY_Z = 2.0
-"""A further effect that differs from place to place gains by this many standard errors across sites."""
+"""Such an effect, and any further one that differs from place to place, gains by this many standard errors
+across sites."""
 
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
@@ -205,6 +209,8 @@ class Search:
             return False
         if score.name == "inclusion":
             return score.gain > o.spatial_gain and score.share > -0.3 and score.toward > o.toward
+        if score.name in EVERYWHERE and score.z < STEADY_Z:
+            return False
         if not first and score.name in SPATIAL and score.z < STEADY_Z:
             # one place that a law misses by far must not name a second effect; a lump lives in few places
             if score.name != "inclusion" or score.candidate.chi > 1.5:

@@ -1,0 +1,34 @@
+"""When an effect is named: what one site says, or many."""
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from diagnose.judging import AttributionOptions, Score, Search
+
+
+def score(name, per_group, **changes):
+    gains = np.asarray(per_group, float)
+    z = gains.sum() / (gains.std() * np.sqrt(len(gains)))
+    values = {"gain": gains.sum(), "z": z, "size_n": 0.014, "closes": 1e-4, "share": 0.7, "toward": 0.9}
+    return Score(name, **{**values, **changes}, per_group=gains, candidate=SimpleNamespace(chi=0.85))
+
+
+@pytest.fixture
+def search():
+    search = Search.__new__(Search)
+    search.options = AttributionOptions()
+    return search
+
+
+@pytest.mark.parametrize("name", ["tip_radius", "tool_compliance", "strain_stiffening"])
+def test_one_site_does_not_name_what_every_site_feels(search, name):
+    alone = [110.0] + [0.5] * 39
+    shared = [3.0, 2.0, 5.0, 4.0] * 10
+    assert not search.passes(score(name, alone))
+    assert search.passes(score(name, shared))
+
+
+def test_one_site_may_name_a_lump(search):
+    assert search.passes(score("inclusion", [130.0] + [0.5] * 39))
