@@ -59,6 +59,7 @@ class Problem:
         self._face_dofs = (3 * self.contact.faces[:, :, None] + np.arange(3)).reshape(-1, 18)
         self._pattern()
         self._factor = Factor()
+        self._factored: State | None = None
         if self.linear:
             rest = np.zeros_like(mesh.points)
             self._constant = self.solid.evaluate(rest, self.solid.new_history(), 0.0, True)[1]
@@ -84,10 +85,10 @@ class Problem:
         self._entries, self._size = len(unique), n
 
     def _evaluate(
-        self, u: np.ndarray, history: History, step_s: float
+        self, u: np.ndarray, history: History, step_s: float, tangent: bool = True
     ) -> tuple[np.ndarray, np.ndarray, float, History]:
         if not self.linear:
-            return self.solid.evaluate(u, history, step_s, True)
+            return self.solid.evaluate(u, history, step_s, tangent)
         local = u.ravel()[self._cell_dofs]
         forces = np.einsum("eij,ej->ei", self._constant, local)
         return forces, self._constant, 0.5 * float((forces * local).sum()), history
@@ -173,13 +174,17 @@ class Problem:
         u = state.displacement if guess is None else guess
         # without a guess the points already held carry the object along before new ones may arrive
         held = state.grip.copy()
+        # what holds and sticks is as stiff at the step's start as where the tip's stiffness was asked for
+        known = self._factored is state and guess is None and contact.friction < 0.0
+        self._factored = None
         arrivals = guess is not None or not held.active.any()
         if arrivals:
             contact.expect(u, centre, held)
-        last, cut, last_norm, touching = u, 1.0, np.inf, held.active
+        last, cut, last_norm, touching, close = u, 1.0, np.inf, held.active, False
         step = np.zeros_like(u)
         for iteration in range(40):
-            cell_f, cell_k, energy, history = self._evaluate(u, state.history, step_s)
+            # close to the end a tangent is seldom needed, and costs more than the forces
+            cell_f, cell_k, energy, history = self._evaluate(u, state.history, step_s, not close)
             if not np.isfinite(energy):
                 # an element turned inside out: take less of the last step
                 cut *= 0.4
@@ -199,9 +204,12 @@ class Problem:
             # close to the end the last tangent serves once more, where the contact has settled
             reuse = arrivals and norm < 0.02 * last_norm and np.array_equal(grip.active, touching)
             last_norm, touching = norm, grip.active
-            if not reuse:
+            if not (reuse or (known and iteration == 0)):
+                if not len(cell_k):
+                    cell_k = self._evaluate(u, state.history, step_s)[1]
                 self._factor.refresh(self._assemble(cell_k, face_k, u))
                 self.factorisations += 1
+            close = arrivals and norm < 0.02 * scale
             step = np.zeros(self.free.size)
             step[self.free] = self._factor.solve(-r)
             step = step.reshape(-1, 3)
@@ -221,6 +229,7 @@ class Problem:
         _, cell_k, _, _ = self._evaluate(state.displacement, state.history, 1e-6)
         _, face_k, _, _ = contact.evaluate(state.displacement, state.centre, state.grip, True)
         self._factor.refresh(self._assemble(cell_k, face_k, u))
+        self._factored = state
         # translating the tip is translating every face node back: coupling = - K_face applied to unit
         # translations
         units = np.tile(np.eye(3), (6, 1))

@@ -6,15 +6,26 @@ from functools import cache
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from mechanics.dent import dent_law
 from scenes.laboratory.contact import SphereContact
 from scenes.laboratory.effects.contact import relaxed
+from scenes.laboratory.factor import Factor
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.refine import boundary_faces
 from scenes.laboratory.solid import Material, Solid
 from scenes.laboratory.solver import Problem
-from scenes.laboratory.verification import box, dent_force, hertz_ratio, patch_test, tangent_error
+from scenes.laboratory.specimen import Fineness, Specimen
+from scenes.laboratory.verification import (
+    box,
+    dent_force,
+    hertz_ratio,
+    patch_test,
+    straight_press,
+    tangent_error,
+)
+from scenes.phantoms import phantom
 
 LAWS = {
     "neo-hookean": {},
@@ -87,6 +98,17 @@ def test_rotation_costs_nothing() -> None:
     force, _, energy, _ = solid.evaluate(u, solid.new_history(), 0.0, False)
     assert abs(energy) < 1e-10
     assert np.abs(force).max() < 1e-10
+
+
+@pytest.mark.parametrize("smallest", [1.0, -1.0])
+def test_factor_solves_definite_and_indefinite_matrices_in_turn(smallest: float) -> None:
+    rng = np.random.default_rng(2)
+    turn = np.linalg.qr(rng.normal(size=(40, 40)))[0]
+    factor, b = Factor(), rng.normal(size=40)
+    for low in (1.0, smallest, 1.0):
+        matrix = turn @ np.diag(np.concatenate([[low], np.linspace(2, 9, 39)])) @ turn.T
+        factor.refresh(sp.csr_matrix(np.triu(matrix)))
+        assert matrix @ factor.solve(b) == pytest.approx(b, abs=1e-9)
 
 
 def test_refined_mesh_fills_the_box_and_grows_away_from_the_touch() -> None:
@@ -214,3 +236,14 @@ def test_deep_dent_is_the_one_of_an_axisymmetric_solution() -> None:
     depths = np.array([2.0, 3.0, 4.0, 6.0])
     known = dent_law("linear").force(1e-3 * depths, 1e6, 0.49, 0.005)
     assert dent_force(depths) / known == pytest.approx(np.ones(4), abs=0.025)
+
+
+@pytest.mark.slow
+def test_press_of_twelve_millimetres_into_a_cylinder_finds_equilibrium_whatever_its_steps() -> None:
+    thing, point, normal = phantom("cylinder"), np.array([40.0, 0.0, 40.0]), np.array([1.0, 0.0, 0.0])
+    steps = np.linspace(0, 12, 9)[1:]
+    force, _ = straight_press(thing, Specimen(finite=True), point, normal, steps, Fineness())
+    assert np.all(np.diff(force) > 0)
+    half = np.sort(np.concatenate([steps, steps - 0.75]))
+    finer, _ = straight_press(thing, Specimen(finite=True), point, normal, half, Fineness())
+    assert force == pytest.approx(finer[1::2], rel=0.005)
