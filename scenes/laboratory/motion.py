@@ -117,7 +117,7 @@ def _one_touch(
     add(WAY_IN, near + (touch.depth - near) * minimum_jerk(_samples(touch.depth - near, speed)))
     held = rng.random() < hand.hold_share or touch.kind == "drag"
     pause = rng.uniform(0.15, 1e3 * hand.longest_hold_s / 1e3) if held else rng.uniform(0.005, 0.03)
-    add(WAY_IN, _hold(touch.depth, pause, hand, rng))
+    add(WAY_IN, _hold(touch.depth, pause, hand, rng, back=touch.kind == "drag"))
     distance = float(np.linalg.norm(touch.side))
     if distance > 0:
         add(SIDEWAYS, distance * minimum_jerk(_samples(distance, rng.uniform(5, 25))))
@@ -148,14 +148,18 @@ def _samples(distance: float, speed: float) -> int:
     return max(int(abs(distance) / speed * RATE_HZ), 60)
 
 
-def _hold(depth: float, seconds: float, hand: HandOptions, rng: np.random.Generator) -> np.ndarray:
-    """Depth while the hand holds still: it creeps in by a little and trembles, never beyond
-    what was solved.
+def _hold(
+    depth: float, seconds: float, hand: HandOptions, rng: np.random.Generator, *, back: bool
+) -> np.ndarray:
+    """Depth while the hand holds still: it creeps out by a little and trembles, never beyond what was
+    solved; `back` at the full depth in the end, where a drag begins.
     """
     count = max(int(seconds * RATE_HZ), 3)
     drift = -rng.uniform(0.0, 0.12) * np.arange(count) / RATE_HZ / max(seconds, 0.3)
     tremor = 0.5e3 * hand.tremor_m * band_noise(count, RATE_HZ, 7, 11, rng)
     window = np.minimum(1.0, np.arange(count) / 60.0)
+    if back:
+        window = np.minimum(window, window[::-1])
     return depth + (drift + np.minimum(tremor, 0.0)) * window
 
 

@@ -52,6 +52,15 @@ def test_noise_and_steps_are_those_stated(springs) -> None:
     assert 0.3 < free.mean() < 0.95
 
 
+def test_the_hand_makes_no_jumps_where_a_drag_begins_and_ends(springs) -> None:
+    for seed in range(3):
+        motion = _run(seed=seed).motion
+        turns = np.flatnonzero((np.diff(motion.leg) != 0) & (np.diff(motion.touch) == 0))
+        assert len(turns)
+        step = np.linalg.norm(np.diff(motion.position, axis=0), axis=1)
+        assert step[turns].max() < 0.02
+
+
 def test_delay_shifts_the_force_and_nothing_else(springs) -> None:
     plain, late = _run(), _run({"time_delay": 1})
     assert np.array_equal(plain.recording.position, late.recording.position)
