@@ -15,7 +15,7 @@ import numpy as np
 from benchmarks.timing import table
 from mechanics.dent import dent_law
 from mechanics.recording import read_recording
-from scenes.laboratory.comparison import block_shape, compare, cylinder_shape
+from scenes.laboratory.comparison import block_shape, by_depth, compare, cylinder_shape
 from scenes.laboratory.solid import Material, Solid
 from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.laboratory.verification import (
@@ -109,7 +109,7 @@ def _verification() -> dict[str, float]:
 
 
 def _comparison(arguments: argparse.Namespace) -> dict[str, Any]:
-    figures, rows = {}, []
+    figures, rows, shares = {}, [], []
     for name, (shape, nearest) in KNOWN.items():
         recording = read_recording(arguments.recordings / f"{name}.csv.gz")
         pairs = compare(
@@ -132,7 +132,12 @@ def _comparison(arguments: argparse.Namespace) -> dict[str, Any]:
                     float(1e3 * np.sqrt(((ours - press.force) ** 2).sum(axis=1).mean())),
                 ]
             )
-        figures[shape] = [row[1:] for row in rows if row[0] == shape]
+        together = by_depth(pairs)
+        shares += [[shape, d, f, f"{100 * x:+.2f} ± {100 * e:.2f}"] for d, f, x, e in together]
+        figures[shape] = {
+            "presses": [row[1:] for row in rows if row[0] == shape],
+            "by_depth": together.tolist(),
+        }
     print(
         table(
             [
@@ -147,4 +152,7 @@ def _comparison(arguments: argparse.Namespace) -> dict[str, Any]:
             rows,
         )
     )
+    print()
+    header = ["phantom", "mean depth [mm]", "mean force [N]", "all presses together: difference [%]"]
+    print(table(header, shares))
     return figures

@@ -133,3 +133,20 @@ def compare(
     )
     modulus = float((recording.truth or {})["young_modulus_pa"])
     return [(press, 1e-6 * modulus * curve.force) for press, curve in zip(chosen, solved, strict=True)]
+
+
+def by_depth(pairs: list[tuple[Press, np.ndarray]]) -> np.ndarray:
+    """(len(SHARES) - 1, 4): mean depth mm, mean recorded normal force N, sum of ours / sum of theirs - 1,
+    its standard error from the scatter among presses.
+
+    Noise of single presses averages out here, so that shallow depths can be judged too.
+    """
+    ours = np.array([force @ press.normal for press, force in pairs])[:, 1:]
+    theirs = np.array([press.force @ press.normal for press, _ in pairs])[:, 1:]
+    depth = np.array([-press.travel @ press.normal for press, _ in pairs])[:, 1:]
+    difference = ours - theirs
+    spread = difference.std(axis=0, ddof=1) / np.sqrt(len(pairs)) if len(pairs) > 1 else np.nan
+    mean = theirs.mean(axis=0)
+    return np.column_stack(
+        [depth.mean(axis=0), mean, difference.mean(axis=0) / mean, np.broadcast_to(spread / mean, mean.shape)]
+    )
