@@ -21,6 +21,8 @@ from mechanics.model import Model
 from mechanics.sites import touch_sites
 
 STANDARD_GRAVITY = 9.80665
+KEPT = 8
+"""Integrated touches that are kept."""
 
 
 @dataclass
@@ -82,6 +84,7 @@ class Forward:
         self._linear = dent_law("linear").table
         self._deep = dent_law("neo-hookean").table
         t = self.touches
+        self._kept: dict[tuple, np.ndarray] = {}
         self.clock = t.t - t.t[0]
         self.acceleration = _acceleration(t)
         self.dents = grid()
@@ -111,20 +114,7 @@ class Forward:
         y[:, 0] += s.onset[t.press]
         if s.backlash != 0:
             y = self._with_play(y, s.backlash)
-        table = self._linear
-        if s.finite_strain != 0:
-            table = table + s.finite_strain * (self._deep - table)
-        if s.table_factor is not None:
-            table = table.copy()
-            table[:, [0, 2]] *= s.table_factor
-        radius = np.ascontiguousarray(
-            np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (t.presses,))
-        )
-        f = np.zeros_like(y)
-        modulus = s.modulus * s.stiffness
-        kernel.integrate(
-            t.start, y, s.far, radius, modulus * s.dent_ratio, modulus, s.nu, table, s.tool_give, s.mu, f
-        )
+        f = self._elastic(s, y)
         if s.mullins is not None:
             f = f * _mullins(t, y[:, 0], f[:, 0], *s.mullins)[:, None]
         if s.g is not None and len(s.g):
@@ -139,6 +129,40 @@ class Forward:
         if s.delay != 0:
             f = _shifted(t, f, s.delay)
         return self._read(s, f)
+
+    def _elastic(self, s: Settings, y: np.ndarray) -> np.ndarray:
+        """(n, 3) N, the touch's own force along the path y; the last few are kept.
+
+        Force goes with the modulus where the spring of the tool is measured in it, so another modulus,
+        memory, delay or reading of the same touch costs no new integration.
+        """
+        t = self.touches
+        table = self._linear
+        if s.finite_strain != 0:
+            table = table + s.finite_strain * (self._deep - table)
+        if s.table_factor is not None:
+            table = table.copy()
+            table[:, [0, 2]] *= s.table_factor
+        usual = self.model.young_modulus_pa
+        give = s.tool_give * s.modulus / usual
+        arrays = (y, s.far, s.stiffness, s.dent_ratio, table)
+        key = (s.tip_radius, s.nu, give, s.mu, *(a.tobytes() for a in arrays))
+        key = (hash(key), s.backlash)
+        f = self._kept.get(key)
+        if f is None:
+            radius = np.ascontiguousarray(
+                np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (t.presses,))
+            )
+            f = np.zeros_like(y)
+            modulus = usual * s.stiffness
+            far = np.ascontiguousarray(s.far)
+            kernel.integrate(
+                t.start, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, give, s.mu, f
+            )
+            if len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = f
+        return f * (s.modulus / usual)
 
     def weight(self, mass_kg: float, share: float) -> np.ndarray:
         """(n, 3) N, device frame: `share` of the tool's weight that a tare has not taken off, along the

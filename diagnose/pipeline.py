@@ -15,6 +15,7 @@ from diagnose.forward import Forward, build_forward
 from diagnose.freeair import FreeAir, free_air_of
 from diagnose.gaps import closed_share, gap
 from diagnose.inclusions import inclusion_starts
+from diagnose.intervals import parameter_intervals
 from diagnose.judging import AttributionOptions, Candidate, Score, Search, sideways_off
 from diagnose.library import NAMES, effect
 from diagnose.next_touch import next_touch
@@ -22,6 +23,7 @@ from diagnose.result import Diagnosis, EffectEntry
 from diagnose.settled import Settled, settle
 from diagnose.shape import heterogeneity, site_factors, site_stiffness_sd
 from diagnose.touches import touches_of
+from diagnose.validation import held_out_by_refit
 from diagnose.where import locate
 from diagnose.whiten import NuisanceOptions
 from mechanics.model import Model
@@ -124,6 +126,14 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     counts = search.whitener.counts()
     rng = np.random.default_rng(options.seed)
     plain_before = found.ideal.plain + settled.plain(search.whitener, found.ideal)
+    after = found.final.plain
+    held: dict[str, tuple[float, float]] = {}
+    if not options.fast:
+        old = held_out_by_refit(search, found.ideal.found, settled.residual, added)
+        new = held_out_by_refit(search, found.final.found, None, added)
+        plain_before, after = old.plain, new.plain
+        held = {"deepest": (old.deepest_n, new.deepest_n), "fastest": (old.fastest_n, new.fastest_n)}
+        lap("held out")
     gap_before = gap(plain_before, counts, added)
     deep_size = predicted_size(forward, found.base.found)
     with_fs = "finite_strain" not in excluded and deep_size > FINITE_STRAIN_LEAST * noise
@@ -171,7 +181,6 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     entries = _entries(
         forward, search, found, names, settled, counts, plain_before, noise, added, deep_size, options, rng
     )
-    after = found.final.plain
     gap_after = gap(after, counts, added) if names else gap_before
     closed, interval = closed_share(plain_before, after, counts, noise, added, rng, options.bootstrap)
     if not names:
@@ -204,6 +213,7 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         "entries": entries,
         "young_modulus_pa": found.final.found.modulus,
         "next_touch": touch,
+        "held_out_n": held,
         "errors_n": _errors(forward, found, site_sd, noise),
         "reasons": tuple(reasons),
         "confusable": tuple(pairs),
@@ -233,7 +243,8 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
         closed, interval = closed_share(
             before, score.candidate.plain, counts, noise, added, rng, max(100, options.bootstrap // 4)
         )
-        values = found.final.found.of(name) if name in found.chosen else score.candidate.found.of(name)
+        fitted = found.final.found if name in found.chosen else score.candidate.found
+        values = fitted.of(name)
         entries.append(
             EffectEntry(
                 name,
@@ -244,6 +255,7 @@ def _entries(forward, search, found, names, settled, counts, before, noise, adde
                 interval,
                 effect(name).report(values, forward),
                 score.gain,
+                parameter_intervals(fitted, name, forward, search.dof, rng),
             )
         )
     if found.finite_strain_gain > LINEAR_UNLESS or "finite_strain" in names:

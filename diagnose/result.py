@@ -32,7 +32,10 @@ KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
 
 @dataclass(frozen=True)
 class EffectEntry:
-    """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters."""
+    """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
+
+    intervals: [low, high] of each parameter at 95 %.
+    """
 
     name: str
     domain: str
@@ -42,6 +45,7 @@ class EffectEntry:
     gap_closed_ci95: tuple[float, float] | None
     parameters: dict[str, Any]
     gain: float = 0.0
+    intervals: dict[str, Any] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -69,6 +73,8 @@ class Diagnosis:
     """What `palpate diagnose` answers. Gaps: N, rms of the force 3-vector over held-out contact samples.
 
     errors_n: our own errors, N rms: sensor, repeatability, shape, numerical. reasons: the verdict in words.
+    held_out_n: gap (before, after), N, at the places of the deepest and of the fastest presses, fitted to the
+    rest.
     """
 
     noise_n: float
@@ -93,6 +99,7 @@ class Diagnosis:
     residual_before: np.ndarray | None = None
     residual_after: np.ndarray | None = None
     left_out: tuple[str, ...] = ()
+    held_out_n: dict[str, tuple[float, float]] = field(default_factory=dict)
 
     @property
     def summary(self) -> str:
@@ -151,6 +158,7 @@ class Diagnosis:
                     "gap_closed": e.gap_closed,
                     "gap_closed_ci95": None if e.gap_closed_ci95 is None else list(e.gap_closed_ci95),
                     "parameters": e.parameters,
+                    "parameters_ci95": e.intervals,
                 }
                 for e in self.entries
             ],
@@ -169,6 +177,7 @@ class Diagnosis:
                 "sigmas": self.next_touch.sigmas,
             },
             "errors_n": dict(self.errors_n),
+            "held_out": {k: {"gap_before_n": a, "gap_after_n": b} for k, (a, b) in self.held_out_n.items()},
             "reasons": list(self.reasons),
             "confusable": [{"pair": [a, b], "cosine": c} for a, b, c in self.confusable],
             "seconds": dict(self.seconds),

@@ -6,7 +6,7 @@ Their readings are taken off the forces, so that the search for other effects st
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -30,6 +30,7 @@ class Settled:
     parts: dict[str, np.ndarray]
     residual: np.ndarray
     reasons: tuple[str, ...]
+    intervals: dict[str, dict] = field(default_factory=dict)
 
     def plain(self, whitener, candidate) -> np.ndarray:  # type: ignore[no-untyped-def]
         """(g,) N^2: what putting the readings back adds to a candidate's plain sums of squares."""
@@ -48,7 +49,10 @@ class Settled:
             closed, interval = closed_share(before, after, counts, noise, added, rng, 100)
             left = gap(after, counts, added)
             keys = self.parameters[name]
-            result.append(EffectEntry(name, "instrument", 0.97, left, closed, interval, keys, 1e3))
+            entry = EffectEntry(
+                name, "instrument", 0.97, left, closed, interval, keys, 1e3, self.intervals[name]
+            )
+            result.append(entry)
         return result
 
 
@@ -116,9 +120,22 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
         reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
     if not parts:
         return Settled((), {}, {}, nothing, ())
+    turn_se = np.inf if turning is None else turning.se_n / STANDARD_GRAVITY
+    error = {
+        "bias_n": level_se,
+        "rate_n_per_s": free.rate_se_n_per_s,
+        "mass_kg": turn_se if turns else free.mass_se_kg,
+    }
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
     taken = sum(local.values())
     forward.touches = dataclasses.replace(t, f=t.f - taken)
     order = sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum()))
-    return Settled(tuple(order), parameters, local, taken, tuple(reasons))
+    intervals = {
+        n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters
+    }
+    return Settled(tuple(order), parameters, local, taken, tuple(reasons), intervals)
+
+
+def _around(value, error: float) -> list:  # type: ignore[no-untyped-def]
+    return [(np.asarray(value) - 1.96 * error).tolist(), (np.asarray(value) + 1.96 * error).tolist()]

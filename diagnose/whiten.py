@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from diagnose.forward import Forward, Settings
 from diagnose.touches import Touches
@@ -35,12 +35,13 @@ class NuisanceOptions:
 
 @dataclass
 class Block:
-    """One group's rows (flat indices of counted samples), its nuisance and the factor of I + N^T N /
-    sigma^2."""
+    """One group's rows (flat indices of counted samples), its nuisance N, the factor L of I + N^T N /
+    sigma^2, and L^-1 N^T."""
 
     rows: np.ndarray
     nuisance: np.ndarray
     factor: tuple
+    halved: np.ndarray
 
 
 class Whitener:
@@ -62,7 +63,9 @@ class Whitener:
         self.stiffness_sd = options.site_stiffness
         for rows, matrix in _by_site(self.touches, columns):
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
-            self.blocks.append(Block(rows, matrix, cho_factor(small)))
+            factor = cho_factor(small, lower=True)
+            halved = solve_triangular(factor[0], matrix.T, lower=True)
+            self.blocks.append(Block(rows, matrix, factor, halved))
 
     @property
     def groups(self) -> int:
@@ -75,8 +78,8 @@ class Whitener:
         out = np.empty((self.groups, k, k))
         for i, block in enumerate(self.blocks):
             part = x[block.rows].reshape(-1, k)
-            side = block.nuisance.T @ part
-            out[i] = (part.T @ part - side.T @ cho_solve(block.factor, side) / self.variance) / self.variance
+            side = block.halved @ part
+            out[i] = (part.T @ part - side.T @ side / self.variance) / self.variance
         return out
 
     def raw_gram(self, x: np.ndarray) -> np.ndarray:
