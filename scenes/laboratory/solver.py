@@ -217,7 +217,7 @@ class Problem:
             if not np.isfinite(longest):
                 return None
             last, cut = u, 1.0
-            u = u + step * min(1.0, 3.0 / longest)
+            u = u + step * (3.0 / max(longest, 3.0))
             if not arrivals:
                 arrivals = True
                 contact.expect(u, centre, held)
