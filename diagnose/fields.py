@@ -103,7 +103,8 @@ def far_at_poisson(forward: Forward, nu: float, ratios: tuple[float, ...] = (0.3
         def solve() -> dict[str, np.ndarray]:
             known = sorted({*ratios, forward.nu})
             mesh = forward.model.mesh.quadratic()
-            fars = np.array([_far(forward, mesh, r) for r in known])
+            own = energy_fields(forward).solution
+            fars = np.array([_far(forward, mesh, r, own if r == forward.nu else None) for r in known])
             return {"ratios": np.array(known), "far": fars - fars[known.index(forward.nu)]}
 
         kept = stored("poisson", forward.model, forward.touches, solve)
@@ -124,12 +125,13 @@ def _solutions(forward: Forward, mesh: TetMesh, nu: float, first: np.ndarray) ->
     return Solver(mesh, nu).solve(forces)
 
 
-def _far(forward: Forward, mesh: TetMesh, nu: float) -> np.ndarray:
-    """(p, 3, 3) local far field of a mesh whose nodes are the model's (its base may differ)."""
+def _far(forward: Forward, mesh: TetMesh, nu: float, solution: np.ndarray | None = None) -> np.ndarray:
+    """(p, 3, 3) local far field of a mesh whose nodes are the model's (its base may differ); solution: known
+    displacements for the unit loads."""
     sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
     t = forward.touches
     unique, first, inverse = places_of(t)
-    u = _solutions(forward, mesh, nu, first)
+    u = _solutions(forward, mesh, nu, first) if solution is None else solution
     far = np.empty((len(first), 3, 3))
     half = half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m)
     for k, press in enumerate(first):

@@ -89,6 +89,12 @@ class Candidate:
         """Whitened mean square per component: about 1 where the noise model holds."""
         return float(self.found.gram[:, 0, 0].sum() / self.dof)
 
+    def chi_but_for_one(self, counts: np.ndarray) -> tuple[float, int]:
+        """(chi without the site that misses most, that site); counts: (g,) samples of each site."""
+        each = self.found.gram[:, 0, 0]
+        worst = int(np.argmax(each / counts))
+        return float((each.sum() - each[worst]) / (3.0 * (counts.sum() - counts[worst]))), worst
+
 
 @dataclass(frozen=True)
 class Score:

@@ -150,6 +150,15 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     chi = found.final.chi
     slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
     misfit = chi > slack * search.options.unknown_chi
+    rest, lone = found.final.chi_but_for_one(counts)
+    if misfit and rest < slack * search.options.unknown_chi:
+        # one touch that slipped or met something else is no law that is missing
+        misfit = False
+        x, y, z = 1e3 * t.point[t.site == lone].mean(axis=0)
+        reasons.append(
+            f"the touches at ({x:.0f}, {y:.0f}, {z:.0f}) mm fit nothing, the others miss by "
+            f"{np.sqrt(rest):.1f} times the noise: touch there again"
+        )
     remainder = misfit
     slipping = sideways_off(forward, found.final)
     if slipping and "friction_slip" not in names:

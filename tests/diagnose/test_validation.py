@@ -1,0 +1,80 @@
+"""What a fit says of its own parameters, and of places that it has not seen."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnose.effects.time_delay import EFFECT as DELAY
+from diagnose.fit import fit
+from diagnose.forward import build_forward
+from diagnose.intervals import parameter_intervals
+from diagnose.judging import AttributionOptions, Search
+from diagnose.library import effect
+from diagnose.touches import touches_of
+from diagnose.validation import deepest, held_out_by_refit, neighbours
+from diagnose.whiten import NuisanceOptions
+
+MODULUS = 20e3
+
+
+@pytest.fixture(scope="module")
+def late(bench):  # type: ignore[no-untyped-def]
+    """(search, fit without effect, fit with a delay) of presses whose force reads 10 ms late."""
+
+    def alter(t, x, f):  # type: ignore[no-untyped-def]
+        return x, np.stack([np.interp(t - 0.01, t, c) for c in f.T], axis=1)
+
+    recording, model = bench.record(alter)
+    forward = build_forward(touches_of(recording, model), model)
+    search = Search(
+        forward, MODULUS, nuisance=NuisanceOptions(), options=AttributionOptions(), site_sd=None,
+        finite_strain=effect("finite_strain"),
+    )  # fmt: skip
+    deep = effect("finite_strain")
+    plain = fit(forward, search.whitener, [deep], modulus=MODULUS)
+    return search, plain, fit(forward, search.whitener, [deep, DELAY], modulus=MODULUS)
+
+
+def test_the_interval_holds_the_truth_and_is_narrow(late):
+    search, _, found = late
+    rng = np.random.default_rng(0)
+    low, high = parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"]
+    assert low < 0.01 < high
+    assert 1e-5 < high - low < 4e-3
+
+
+def test_half_the_sites_leave_a_wider_interval(late):
+    search, _, found = late
+    rng = np.random.default_rng(0)
+    whole = np.ptp(parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"])
+    few = found.__class__(**{**found.__dict__, "gram": found.gram[::4]})
+    part = np.ptp(parameter_intervals(few, "time_delay", search.forward, search.dof / 4, rng)["delay_s"])
+    assert part > 1.4 * whole
+
+
+def test_places_not_fitted_are_predicted_by_the_right_effect(late):
+    search, plain, found = late
+    t = search.forward.touches
+    added = 3 * (t.raw_noise_n**2 - t.noise_n**2)
+    before, after = (held_out_by_refit(search, f, None, added) for f in (plain, found))
+    noise = 3 * t.noise_n**2 * search.whitener.counts()
+    assert after.plain.sum() < 1.3 * noise.sum() < before.plain.sum()
+    assert after.deepest_n < before.deepest_n and after.fastest_n < before.fastest_n
+
+
+def test_readings_put_back_count_as_gap(late):
+    search, _, found = late
+    bias = np.full_like(found.residual, 0.05)
+    with_bias = held_out_by_refit(search, found, bias, 0.0).plain.sum()
+    assert with_bias > 2 * held_out_by_refit(search, found, None, 0.0).plain.sum()
+
+
+def test_folds_hold_every_site_once_and_neighbours_together(late):
+    t = late[0].forward.touches
+    folds = neighbours(t)
+    assert sorted(np.concatenate(folds)) == list(range(t.sites))
+    place = np.array([t.point[t.site == s].mean(axis=0) for s in range(t.sites)])
+    inside = [np.ptp(place[f], axis=0).max() for f in folds]
+    assert np.mean(inside) < 0.6 * np.ptp(place, axis=0).max()
+    assert t.depth[np.isin(t.site, deepest(t))].max() == t.depth.max()
