@@ -66,6 +66,13 @@ class Grip:
         self.active = self.active & ~pulling
         return bool(pulling.any())
 
+    def settle(self, new: Grip) -> None:
+        """Points that were expected but do not press in `new` slide in this step, should they press later.
+
+        Held they would pull and free they would press: Newton's method would go to and fro for ever.
+        """
+        self.expected = self.expected & new.active
+
     def copy(self) -> Grip:
         """An independent copy."""
         twin = Grip(0)

@@ -132,6 +132,8 @@ class LinearProblem:
                 change = u - state.displacement
                 memory = decay[:, None, None] * state.memory + gains[:, None, None] * change
                 return LinearState(u, centre, force, grip, 0.5 * float(load @ given), memory)
+            if iteration > 20:
+                held.settle(grip)
             size = np.linalg.norm(r)
             if size > 1.5 * least and cut > 0.1 and arrivals:
                 # sticking and sliding in turn: go back along the last step

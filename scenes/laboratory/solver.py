@@ -201,6 +201,8 @@ class Problem:
                     continue
                 if norm < self.tolerance * scale:
                     return State(u, centre.copy(), force, energy, history, grip, None, iteration)
+            if iteration > 12:
+                held.settle(grip)
             # close to the end the last tangent serves once more, where the contact has settled
             reuse = arrivals and norm < 0.02 * last_norm and np.array_equal(grip.active, touching)
             last_norm, touching = norm, grip.active

@@ -128,6 +128,20 @@ def test_refined_mesh_fills_the_box_and_grows_away_from_the_touch() -> None:
     assert volume[distance < 6].max() < 0.2 * volume[distance > 25].max()
 
 
+def test_point_that_would_only_pull_slides_once_newton_goes_to_and_fro() -> None:
+    flat = np.array([[-1, -1, 0], [1, -1, 0], [0, 1, 0], [0, -1, 0], [0.5, 0, 0], [-0.5, 0, 0]]) * 0.3
+    contact, centre = SphereContact(flat, np.arange(6)[None], 5.0, None), np.array([0.0, 0.0, 4.9])
+    held = contact.start(centre + [0.0, 0.0, 0.2])
+    contact.expect(np.zeros_like(flat), centre, held)
+    aside, below = np.tile([0.05, 0.0, 0.0], (6, 1)), np.tile([0.0, 0.0, -0.4], (6, 1))
+    stuck = contact.evaluate(aside, centre, held, False)[2]
+    out = contact.evaluate(below, centre, held, False)
+    assert held.expected.all() and stuck[0] > 0.4 * stuck[2] and not out[3].active.any()
+    held.settle(out[3])
+    free = contact.evaluate(aside, centre, held, False)[2]
+    assert 0 < abs(free[0]) < 0.02 * free[2]
+
+
 def test_small_dent_in_linear_box_equals_finite_strain() -> None:
     linear = _pressed(0.4, None, linear=True, steps=3)[1][-1]
     finite = _pressed(0.4, None, linear=False, steps=3)[1][-1]
