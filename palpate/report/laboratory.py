@@ -46,7 +46,7 @@ def _time(ax, result: Simulation) -> None:
     ax.plot(t, np.linalg.norm(result.recording.force_on_tool, axis=1), color="#2c6fbb", lw=0.5, label="read")
     if result.ideal_n is not None:
         difference = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
-        ax.plot(t, difference, color="#c0392b", lw=0.6, label="effect's share")
+        ax.plot(t, difference, color="#c0392b", lw=0.6, label="change of the force")
     ax.set(xlabel="time [s]", ylabel="|force| [N]", title="force in time")
     ax.legend(fontsize=8)
 

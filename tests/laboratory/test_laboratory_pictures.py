@@ -41,7 +41,7 @@ def test_soft_tool_shows_as_presses_that_read_deeper(springs) -> None:
         assert read[:, 1] == pytest.approx(ideal[:, 1], abs=1e-5)
 
 
-def test_force_in_time_shows_the_effects_share(springs) -> None:
+def test_force_in_time_shows_the_change_of_the_force(springs) -> None:
     result, figure = _figure({"force_bias": 2})
     share = figure.axes[1].lines[1].get_ydata()
     assert share == pytest.approx(np.full(len(share), 0.1), rel=1e-3)
