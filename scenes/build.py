@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import shutil
 import sys
 from dataclasses import asdict
 from pathlib import Path
@@ -16,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import ModelError, SceneError
+from mechanics.files import atomic_folder
 from mechanics.model import Model, read_model, write_model
 from mechanics.progress import Progress, silent
 from mechanics.recording import read_recording, recording_files
@@ -48,7 +50,7 @@ def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = 
     """The scene's model, with a path; a MODEL folder about which the scene changes nothing is used itself."""
     if scene.kind == "model" and _own(scene):
         return read_model(scene.source)
-    path = (cache or cache_folder()) / "scenes" / f"{scene.name}-{_key(scene)}"
+    path = _folder(scene, cache)
     if (path / "model.toml").is_file():
         try:
             return read_model(path)
@@ -62,6 +64,24 @@ def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = 
         raise SceneError(
             f"'{path}' cannot be written ({error}): set PALPATE_CACHE to a folder of yours"
         ) from error
+
+
+def keep(scene: Scene, model: Path, *, cache: Path | None = None) -> None:
+    """Take a MODEL folder that was made from the scene's recording, with its compliance, for the scene's.
+
+    A scene that is touched next then opens at once. Raises SceneError where the cache cannot be written.
+    """
+    try:
+        with atomic_folder(_folder(scene, cache)) as folder:
+            shutil.copytree(model, folder, dirs_exist_ok=True)
+    except OSError as error:
+        raise SceneError(
+            f"'{model}' cannot be kept ({error}): set PALPATE_CACHE to a folder of yours"
+        ) from error
+
+
+def _folder(scene: Scene, cache: Path | None) -> Path:
+    return (cache or cache_folder()) / "scenes" / f"{scene.name}-{_key(scene)}"
 
 
 def _own(scene: Scene) -> bool:

@@ -46,13 +46,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Run the demo."""
     from palpate.report.demo import write_report
+    from scenes.build import keep
     from scenes.embedded import embedded_recording
+    from scenes.scene import load_scene
 
     folder = Path(arguments.output)
     folder.mkdir(parents=True, exist_ok=True)
     source = arguments.recording or embedded_recording()
     result = run_demo(source, folder, options_from(arguments, DemoOptions), progress_bar, arguments.seed)
     report = write_report(result, folder)
+    if not arguments.recording:
+        keep(load_scene("demo"), folder / "model")  # 'palpate touch' opens at once
     model = result.model
     say(
         arguments,
@@ -61,6 +65,7 @@ def run(arguments: argparse.Namespace) -> int:
         f"of {result.contact_force_rms_n:.3f} N rms",
         str(result.servo),
         f"report: {report.resolve()}",
+        f"to feel it: palpate touch {folder / 'model' if arguments.recording else ''}".rstrip(),
     )
     emit_json(
         {

@@ -1,8 +1,8 @@
 """Feel a model or scene at 1 kHz: in a window, or headless.
 
-MODEL_OR_SCENE is a MODEL folder, a scene (silicone-1, silicone-2, silicone-3, bean, nodule, your-recording,
-or a scene's .toml), a recording, or a phantom. In the window the mouse hovers over the object, the left
-button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
+MODEL_OR_SCENE is a MODEL folder, a scene (demo, silicone-1, silicone-2, silicone-3, bean, nodule,
+your-recording, or a scene's .toml), a recording, or a phantom. In the window the mouse hovers over the
+object, the left button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene, load_scene
 
 SUMMARY = "feel a model or scene at 1 kHz"
-DEFAULT_SCENE = "silicone-2"
+DEFAULT_SCENE = "demo"
 POLL_S = 0.1
 
 

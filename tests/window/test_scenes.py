@@ -9,7 +9,7 @@ import pytest
 
 from mechanics.errors import SceneError
 from mechanics.model import Model
-from scenes.build import model_of
+from scenes.build import keep, model_of
 from scenes.exploration import ExplorationOptions, base_tracing, explore
 from scenes.inclusions import modulus_ratio
 from scenes.phantoms import Region
@@ -20,7 +20,7 @@ from .small import block_mesh
 
 
 def test_embedded_scenes_are_there_and_whole() -> None:
-    assert {"silicone-1", "silicone-2", "silicone-3", "bean", "nodule", "your-recording"} <= set(
+    assert {"demo", "silicone-1", "silicone-2", "silicone-3", "bean", "nodule", "your-recording"} <= set(
         scene_names()
     )
     for name in scene_names():
@@ -28,6 +28,15 @@ def test_embedded_scenes_are_there_and_whole() -> None:
         assert scene.title and scene.about and scene.renderer == "fem"
     assert load_scene("silicone-1").young_modulus_pa == 29e3
     assert load_scene("nodule").inclusions[0].modulus_ratio > 1
+
+
+def test_what_the_demo_made_is_what_is_touched(block: Model, tmp_path: Path) -> None:
+    scene = load_scene("demo")
+    keep(scene, block.path, cache=tmp_path)
+    touched = model_of(scene, cache=tmp_path)
+    assert np.array_equal(touched.mesh.points, block.mesh.points)
+    assert touched.path != block.path
+    assert {f.name for f in touched.path.iterdir()} == {f.name for f in block.path.iterdir()}
 
 
 def test_anything_that_can_be_touched_is_a_scene(block: Model, tmp_path: Path) -> None:
