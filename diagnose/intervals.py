@@ -47,6 +47,9 @@ def parameter_intervals(
     spread = spread + np.diag(np.square(effect.extra.get("systematic", np.zeros(k))))
     low, high = effect.bounds
     draws = rng.multivariate_normal(found.values[own], spread, DRAWS, check_valid="ignore")
+    for i in effect.extra.get("signed", ()):
+        # what was named is known to be harder or softer; how much is what the interval says
+        draws[:, i] = np.sign(found.values[own][i]) * np.abs(draws[:, i])
     reports = [effect.report(v, forward) for v in np.clip(draws, low, high)]
     stated = effect.report(found.values[own], forward)
     intervals = {}

@@ -11,6 +11,7 @@ import numpy as np
 from diagnose.effects.base import Effect
 from diagnose.fit import Descent, Fit, first_touches, fit, held_out, levelled, settings_of
 from diagnose.forward import Forward
+from diagnose.shape import repeat_scatter
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.options import option
 
@@ -35,6 +36,9 @@ EVERYWHERE = ("tip_radius", "tool_compliance", "strain_stiffening", "poisson_rat
 STEADY_Z = 2.0
 """Such an effect, and any further one that differs from place to place, gains by this many standard errors
 across sites."""
+
+SURE_Z = 3.0
+"""What every site feels is named on a small gain only if so many standard errors of the sites agree."""
 
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
@@ -104,6 +108,7 @@ class Score:
     size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
     share: of the old excess over the noise.
     toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
+    scatter_n: N rms by which repeats at one place still differ.
     """
 
     name: str
@@ -115,6 +120,7 @@ class Score:
     toward: float
     per_group: np.ndarray
     candidate: Candidate
+    scatter_n: float = 0.0
 
 
 class Search:
@@ -203,7 +209,10 @@ class Search:
         noise = 3 * self.forward.touches.noise_n**2
         excess = max(float(old.plain.sum() / counted.sum()) - noise, 0.02 * noise)
         share = closes / excess
-        return Score(name, float(gain / over), float(z), size, closes, share, toward, per_group / over, new)
+        scatter = np.nan_to_num(repeat_scatter(new.residual, self.forward.touches))
+        return Score(
+            name, float(gain / over), float(z), size, closes, share, toward, per_group / over, new, scatter
+        )  # fmt: skip
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect; one beside another must close a fair share of what is left."""
@@ -225,8 +234,11 @@ class Search:
             return True
         if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
             return False
-        if score.gain > o.plain_gain and score.share > o.plain_share and score.z > 2.0:
-            return True
+        steady = SURE_Z if score.name in EVERYWHERE else STEADY_Z
+        if score.gain > o.plain_gain and score.share > o.plain_share and score.z > steady:
+            # repeats of one place that differ by more than the effect changes may be all that it fits
+            if score.name not in SPATIAL or score.size_n > score.scatter_n:
+                return True
         return score.gain > o.spatial_gain if score.name in SPATIAL else score.gain > o.gain and score.z > o.z
 
 

@@ -21,7 +21,7 @@ from diagnose.library import NAMES, effect
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry
 from diagnose.settled import Settled, settle
-from diagnose.shape import heterogeneity, site_factors, site_stiffness_sd
+from diagnose.shape import heterogeneity, repeat_scatter, site_factors, site_stiffness_sd
 from diagnose.touches import touches_of
 from diagnose.validation import held_out_by_refit
 from diagnose.where import locate
@@ -37,7 +37,6 @@ FAST_LEAVES_OUT = (
     "compliant_base",
     "skin_layer",
     "modulus_gradient",
-    "force_gain",
 )
 
 
@@ -166,6 +165,10 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         candidates = ["friction_slip", *candidates]
         remainder = True
         reasons.append(f"the sideways force is off by {slipping:.0%} of itself: the tip may slip")
+    if names and not with_fs and "finite_strain" not in excluded and deep_size > FINITE_STRAIN_LEAST * noise:
+        if "finite_strain" in found.final.found.names or "finite_strain" in found.base.found.names:
+            # deep enough for it, and it fitted no worse than the linear law until another took its place
+            candidates.append("finite_strain")
     if with_fs:
         sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
         beyond = FINITE_STRAIN_BEYOND_SCALE * deep_size
@@ -305,26 +308,10 @@ def _errors(forward: Forward, found: Attribution, site_sd: np.ndarray, noise: fl
     model."""
     t = forward.touches
     rms = float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
-    factors = []
-    residual, predicted = found.final.residual, t.f - found.final.residual
-    for site in range(t.sites):
-        own = [p for p in range(t.presses) if t.site[p] == site]
-        if len(own) < 2:
-            continue
-        each = []
-        for p in own:
-            rows = (t.press == p) & t.counted
-            f, r = predicted[rows].ravel(), residual[rows].ravel()
-            each.append(f @ r / max(f @ f, 1e-12))
-        factors += list(np.array(each) - np.mean(each))
-    repeat = (
-        float(np.sqrt(np.sum(np.square(factors)) / max(len(factors) / 2, 1))) * rms
-        if factors
-        else float("nan")
-    )
+    residual = found.final.residual
     return {
         "sensor": noise,
-        "repeatability": repeat,
+        "repeatability": repeat_scatter(residual, t),
         "shape": float(np.sqrt(np.mean(site_sd**2)) * rms),
         "model": float(np.sqrt(max((residual[t.counted] ** 2).sum(axis=1).mean() - 3 * t.noise_n**2, 0))),
     }

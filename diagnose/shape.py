@@ -44,6 +44,26 @@ def site_factors(found: Fit, touches: Touches) -> tuple[np.ndarray, np.ndarray]:
     return factor, error
 
 
+def repeat_scatter(residual: np.ndarray, touches: Touches) -> float:
+    """N rms by which presses of one place differ in what they leave of their force; nan without repeats."""
+    t = touches
+    each = np.zeros(t.presses)
+    for press in range(t.presses):
+        rows = (t.press == press) & t.counted
+        f, r = (t.f[rows] - residual[rows]).ravel(), residual[rows].ravel()
+        each[press] = f @ r / max(f @ f, 1e-12)
+    factors = [
+        each[own] - each[own].mean()
+        for own in (np.flatnonzero(t.site == s) for s in range(t.sites))
+        if len(own) > 1
+    ]
+    if not factors:
+        return float("nan")
+    spread = np.concatenate(factors)
+    rms = np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean())
+    return float(np.sqrt((spread**2).sum() / max(len(spread) / 2, 1)) * rms)
+
+
 def heterogeneity(factor: np.ndarray, error: np.ndarray, prior: np.ndarray) -> tuple[float, float]:
     """(gain in log likelihood, spread) of letting sites differ by more than their prior (s,) allows."""
     log = np.log(np.clip(factor, 0.2, 5))

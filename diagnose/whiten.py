@@ -60,7 +60,8 @@ class Whitener:
         columns = nuisance_columns(forward, settings, options, site_sd)
         self.onset_sd = options.onset_m
         self.onset_column = columns[0][1] / options.onset_m
-        self.stiffness_sd = options.site_stiffness
+        site = options.site_stiffness if site_sd is None else site_sd
+        self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(self.touches.presses)
         for rows, matrix in _by_site(self.touches, columns):
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)

@@ -69,5 +69,5 @@ EFFECT = Effect(
     candidates=_starts,
     signature="a few neighbouring places too stiff or too soft",
     # a large soft ball and a small hard one look alike, and first order pulls the place towards the tip
-    extra={"systematic": np.array([3e-3, 3e-3, 3e-3, 4e-3, 0.7])},
+    extra={"systematic": np.array([3e-3, 3e-3, 3e-3, 4e-3, 0.7]), "signed": (4,)},
 )

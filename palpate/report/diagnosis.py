@@ -61,8 +61,20 @@ def write_report(path: Path | str, recording: Recording, model: Model, result: D
             for e in result.entries[:8]
         ],
     )
+    if rows := _parameter_rows(result):
+        page.heading("How large, and how sure")
+        page.table(["effect", "quantity", "found", "95 % interval", "unit"], rows)
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
+    if result.held_out_n:
+        page.paragraph(
+            "Held out on purpose: "
+            + "; ".join(
+                f"at the places of the {k} presses the gap goes from {a * 1e3:.0f} to {b * 1e3:.0f} mN"
+                for k, (a, b) in result.held_out_n.items()
+            )
+            + "."
+        )
     page.heading("What the gap follows")
     page.table(
         ["the gap follows", "share of it", "chance (family-wise p)"],
@@ -230,10 +242,54 @@ def presses_picture(result: Diagnosis, count: int = 4) -> Any:
     return figure
 
 
-def _short(parameters: dict[str, Any]) -> str:
-    def word(value: Any) -> str:
-        if isinstance(value, list):
-            return "[" + ", ".join(word(v) for v in value) + "]"
-        return f"{value:.3g}" if isinstance(value, float) else str(value)
+UNITS = (
+    ("_n_per_m", 1.0, "N/m"),
+    ("_n_per_s", 1e3, "mN/s"),
+    ("_pa_per_m", 1e-6, "MPa/m"),
+    ("_kg", 1e3, "g"),
+    ("_rad", 180 / np.pi, "degrees"),
+    ("_m", 1e3, "mm"),
+    ("_s", 1e3, "ms"),
+    ("_n", 1e3, "mN"),
+)
+WORDS = {
+    "mu": "friction coefficient",
+    "g": "extra force when fast, shares",
+    "tau_s": "fading with time constants of",
+    "c20_over_c10": "stiffening (c20/c10)",
+    "r": "softening (r)",
+    "m_rel": "softening (m)",
+    "matrix": "gain matrix",
+}
 
-    return ", ".join(f"{k} {word(v)}" for k, v in parameters.items())
+
+def _plain(key: str, value: Any) -> tuple[str, str, str]:
+    """(words, value, unit) of a parameter's key, in units that a hand knows."""
+    suffix, factor, unit = next((u for u in UNITS if key.endswith(u[0])), ("", 1.0, ""))
+    words = WORDS.get(key, key.removesuffix(suffix).replace("_", " "))
+    return words, _number(value, factor), unit
+
+
+def _number(value: Any, factor: float = 1.0) -> str:
+    if isinstance(value, list):
+        return "(" + ", ".join(_number(v, factor) for v in value) + ")"
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return str(value)
+    return f"{value * factor:.3g}"
+
+
+def _short(parameters: dict[str, Any]) -> str:
+    return ", ".join(" ".join(_plain(k, v)).strip() for k, v in parameters.items())
+
+
+def _parameter_rows(result: Diagnosis) -> list[list[str]]:
+    """Effect, parameter, value, 95 % interval and unit of what was named."""
+    rows = []
+    for entry in result.entries:
+        for key, value in entry.parameters.items() if entry.name in result.effects else ():
+            words, number, unit = _plain(key, value)
+            _, factor, _ = next((u for u in UNITS if key.endswith(u[0])), ("", 1.0, ""))
+            low, high = entry.intervals.get(key, (None, None))
+            span = "-" if low is None else f"{_number(low, factor)} to {_number(high, factor)}"
+            rows.append([entry.name.replace("_", " "), words, number, span, unit])
+    return rows

@@ -32,3 +32,11 @@ def test_one_site_does_not_name_what_every_site_feels(search, name):
 
 def test_one_site_may_name_a_lump(search):
     assert search.passes(score("inclusion", [130.0] + [0.5] * 39))
+
+
+def test_weak_evidence_is_not_enough_where_repeats_disagree_by_more(search):
+    weak = [1.0, 2.0, 1.5, 1.0] * 10
+    assert search.passes(score("tip_radius", weak))
+    assert not search.passes(score("tip_radius", weak, scatter_n=0.03))
+    # what acts in time shows within a press, whatever its repeats do
+    assert search.passes(score("time_delay", weak, scatter_n=0.03))

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from diagnose.effects.time_delay import EFFECT as DELAY
-from diagnose.fit import fit
+from diagnose.fit import Descent, fit
 from diagnose.forward import build_forward
 from diagnose.intervals import parameter_intervals
 from diagnose.judging import AttributionOptions, Search
 from diagnose.library import effect
+from diagnose.shape import repeat_scatter
 from diagnose.touches import touches_of
 from diagnose.validation import deepest, held_out_by_refit, neighbours
 from diagnose.whiten import NuisanceOptions
@@ -78,3 +79,24 @@ def test_folds_hold_every_site_once_and_neighbours_together(late):
     inside = [np.ptp(place[f], axis=0).max() for f in folds]
     assert np.mean(inside) < 0.6 * np.ptp(place, axis=0).max()
     assert t.depth[np.isin(t.site, deepest(t))].max() == t.depth.max()
+
+
+def test_a_first_touch_left_aside_is_found_again_press_by_press(late):
+    search, _, found = late
+    descent = Descent(search.forward, search.whitener, found.effects, None)
+    aside = found.onset.copy()
+    aside[[3, 15]] += 3e-4
+    residual = descent.residual(found.values, aside)
+    onset, better = descent.likeliest_touches(found.values, residual, aside)
+    t = search.forward.touches
+    moved = np.isin(t.press, [3, 15]) & t.counted
+    assert (residual[moved] ** 2).mean() > 3 * (better[moved] ** 2).mean()
+    np.testing.assert_allclose(onset, found.onset, atol=6e-5)
+
+
+def test_repeats_that_disagree_are_told(late):
+    search, _, found = late
+    t = search.forward.touches
+    assert repeat_scatter(found.residual, t) < 0.01
+    again = (t.repeat > 0)[t.press][:, None]
+    assert repeat_scatter(found.residual + 0.2 * again * t.f, t) > 0.05
