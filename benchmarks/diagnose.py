@@ -15,9 +15,10 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks._diagnosis_blind import NotSolved, judge, opened_case, prepare, prepared, verdict_path
-from benchmarks._diagnosis_cases import cases
+from benchmarks._diagnosis_cases import Case, cases
 from benchmarks._diagnosis_scores import summarise
 from benchmarks._diagnosis_tables import pictures, show
+from mechanics.errors import OptionError
 
 SUMMARY = "blind diagnosis of sealed recordings: detection, names, false alarms, gap closed"
 
@@ -48,6 +49,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--limit", type=int, help="stop after this many new cases (the table shows what is there)"
     )
     parser.add_argument("--minutes", type=float, help="begin no further case after so many minutes")
+    parser.add_argument(
+        "--part",
+        default="1/1",
+        metavar="K/N",
+        help="only every N-th case, from the K-th (runs beside others)",
+    )
     parser.add_argument("--picture", metavar="PNG", help="write the pictures")
     parser.add_argument("--seed", type=int, default=0, help="first seed")
 
@@ -59,9 +66,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     fast = quick if arguments.fast is None else arguments.fast
     solve = quick if arguments.solve is None else arguments.solve
     todo = cases(arguments.size, arguments.phantom, arguments.seed)
+    own = part_of(todo, arguments.part)
     fresh, unsolved = 0, 0
     begun = time.perf_counter()
-    for number, case in enumerate(todo if arguments.stage != "table" else []):
+    for number, case in enumerate(own if arguments.stage != "table" else []):
         late = arguments.minutes is not None and time.perf_counter() - begun > 60 * arguments.minutes
         if late or (arguments.limit is not None and fresh >= arguments.limit):
             break
@@ -83,7 +91,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             answer = judge(case, work, fast=fast)
             said = f"{answer['kind']} {answer['effects']} {answer['candidates']}"
         fresh += 1
-        print(f"{number + 1}/{len(todo)} {case.key}: {said} ({time.process_time() - clock:.0f} CPU s)",
+        print(f"{number + 1}/{len(own)} {case.key}: {said} ({time.process_time() - clock:.0f} CPU s)",
               flush=True)  # fmt: skip
     done = [opened_case(c, work) for c in todo if verdict_path(c, work).exists()]
     summary = summarise(done)
@@ -92,3 +100,11 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     if arguments.picture and done:
         print(f"picture: {pictures(summary, arguments.picture)}")
     return summary
+
+
+def part_of(todo: list[Case], part: str) -> list[Case]:
+    """Every N-th case from the K-th; raises OptionError for anything but K/N with 1 <= K <= N."""
+    first, _, of = part.partition("/")
+    if not (first.isdigit() and of.isdigit() and 1 <= int(first) <= int(of)):
+        raise OptionError(f"--part '{part}' must be K/N with 1 <= K <= N, such as 1/2")
+    return todo[int(first) - 1 :: int(of)]
