@@ -29,7 +29,7 @@ SUMMARY = "condensed compliance against the dense inverse and column solves"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Sizes, element, repeats."""
     parser.add_argument(
-        "--touchable", type=int, nargs="+", default=[1000, 2000, 5000], help="touchable nodes, about"
+        "--touchable", type=int, nargs="+", default=[1000, 2000, 5400], help="touchable nodes, about"
     )
     parser.add_argument("--order", type=int, choices=(1, 2), default=2, help="element order (default: 2)")
     parser.add_argument("--repeats", type=int, default=3)

@@ -19,7 +19,7 @@ from benchmarks._axisymmetric_nodule import press_force
 from benchmarks._sample_shapes import sample_mesh
 from benchmarks.timing import measure, table
 from mechanics.box_mesh import box_mesh
-from mechanics.inclusion import Region, inclusion_ratio, share_inside
+from mechanics.inclusion import Ball, Region, inclusion_ratio, mixed_ratio, share_inside
 from mechanics.patch import PatchSampler
 from mechanics.sites import patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
@@ -76,7 +76,8 @@ def felt(arguments: argparse.Namespace) -> list[dict[str, float]]:
     for centre in arguments.centre:
         place = np.array([0, 0, 0.08 - centre])
         stiffer = inclusion_ratio(mesh, place, arguments.radius, arguments.ratio)
-        stiff = press_on_axis(touch_solver(mesh, NU, stiffer), 0.08, arguments.depth)
+        ball = Ball(tuple(place), arguments.radius, arguments.ratio)
+        stiff = press_on_axis(touch_solver(mesh, NU, stiffer, balls=[ball]), 0.08, arguments.depth)
         contrast = stiff / plain - 1
         known = reference[centre, arguments.ratio] / reference[centre, 1.0] - 1
         rows.append(
@@ -107,7 +108,7 @@ def dragged(arguments: argparse.Namespace) -> dict[str, float]:
 
     def move() -> np.ndarray:
         share = share_inside(mesh, there, arguments.radius, region.elements)
-        return region.updated(plain, arguments.ratio**share)
+        return region.updated(plain, mixed_ratio(share, arguments.ratio))
 
     def recompute() -> np.ndarray:
         ratio = inclusion_ratio(mesh, there, arguments.radius, arguments.ratio)

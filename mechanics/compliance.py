@@ -19,6 +19,7 @@ import scipy.sparse as sp
 from mechanics import pardiso
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError, OptionError
+from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
@@ -29,7 +30,8 @@ from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 
 _COLUMNS = 64  # right-hand sides solved at once
-_CONDENSED = 0.75  # share of the unknowns taken from the Schur complement, whose square is held twice
+_CONDENSED = 0.75  # share of the unknowns taken from the Schur complement, whose square is held twice;
+_SMALL = 1e8  # bytes: up to here all of them, which is faster
 METHODS = ("schur", "columns")
 FORMS = ("auto", "dense", "low-rank")
 
@@ -66,10 +68,10 @@ def condense(
 ) -> Compliance:
     """Condense the stiffness on the touchable nodes and invert it.
 
-    method: 'schur' (static condensation in MKL Pardiso and one dense inverse for most of the result, column
-    solves for the rest, which bounds the memory), 'columns' (a solve a column, in batches, with either
-    backend), None for the best that is there. Raises MeshError where the mesh is not held or has nothing to
-    touch.
+    method: 'schur' (static condensation in MKL Pardiso and one dense inverse; for a large result that for
+    most of it and column solves for the rest, which bounds the memory), 'columns' (a solve a column, in
+    batches, with either backend), None for the best that is there. Raises MeshError where the mesh is not
+    held or has nothing to touch.
     """
     nodes = np.flatnonzero(mesh.touchable)
     free = free_dofs(mesh)
@@ -85,10 +87,10 @@ def condense(
     result = np.empty((k, k))
     first = 0
     if method == "schur":
-        first = int(_CONDENSED * k)
+        first = k if result.nbytes <= _SMALL else int(_CONDENSED * k)
         matrix = stiffness(mesh, poisson_ratio, modulus_ratio)[free][:, free].tocsr()
         _condense_first(matrix, place[:first], result, progress)
-        solve = pardiso.Pardiso(matrix).solve
+        solve = pardiso.Pardiso(matrix).solve if first < k else None
         del matrix
     else:
         solve = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend).solve_free
@@ -190,10 +192,11 @@ def load_or_condense(
     """
     support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
     held = () if support is None else dataclasses.astuple(support)
+    balls = balls_of(model)
     error = (options or ComplianceOptions()).error_of(model.mesh)
     form = () if error is None else ("low-rank", error)
     key = content_key(
-        "surface compliance 3",
+        "surface compliance 4",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,
@@ -202,6 +205,8 @@ def load_or_condense(
         model.modulus_ratio,
         *held,
         *form,
+        *([model.tip_radius_m] if np.ptp(model.modulus_ratio) > 0 else []),
+        *(value for ball in balls for value in dataclasses.astuple(ball)),
     )
 
     def build() -> dict[str, np.ndarray]:
@@ -209,8 +214,10 @@ def load_or_condense(
             model.mesh,
             model.poisson_ratio,
             model.modulus_ratio,
+            balls=balls,
             support=support,
             low_rank_error=error,
+            tip_radius_m=model.tip_radius_m,
             progress=progress,
         )
         return made.arrays()

@@ -71,12 +71,7 @@ class PatchSampler:
 
         A force F on the patch loads node i with weights[i] * F; the mean displacement is weights . u.
         """
-        reach = REACH * self.width_m
-        near = np.flatnonzero(np.linalg.norm(self._centres - point, axis=1) < reach + self._radii)
-        if not len(near):
-            raise MeshError(f"no touchable surface within {reach:.3g} m of {np.round(point, 5)}")
-        squared = ((self._positions[near] - point) ** 2).sum(axis=2)
-        density = np.exp(-squared / (2 * self.width_m**2)) * self._areas[near]
+        near, density = self._density(point)
         local = density @ self._shapes
         nodes, inverse = np.unique(self._triangles[near], return_inverse=True)
         total = np.bincount(inverse.ravel(), weights=local.ravel())
@@ -86,6 +81,20 @@ class PatchSampler:
                 f"the patch at {np.round(point, 5)} meets no surface: is the point on the object?"
             )
         return nodes, total / total_sum
+
+    def triangle_mean(self, point: np.ndarray, values: np.ndarray) -> float:
+        """Mean under the patch at `point` of a value a triangle of the touchable surface."""
+        near, density = self._density(point)
+        return float(density.sum(axis=1) @ values[near] / density.sum())
+
+    def _density(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(triangles that the patch meets (k,), its unscaled weight at their quadrature points (k, q))."""
+        reach = REACH * self.width_m
+        near = np.flatnonzero(np.linalg.norm(self._centres - point, axis=1) < reach + self._radii)
+        if not len(near):
+            raise MeshError(f"no touchable surface within {reach:.3g} m of {np.round(point, 5)}")
+        squared = ((self._positions[near] - point) ** 2).sum(axis=2)
+        return near, np.exp(-squared / (2 * self.width_m**2)) * self._areas[near]
 
     def matrix(self, points: np.ndarray) -> sp.csr_matrix:
         """(k, n) rows of patch weights over all nodes: the smoothing that turns nodal values into patch

@@ -1,4 +1,4 @@
-"""Split the tetrahedra next to the touchable surface: a narrow load patch needs small elements."""
+"""Split tetrahedra: those next to the touchable surface, for a narrow load patch, and those of a nodule."""
 
 from __future__ import annotations
 
@@ -25,20 +25,32 @@ def refined_near_surface(mesh: TetMesh, surface_edge_m: float) -> tuple[TetMesh,
     for _ in range(4):
         if typical_edge(mesh) <= surface_edge_m:
             break
-        mesh, step = _halved(mesh, surface_edge_m)
+        on_surface = np.zeros(len(mesh.points), dtype=bool)
+        on_surface[np.unique(mesh.touchable_surface)] = True
+        mesh, step = _halved(mesh, on_surface, surface_edge_m)
         parent = parent[step]
     return mesh, parent
 
 
-def _halved(mesh: TetMesh, surface_edge_m: float) -> tuple[TetMesh, np.ndarray]:
-    """One round: every marked edge is bisected once, the longest first, which keeps neighbours conforming."""
+def refined_around(
+    mesh: TetMesh, centre_m: np.ndarray, radius_m: float, edge_m: float
+) -> tuple[TetMesh, np.ndarray]:
+    """(linear mesh, parent) with the edges longer than `edge_m` of a sphere's tetrahedra halved once."""
+    mesh = mesh.linear()
+    inside = np.linalg.norm(mesh.points - np.asarray(centre_m), axis=1) < radius_m + edge_m / 2
+    return _halved(mesh, inside, edge_m)
+
+
+def _halved(mesh: TetMesh, chosen: np.ndarray, edge_m: float) -> tuple[TetMesh, np.ndarray]:
+    """One round: the longer edges with an end on a chosen node are bisected once.
+
+    The longest first, which keeps neighbours conforming.
+    """
     n = len(mesh.points)
     tets = mesh.tetrahedra
-    on_surface = np.zeros(n, dtype=bool)
-    on_surface[np.unique(mesh.touchable_surface)] = True
     pairs = np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0)
     length = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
-    marked = pairs[on_surface[pairs].any(axis=1) & (length > surface_edge_m)]
+    marked = pairs[chosen[pairs].any(axis=1) & (length > edge_m)]
     length = np.linalg.norm(mesh.points[marked[:, 0]] - mesh.points[marked[:, 1]], axis=1)
     marked = marked[np.argsort(-length, kind="stable")]
     points = np.vstack([mesh.points, mesh.points[marked].mean(axis=1)])

@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import MeshError
+from mechanics.inclusion import Ball, drawn_anew
+from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
-from mechanics.refine import refined_near_surface, typical_edge
+from mechanics.refine import refined_around, refined_near_surface, typical_edge
 from mechanics.solver import Solver
 from mechanics.support import Support
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -56,6 +58,7 @@ def touch_solver(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
+    balls: Sequence[Ball] = (),
     surface_edge_m: float = SURFACE_EDGE_M,
     support: Support | None = None,
 ) -> Solver:
@@ -63,10 +66,15 @@ def touch_solver(
 
     A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
     to 5 % too soft (docs/mechanics.md). Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
-    `mesh`.
+    `mesh`. balls: those that modulus_ratio holds; their elements are halved too and the balls drawn anew.
     """
     fine, parent = refined_near_surface(mesh, surface_edge_m)
-    ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)[parent]
+    for ball in balls:
+        fine, step = refined_around(fine, np.array(ball.centre_m), ball.radius_m, surface_edge_m)
+        parent = parent[step]
+    ratio = None
+    if modulus_ratio is not None:
+        ratio = drawn_anew(mesh, np.asarray(modulus_ratio, dtype=float), fine, parent, balls)
     return Solver(fine.quadratic(), poisson_ratio, ratio, support=support)
 
 
@@ -85,6 +93,7 @@ def touch_sites(
     patch_width_m: float | None = None,
     curvature: np.ndarray | float | None = None,
     solver: Solver | None = None,
+    tip_radius_m: float = USUAL_TIP_RADIUS_M,
     progress: Progress = silent,
 ) -> TouchSites:
     """Far-field compliance at surface points (k, 3) m with outward normals (k, 3).
@@ -92,6 +101,7 @@ def touch_sites(
     mesh: linear or quadratic; modulus_ratio: (m,). patch_width_m: None takes `patch_width`.
     curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh.
     solver: a factorisation to reuse, whose own mesh then counts; None makes `touch_solver(mesh, ...)`.
+    tip_radius_m: only matters where the modulus varies close below the surface (mechanics.near_field).
     Raises MeshError for points off the surface.
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
@@ -111,6 +121,7 @@ def touch_sites(
         patches = [sampler.weights(points[i]) for i in batch]
         far[list(batch)] = patch_compliance(solver, patches)
         progress("touch sites", (batch[-1] + 1) / len(points))
+    far += sharpening(solver, points, width, tip_radius_m)
     for i, normal in enumerate(normals):
         far[i] -= half_space_compliance(normal, poisson_ratio, width)
     if curvature is None:

@@ -34,6 +34,7 @@ class Solver:
     ) -> None:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
+        self.support = support
         self.modulus_ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
         self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
         if self.backend not in BACKENDS:

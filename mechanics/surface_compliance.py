@@ -9,13 +9,15 @@ elements and the mesh's own corners serve.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 
 import numpy as np
 import scipy.sparse as sp
 
 from mechanics.compression import compress, own_compliance
+from mechanics.inclusion import Ball
+from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
 from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
@@ -38,7 +40,8 @@ class SurfaceCompliance:
     a whole. patch_width_m: (1,). A large surface has no blocks (shape 0) but a factor (t, 3, r) float32:
     block (i, j) = factor[i] @ factor[j].T.
     Fine, v corners: own_points, own_normals (v, 3), own_triangles (g, 3) into them, own (v, 3, 3), 1/m:
-    displacement of the patch at i for a unit force on itself. own_width_m: (1,).
+    displacement of the patch at i for a unit force on itself, and what a nodule close below adds
+    (mechanics.near_field). own_width_m: (1,).
     poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.
     """
 
@@ -93,14 +96,18 @@ def surface_compliance(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
+    balls: Sequence[Ball] = (),
     support: Support | None = None,
     low_rank_error: float | None = None,
+    tip_radius_m: float = USUAL_TIP_RADIUS_M,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
-    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None; support: None, bonded.
+    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None, with the balls in it;
+    support: None, bonded.
 
     low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
-    a patch of at least WIDE_PATCH_M.
+    a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where the modulus varies close below the
+    surface (mechanics.near_field).
     """
     coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=support)
     nodes, triangles = _corners(coarse.mesh)
@@ -114,16 +121,17 @@ def surface_compliance(
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
-    if typical_edge(mesh) > SURFACE_EDGE_M:
+    if typical_edge(mesh) > SURFACE_EDGE_M or balls:
         del coarse
-        fine = touch_solver(mesh, poisson_ratio, modulus_ratio, support=support)
+        fine = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, support=support)
     else:  # what touch_solver would factorise once more
         fine = coarse
     own_nodes, own_triangles = _corners(fine.mesh)
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
     own_width = patch_width(fine.mesh)
-    own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.7 * f))
+    own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.5 * f))
+    own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
     return SurfaceCompliance(
         nodes=nodes,
         points=points,

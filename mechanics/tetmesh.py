@@ -69,18 +69,29 @@ class TetMesh:
     @cached_property
     def surface(self) -> np.ndarray:
         """(k, 3) or (k, 6): the whole boundary, base included, outward by the right-hand rule."""
-        corners = self.tetrahedra[:, :4]
-        faces = corners[:, FACES].reshape(-1, 3)
-        _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-        boundary = np.sort(first[counts == 1])
-        if self.order == 1:
-            return faces[boundary]
-        return self.tetrahedra[:, FACES6].reshape(-1, 6)[boundary]
+        faces = FACES if self.order == 1 else FACES6
+        return self.tetrahedra[:, faces].reshape(-1, faces.shape[1])[self._boundary]
+
+    @cached_property
+    def _boundary(self) -> np.ndarray:
+        """Faces of one tetrahedron alone, ascending, as 4 x tetrahedron + face."""
+        faces = np.sort(self.tetrahedra[:, FACES].reshape(-1, 3), axis=1)
+        _, first, counts = np.unique(faces, axis=0, return_index=True, return_counts=True)
+        return np.sort(first[counts == 1])
 
     @cached_property
     def touchable_surface(self) -> np.ndarray:
         """The triangles of `surface` that are not part of the base (not all of whose corners are fixed)."""
-        return self.surface[~self.fixed[self.surface[:, :3]].all(axis=1)]
+        return self.surface[self._off_base]
+
+    @cached_property
+    def touchable_elements(self) -> np.ndarray:
+        """The tetrahedron behind each triangle of `touchable_surface`."""
+        return self._boundary[self._off_base] // 4
+
+    @property
+    def _off_base(self) -> np.ndarray:
+        return ~self.fixed[self.surface[:, :3]].all(axis=1)
 
     def linear(self) -> TetMesh:
         """The corners alone, as a linear mesh whose nodes keep their order."""

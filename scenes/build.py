@@ -11,8 +11,10 @@ import json
 import os
 import shutil
 import sys
+from collections.abc import Iterable
 from dataclasses import asdict
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -26,11 +28,11 @@ from reconstruct.pipeline import reconstruct
 from reconstruct.surface import Surface
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.inclusions import modulus_ratio
-from scenes.phantoms import phantom
+from scenes.phantoms import Region, phantom
 from scenes.scene import Scene
 from scenes.virtual_presses import palpate_model
 
-VERSION = 4
+VERSION = 5
 DEFAULT_TIP_RADIUS_M = 0.005
 
 
@@ -139,18 +141,20 @@ def _from_phantom(scene: Scene, progress: Progress) -> Model:
         modulus_ratio=modulus_ratio(mesh, regions),
         effects={"finite_strain": {}} if scene.finite_strain else {},
         provenance={"method": "scene", "phantom": shape.name, "shape": shape.shape},
-        extra={
-            "inclusions": {
-                r.name: {
-                    "centre_m": list(r.centre_m),
-                    "radius_m": r.radius_m,
-                    "modulus_ratio": r.modulus_ratio,
-                }
-                for r in regions
-            }
-        },
+        extra={"inclusions": _stated(regions)},
     )
     return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
+
+
+def _stated(regions: Iterable[Region]) -> dict[str, dict[str, Any]]:
+    return {
+        r.name: {
+            "centre_m": list(r.centre_m),
+            "radius_m": r.radius_m,
+            "modulus_ratio": r.modulus_ratio,
+        }
+        for r in regions
+    }
 
 
 def _from_recording(scene: Scene, progress: Progress) -> Model:
@@ -173,6 +177,7 @@ def _changed(scene: Scene, model: Model) -> Model:
         changes["tip_radius_m"] = scene.tip_radius_m
     if scene.inclusions is not None:
         changes["modulus_ratio"] = modulus_ratio(model.mesh, scene.inclusions)
+        changes["extra"] = {**model.extra, "inclusions": _stated(scene.inclusions)}
     return model.replaced(**changes)
 
 

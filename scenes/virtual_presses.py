@@ -9,10 +9,11 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.errors import SceneError
+from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.palpation import Palpation
 from mechanics.progress import Progress, silent
-from mechanics.sites import touch_sites
+from mechanics.sites import touch_sites, touch_solver
 from mechanics.touch import forces_at
 from reconstruct.one_d import Press, fit_robust
 
@@ -33,7 +34,13 @@ def palpate_model(
     chosen = spread_places(model, sites)
     points, normals = model.mesh.points[chosen], model.normals[chosen]
     touched = touch_sites(
-        model.mesh, points, normals, model.poisson_ratio, model.modulus_ratio, progress=progress
+        model.mesh,
+        points,
+        normals,
+        model.poisson_ratio,
+        solver=touch_solver(model.mesh, model.poisson_ratio, model.modulus_ratio, balls=balls_of(model)),
+        tip_radius_m=model.tip_radius_m,
+        progress=progress,
     )
     samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))
     ramp = np.arange(1, samples) * (depth_m / samples)

@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from mechanics import inclusion
 from mechanics.model import Model
+from mechanics.near_field import contact_width
 from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
@@ -51,7 +52,8 @@ class MovingInclusion:
         support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
         self._solver = Solver(self._mesh, model.poisson_ratio, model.modulus_ratio, support=support)
         wide = PatchSampler(self._mesh, float(compliance.patch_width_m[0])).matrix(compliance.points)
-        narrow = PatchSampler(self._mesh, float(compliance.own_width_m[0])).matrix(compliance.own_points)
+        width = min(contact_width(model.tip_radius_m), float(compliance.own_width_m[0]))
+        narrow = PatchSampler(self._mesh, width).matrix(compliance.own_points)
         self._outputs = sp.vstack([wide, narrow], format="csr")
         self._mutual = 3 * len(compliance.points)  # rows of the wide patches
         self._plain_far = renderer.parameters.far

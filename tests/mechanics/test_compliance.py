@@ -15,11 +15,14 @@ from mechanics.solver import Solver
 from mechanics.surface_compliance import patch_blocks, surface_compliance
 from mechanics.tetmesh import TetMesh
 
-WAYS = [("columns", "superlu")] + ([("schur", None), ("columns", "pardiso")] if available() else [])
+WAYS = [("columns", "superlu", 0)]
+if available():  # schur: all at once for a small result, in two parts for a large one
+    WAYS += [("columns", "pardiso", 0), ("schur", None, 1e8), ("schur", None, 0)]
 
 
-@pytest.mark.parametrize(("method", "backend"), WAYS)
-def test_condensed_equals_full_solves(box, method, backend):
+@pytest.mark.parametrize(("method", "backend", "small"), WAYS)
+def test_condensed_equals_full_solves(box, monkeypatch, method, backend, small):
+    monkeypatch.setattr("mechanics.compliance._SMALL", small)
     mesh = box((3, 3, 2), (0.1, 0.1, 0.05)).quadratic()
     ratio = np.random.default_rng(0).uniform(0.5, 6, len(mesh.tetrahedra))
     compliance = condense(mesh, 0.49, ratio, method=method, backend=backend)

@@ -79,9 +79,9 @@ def test_a_factor_an_element_is_asked_for(box):
 @pytest.mark.slow
 @pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
 def test_a_nodule_is_felt_as_in_a_fine_reference():
-    """A nodule of 10 mm, 6 times as stiff, its top 14 mm deep: contrast within 10 % of another library."""
-    arguments = argparse.Namespace(mesh_size=0.01, centre=[0.024], radius=0.01, ratio=6.0, depth=0.004)
-    (row,) = felt(arguments)
-    assert row["reference"] > 0.05
-    assert row["contrast"] == pytest.approx(row["reference"], rel=0.10)
-    assert row["plain_force_over_reference"] == pytest.approx(1, abs=0.04)
+    """Nodules of 10 mm, 6 times as stiff, tops 4 and 14 mm deep: contrast within 10 % of another library."""
+    arguments = argparse.Namespace(mesh_size=0.01, centre=[0.014, 0.024], radius=0.01, ratio=6.0, depth=0.004)
+    for row, least in zip(felt(arguments), (0.4, 0.05), strict=True):
+        assert row["reference"] > least
+        assert row["contrast"] == pytest.approx(row["reference"], rel=0.10)
+        assert row["plain_force_over_reference"] == pytest.approx(1, abs=0.04)

@@ -1,0 +1,77 @@
+"""What a nodule close below the surface adds under a contact narrower than the load patch."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.inclusion import Ball, drawn_anew, inclusion_ratio, mixed_ratio
+from mechanics.near_field import contact_width, sharpening
+from mechanics.refine import refined_around
+from mechanics.sites import patch_width, touch_sites
+from mechanics.solver import Solver
+
+NU = 0.49
+TOP = np.array([[0.0, 0.0, 0.04], [0.035, 0.035, 0.04]])
+UP = np.array([[0.0, 0.0, 1.0]] * 2)
+BALL = Ball((0.0, 0.0, 0.026), 0.009, 6.0)
+
+
+@pytest.fixture(scope="module")
+def mesh(box):
+    return box((8, 8, 4), (0.08, 0.08, 0.04)).quadratic()
+
+
+def stiff(mesh, times=1.0):
+    return times * inclusion_ratio(mesh, np.array(BALL.centre_m), BALL.radius_m, BALL.modulus_ratio)
+
+
+def test_a_uniform_object_keeps_its_far_field(mesh):
+    width = patch_width(mesh)
+    for ratio in (None, np.ones(len(mesh.tetrahedra)), np.full(len(mesh.tetrahedra), 3.0)):
+        assert (sharpening(Solver(mesh, NU, ratio), TOP, width) == 0).all()
+
+
+def test_a_narrower_contact_feels_more_of_a_nodule(mesh):
+    width = patch_width(mesh)
+    solver = Solver(mesh, NU, stiff(mesh))
+    near, away = sharpening(solver, TOP, width)
+    assert (away == 0).all(), "too far to matter, so it is not solved for"
+    assert (np.linalg.eigvalsh(near) < 0).all() and np.allclose(near, near.T)
+    plain = touch_sites(mesh, TOP[:1], UP[:1], NU, solver=Solver(mesh, NU), curvature=0.0).far[0]
+    wide = touch_sites(mesh, TOP[:1], UP[:1], NU, solver=solver, tip_radius_m=1.0, curvature=0.0).far[0]
+    tip = touch_sites(mesh, TOP[:1], UP[:1], NU, solver=solver, curvature=0.0).far[0]
+    assert np.allclose(tip - wide, near, rtol=1e-6, atol=1e-6)
+    assert (tip - plain)[2, 2] < 1.3 * (wide - plain)[2, 2] < 0
+    blunt = sharpening(solver, TOP[:1], width, tip_radius_m=0.008)[0]
+    assert near[2, 2] < blunt[2, 2] < 0
+    assert (sharpening(solver, TOP, contact_width(0.005)) == 0).all()
+
+
+def test_a_stiffer_object_as_a_whole_scales_it(mesh):
+    width = patch_width(mesh)
+    once, thrice = (sharpening(Solver(mesh, NU, stiff(mesh, m)), TOP, width) for m in (1.0, 3.0))
+    assert np.allclose(once / 3, thrice, rtol=1e-6, atol=1e-9)
+
+
+def test_a_cut_element_keeps_the_far_effect_of_its_share():
+    def effect(ratio):  # Eshelby's factor of a ball in an incompressible solid
+        return 5 * (ratio - 1) / (2 * ratio + 3)
+
+    share = np.linspace(0, 1, 11)
+    for stiffness in (0.3, 6.0, 50.0):
+        assert np.allclose(effect(mixed_ratio(share, stiffness)), share * effect(stiffness))
+
+
+def test_a_ball_is_drawn_anew_on_finer_elements(mesh):
+    linear, centre = mesh.linear(), np.array(BALL.centre_m)
+    fine, parent = refined_around(mesh, centre, BALL.radius_m, 0.006)
+    assert len(fine.tetrahedra) > 1.2 * len(mesh.tetrahedra)
+    assert np.allclose(np.bincount(parent, fine.volumes), linear.volumes)
+    area = [np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum() / 2
+            for p in (m.points[m.surface] for m in (fine, linear))]  # fmt: skip
+    assert area[0] == pytest.approx(area[1]), "a face that only one side halved would count twice"
+    base = np.random.default_rng(0).uniform(0.5, 2.0, len(mesh.tetrahedra))
+    ratio = drawn_anew(mesh, base * stiff(mesh), fine, parent, [BALL])
+    want = base[parent] * inclusion_ratio(fine, centre, BALL.radius_m, BALL.modulus_ratio)
+    assert np.allclose(ratio, want)
