@@ -71,7 +71,9 @@ def _touch(ax, result: Simulation) -> None:
 
 
 def _curves(ax, result: Simulation) -> None:
-    """Some presses spread over the depths, each at the depth that the instrument reads."""
+    """Some presses spread over the depths, and the one that differs most from the ideal object's, each at
+    the depth that the instrument reads.
+    """
     motion = result.motion
     turn = np.array(result.truth["device_from_object_rotation"])
     shift = np.array(result.truth["device_from_object_shift_mm"])
@@ -79,6 +81,9 @@ def _curves(ax, result: Simulation) -> None:
     presses = [k for k, touch in enumerate(result.touches) if touch.kind == "press"]
     presses.sort(key=lambda k: result.touches[k].depth)
     shown = np.unique(np.linspace(0, len(presses) - 1, PRESSES_SHOWN).round().astype(int))
+    if result.ideal_n is not None:
+        change = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
+        shown = np.union1d(shown, np.argmax([change[motion.touch == k].max() for k in presses]))
     for k in shown:
         normal = result.touches[presses[k]].normal
         rows = np.flatnonzero((motion.touch == presses[k]) & (motion.s > -1.0))

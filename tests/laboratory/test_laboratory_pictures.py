@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -39,6 +40,15 @@ def test_soft_tool_shows_as_presses_that_read_deeper(springs) -> None:
         deepest = int(ideal[:, 1].argmax())
         assert read[deepest, 0] - ideal[deepest, 0] == pytest.approx(1e3 * ideal[deepest, 1] / 1200, rel=0.02)
         assert read[:, 1] == pytest.approx(ideal[:, 1], abs=1e-5)
+
+
+def test_press_that_differs_most_is_among_those_drawn(springs) -> None:
+    result, _ = _figure({"force_bias": 1})
+    odd = sorted((t.depth, k) for k, t in enumerate(result.touches) if t.kind == "press")[1][1]
+    changed = np.where((result.motion.touch == odd)[:, None], 1.3 * result.clean_n, result.ideal_n)
+    figure = simulation_figure(replace(result, clean_n=changed))
+    ratios = [read[:, 1].max() / ideal[:, 1].max() for read, ideal in _pairs(figure.axes[3])]
+    assert len(ratios) == PRESSES_SHOWN + 1 and max(ratios) > 1.2
 
 
 def test_force_in_time_shows_the_change_of_the_force(springs) -> None:
