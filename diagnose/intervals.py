@@ -44,7 +44,9 @@ def parameter_intervals(
     index = 1 + sum(len(e.parameters) for e in found.effects[: found.effects.index(effect)])
     own = slice(index, index + k)
     spread = covariance(found, forward.touches.slowness, dof)[own, own]
-    spread = spread + np.diag(np.square(effect.extra.get("systematic", np.zeros(k))))
+    systematic = np.asarray(effect.extra.get("systematic", np.zeros(k)))
+    share = np.asarray(effect.extra.get("systematic_share", np.zeros(k)))
+    spread = spread + np.diag(systematic**2 + (share * found.values[own]) ** 2)
     low, high = effect.bounds
     draws = rng.multivariate_normal(found.values[own], spread, DRAWS, check_valid="ignore")
     for i in effect.extra.get("signed", ()):

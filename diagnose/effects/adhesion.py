@@ -18,5 +18,6 @@ EFFECT = Effect(
     ),
     change=_change,
     report=lambda values, forward: {"pull_off_n": float(values[0]), "range_m": float(values[1])},
+    extra={"systematic_share": (0.1, 0.2, 0.0)},
     signature="negative force at release only",
 )

@@ -20,6 +20,6 @@ EFFECT = Effect(
     change=_change,
     report=lambda values, forward: {"width_m": abs(float(values[0]))},
     # within the play the tip's place is not known, so a fit with the right width still misses
-    extra={"slack": 2.5},
+    extra={"slack": 2.5, "systematic_share": (0.15,)},
     signature="loop of constant width between loading and unloading",
 )

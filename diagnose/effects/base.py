@@ -42,8 +42,8 @@ class Effect:
     needs: stages that must be computed first ('fields', 'poisson', 'springs', 'unbonded').
     candidates(forward): starts found from the data, where the parameters' own are not enough.
     signature: in words. extra: 'slack', a factor on the lack of fit that its own law may leave; 'systematic',
-    (k,) standard deviations of its values that no noise tells; 'signed', values whose sign is sure once
-    named.
+    (k,) standard deviations of its values that no noise tells, from known cases; 'systematic_share', the same
+    in shares of the values; 'signed', values whose sign is sure once named.
     """
 
     name: str

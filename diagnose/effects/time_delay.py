@@ -15,5 +15,6 @@ EFFECT = Effect(
     parameters=(Parameter("delay_s", "s", -0.08, 0.08, 0.0, (0.01, -0.01), 0.002),),
     change=_change,
     report=lambda values, forward: {"delay_s": float(values[0])},
+    extra={"systematic": (2e-4,)},
     signature="loop proportional to the rate of force, none in a hold",
 )
