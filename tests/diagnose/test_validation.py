@@ -8,7 +8,7 @@ import pytest
 from diagnose.effects.time_delay import EFFECT as DELAY
 from diagnose.fit import Descent, fit
 from diagnose.forward import build_forward
-from diagnose.intervals import parameter_intervals
+from diagnose.intervals import covariance, parameter_intervals
 from diagnose.judging import AttributionOptions, Search
 from diagnose.library import effect
 from diagnose.shape import repeat_scatter
@@ -45,13 +45,20 @@ def test_the_interval_holds_the_truth_and_is_narrow(late):
     assert 1e-5 < high - low < 4e-3
 
 
-def test_half_the_sites_leave_a_wider_interval(late):
+def test_fewer_sites_tell_less(late):
+    search, _, found = late
+    few = found.__class__(**{**found.__dict__, "gram": found.gram[::4]})
+    whole, part = (covariance(f, 1.0, d)[1, 1] for f, d in ((found, search.dof), (few, search.dof / 4)))
+    assert part > 2 * whole
+
+
+def test_what_no_noise_tells_is_added(late):
     search, _, found = late
     rng = np.random.default_rng(0)
-    whole = np.ptp(parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"])
-    few = found.__class__(**{**found.__dict__, "gram": found.gram[::4]})
-    part = np.ptp(parameter_intervals(few, "time_delay", search.forward, search.dof / 4, rng)["delay_s"])
-    assert part > 1.4 * whole
+    low, high = parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"]
+    formal = np.sqrt(covariance(found, 1.0, search.dof)[1, 1])
+    expected = 2 * 1.96 * np.hypot(formal, DELAY.extra["systematic"][0])
+    assert high - low == pytest.approx(expected, rel=0.2)
 
 
 def test_places_not_fitted_are_predicted_by_the_right_effect(late):
