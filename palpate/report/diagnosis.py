@@ -271,6 +271,8 @@ def _plain(key: str, value: Any) -> tuple[str, str, str]:
 
 
 def _number(value: Any, factor: float = 1.0) -> str:
+    if isinstance(value, list) and len(value) == 1:
+        return _number(value[0], factor)
     if isinstance(value, list):
         return "(" + ", ".join(_number(v, factor) for v in value) + ")"
     if isinstance(value, bool) or not isinstance(value, (int, float)):
