@@ -34,9 +34,11 @@ from reconstruct.pipeline import Reconstruction
 def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Model] | None = None) -> Path:
     """Write the page, and its figures as PNGs into the folder PATH without suffix; returns the page's path.
 
+    A path without suffix gets '.html': its own name is the folder's.
     beside: other models by name, drawn beside in Figures 4 and 6 and in Table 1.
     """
     path = Path(path)
+    path = path if path.suffix else path.with_suffix(".html")
     figures = _figures(result, beside or {})
     save_figures(path.with_suffix(""), figures)
     page = Page(f"Reconstruction of {result.exploration.recording.name}")
