@@ -15,7 +15,7 @@ from scenes.phantoms import phantom
 
 
 def _figure(effects: dict[str, float]):
-    options = SimulateOptions(protocol="sparse", frame=True, position_resolution_m=0.0)
+    options = SimulateOptions(protocol="brief", frame=True, position_resolution_m=0.0)
     result = simulate(phantom("cylinder"), effects, options, seed=3, sizes=False, ideal=True)
     return result, simulation_figure(result)
 
