@@ -30,7 +30,8 @@ SPEC = DeviceSpec(
     workspace_radius_m=1.0,
     buttons=1,
 )
-LONGEST_CATCH_UP_S = 0.1
+LONGEST_CATCH_UP_S = 0.01
+"""A hand that leapt on by more in one reading would look like a device whose pose jumps."""
 TREMOR_HZ = (8.0, 9.7, 11.3)
 
 

@@ -65,10 +65,13 @@ class ObjectPicture:
         self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
 
     def colour_by_stiffness(self, stiffness_n_per_m: np.ndarray) -> None:
-        """(n,) N/m a point; the colours span all but the outermost two per cent."""
+        """(n,) N/m a point, 0 where it cannot be pressed; the colours span all but the outermost two per
+        cent."""
         name = "stiffness (N/m)"
+        pressed = stiffness_n_per_m > 0
+        shown = stiffness_n_per_m[pressed] if pressed.any() else stiffness_n_per_m
         self._surface[name] = stiffness_n_per_m
-        self._colour_by(name, "viridis", tuple(np.percentile(stiffness_n_per_m, [2, 98])))
+        self._colour_by(name, "viridis", tuple(np.percentile(shown, [2, 98])))
 
     def _colour_by(self, name: str, colours: str, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
@@ -90,7 +93,7 @@ class ObjectPicture:
                 "title": self._bar,
                 "title_font_size": 12,
                 "label_font_size": 11,
-                "n_labels": 4,
+                "n_labels": 2,  # a third would lie under the title
                 "fmt": "%.0f",
                 "color": "black",
                 "width": 0.42,

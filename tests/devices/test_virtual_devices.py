@@ -15,6 +15,7 @@ from devices.intention import FreeExploration, Path, Rest, minimum_jerk
 from devices.mouse import WINDOW_SILENT_S, MouseDevice
 from devices.registry import DEVICES, DeviceChoice, find_devices, make_device
 from devices.replay import ReplayDevice, ReplayOptions
+from devices.safety import SafetyOptions
 from devices.simulated import SimulatedHand, SimulatedOptions
 from mechanics.errors import DeviceError
 from mechanics.recording import Recording
@@ -140,6 +141,16 @@ def test_a_pause_is_not_replayed() -> None:
         later = hand.read()
     assert later.position_m[0] - late.position_m[0] < 0.011
     assert later.time_s == pytest.approx(clock.now)
+
+
+def test_a_pause_is_no_jump_to_the_safety_filter() -> None:
+    clock = Clock()
+    travel = Path([0.0, 10.0], [[0, 0, 0], [2.0, 0, 0]], even=True)
+    with SimulatedHand(STILL, travel, clock=clock) as hand:
+        before = run(hand, clock, 2.0)[-1]
+        clock.now += 0.3
+        after = hand.read()
+    assert np.linalg.norm(after.position_m - before.position_m) < SafetyOptions().jump_m
 
 
 def test_channel_carries_the_newest_and_survives_torn_writes() -> None:
