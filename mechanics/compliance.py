@@ -128,15 +128,16 @@ def _condense_first(matrix: sp.csr_matrix, place: np.ndarray, result: np.ndarray
 
 def inverse(matrix: np.ndarray) -> np.ndarray:
     """Inverse of a symmetric positive definite matrix, in its own memory (the argument is overwritten)."""
-    factor, info = la.lapack.dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
-    if info:
-        raise MeshError(f"the condensed stiffness is not positive definite (at row {info}): mesh again")
-    result, info = la.lapack.dpotri(factor, lower=1, overwrite_c=1)
-    if info:
-        raise MeshError(f"the condensed stiffness is singular (at row {info}): is every part held?")
-    result = result.T  # C order; the upper triangle holds the inverse
-    _mirror_upper(result)
-    return result
+    if pardiso.available():
+        row = pardiso.invert(matrix)
+    else:
+        factor, row = la.lapack.dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)
+        if not row:
+            _, row = la.lapack.dpotri(factor, lower=1, overwrite_c=1)
+    if row:
+        raise MeshError(f"the condensed stiffness is not positive definite (at row {row}): mesh again")
+    _mirror_upper(matrix)  # in C order the upper triangle holds the inverse
+    return matrix
 
 
 def _mirror_upper(matrix: np.ndarray, block: int = 512) -> None:
@@ -196,7 +197,7 @@ def load_or_condense(
     error = (options or ComplianceOptions()).error_of(model.mesh)
     form = () if error is None else ("low-rank", error)
     key = content_key(
-        "surface compliance 4",
+        "surface compliance 5",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,

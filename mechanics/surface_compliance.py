@@ -19,8 +19,9 @@ from mechanics.compression import compress, own_compliance
 from mechanics.inclusion import Ball
 from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
 from mechanics.nearest import closest_on_triangles
-from mechanics.patch import PatchSampler, half_space_compliance
+from mechanics.patch import PatchSampler, half_space_compliance, triangle_shapes
 from mechanics.progress import Progress, silent
+from mechanics.recovery import edge_middles
 from mechanics.refine import typical_edge
 from mechanics.sites import SURFACE_EDGE_M, patch_width, touch_solver
 from mechanics.solver import Solver
@@ -41,7 +42,8 @@ class SurfaceCompliance:
     block (i, j) = factor[i] @ factor[j].T.
     Fine, v corners: own_points, own_normals (v, 3), own_triangles (g, 3) into them, own (v, 3, 3), 1/m:
     displacement of the patch at i for a unit force on itself, and what a nodule close below adds
-    (mechanics.near_field). own_width_m: (1,).
+    (mechanics.near_field); own_middles (g, 3, 3, 3): the same half way between the corners of each triangle,
+    recovered from those around (mechanics.recovery). own_width_m: (1,).
     poisson_ratio: (1,). Rounding to float32 moves a block by less than 1e-7 of its greatest entry.
     """
 
@@ -58,8 +60,12 @@ class SurfaceCompliance:
     own_width_m: np.ndarray
     poisson_ratio: np.ndarray
     factor: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 0), dtype=np.float32))
+    own_middles: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 3, 3)))
 
     def __post_init__(self) -> None:
+        if not len(self.own_middles):
+            middles = edge_middles(self.own_points, self.own_triangles, self.own)
+            object.__setattr__(self, "own_middles", middles)
         for each in fields(self):
             getattr(self, each.name).setflags(write=False)
 
@@ -75,11 +81,12 @@ class SurfaceCompliance:
     def far_at(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(k, 3, 3) far-field compliance, 1/m, at surface points (k, 3) with normals (k, 3).
 
-        Interpolated in the nearest fine triangle; what TouchSites.far holds for a site there.
+        Interpolated quadratically in the nearest fine triangle; what TouchSites.far holds for a site there.
         """
         points, normals = np.atleast_2d(points), np.atleast_2d(normals)
         triangle, weights = closest_on_triangles(points, self.own_points, self.own_triangles)
-        own = np.einsum("kc,kcab->kab", weights, self.own[self.own_triangles[triangle]])
+        six = np.concatenate([self.own[self.own_triangles[triangle]], self.own_middles[triangle]], axis=1)
+        own = np.einsum("kc,kcab->kab", triangle_shapes(2, weights), six)
         nu, width = float(self.poisson_ratio[0]), float(self.own_width_m[0])
         return own - np.array([half_space_compliance(n, nu, width) for n in normals])
 
@@ -132,6 +139,7 @@ def surface_compliance(
     own_width = patch_width(fine.mesh)
     own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.5 * f))
     own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
+    progress("give of each place", 1.0)
     return SurfaceCompliance(
         nodes=nodes,
         points=points,
