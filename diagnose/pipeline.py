@@ -16,7 +16,7 @@ from diagnose.freeair import FreeAir, free_air_of
 from diagnose.gaps import closed_share, gap
 from diagnose.inclusions import inclusion_starts
 from diagnose.intervals import parameter_intervals
-from diagnose.judging import AttributionOptions, Candidate, Score, Search, sideways_off
+from diagnose.judging import EVERYWHERE, AttributionOptions, Candidate, Score, Search, sideways_off
 from diagnose.library import NAMES, effect
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry
@@ -150,7 +150,8 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
     misfit = chi > slack * search.options.unknown_chi
     rest, lone = found.final.chi_but_for_one(counts)
-    if misfit and rest < slack * search.options.unknown_chi:
+    lone_place = misfit and rest < slack * search.options.unknown_chi
+    if lone_place:
         # one touch that slipped or met something else is no law that is missing
         misfit = False
         x, y, z = 1e3 * t.point[t.site == lone].mean(axis=0)
@@ -165,8 +166,10 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         candidates = ["friction_slip", *candidates]
         remainder = True
         reasons.append(f"the sideways force is off by {slipping:.0%} of itself: the tip may slip")
-    if names and not with_fs and "finite_strain" not in excluded and deep_size > FINITE_STRAIN_LEAST * noise:
-        if "finite_strain" in found.final.found.names or "finite_strain" in found.base.found.names:
+    displacing = any(n in (*EVERYWHERE, "skin_layer") for n in found.chosen)
+    if displacing and not with_fs and "finite_strain" not in excluded:
+        ever = "finite_strain" in (*found.final.found.names, *found.base.found.names)
+        if ever and deep_size > FINITE_STRAIN_LEAST * noise:
             # deep enough for it, and it fitted no worse than the linear law until another took its place
             candidates.append("finite_strain")
     if with_fs:
@@ -189,6 +192,8 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
         reasons.append(
             f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"
         )
+    # with nothing named the gap is there all the same
+    remainder = remainder or (lone_place and not names)
     kind = _kind(names, candidates, remainder or (uneven and "surface_shape" in excluded))
     entries = _entries(
         forward, search, found, names, settled, counts, plain_before, noise, added, deep_size, options, rng
