@@ -24,6 +24,9 @@ from reconstruct.tool_weight import tool_weight
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW, _HIGH, _PEAK = 5.0, 10.0, 12.0  # in standard deviations of the noise
+_RIPPLE = 1e-4
+"""Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
+a rendered force knows no other noise."""
 _DELAY_ROUNDS = 4
 
 
@@ -216,7 +219,9 @@ def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarra
     """Filtered signals, free-air force (n, 3) N, and the noise of the filtered force, N an axis."""
     rate = recording.sample_rate_hz
     filtered = low_pass(recording.force_on_tool, rate, cutoff_hz)
-    noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), 1e-6)
+    ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
+    noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), ripple)
+    noise = max(noise, 1e-6)
     spread = noise * noise_gain(rate, cutoff_hz)
     weight = tool_weight(recording, filtered, cutoff_hz, spread)
     drift, _ = free_air_force(recording.t, filtered - weight, spread)

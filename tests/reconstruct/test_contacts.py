@@ -57,6 +57,23 @@ def test_normals_come_from_the_force(cylinder):
     assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 3
 
 
+def test_what_the_low_pass_leaves_of_a_rendered_force_is_no_contact():
+    recording, _ = explore_cylinder(noise=0.0)
+    kept = np.ones(len(recording.t), dtype=bool)
+    touching = np.linalg.norm(recording.force_on_tool, axis=1) > 0
+    for late in np.flatnonzero(touching[:-1] & ~touching[1:]):
+        kept[late - 70 : late] = False  # a loop that was held up while the tip let go
+    rows = {
+        name: value[kept]
+        for name, value in vars(recording).items()
+        if isinstance(value, np.ndarray) and len(value) == len(kept)
+    }
+    exploration = explore(dataclasses.replace(recording, **rows))
+    near = np.convolve(touching[kept], np.ones(201), mode="same") > 0.5  # within 0.1 s of a touch
+    left = np.linalg.norm(exploration.force, axis=1)[~near].max()
+    assert 0 < left < exploration.threshold_n
+
+
 def test_bias_and_drift_of_the_sensor_are_followed():
     recording, onsets = explore_cylinder(bias=(0.05, -0.03, 0.04), drift_n_per_s=0.002)
     exploration = explore(recording)
