@@ -115,7 +115,8 @@ def _curve(axis: Any, bins: list[dict[str, Any]]) -> None:
         of = [b for b in bins if b[key]["of"]]
         x = np.arange(len(of)) + shift
         p, low, high = np.array([b[key]["rate_and_interval"] for b in of]).reshape(-1, 3).T
-        axis.errorbar(x, p, yerr=[p - low, high - p], fmt="o-", color=colour, label=words, capsize=3)
+        bars = np.maximum([p - low, high - p], 0.0)  # rounding
+        axis.errorbar(x, p, yerr=bars, fmt="o-", color=colour, label=words, capsize=3)
         axis.set_xticks(np.arange(len(of)), [
             (f"{b['from']:g}-{b['to']:g}" if b["to"] < 1e8 else f">{b['from']:g}") + f"\n({b[key]['of']})"
             for b in of])  # fmt: skip

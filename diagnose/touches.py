@@ -282,7 +282,7 @@ def _loss_of_touch(recording, onset, peak, limit, normal, noise) -> float:
 
 def _phases(t: np.ndarray, depth: np.ndarray, onset: float, end: float) -> np.ndarray:
     deepest = depth.max()
-    near = depth > 0.9 * deepest
+    near = depth >= deepest - 0.1 * abs(deepest)  # a delayed hand may stay out of the surface throughout
     first, last = np.flatnonzero(near)[[0, -1]]
     phase = np.full(len(t), HOLDING)
     phase[:first] = LOADING
