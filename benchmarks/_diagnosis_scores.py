@@ -9,6 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._rates import wilson
+
 FAMILIES = {"poroelasticity": ("viscoelasticity",), "plasticity": ("mullins_softening",)}
 """What effects that the library has never had may be taken for, as declared; 'unknown' is right as well."""
 SIZES_IN_NOISE = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 1e9)
@@ -51,16 +53,6 @@ def answer_of(item: dict[str, Any]) -> Answer:
     else:
         first = "unknown" if "unknown" in kind or candidates else "none"
     return Answer(kind, named, candidates, first)
-
-
-def wilson(hits: int, of: int) -> tuple[float, float, float]:
-    """(rate, low, high): Wilson's 95 % interval; all nan for none."""
-    if of == 0:
-        return (float("nan"),) * 3
-    z, p = 1.959964, hits / of
-    centre = (p + z * z / (2 * of)) / (1 + z * z / of)
-    half = z * np.sqrt(p * (1 - p) / of + z * z / (4 * of * of)) / (1 + z * z / of)
-    return p, max(0.0, centre - half), min(1.0, centre + half)
 
 
 class _Tally:

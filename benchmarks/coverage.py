@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._rates import wilson
 from benchmarks._surface_truth import phantom_truth
 from benchmarks.surface import deviation
 from benchmarks.timing import table
@@ -50,7 +51,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 print(*rows[-1], flush=True)
             progress("explorations", (k + 1) / len(sets))
     covered, count = sum(e["covers"] for e in found), len(found)
-    low, high = wilson(covered, count)
+    _, low, high = wilson(covered, count)
     errors = np.array([e["error"] for e in found])
     print(table(["phantom", "hand", "true [kPa]", "found", "from", "to", "error", "covers", "law", "surface",
                  "mean mm", "95 % mm", "volume"], rows))  # fmt: skip
@@ -100,11 +101,3 @@ def _row(entry: dict[str, Any]) -> list[Any]:
         *(f"{1e3 * entry[k]:.2f}" for k in ("mean_m", "p95_m")),
         f"{100 * entry['volume_error']:+.1f} %",
     ]
-
-
-def wilson(hits: int, count: int, z: float = 1.96) -> tuple[float, float]:
-    """95 % interval of a share."""
-    share = hits / count
-    centre = (share + z * z / (2 * count)) / (1 + z * z / count)
-    half = z * np.sqrt(share * (1 - share) / count + z * z / (4 * count**2)) / (1 + z * z / count)
-    return float(centre - half), float(centre + half)

@@ -19,7 +19,7 @@ from mechanics.errors import OptionError
 from mechanics.recording import Recording, read_recording
 from mechanics.sites import patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 
 SUMMARY = "predicted against recorded forces where shape and modulus are known"
 WAYS = (
@@ -111,23 +111,20 @@ def run(arguments: argparse.Namespace) -> dict:
         nu = recording.poisson_ratio or 0.49
         displacement, measured, starts, points, normals, bent = touches(recording, sample)
         mesh = sample_mesh(sample, arguments.mesh_size)
-        far = {}
+        sites = {}
         for refined in (False, True):
             solver = touch_solver(mesh, nu) if refined else Solver(mesh.quadratic(), nu)
             width = patch_width(solver.mesh)
-            far[refined] = touch_sites(
+            sites[refined] = touch_sites(
                 solver.mesh, points, normals, nu, solver=solver, patch_width_m=width, curvature=bent
-            ).far
+            )
         for law, refined in WAYS:
-            predicted = touch_forces(
+            predicted = forces_at(
+                sites[refined],
                 displacement,
                 starts,
-                normals,
-                far[refined],
                 young_modulus_pa=float(recording.truth["young_modulus_pa"]),
-                poisson_ratio=nu,
                 tip_radius_m=recording.tip_radius_m,
-                curvature=bent,
                 law=law,
             )
             rms = float(np.sqrt(((predicted - measured) ** 2).sum(axis=1).mean()))
