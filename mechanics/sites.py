@@ -90,6 +90,7 @@ def touch_sites(
     poisson_ratio: float,
     modulus_ratio: np.ndarray | None = None,
     *,
+    balls: Sequence[Ball] = (),
     patch_width_m: float | None = None,
     curvature: np.ndarray | float | None = None,
     solver: Solver | None = None,
@@ -100,7 +101,8 @@ def touch_sites(
 
     mesh: linear or quadratic; modulus_ratio: (m,). patch_width_m: None takes `patch_width`.
     curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh.
-    solver: a factorisation to reuse, whose own mesh then counts; None makes `touch_solver(mesh, ...)`.
+    solver: a factorisation to reuse, whose own mesh then counts; None makes `touch_solver(mesh, ...)`, for
+    which the balls are.
     tip_radius_m: only matters where the modulus varies close below the surface (mechanics.near_field).
     Raises MeshError for points off the surface.
     """
@@ -112,7 +114,7 @@ def touch_sites(
             f"points {points.shape} and normals {normals.shape} must both be (k, 3), normals not 0"
         )
     normals = normals / length
-    solver = solver or touch_solver(mesh, poisson_ratio, modulus_ratio)
+    solver = solver or touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls)
     width = patch_width_m or patch_width(solver.mesh)
     sampler = PatchSampler(solver.mesh, width)
     far = np.empty((len(points), 3, 3))

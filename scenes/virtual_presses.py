@@ -13,7 +13,7 @@ from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.palpation import Palpation
 from mechanics.progress import Progress, silent
-from mechanics.sites import touch_sites, touch_solver
+from mechanics.sites import touch_sites
 from mechanics.touch import forces_at
 from reconstruct.one_d import Press, fit_robust
 
@@ -38,7 +38,8 @@ def palpate_model(
         points,
         normals,
         model.poisson_ratio,
-        solver=touch_solver(model.mesh, model.poisson_ratio, model.modulus_ratio, balls=balls_of(model)),
+        model.modulus_ratio,
+        balls=balls_of(model),
         tip_radius_m=model.tip_radius_m,
         progress=progress,
     )
