@@ -13,7 +13,6 @@ from diagnose.forward import Forward, Settings
 from diagnose.whiten import Whitener
 
 MODULUS_STEP = 0.01
-_FAR = 20  # parameter steps
 
 
 @dataclass(frozen=True)
@@ -50,11 +49,15 @@ class Fit:
 
     def of(self, name: str) -> np.ndarray:
         """One effect's values."""
+        return self.values[self.place_of(name)]
+
+    def place_of(self, name: str) -> slice:
+        """Where one effect's parameters lie among the values."""
         i = 1
         for effect in self.effects:
             k = len(effect.parameters)
             if effect.name == name:
-                return self.values[i : i + k]
+                return slice(i, i + k)
             i += k
         raise KeyError(name)
 
@@ -108,7 +111,10 @@ def fit(
     return best
 
 
-def _bounds(effects: tuple[Effect, ...]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def bounds_of(
+    effects: tuple[Effect, ...],
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """(k,) each of all values: least, greatest, step, weight of the prior, and its centre."""
     low, high, step, prior, centre = [-np.inf], [np.inf], [MODULUS_STEP], [0.0], [0.0]
     for effect in effects:
         for p in effect.parameters:
@@ -131,7 +137,7 @@ class Descent:
 
     def __init__(self, forward: Forward, whitener: Whitener, effects: tuple[Effect, ...], weights) -> None:  # type: ignore[no-untyped-def]
         self.forward, self.whitener, self.effects, self.weights = forward, whitener, effects, weights
-        self.low, self.high, self.step, self.prior, self.centre = _bounds(effects)
+        self.low, self.high, self.step, self.prior, self.centre = bounds_of(effects)
 
     def residual(self, values: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(n, 3) N, measured less predicted."""
@@ -294,75 +300,3 @@ class Descent:
                 break
             held |= outside
         return np.clip(values + np.clip(move, -30 * self.step, 30 * self.step), self.low, self.high)
-
-
-def held_out(found: Fit) -> tuple[np.ndarray, np.ndarray]:
-    """Leave one group out: (whitened loss, plain sum of squares N^2), (g,) each, of the group not fitted.
-
-    Linearised at the optimum of all: each group's share of the normal equations is taken out again. For the
-    plain gap the modulus is refitted to the other groups' plain residual, so that a gap is never one that a
-    modulus would close.
-    """
-    gram, raw = found.gram, found.raw
-    low, high, step, *_ = _bounds(found.effects)
-    total, raw_total = gram.sum(axis=0), raw.sum(axis=0)
-    whitened = np.empty(len(gram))
-    plain = np.empty(len(gram))
-    at_bound = (found.values <= low + 1e-9) | (found.values >= high - 1e-9)
-    free = ~at_bound
-    free[0] = True
-    for g in range(len(gram)):
-        rest = total - gram[g]
-        hessian = (rest[1:, 1:] + np.diag(found.prior))[np.ix_(free, free)]
-        hessian = hessian + 1e-9 * np.diag(np.diag(hessian))
-        move = np.zeros(len(found.values))
-        move[free] = np.linalg.solve(hessian, (rest[1:, 0] - found.pull)[free])
-        # where sites leave a parameter loose, a linear answer is good near the optimum only
-        move = np.clip(move, -_FAR * step, _FAR * step)
-        move = np.clip(found.values + move, low, high) - found.values
-        coefficients = np.concatenate([[1.0], -move])
-        whitened[g] = 0.5 * coefficients @ gram[g] @ coefficients
-        others = raw_total - raw[g]
-        coefficients[1] -= others[1] @ coefficients / max(others[1, 1], 1e-12)
-        plain[g] = coefficients @ raw[g] @ coefficients
-    return whitened, plain
-
-
-def levelled(found: Fit) -> np.ndarray:
-    """(n, 3) N, the residual after the modulus is refitted to it plainly (linearised)."""
-    raw = found.raw.sum(axis=0)
-    return found.residual - raw[0, 1] / max(raw[1, 1], 1e-12) * found.jacobian[:, :, 0]
-
-
-def first_touches(
-    forward: Forward, whitener: Whitener, modulus: float, reach_m: float = 2.4e-3
-) -> np.ndarray:
-    """(p,) m, how much earlier each press met the surface than its model says: a search over shifts.
-
-    Each press alone, with a free factor on its force, so that neither modulus nor shape decides it.
-    """
-    t = forward.touches
-    shifts = np.linspace(-reach_m, reach_m, 25)
-    cost = np.empty((len(shifts), t.presses))
-    measured = np.where(t.counted, t.f[:, 0], 0.0)
-    for i, shift in enumerate(shifts):
-        settings = forward.ideal(modulus)
-        settings.onset = settings.onset + shift
-        predicted = np.where(t.counted, forward.predict(settings)[:, 0], 0.0)
-
-        def sums(a: np.ndarray) -> np.ndarray:
-            return np.bincount(t.press, weights=a, minlength=t.presses)
-
-        pp, pf, ff = sums(predicted**2), sums(predicted * measured), sums(measured**2)
-        factor = np.clip(pf / np.maximum(pp, 1e-12), 0.5, 2.0)
-        error = ff - 2 * factor * pf + factor**2 * pp
-        cost[i] = (
-            error / (sums(t.counted.astype(float)) * whitener.variance) * 50
-            + (shift / (2 * whitener.onset_sd)) ** 2
-        )
-    best = np.argmin(cost, axis=0)
-    inner = np.clip(best, 1, len(shifts) - 2)
-    rows = np.arange(t.presses)
-    left, mid, right = cost[inner - 1, rows], cost[inner, rows], cost[inner + 1, rows]
-    curve = np.maximum(left - 2 * mid + right, 1e-12)
-    return shifts[inner] + np.clip(0.5 * (left - right) / curve, -0.5, 0.5) * (shifts[1] - shifts[0])

@@ -84,7 +84,7 @@ class Forward:
         self._linear = dent_law("linear").table
         self._deep = dent_law("neo-hookean").table
         t = self.touches
-        self._kept: dict[tuple, np.ndarray] = {}
+        self._kept: dict[int, np.ndarray] = {}
         self.clock = t.t - t.t[0]
         self.acceleration = _acceleration(t)
         self.dents = grid()
@@ -146,8 +146,7 @@ class Forward:
         usual = self.model.young_modulus_pa
         give = s.tool_give * s.modulus / usual
         arrays = (y, s.far, s.stiffness, s.dent_ratio, table)
-        key = (s.tip_radius, s.nu, give, s.mu, *(a.tobytes() for a in arrays))
-        key = (hash(key), s.backlash)
+        key = hash((s.tip_radius, s.nu, give, s.mu, *(a.tobytes() for a in arrays)))
         f = self._kept.get(key)
         if f is None:
             radius = np.ascontiguousarray(

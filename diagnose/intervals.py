@@ -41,8 +41,7 @@ def parameter_intervals(
     k = len(effect.parameters)
     if k == 0:
         return {}
-    index = 1 + sum(len(e.parameters) for e in found.effects[: found.effects.index(effect)])
-    own = slice(index, index + k)
+    own = found.place_of(name)
     spread = covariance(found, forward.touches.slowness, dof)[own, own]
     systematic = np.asarray(effect.extra.get("systematic", np.zeros(k)))
     share = np.asarray(effect.extra.get("systematic_share", np.zeros(k)))

@@ -9,8 +9,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.effects.base import Effect
-from diagnose.fit import Descent, Fit, first_touches, fit, held_out, levelled, settings_of
+from diagnose.first_touch import first_touches
+from diagnose.fit import Descent, Fit, fit, settings_of
 from diagnose.forward import Forward
+from diagnose.leave_one_out import held_out, levelled
 from diagnose.shape import repeat_scatter
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.options import option

@@ -154,7 +154,7 @@ def _conclude(recording, forward, search, found, free, settled, site_sd, options
     if lone_place:
         # one touch that slipped or met something else is no law that is missing
         misfit = False
-        x, y, z = 1e3 * t.point[t.site == lone].mean(axis=0)
+        x, y, z = 1e3 * t.site_point[lone]
         reasons.append(
             f"the touches at ({x:.0f}, {y:.0f}, {z:.0f}) mm fit nothing, the others miss by "
             f"{np.sqrt(rest):.1f} times the noise: touch there again"

@@ -74,6 +74,11 @@ class Touches:
         return int(self.site.max()) + 1
 
     @cached_property
+    def site_point(self) -> np.ndarray:
+        """(s, 3) m, device frame: the mean place of each site's presses."""
+        return np.array([self.point[self.site == s].mean(axis=0) for s in range(self.sites)])
+
+    @cached_property
     def press(self) -> np.ndarray:
         """(n,) the press of each sample."""
         return np.repeat(np.arange(self.presses), np.diff(self.start))

@@ -62,7 +62,7 @@ def _without(search: Search, found: Fit, fold: np.ndarray, extra: np.ndarray | N
 
 def neighbours(t: Touches) -> list[np.ndarray]:
     """Site numbers of each fold: sites nearest to one of FOLDS centres, spread by farthest points."""
-    place = np.array([t.point[t.site == s].mean(axis=0) for s in range(t.sites)])
+    place = t.site_point
     centres = [int(np.argmax(np.linalg.norm(place - place.mean(axis=0), axis=1)))]
     while len(centres) < min(FOLDS, t.sites):
         away = np.linalg.norm(place[:, None] - place[centres], axis=2).min(axis=1)

@@ -263,11 +263,10 @@ WORDS = {
 }
 
 
-def _plain(key: str, value: Any) -> tuple[str, str, str]:
-    """(words, value, unit) of a parameter's key, in units that a hand knows."""
+def _plain(key: str) -> tuple[str, float, str]:
+    """(words, factor from SI, unit) of a parameter's key, in units that a hand knows."""
     suffix, factor, unit = next((u for u in UNITS if key.endswith(u[0])), ("", 1.0, ""))
-    words = WORDS.get(key, key.removesuffix(suffix).replace("_", " "))
-    return words, _number(value, factor), unit
+    return WORDS.get(key, key.removesuffix(suffix).replace("_", " ")), factor, unit
 
 
 def _number(value: Any, factor: float = 1.0) -> str:
@@ -281,7 +280,11 @@ def _number(value: Any, factor: float = 1.0) -> str:
 
 
 def _short(parameters: dict[str, Any]) -> str:
-    return ", ".join(" ".join(_plain(k, v)).strip() for k, v in parameters.items())
+    said = []
+    for key, value in parameters.items():
+        words, factor, unit = _plain(key)
+        said.append(f"{words} {_number(value, factor)} {unit}".strip())
+    return ", ".join(said)
 
 
 def _parameter_rows(result: Diagnosis) -> list[list[str]]:
@@ -289,9 +292,8 @@ def _parameter_rows(result: Diagnosis) -> list[list[str]]:
     rows = []
     for entry in result.entries:
         for key, value in entry.parameters.items() if entry.name in result.effects else ():
-            words, number, unit = _plain(key, value)
-            _, factor, _ = next((u for u in UNITS if key.endswith(u[0])), ("", 1.0, ""))
+            words, factor, unit = _plain(key)
             low, high = entry.intervals.get(key, (None, None))
             span = "-" if low is None else f"{_number(low, factor)} to {_number(high, factor)}"
-            rows.append([entry.name.replace("_", " "), words, number, span, unit])
+            rows.append([entry.name.replace("_", " "), words, _number(value, factor), span, unit])
     return rows

@@ -1,0 +1,42 @@
+"""Where each press first met the surface, before anything is fitted: a search over shifts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnose.forward import Forward
+from diagnose.whiten import Whitener
+
+
+def first_touches(
+    forward: Forward, whitener: Whitener, modulus: float, reach_m: float = 2.4e-3
+) -> np.ndarray:
+    """(p,) m, how much earlier each press met the surface than its model says: a search over shifts.
+
+    Each press alone, with a free factor on its force, so that neither modulus nor shape decides it.
+    """
+    t = forward.touches
+    shifts = np.linspace(-reach_m, reach_m, 25)
+    cost = np.empty((len(shifts), t.presses))
+    measured = np.where(t.counted, t.f[:, 0], 0.0)
+    for i, shift in enumerate(shifts):
+        settings = forward.ideal(modulus)
+        settings.onset = settings.onset + shift
+        predicted = np.where(t.counted, forward.predict(settings)[:, 0], 0.0)
+
+        def sums(a: np.ndarray) -> np.ndarray:
+            return np.bincount(t.press, weights=a, minlength=t.presses)
+
+        pp, pf, ff = sums(predicted**2), sums(predicted * measured), sums(measured**2)
+        factor = np.clip(pf / np.maximum(pp, 1e-12), 0.5, 2.0)
+        error = ff - 2 * factor * pf + factor**2 * pp
+        cost[i] = (
+            error / (sums(t.counted.astype(float)) * whitener.variance) * 50
+            + (shift / (2 * whitener.onset_sd)) ** 2
+        )
+    best = np.argmin(cost, axis=0)
+    inner = np.clip(best, 1, len(shifts) - 2)
+    rows = np.arange(t.presses)
+    left, mid, right = cost[inner - 1, rows], cost[inner, rows], cost[inner + 1, rows]
+    curve = np.maximum(left - 2 * mid + right, 1e-12)
+    return shifts[inner] + np.clip(0.5 * (left - right) / curve, -0.5, 0.5) * (shifts[1] - shifts[0])
