@@ -220,8 +220,8 @@ def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarra
     rate = recording.sample_rate_hz
     filtered = low_pass(recording.force_on_tool, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
-    noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), ripple)
-    noise = max(noise, 1e-6)
+    stated = 0.5 * (recording.force_noise_std_n or 0.0)
+    noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
     spread = noise * noise_gain(rate, cutoff_hz)
     weight = tool_weight(recording, filtered, cutoff_hz, spread)
     drift, _ = free_air_force(recording.t, filtered - weight, spread)
