@@ -40,9 +40,13 @@ def share_inside(
     mesh: TetMesh, centre_m: np.ndarray, radius_m: float, elements: np.ndarray | slice = slice(None)
 ) -> np.ndarray:
     """(m,) share of each tetrahedron (or of `elements` alone) in a sphere, from 20 points in each."""
-    corners = mesh.points[mesh.tetrahedra[elements, :4]]
-    points = np.einsum("qc,mcx->mqx", _SAMPLES, corners)
+    points = points_inside(mesh, elements)
     return (np.linalg.norm(points - centre_m, axis=2) < radius_m).mean(axis=1)
+
+
+def points_inside(mesh: TetMesh, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
+    """(m, 20, 3) m, points that share each tetrahedron (or each of `elements`) evenly."""
+    return np.einsum("qc,mcx->mqx", _SAMPLES, mesh.points[mesh.tetrahedra[elements, :4]])
 
 
 def inclusion_ratio(mesh: TetMesh, centre_m: np.ndarray, radius_m: float, modulus_ratio: float) -> np.ndarray:

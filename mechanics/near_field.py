@@ -9,12 +9,16 @@ without the nodule and drops out of the difference.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from mechanics.compression import own_compliance
+from mechanics.inclusion import Ball, inclusion_ratio
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
+from mechanics.tetmesh import TetMesh
 
 CONTACT_IN_TIP_RADII = 0.44
 """Width of the Gaussian that stands for a contact 0.8 tip radii deep: by it a nodule is felt as in a contact
@@ -28,6 +32,27 @@ _BATCH = 32
 def contact_width(tip_radius_m: float) -> float:
     """Width, m, of a Gaussian patch that reaches into the depth as the contact of a tip does."""
     return CONTACT_IN_TIP_RADII * tip_radius_m
+
+
+def surface_softness(
+    mesh: TetMesh,
+    modulus_ratio: np.ndarray,
+    points: np.ndarray,
+    tip_radius_m: float,
+    balls: Sequence[Ball] = (),
+) -> np.ndarray:
+    """(k,) global modulus over that of the surface under a tip at points (k, 3) m; 1 where it is uniform.
+
+    Balls that modulus_ratio (m,) holds lie inside: what they add to elements at the surface does not count.
+    """
+    ratio = np.asarray(modulus_ratio, dtype=float)
+    for ball in balls:
+        ratio = ratio / inclusion_ratio(mesh, np.array(ball.centre_m), ball.radius_m, ball.modulus_ratio)
+    softness = 1 / ratio[mesh.touchable_elements]
+    if np.abs(softness - 1).max() < 1e-9:
+        return np.ones(len(points))
+    sampler = PatchSampler(mesh, contact_width(tip_radius_m))
+    return np.array([sampler.triangle_mean(point, softness) for point in points])
 
 
 def sharpening(

@@ -41,8 +41,9 @@ class Solver:
             raise OptionError(f"backend is '{backend}'; allowed are {', '.join(BACKENDS)}")
         self.free = free_dofs(mesh, support)
         full = stiffness(mesh, poisson_ratio, modulus_ratio, mean_dilatation=mean_dilatation)
-        if support is not None and support.springs is not None:
-            full = (full + support.stiffness(mesh)).tocsr()
+        springs = None if support is None else support.stiffness(mesh)
+        if springs is not None:
+            full = (full + springs).tocsr()
         self.matrix = full[self.free][:, self.free].tocsr()
         try:
             if self.backend == "pardiso":

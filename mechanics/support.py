@@ -16,6 +16,8 @@ from mechanics.elasticity import triangle_mass
 from mechanics.errors import OptionError
 from mechanics.tetmesh import TetMesh
 
+FLOOR = 1e5  # 1/m, stiffness a unit of area over the modulus: far stiffer than an object of centimetres
+
 
 @dataclass(frozen=True)
 class Support:
@@ -23,13 +25,14 @@ class Support:
 
     springs: (normal, tangential) stiffness a unit of area over Young's modulus, 1/m; None: rigid.
     bonded_fraction: share of the base's area that is held; the rest, towards `direction` (3,), may lift
-    and slip.
+    and slip (mechanics.floor says what the floor carries of it), or with `resting` slip but not lift.
     """
 
     normal: np.ndarray
     springs: tuple[float, float] | None = None
     bonded_fraction: float = 1.0
     direction: np.ndarray | None = None
+    resting: bool = False
 
     def __post_init__(self) -> None:
         if not 0 < self.bonded_fraction <= 1:
@@ -58,18 +61,30 @@ class Support:
         return held
 
     def stiffness(self, mesh: TetMesh) -> sp.csr_matrix | None:
-        """What the springs add to the stiffness for unit modulus, (3n, 3n) m, or None."""
-        if self.springs is None:
-            return None
+        """What springs, and a floor that holds on, add to the stiffness for unit modulus, (3n, 3n) m, or
+        None."""
         nn = np.outer(self.normal, self.normal)
-        per_area = self.springs[0] * nn + self.springs[1] * (np.eye(3) - nn)
-        triangles = self.held_triangles(mesh)
-        mass = triangle_mass(mesh.points, triangles)
-        k = triangles.shape[1]
-        rows = np.repeat(triangles, k, axis=1).ravel()
-        columns = np.tile(triangles, (1, k)).ravel()
-        nodal = sp.csr_matrix((mass.ravel(), (rows, columns)), shape=(len(mesh.points),) * 2)
-        return sp.kron(nodal, per_area, format="csr")
+        total = None
+        if self.springs is not None:
+            per_area = self.springs[0] * nn + self.springs[1] * (np.eye(3) - nn)
+            total = _spread(mesh, self.held_triangles(mesh), per_area)
+        if self.resting and self.bonded_fraction < 1:
+            base = base_triangles(mesh)
+            held = {tuple(t) for t in self.held_triangles(mesh)}
+            loose = np.array([t for t in base if tuple(t) not in held]).reshape(-1, base.shape[1])
+            floor = _spread(mesh, loose, FLOOR * nn)
+            total = floor if total is None else total + floor
+        return total
+
+
+def _spread(mesh: TetMesh, triangles: np.ndarray, per_area: np.ndarray) -> sp.csr_matrix:
+    """(3n, 3n) of springs (3, 3) a unit of area over triangles."""
+    mass = triangle_mass(mesh.points, triangles)
+    k = triangles.shape[1]
+    rows = np.repeat(triangles, k, axis=1).ravel()
+    columns = np.tile(triangles, (1, k)).ravel()
+    nodal = sp.csr_matrix((mass.ravel(), (rows, columns)), shape=(len(mesh.points),) * 2)
+    return sp.kron(nodal, per_area, format="csr")
 
 
 def base_triangles(mesh: TetMesh) -> np.ndarray:

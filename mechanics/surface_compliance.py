@@ -10,12 +10,13 @@ elements and the mesh's own corners serve.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 import scipy.sparse as sp
 
 from mechanics.compression import compress, own_compliance
+from mechanics.floor import carried_by_floor
 from mechanics.inclusion import Ball
 from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
 from mechanics.nearest import closest_on_triangles
@@ -116,7 +117,10 @@ def surface_compliance(
     a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where the modulus varies close below the
     surface (mechanics.near_field).
     """
-    coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=support)
+    # between places a loose base rests on the floor: never softer than what each place has of its own
+    resting = None if support is None else replace(support, resting=True)
+    loose = support is not None and support.bonded_fraction < 1
+    coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=resting)
     nodes, triangles = _corners(coarse.mesh)
     points = coarse.mesh.points[nodes]
     normals = _normals(coarse.mesh, nodes)
@@ -128,7 +132,7 @@ def surface_compliance(
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
-    if typical_edge(mesh) > SURFACE_EDGE_M or balls:
+    if typical_edge(mesh) > SURFACE_EDGE_M or balls or loose:
         del coarse
         fine = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, support=support)
     else:  # what touch_solver would factorise once more
@@ -139,6 +143,8 @@ def surface_compliance(
     own_width = patch_width(fine.mesh)
     own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.5 * f))
     own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
+    if loose:
+        own -= carried_by_floor(fine, own_points, own_normals, own_width)
     progress("give of each place", 1.0)
     return SurfaceCompliance(
         nodes=nodes,

@@ -15,6 +15,7 @@ from render.walking import foot
 
 SWEEP_STEPS = 24
 CLEAR = 1e-6  # m off the surface that counts as outside, whatever rounding says
+OVERLAP = 0.5  # of the depth below the anchor's plane: a tip that overlaps the object by less has left
 FAR = 0.02  # m beyond the tip's radius that a search looks; clearances above it are as good as that
 
 
@@ -119,6 +120,28 @@ def _arm(surface, grip, tip, i, radius, weights, stack):
         grip.clearance[i] = distance - radius
     for k in range(3):
         grip.previous[i, k] = tip[k]
+
+
+@kernel
+def strayed(surface, tip, point, normal, radius, weights, stack):
+    """Whether a tip that was carried away from its anchor is off the object, or nearly so.
+
+    An anchor that sticks near a rim takes a tip that passes by for one that goes in: by its plane the tip is
+    deep, while it overlaps the object by little. Only asked where the tip is more than its radius aside.
+    """
+    along = squared = 0.0
+    for k in range(3):
+        d = tip[k] - point[k]
+        along += d * normal[k]
+        squared += d * d
+    if not squared - along * along > radius * radius:
+        return False
+    triangle, distance = closest_triangle(
+        surface.bvh, surface.vertices, surface.triangles, tip, np.inf, weights, stack
+    )
+    if triangle < 0 or not outside(surface, triangle, weights, tip):
+        return False
+    return radius - distance < OVERLAP * (radius - along)
 
 
 @kernel

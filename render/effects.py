@@ -13,6 +13,7 @@ import numpy as np
 
 from mechanics.dent import DentLaw, dent_law
 from mechanics.effects.mullins_softening import dent_energy
+from mechanics.effects.skin_layer import skinned
 from mechanics.effects.strain_stiffening import stiffened
 from mechanics.effects.viscoelasticity import prony_series
 from mechanics.errors import ModelError
@@ -27,6 +28,7 @@ RENDERED = (
     "tip_radius",
     "friction_slip",
     "adhesion",
+    "skin_layer",
 )
 """Effects that a step renders by a law of its own."""
 
@@ -37,8 +39,8 @@ the same, where one that stuck for good would stretch the surface without bound.
 
 
 class EffectArrays(NamedTuple):
-    """For the kernel. g, tau_s: (k,) Prony. mullins: (2,) r, m; r = 0: none. adhesion: (2,) pull-off N, range
-    m.
+    """For the kernel. g, tau_s: (k,) Prony. mullins: (2,) r, m; r = 0: none. adhesion: (3,) pull-off N, range
+    m, share that holds deeper inside.
 
     dent_radius: (1,) factor on the tip's radius in the dent.
     """
@@ -54,7 +56,7 @@ def effect_arrays(model: Model, options: RenderOptions) -> EffectArrays:
     """The kernel's numbers; raises ModelError where an effect's keys are missing or impossible."""
     effects = dict(model.effects) if options.effects else {}
     g = tau = np.zeros(0)
-    mullins, adhesion, dent_radius = np.zeros(2), np.zeros(2), np.ones(1)
+    mullins, adhesion, dent_radius = np.zeros(2), np.zeros(3), np.ones(1)
     try:
         if "viscoelasticity" in effects:
             g, tau = prony_series(effects["viscoelasticity"])
@@ -69,8 +71,14 @@ def effect_arrays(model: Model, options: RenderOptions) -> EffectArrays:
             )
         if "adhesion" in effects:
             keys = effects["adhesion"]
-            adhesion = np.array([float(keys["pull_off_n"]), float(keys["range_m"])])
-            _check(adhesion[0] >= 0 and adhesion[1] > 0, "adhesion", "pull_off_n at least 0, range_m above 0")
+            adhesion = np.array(
+                [float(keys["pull_off_n"]), float(keys["range_m"]), float(keys.get("inside", 0.0))]
+            )
+            _check(
+                adhesion[0] >= 0 and adhesion[1] > 0 and 0 <= adhesion[2] <= 1,
+                "adhesion",
+                "pull_off_n at least 0, range_m above 0, inside from 0 to 1",
+            )
         if "tip_radius" in effects:
             dent_radius = np.array([float(effects["tip_radius"]["tip_radius_m"]) / model.tip_radius_m])
             _check(dent_radius[0] > 0, "tip_radius", "tip_radius_m greater than 0")
@@ -94,6 +102,11 @@ def rendered_dent_law(model: Model, options: RenderOptions) -> DentLaw:
     law = dent_law(name)
     if "strain_stiffening" in model.effects:
         law = stiffened(law, float(model.effects["strain_stiffening"]["c20_over_c10"]))
+    if "skin_layer" in model.effects:
+        keys = model.effects["skin_layer"]
+        thickness, ratio = float(keys["thickness_m"]), float(keys["modulus_ratio"])
+        _check(thickness > 0 and ratio > 0, "skin_layer", "thickness_m and modulus_ratio above 0")
+        law = skinned(law, thickness, ratio, model.tip_radius_m, model.poisson_ratio)
     return law
 
 

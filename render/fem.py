@@ -46,7 +46,7 @@ class FemRenderer(Renderer):
         self.compliance = compliance or load_or_condense(model, progress=progress)
         self.contact = touched_surface(model, self.options)
         self.dent_law = rendered_dent_law(model, self.options)
-        field = far_field(model.mesh, self.contact, self.compliance)
+        field = far_field(model, self.contact, self.compliance)
         number = np.full(len(model.mesh.points), len(self.compliance.nodes))
         number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
         self._drawn = number[self.contact.nodes]
@@ -54,6 +54,7 @@ class FemRenderer(Renderer):
             surface=self.contact.arrays,
             far=field.far,
             curvature=field.curvature,
+            softness=field.softness,
             parents=field.parents,
             parent_weights=self.contact.parent_weights,
             blocks=np.array(self.compliance.blocks),

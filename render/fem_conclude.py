@@ -68,7 +68,7 @@ def _force(p, state, i, depth):
         push += force[k] * normal[k]
     pull = 0.0
     if e.adhesion[0] > 0.0:
-        pull = adhesive_pull(depth, state.deepest[i], e.adhesion[0], e.adhesion[1])
+        pull = adhesive_pull(depth, state.deepest[i], e.adhesion[0], e.adhesion[1], e.adhesion[2])
     for k in range(3):
         force[k] = (force[k] if push > 0.0 else 0.0) - pull * normal[k]
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.contact import approach, lose
+from render.contact import approach, lose, release, strayed
 from render.fem_conclude import conclude, forget
 from render.fem_coupling import carry_all, leave, link, locate, renew
 from render.fem_solve import settle, solve_one, unsettled
@@ -35,6 +35,17 @@ def fem_step(p, state, tips):
     for i in range(m):
         if not (np.isfinite(tips[i, 0]) and np.isfinite(tips[i, 1]) and np.isfinite(tips[i, 2])):
             lose(grip, i)
+        elif grip.triangle[i] >= 0 and strayed(
+            p.surface,
+            tips[i],
+            state.points[i],
+            state.normals[i],
+            state.radii_m[i],
+            state.vectors[0],
+            state.stack,
+        ):
+            forget(state, i)
+            release(grip, i, tips[i])
         elif grip.triangle[i] < 0 and approach(
             p.surface,
             grip,

@@ -26,7 +26,7 @@ def settle(p, state, i):
     place(p.surface, t, weights, state.points[i], state.normals[i])
     turn_frame(state.frames[i], state.normals[i])
     frame, local, young = state.frames[i], state.local_far[i], p.young_modulus_pa[0]
-    curvature = 0.0
+    curvature = softness = 0.0
     turned = state.vectors
     for r in range(3):
         for c in range(3):
@@ -34,6 +34,7 @@ def settle(p, state, i):
     for corner in range(3):
         v, w = p.surface.triangles[t, corner], weights[corner] / young
         curvature += weights[corner] * p.curvature[v]
+        softness += weights[corner] * p.softness[v]
         for r in range(3):
             for c in range(3):
                 local[r, c] += w * p.far[v, r, c]
@@ -53,6 +54,7 @@ def settle(p, state, i):
     radius = state.radii_m[i] * p.effects.dent_radius[0]
     state.radius[i] = 1.0 / max(1.0 / radius + curvature, 0.25 / radius)
     state.curvature[i] = curvature
+    state.young[i] = young / softness
 
 
 @part
@@ -60,8 +62,9 @@ def solve_one(p, state, tips, i):
     """One Gauss-Seidel update: the force of tip i where the others' forces stand as they are; tells them."""
     grip, frame, out = state.grip, state.frames[i], state.solution[i]
     d, local, move = state.vectors[3], state.vectors[4], state.vectors[5]
-    plane_strain = p.young_modulus_pa[0] / (1.0 - p.poisson_ratio[0] ** 2)
-    stick = 4.0 * p.young_modulus_pa[0] / ((1.0 + p.poisson_ratio[0]) * (2.0 - p.poisson_ratio[0]))
+    nu = p.poisson_ratio[0]
+    plane_strain = state.young[i] / (1.0 - nu**2)
+    stick = 4.0 * state.young[i] / ((1.0 + nu) * (2.0 - nu))
     mu = p.friction[0]
     fu = fv = fn = dent = a = du = dv = tangent = 0.0
     length = before = 0.0
@@ -95,6 +98,8 @@ def solve_one(p, state, tips, i):
             move[k] = -length * (fu * frame[0, k] + fv * frame[1, k]) / pull
         grip.triangle[i] = walk(p.surface, grip.triangle[i], grip.weights[i], move)
         settle(p, state, i)
+        plane_strain = state.young[i] / (1.0 - nu**2)
+        stick = 4.0 * state.young[i] / ((1.0 + nu) * (2.0 - nu))
     for k in range(3):
         move[k] = fu * frame[0, k] + fv * frame[1, k] + fn * frame[2, k] - state.elastic[i, k]
         state.elastic[i, k] += move[k]
@@ -109,7 +114,7 @@ def solve_one(p, state, tips, i):
 def unsettled(p, state, i):
     """Whether the others have moved the place of tip i by what changes its force by more than CONVERGED_N."""
     # E times the radius bounds the sideways stiffness, and the normal one before it touches
-    least = CONVERGED_N / (state.solution[i, 7] + p.young_modulus_pa[0] * state.radius[i])
+    least = CONVERGED_N / (state.solution[i, 7] + state.young[i] * state.radius[i])
     for k in range(3):
         if abs(state.carried[k, i] - state.carried_before[k, i]) > least:
             return True

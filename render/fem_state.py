@@ -16,8 +16,9 @@ from render.surface import SurfaceArrays
 class FemParameters(NamedTuple):
     """Read-only arrays of the kernel; v fine vertices, k fine triangles, n compliance nodes, unit modulus.
 
-    far: (v, 3, 3) 1/m. curvature: (v,) 1/m. parents: (k, 3) compliance nodes that interpolate over a
-    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor:
+    far: (v, 3, 3) 1/m. curvature: (v,) 1/m. softness: (v,) of the material under a tip, 1 where its modulus
+    is the global one. parents: (k, 3) compliance nodes that interpolate over a triangle, -1 where fixed;
+    parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor:
     (n, 3, r) in their place, see SurfaceCompliance. table: dent law.
     young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition: (1,) int64,
     that of the table.
@@ -26,6 +27,7 @@ class FemParameters(NamedTuple):
     surface: SurfaceArrays
     far: np.ndarray
     curvature: np.ndarray
+    softness: np.ndarray
     parents: np.ndarray
     parent_weights: np.ndarray
     blocks: np.ndarray
@@ -44,7 +46,8 @@ class FemState(NamedTuple):
 
     grip: where each tip is held. frames: (m, 3, 3) rows u, v, n. elastic: (m, 3) N, quasi-static forces on
     the tools. memory: (m, STATE_SIZE) of the sticks. prony: (m, k, 3) N and before: (m, 3) N of
-    viscoelasticity. deepest: (m,) m of this touch. felt: (v,) greatest load of each fine vertex (Mullins).
+    viscoelasticity. young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,) greatest load
+    of each fine vertex (Mullins).
     Between contacts (render.fem_coupling): nodes (m, 3), node_weights (m, 3) interpolate at each tip; moved
     (m, 2) whether nodes or weights changed this tick; corners (m, m, 9, 9) 1/m, blocks of the corners of
     pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N, [j, c, k, i] the displacement
@@ -83,6 +86,7 @@ class FemState(NamedTuple):
     local_far: np.ndarray
     radius: np.ndarray
     curvature: np.ndarray
+    young: np.ndarray
     vectors: np.ndarray
     stack: np.ndarray
 
@@ -121,6 +125,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         local_far=np.zeros((m, 3, 3)),
         radius=np.zeros(m),
         curvature=np.zeros(m),
+        young=np.zeros(m),
         vectors=np.zeros((6, 3)),
         stack=np.zeros(STACK, dtype=np.int64),
     )

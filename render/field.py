@@ -6,26 +6,36 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.effects.skin_layer import skin_ratio
+from mechanics.inclusion import balls_of
+from mechanics.model import Model
+from mechanics.near_field import surface_softness
+from mechanics.patch import half_space_compliance
 from mechanics.sites import mean_curvature
 from mechanics.surface_compliance import SurfaceCompliance
-from mechanics.tetmesh import TetMesh
 from render.surface import ContactSurface
 
 
 class Field(NamedTuple):
     """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base.
 
+    softness: (v,) of the material under a tip, global modulus over its own.
     parents: (k, 3) numbers of each fine triangle's mesh corners among the compliance's, -1 on the base.
     """
 
     far: np.ndarray
     curvature: np.ndarray
+    softness: np.ndarray
     parents: np.ndarray
 
 
-def far_field(mesh: TetMesh, surface: ContactSurface, compliance: SurfaceCompliance) -> Field:
-    """Evaluate the compliance at every fine vertex that may be touched."""
-    arrays = surface.arrays
+def far_field(model: Model, surface: ContactSurface, compliance: SurfaceCompliance) -> Field:
+    """Evaluate the compliance at every fine vertex that may be touched.
+
+    What is local is the dent's, which goes with the modulus under the tip: where that is not the global one,
+    the half-space that the compliance takes off is of the wrong modulus, and the difference is given back.
+    """
+    arrays, mesh = surface.arrays, model.mesh
     number = np.full(int(max(surface.parents.max(), compliance.nodes.max())) + 1, -1, dtype=np.int64)
     number[compliance.nodes] = np.arange(len(compliance.nodes))
     parents = np.ascontiguousarray(number[surface.parents])
@@ -33,6 +43,15 @@ def far_field(mesh: TetMesh, surface: ContactSurface, compliance: SurfaceComplia
     points, normals = arrays.vertices[touched], arrays.normals[touched]
     far = np.zeros((len(arrays.vertices), 3, 3))
     far[touched] = compliance.far_at(points, normals)
+    softness = np.ones(len(arrays.vertices))
+    ratio = model.modulus_ratio
+    if "skin_layer" in model.effects:  # the dent's law knows it
+        keys = model.effects["skin_layer"]
+        ratio = ratio / skin_ratio(mesh, float(keys["thickness_m"]), float(keys["modulus_ratio"]))
+    softness[touched] = surface_softness(mesh, ratio, points, model.tip_radius_m, balls_of(model))
+    width = float(compliance.own_width_m[0])
+    for v in touched[softness[touched] != 1]:
+        far[v] += (1 - softness[v]) * half_space_compliance(arrays.normals[v], model.poisson_ratio, width)
     curvature = np.zeros(len(arrays.vertices))
     curvature[touched] = mean_curvature(mesh, points, normals)
-    return Field(far, curvature, parents)
+    return Field(far, curvature, softness, parents)
