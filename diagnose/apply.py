@@ -4,85 +4,99 @@ effects)."""
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
-from diagnose.effects.inclusion import inside
 from diagnose.freeair import matrices
 from diagnose.library import effect
 from diagnose.result import Diagnosis
+from mechanics.effects.skin_layer import skin_ratio
+from mechanics.inclusion import inclusion_ratio
 from mechanics.model import Model
 from mechanics.recording import Recording
 
-BY_LAW = (
-    "finite_strain",
-    "strain_stiffening",
-    "viscoelasticity",
-    "mullins_softening",
-    "tip_radius",
-    "friction_slip",
-    "adhesion",
-)
-"""Effects that the renderer runs from their keys in [effects.NAME]."""
 MODULUS_LIMITS = (0.05, 50.0)
+NOT_RENDERED = ("surface_shape", "surface_offset")
+"""They say that the model's surface is wrong, not what it should be."""
+FOUND_INCLUSION = "diagnosed"
 
 
 def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
     """(model with the asserted effects, their names). Instrument effects are left out: they must not be
     rendered.
 
-    Laws of material and contact go to [effects.NAME]; inclusions, gradients and skins into the elements'
-    moduli; Poisson's ratio into the material; a loose or springy base to [effects.NAME], where the
-    compliance reads it.
+    The modulus, and the dent law that is rendered, are those of the diagnosis's own fit.
     """
-    effects = {k: dict(v) for k, v in model.effects.items()}
-    ratio = model.modulus_ratio.copy()
-    nu, mesh = model.poisson_ratio, model.mesh
-    kept = []
-    parameters = {e.name: e.parameters for e in diagnosis.entries}
-    centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
-    height = (centroid - model.support_point) @ model.support_normal
-    for name in diagnosis.effects:
-        keys = parameters.get(name, {})
-        if effect(name).domain == "instrument" or name in ("surface_shape", "surface_offset"):
-            continue
-        effects[name] = dict(keys)
-        kept.append(name)
-        if name == "inclusion":
-            blur = float(np.cbrt(np.median(mesh.volumes)))
-            share = inside(centroid, np.array(keys["centre_m"]), keys["radius_m"], blur)
-            ratio = ratio * keys["modulus_ratio"] ** share
-        elif name == "modulus_gradient":
-            top = height.max() * 1.02
-            ratio = ratio * (keys["ratio_base"] + (keys["ratio_top"] - keys["ratio_base"]) * height / top)
-        elif name == "skin_layer":
-            from scipy.spatial import cKDTree
-
-            depth = cKDTree(mesh.points[mesh.touchable]).query(centroid)[0]
-            ratio = np.where(depth < keys["thickness_m"], ratio * keys["modulus_ratio"], ratio)
-        elif name == "poisson_ratio":
-            nu = float(keys["poisson_ratio"])
-    ratio = np.clip(ratio, *MODULUS_LIMITS)
+    parameters = {e.name: dict(e.parameters) for e in diagnosis.entries}
+    asserted = {name: parameters.get(name, {}) for name in diagnosis.effects}
     provenance = {**model.provenance, "diagnosed_effects": list(diagnosis.effects)}
-    better = dataclasses.replace(
-        model,
+    if diagnosis.attribution is not None:
+        fitted = diagnosis.attribution.final.found
+        deep = "finite_strain" in (*fitted.names, *diagnosis.effects)
+        provenance["dent_law"] = "neo-hookean" if deep else "linear"
+        if "adhesion" in asserted and "adhesion" in fitted.names:
+            asserted["adhesion"].setdefault("inside", float(fitted.of("adhesion")[2]))
+    better = with_effects(model, asserted)
+    better = better.replaced(
         young_modulus_pa=diagnosis.young_modulus_pa,
         young_modulus_ci95_pa=(float("nan"), float("nan")),
-        poisson_ratio=nu,
-        modulus_ratio=ratio,
-        effects=effects,
         provenance=provenance,
+    )
+    return better, [name for name in asserted if rendered(name)]
+
+
+def rendered(name: str) -> bool:
+    """Whether an effect belongs into a model: those of the instrument do not. Raises OptionError for an
+    unknown one."""
+    return effect(name).domain != "instrument" and name not in NOT_RENDERED
+
+
+def with_effects(model: Model, effects: Mapping[str, Mapping[str, Any]]) -> Model:
+    """The model with these effects, by the contract's keys (SI, device frame), over those that it has.
+
+    Laws of material and contact go to [effects.NAME]; an inclusion, a gradient and a skin into the elements'
+    moduli as well, Poisson's ratio into the material; a loose or springy base to [effects.NAME], where the
+    compliance reads it. Effects of the instrument are left out.
+    """
+    kept = {name: dict(keys) for name, keys in effects.items() if rendered(name)}
+    ratio, nu, extra = model.modulus_ratio, model.poisson_ratio, dict(model.extra)
+    for name, keys in kept.items():
+        if name == "inclusion":
+            centre, radius, times = np.array(keys["centre_m"]), float(keys["radius_m"]), keys["modulus_ratio"]
+            ratio = ratio * inclusion_ratio(model.mesh, centre, radius, float(times))
+            known = extra.get("inclusions", {})
+            extra["inclusions"] = {**known, f"{FOUND_INCLUSION}-{len(known) + 1}": dict(keys)}
+        elif name == "modulus_gradient":
+            ratio = ratio * _along_the_normal(model, float(keys["ratio_base"]), float(keys["ratio_top"]))
+        elif name == "skin_layer":
+            ratio = ratio * skin_ratio(model.mesh, float(keys["thickness_m"]), float(keys["modulus_ratio"]))
+        elif name == "poisson_ratio":
+            nu = float(keys["poisson_ratio"])
+    return model.replaced(
+        poisson_ratio=nu,
+        modulus_ratio=np.clip(ratio, *MODULUS_LIMITS),
+        effects={**{k: dict(v) for k, v in model.effects.items()}, **kept},
+        extra=extra,
         path=None,
     )
-    return better, kept
+
+
+def _along_the_normal(model: Model, base: float, top: float) -> np.ndarray:
+    """(m,) modulus of each element where it runs linearly from the support to the object's top."""
+    mesh = model.mesh
+    normal = model.support_normal / np.linalg.norm(model.support_normal)
+    highest = ((mesh.points - model.support_point) @ normal).max()
+    centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
+    return base + (top - base) * ((centroid - model.support_point) @ normal) / highest
 
 
 def corrected(recording: Recording, diagnosis: Diagnosis) -> Recording:
     """The recording with asserted instrument effects taken off: bias, drift, weight and inertia, gain, delay.
 
     Tool compliance moves the tip by force / stiffness; a play is not undone (the tip's side of it is not
-    known
-    in free air). Times keep their samples; a delayed force is read earlier, its ends held.
+    known in free air). Times keep their samples; a delayed force is read earlier, its ends held.
     """
     t, force, position = recording.t, recording.force_on_tool.copy(), recording.position.copy()
     parameters = {e.name: e.parameters for e in diagnosis.entries}

@@ -20,6 +20,13 @@ p.lead { font-size: 1.15rem; } figure { margin: 1rem 0; } figure img { max-width
 figcaption { color: #55606e; font-size: .92rem; } table { border-collapse: collapse; margin: .8rem 0; }
 th, td { padding: .3rem .8rem; border-bottom: 1px solid #d9dee5; text-align: right; }
 th:first-child, td:first-child { text-align: left; } th { border-bottom: 2px solid #8a96a5; }
+.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(16rem, 1fr)); gap: .9rem;
+         margin: .9rem 0; }
+.card { border: 1px solid #d9dee5; border-top: 4px solid #2a9d8f; border-radius: 4px; padding: .6rem .9rem;
+        overflow-wrap: anywhere; }
+.card h2 { margin: 0; font-size: .82rem; letter-spacing: .06em; text-transform: uppercase; color: #55606e; }
+.card strong { display: block; font-size: 1.12rem; line-height: 1.3; margin: .15rem 0 .3rem; }
+.card p { margin: 0; font-size: .95rem; line-height: 1.4; }
 footer { margin-top: 3rem; color: #77808c; font-size: .85rem; }
 """
 
@@ -42,6 +49,15 @@ class Page:
     def paragraph(self, text: str) -> None:
         """Plain words."""
         self._parts.append(f"<p>{html.escape(text)}</p>")
+
+    def cards(self, cards: Sequence[tuple[str, str, str]]) -> None:
+        """Answers side by side: (question, answer in a few words, a sentence or two) each."""
+        inside = "".join(
+            f'<div class="card"><h2>{html.escape(question)}</h2><strong>{html.escape(answer)}</strong>'
+            f"<p>{html.escape(text)}</p></div>"
+            for question, answer, text in cards
+        )
+        self._parts.append(f'<div class="cards">{inside}</div>')
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
         """A table; floats to four significant digits."""
