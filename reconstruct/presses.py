@@ -93,6 +93,8 @@ def fitted_contact(signals: Signals, a: int, b: int) -> Contact | None:
         guess_m=0.0,
     )
     touched = np.flatnonzero(travel >= rise.u0_m)
+    if not len(touched):
+        return None
     start = first + int(touched[0])
     here = -(signals.position[start] - signals.position[a]) @ normal
     centre = signals.position[start] - (rise.u0_m - here) * normal

@@ -7,6 +7,7 @@ import pytest
 from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 from mechanics.errors import ContactError, OptionError
+from reconstruct import presses
 from reconstruct.contacts import ContactOptions, explore
 
 
@@ -95,6 +96,23 @@ def test_the_tools_weight_and_inertia_are_taken_off():
     except ContactError:
         found = 0
     assert found < len(onsets)
+
+
+def test_a_rise_that_would_begin_beyond_the_deepest_travel_is_no_press(monkeypatch):
+    """As where a heavy tool's weight, read late, swings while nothing is touched."""
+    recording, onsets = explore_cylinder()
+    fit = presses.fit_rise
+    calls = []
+
+    def misled(travel, force, noise_n, **options):
+        rise = fit(travel, force, noise_n, **options)
+        calls.append(rise)
+        return dataclasses.replace(rise, u0_m=travel.max() + 1e-4) if len(calls) == 4 else rise
+
+    monkeypatch.setattr(presses, "fit_rise", misled)
+    exploration = explore(recording, contact_options=ContactOptions(correct_delay=False))
+    assert len(exploration.contacts) == len(onsets) - 1
+    assert [reason for _, reason in exploration.rejected if "no rise" in reason]
 
 
 def test_a_press_on_the_support_is_rejected_and_named():
