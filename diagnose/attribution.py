@@ -10,8 +10,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.confidence_set import confidence_p
 from diagnose.effects.base import Effect
-from diagnose.judging import SPATIAL, Candidate, Score, Search, sideways_off
+from diagnose.judging import EVERYWHERE, SPATIAL, Candidate, Score, Search, sideways_off
 from diagnose.solved_again import solve_inclusion
 from mechanics.progress import Progress, silent
 
@@ -20,6 +21,15 @@ REEXAMINED = 4
 
 IN_TIME = ("time_delay", "viscoelasticity", "backlash", "adhesion", "mullins_softening")
 """Effects that are also tried two at a time where none helps alone."""
+
+OUT_OF_SET = 0.1
+"""An effect with a smaller p value is not in the model confidence set of 90 %."""
+
+RIVAL_CLOSES = 0.3
+"""A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
+
+HIDING = (*EVERYWHERE, "skin_layer", "compliant_base")
+"""Effects that bend the depth law the other way than finite strain does, so that neither shows alone."""
 
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
@@ -32,7 +42,8 @@ class Attribution:
     base: what effects were added to (finite strain in it where the data prefer it). ideal: linear elasticity
     alone; deep: neo-Hookean alone. scores: of every single effect on the base. chosen: names, strongest
     first. rivals: names not told apart from a chosen one. final: the chosen set. steps, picked: what each
-    step looked like and what it took. finite_strain_gain: log likelihood, in the final set.
+    step looked like and what it took. finite_strain_gain: log likelihood, in the final set. standing: p value
+    by which each effect, and 'none', is in the first step's model confidence set.
     """
 
     base: Candidate
@@ -45,6 +56,7 @@ class Attribution:
     steps: tuple[dict[str, Score], ...]
     picked: tuple[str, ...]
     finite_strain_gain: float
+    standing: dict[str, float]
 
 
 def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:
@@ -63,8 +75,7 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
             if effect.name in current.found.names:
                 continue
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(library)) / search.options.most)
-            candidate = search.judge([*current.found.effects, effect], like=current)
-            scores[effect.name] = search.score(effect.name, candidate, current)
+            scores[effect.name] = search.score(effect.name, _added(search, effect, current), current)
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
             if score.gain > search.options.plain_gain and not search.passes(score, first=first):
@@ -104,7 +115,17 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         tuple(steps),
         tuple(name for _, name in picked),
         float(strain_gain),
+        standing(steps[0]),
     )
+
+
+def _added(search: Search, effect: Effect, current: Candidate) -> Candidate:
+    """The current set and one effect more; with finite strain where each may have hidden the other."""
+    candidate = search.judge([*current.found.effects, effect], like=current)
+    if effect.name not in HIDING or "finite_strain" in current.found.names:
+        return candidate
+    both = search.judge([search.finite_strain, *current.found.effects, effect], like=candidate)
+    return both if both.found.loss < candidate.found.loss else candidate
 
 
 def _paired(search: Search, library: Sequence[Effect], current: Candidate) -> Candidate | None:
@@ -164,7 +185,9 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
     rest = [e for e in effects if e.name != "finite_strain"]
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
     over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.slowness
-    gain = (without.found.loss - deep.found.loss) / over
+    each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
+    # the site that speaks loudest may be one that slipped
+    gain = (each.sum() - each[np.argmax(np.abs(each))]) / over
     return (deep if gain > LINEAR_UNLESS else without), float(gain)
 
 
@@ -184,6 +207,14 @@ def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tupl
     return current, chosen
 
 
+def standing(scores: dict[str, Score]) -> dict[str, float]:
+    """p value of each effect of a step, and of 'none', in the model confidence set over sites."""
+    names = [*scores, "none"]
+    losses = np.array([-s.per_group for s in scores.values()])
+    losses = np.vstack([losses, np.zeros(losses.shape[1])])
+    return dict(zip(names, confidence_p(losses, np.random.default_rng(0)), strict=True))
+
+
 def _rivals(search: Search, picked: list[tuple[dict[str, Score], str]], chosen: list[str]) -> tuple[str, ...]:
     """Effects whose gain comes so close to that of the one picked in the same step that the sites do not tell
     them apart."""
@@ -192,17 +223,19 @@ def _rivals(search: Search, picked: list[tuple[dict[str, Score], str]], chosen: 
         if name not in chosen:
             continue
         first = scores[name]
+        p = standing(scores)
         for score in scores.values():
             if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
                 continue
-            if score.share < 0 and score.name != "inclusion":
+            if score.share < RIVAL_CLOSES * max(first.share, 0.0) and score.name != "inclusion":
                 continue
             behind = first.gain - score.gain
             difference = first.per_group - score.per_group
             spread = difference.std() * np.sqrt(len(difference))
             near = behind < max(search.options.rival_share * first.gain, 2.0 * spread, 25.0)
             as_good = score.share > first.share - 0.05 and score.gain > 0.3 * first.gain
-            if (near and behind < 0.6 * first.gain) or as_good:
+            standing_beside = p[score.name] > OUT_OF_SET and score.gain > 0.6 * first.gain
+            if (near and behind < 0.6 * first.gain) or as_good or standing_beside:
                 found.setdefault(score.name, behind)
     return tuple(sorted(found, key=lambda n: found[n]))
 

@@ -48,6 +48,7 @@ def parameter_intervals(
     spread = spread + np.diag(systematic**2 + (share * found.values[own]) ** 2)
     low, high = effect.bounds
     draws = rng.multivariate_normal(found.values[own], spread, DRAWS, check_valid="ignore")
+    draws *= 1 + effect.extra.get("common_factor", 0.0) * rng.standard_normal((DRAWS, 1))
     for i in effect.extra.get("signed", ()):
         # what was named is known to be harder or softer; how much is what the interval says
         draws[:, i] = np.sign(found.values[own][i]) * np.abs(draws[:, i])

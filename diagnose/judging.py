@@ -40,7 +40,10 @@ STEADY_Z = 2.0
 across sites."""
 
 SURE_Z = 3.0
-"""What every site feels is named on a small gain only if so many standard errors of the sites agree."""
+"""What every site feels is named on a small gain only if so many standard errors of the sites agree ..."""
+
+CLOSING_GAIN, CLOSING_SHARE = 50.0, 0.5
+"""... or if the gain is not that small and half of the gap closes on held-out sites."""
 
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
@@ -50,8 +53,11 @@ ANEW = 0.8
 class AttributionOptions:
     """When an effect is named. Calibrated on recordings without any effect; see docs/diagnosis.md."""
 
-    gain: float = option(150.0, "least gain in log likelihood over held-out sites that names an effect")
-    spatial_gain: float = option(120.0, "the same for effects that live in a few places, penalised in sample")
+    gain: float = option(120.0, "least gain in log likelihood over held-out sites that names an effect")
+    spatial_gain: float = option(
+        75.0, "the same for effects that differ from site to site, penalised in sample"
+    )
+    lump_gain: float = option(120.0, "the same for an inclusion, which lives in a few places")
     plain_gain: float = option(35.0, "a lower gain that is enough where the gap closes plainly ...")
     plain_share: float = option(0.35, "... by at least this share on held-out sites")
     strong_gain: float = option(
@@ -107,6 +113,7 @@ class Score:
     """How much better a candidate is than what it was added to.
 
     gain: log likelihood, deflated by its own lack of fit. z: gain over its standard error across sites.
+    per_group: (g,) the gain of each site, deflated likewise.
     size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
     share: of the old excess over the noise.
     toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
@@ -123,6 +130,12 @@ class Score:
     per_group: np.ndarray
     candidate: Candidate
     scatter_n: float = 0.0
+
+    @property
+    def evidence(self) -> float:
+        """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
+        is wrong, speaks for whatever bends it; a lump lives in few places, so there all of it."""
+        return self.gain if self.name == "inclusion" else self.gain - max(float(self.per_group.max()), 0.0)
 
 
 class Search:
@@ -225,23 +238,26 @@ class Search:
             # a delay or a play has already moved the first touches that the surface was fitted to
             return False
         if score.name == "inclusion":
-            return score.gain > o.spatial_gain and score.share > -0.3 and score.toward > o.toward
+            return score.evidence > o.lump_gain and score.share > -0.3 and score.toward > o.toward
         if score.name in EVERYWHERE and score.z < STEADY_Z:
             return False
         if not first and score.name in SPATIAL and score.z < STEADY_Z:
             # one place that a law misses by far must not name a second effect; a lump lives in few places
             if score.name != "inclusion" or score.candidate.chi > 1.5:
                 return False
-        if first and score.gain > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
+        if first and score.evidence > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
             return True
         if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
             return False
-        steady = SURE_Z if score.name in EVERYWHERE else STEADY_Z
-        if score.gain > o.plain_gain and score.share > o.plain_share and score.z > steady:
+        closing = score.evidence > CLOSING_GAIN and score.share > CLOSING_SHARE
+        steady = SURE_Z if score.name in EVERYWHERE and not closing else STEADY_Z
+        if score.evidence > o.plain_gain and score.share > o.plain_share and score.z > steady:
             # repeats of one place that differ by more than the effect changes may be all that it fits
             if score.name not in SPATIAL or score.size_n > score.scatter_n:
                 return True
-        return score.gain > o.spatial_gain if score.name in SPATIAL else score.gain > o.gain and score.z > o.z
+        if score.name in SPATIAL:
+            return score.evidence > o.spatial_gain
+        return score.evidence > o.gain and score.z > o.z
 
 
 SIDEWAYS_SHARE = 0.3

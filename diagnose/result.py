@@ -34,7 +34,8 @@ KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
 class EffectEntry:
     """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
 
-    intervals: [low, high] of each parameter at 95 %.
+    intervals: [low, high] of each parameter at 95 %. standing: p value of the model confidence set (nan where
+    it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
     """
 
     name: str
@@ -46,6 +47,7 @@ class EffectEntry:
     parameters: dict[str, Any]
     gain: float = 0.0
     intervals: dict[str, Any] = field(default_factory=dict)
+    standing: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -159,6 +161,7 @@ class Diagnosis:
                     "gap_closed_ci95": None if e.gap_closed_ci95 is None else list(e.gap_closed_ci95),
                     "parameters": e.parameters,
                     "parameters_ci95": e.intervals,
+                    "confidence_set_p": e.standing if np.isfinite(e.standing) else None,
                 }
                 for e in self.entries
             ],

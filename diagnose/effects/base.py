@@ -43,7 +43,8 @@ class Effect:
     candidates(forward): starts found from the data, where the parameters' own are not enough.
     signature: in words. extra: 'slack', a factor on the lack of fit that its own law may leave; 'systematic',
     (k,) standard deviations of its values that no noise tells, from known cases; 'systematic_share', the same
-    in shares of the values; 'signed', values whose sign is sure once named.
+    in shares of the values; 'common_factor', standard deviation of a factor on all values that the modulus
+    takes up; 'signed', values whose sign is sure once named.
     """
 
     name: str

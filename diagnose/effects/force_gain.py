@@ -22,5 +22,7 @@ EFFECT = Effect(
     ),
     change=_change,
     report=lambda values, forward: {"matrix": np.asarray(values).reshape(3, 3).tolist()},
+    # the modulus takes up any factor common to all axes: how far a sensor may be off on the whole is a guess
+    extra={"common_factor": 0.12},
     signature="proportional to the force, fixed in the device frame, the same at every depth and rate",
 )

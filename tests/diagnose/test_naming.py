@@ -5,7 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.attribution import _with_strain
 from diagnose.judging import AttributionOptions, Score, Search
+from diagnose.verdict import FINITE_STRAIN_GAIN
 
 
 def score(name, per_group, **changes):
@@ -28,6 +30,32 @@ def test_one_site_does_not_name_what_every_site_feels(search, name):
     shared = [3.0, 2.0, 5.0, 4.0] * 10
     assert not search.passes(score(name, alone))
     assert search.passes(score(name, shared))
+
+
+@pytest.mark.parametrize("name", ["friction_slip", "compliant_base", "time_delay"])
+def test_what_one_place_gains_is_no_evidence_but_for_a_lump(search, name):
+    alone = score(name, [400.0] + [1.5] * 39, z=5.0, share=0.3)
+    assert alone.evidence < 60 < alone.gain
+    assert not search.passes(alone)
+    assert score("inclusion", [400.0] + [1.5] * 39).evidence == pytest.approx(458.5)
+
+
+@pytest.mark.parametrize(("loud", "named"), [(-300.0, True), (300.0, False)])
+def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
+    """All other sites prefer one law; the one that slipped would tip the sum the other way."""
+    quiet = np.full(24, 3.0 if named else -3.0)
+    quiet[7] = loud
+
+    def judged(effects):
+        gram = np.zeros((24, 1, 1))
+        gram[:, 0, 0] = 500.0 - (2 * quiet if effects else 0.0)
+        return SimpleNamespace(chi=1.0, found=SimpleNamespace(gram=gram, loss=gram.sum() / 2))
+
+    search.judge = judged
+    search.finite_strain = SimpleNamespace(name="finite_strain")
+    search.forward = SimpleNamespace(touches=SimpleNamespace(slowness=1.0))
+    _, gain = _with_strain(search, [])
+    assert (gain > FINITE_STRAIN_GAIN) == named
 
 
 def test_one_site_may_name_a_lump(search):

@@ -1,0 +1,178 @@
+"""The whole answer of a diagnosis: verdict, gaps before and after, every effect tried, the next touch."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.attribution import LINEAR_UNLESS, Attribution
+from diagnose.confusable import alike
+from diagnose.gaps import closed_share, gap
+from diagnose.intervals import parameter_intervals
+from diagnose.judging import Score, Search
+from diagnose.library import effect
+from diagnose.next_touch import next_touch
+from diagnose.result import Diagnosis, EffectEntry, NextTouch
+from diagnose.shape import repeat_scatter
+from diagnose.sureness import FINITE_STRAIN, SHAPE, odds, sureness
+from diagnose.validation import held_out_by_refit
+from diagnose.verdict import Answer, Evidence, answer_of
+from diagnose.where import locate
+
+
+@dataclass(frozen=True)
+class Gaps:
+    """Held-out plain sums of squares (g,) N^2 before and after. held: N, of deepest and fastest places."""
+
+    before: np.ndarray
+    after: np.ndarray
+    held: dict[str, tuple[float, float]]
+
+
+def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
+    """The answer to where, which and how far. lap(name) is called where a timed part ends."""
+    found, forward = evidence.found, evidence.forward
+    counts, noise, added = evidence.search.whitener.counts(), evidence.noise_n, evidence.thinned_away
+    rng = np.random.default_rng(evidence.seed)
+    gaps = _gaps(evidence)
+    lap("held out")
+    answer = answer_of(evidence, counts)
+    before_n = gap(gaps.before, counts, added)
+    after_n = gap(gaps.after, counts, added) if answer.names else before_n
+    closed, interval = closed_share(gaps.before, gaps.after, counts, noise, added, rng, evidence.bootstrap)
+    if not answer.names:
+        closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
+    sure = sureness(answer.remainder, closed, bool(answer.candidates))
+    residual_before = found.ideal.residual + evidence.settled.residual
+    result = Diagnosis(
+        noise_n=noise,
+        gap_before_n=before_n,
+        gap_after_n=after_n,
+        gap_closed=closed,
+        gap_closed_ci95=interval,
+        kind=answer.kind,
+        effects=tuple(answer.names),
+        candidates=tuple(dict.fromkeys(answer.candidates)),
+        where=locate(forward, residual_before, evidence.free, evidence.site_sd, seed=evidence.seed),
+        entries=_entries(evidence, answer, gaps, counts, sure, rng),
+        young_modulus_pa=found.final.found.modulus,
+        next_touch=_next(evidence.search, found, answer.candidates),
+        errors_n=_errors(evidence),
+        reasons=tuple(answer.reasons),
+        confusable=tuple(_alike(evidence)),
+        held_out_n=gaps.held,
+        forward=forward,
+        attribution=found,
+        free_air=evidence.free,
+        residual_before=residual_before,
+        residual_after=found.final.residual,
+    )
+    lap("verdict")
+    return result
+
+
+def _gaps(evidence: Evidence) -> Gaps:
+    search, found, settled = evidence.search, evidence.found, evidence.settled
+    if not evidence.refit:
+        return Gaps(found.ideal.plain + settled.plain(search.whitener, found.ideal), found.final.plain, {})
+    added = evidence.thinned_away
+    old = held_out_by_refit(search, found.ideal.found, settled.residual, added)
+    new = held_out_by_refit(search, found.final.found, None, added)
+    held = {"deepest": (old.deepest_n, new.deepest_n), "fastest": (old.fastest_n, new.fastest_n)}
+    return Gaps(old.plain, new.plain, held)
+
+
+def _entries(
+    evidence: Evidence,
+    answer: Answer,
+    gaps: Gaps,
+    counts: np.ndarray,
+    sure: float,
+    rng: np.random.Generator,
+) -> tuple[EffectEntry, ...]:
+    forward, search, found, settled = evidence.forward, evidence.search, evidence.found, evidence.settled
+    noise, added = evidence.noise_n, evidence.thinned_away
+    best = max((max(s.gain, 0.0) for s in found.scores.values()), default=0.0)
+    draws = max(100, evidence.bootstrap // 4)
+    entries = []
+    for name, score in found.scores.items():
+        closed, interval = closed_share(gaps.before, score.candidate.plain, counts, noise, added, rng, draws)
+        fitted = found.final.found if name in found.chosen else score.candidate.found
+        entries.append(
+            EffectEntry(
+                name,
+                effect(name).domain,
+                sure if name in found.chosen else odds(score, search, best),
+                gap(score.candidate.plain, counts, added),
+                closed,
+                interval,
+                effect(name).report(fitted.of(name), forward),
+                score.gain,
+                parameter_intervals(fitted, name, forward, search.dof, rng),
+                found.standing[name],
+            )
+        )
+    if found.finite_strain_gain > LINEAR_UNLESS or "finite_strain" in answer.names:
+        deep = found.deep
+        closed, interval = closed_share(gaps.before, deep.plain, counts, noise, added, rng, draws)
+        probability = FINITE_STRAIN if "finite_strain" in answer.names else 0.1
+        entries.append(
+            EffectEntry(
+                "finite_strain", "object", probability, gap(deep.plain, counts, added), closed, interval, {},
+                found.finite_strain_gain,
+            )
+        )  # fmt: skip
+    entries += [
+        dataclasses.replace(e, probability=min(e.probability, sure))
+        for e in settled.entries(gaps.before, found.ideal, counts, noise, added, rng)
+    ]
+    if "surface_shape" in answer.names:
+        left = gap(found.final.plain, counts, added)
+        entries.append(EffectEntry("surface_shape", "boundary", SHAPE, left, 0.0, None, {}))
+    place = {n: i for i, n in enumerate(answer.names)}
+    entries.sort(key=lambda e: (place.get(e.name, 99), -e.probability, -e.gain))
+    return tuple(entries)
+
+
+def _errors(evidence: Evidence) -> dict[str, float]:
+    """Our own errors in newtons rms: sensor noise, repeatability of sites, shape, and the rest of the
+    model."""
+    t = evidence.forward.touches
+    rms = float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
+    residual = evidence.found.final.residual
+    return {
+        "sensor": evidence.noise_n,
+        "repeatability": repeat_scatter(residual, t),
+        "shape": float(np.sqrt(np.mean(evidence.site_sd**2)) * rms),
+        "model": float(np.sqrt(max((residual[t.counted] ** 2).sum(axis=1).mean() - 3 * t.noise_n**2, 0))),
+    }
+
+
+def _alike(evidence: Evidence) -> list[tuple[str, str, float]]:
+    """Confusable pairs among the effects that gain anything to speak of."""
+    found = evidence.found
+    least = 0.1 * max((s.gain for s in found.scores.values()), default=0.0)
+    strong = {n: s.candidate for n, s in found.scores.items() if s.gain > least}
+    return alike(evidence.search, found.base, strong)
+
+
+def _next(search: Search, found: Attribution, candidates: list[str]) -> NextTouch | None:
+    """The press that parts the two explanations that stand closest."""
+    for scores, name in zip(found.steps, found.picked, strict=False):
+        rival = next((c for c in candidates if c in scores and c != name), None)
+        if rival is not None:
+            return _parting(search, scores, name, rival)
+    ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
+    if len(ranked) < 2:
+        return None
+    first = found.picked[0] if found.picked else ranked[0].name
+    second = next(s.name for s in ranked if s.name != first)
+    return _parting(search, found.scores, first, second)
+
+
+def _parting(search: Search, scores: dict[str, Score], first: str, second: str) -> NextTouch | None:
+    pair = ((first, scores[first].candidate), (second, scores[second].candidate))
+    return next_touch(search.forward, *pair, search.nuisance)

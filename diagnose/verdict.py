@@ -1,0 +1,171 @@
+"""From evidence to verdict: what is named, what cannot be told apart, whether something is left over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnose.attribution import Attribution
+from diagnose.finite import predicted_size
+from diagnose.forward import Forward
+from diagnose.freeair import FreeAir
+from diagnose.judging import EVERYWHERE, Search, sideways_off
+from diagnose.library import effect
+from diagnose.settled import Settled
+from diagnose.shape import heterogeneity, site_factors
+
+FINITE_STRAIN_LEAST = 0.7
+"""Finite strain is named where it must be larger than this share of the noise ..."""
+FINITE_STRAIN_GAIN = 2.0
+"""... and the neo-Hookean law fits better than the linear one by this log likelihood."""
+FINITE_STRAIN_BEYOND_SCALE = 0.65
+"""Share of its size that another modulus cannot take up; by it the asserted effects are put in order."""
+SHAPE_FELT = 0.6
+"""Sites that differ by more than their shape may are a cause where that is this share of the noise."""
+SHAPE_RIVALS = ("inclusion", "modulus_gradient", "unbonded_base", "compliant_base")
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that a verdict rests on. refit: report gaps of folds fitted anew (else of the linearised fits)."""
+
+    forward: Forward
+    search: Search
+    found: Attribution
+    free: FreeAir | None
+    settled: Settled
+    site_sd: np.ndarray
+    excluded: frozenset[str]
+    shape_gain: float
+    bootstrap: int
+    seed: int
+    refit: bool
+
+    @property
+    def noise_n(self) -> float:
+        """N, rms of the force 3-vector's noise."""
+        return float(np.sqrt(3) * self.forward.touches.raw_noise_n)
+
+    @property
+    def thinned_away(self) -> float:
+        """N^2, what thinning took off the mean square of the 3-vector."""
+        t = self.forward.touches
+        return 3 * (t.raw_noise_n**2 - t.noise_n**2)
+
+
+@dataclass
+class Answer:
+    """What is said: names (strongest first), rivals, reasons in words, and whether something is left over."""
+
+    names: list[str]
+    candidates: list[str]
+    reasons: list[str] = field(default_factory=list)
+    remainder: bool = False
+    nameless_shape: bool = False
+
+    @property
+    def kind(self) -> str:
+        """The contract's word."""
+        remainder = self.remainder or self.nameless_shape
+        if self.names and remainder:
+            return "effect+unknown"
+        if remainder:
+            return "unknown"
+        if not self.names:
+            return "none"
+        return "ambiguous" if self.candidates else "effect"
+
+
+def answer_of(evidence: Evidence, counts: np.ndarray) -> Answer:
+    """Weigh the search's outcome. counts: (g,) thinned contact samples of each site."""
+    found, settled = evidence.found, evidence.settled
+    answer = Answer([*settled.names, *found.chosen], list(found.rivals), list(settled.reasons))
+    misfit, lone = _misfit(evidence, counts, answer)
+    answer.remainder = misfit
+    _slipping(evidence, answer)
+    _finite_strain(evidence, answer)
+    _shape(evidence, answer)
+    # with nothing named the gap is there all the same
+    answer.remainder = answer.remainder or (lone and not answer.names)
+    if not answer.names and not answer.remainder:
+        answer.reasons.append("what is left is no larger than noise, first touch and shape can explain")
+    if misfit:
+        answer.reasons.append(
+            f"the best answer still misses by {np.sqrt(found.final.chi):.1f} times the noise: something else "
+            "is there"
+        )
+    return answer
+
+
+def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[bool, bool]:
+    """(something is left that no law explains, it is one place alone)."""
+    found, search = evidence.found, evidence.search
+    slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
+    most = slack * search.options.unknown_chi
+    if found.final.chi <= most:
+        return False, False
+    rest, site = found.final.chi_but_for_one(counts)
+    if rest >= most:
+        return True, False
+    # one touch that slipped or met something else is no law that is missing
+    x, y, z = 1e3 * evidence.forward.touches.site_point[site]
+    answer.reasons.append(
+        f"the touches at ({x:.0f}, {y:.0f}, {z:.0f}) mm fit nothing, the others miss by "
+        f"{np.sqrt(rest):.1f} times the noise: touch there again"
+    )
+    return False, True
+
+
+def _slipping(evidence: Evidence, answer: Answer) -> None:
+    """Sticking is only trusted to a quarter, press by press, so a fit may let the sideways force go wrong."""
+    off = sideways_off(evidence.forward, evidence.found.final)
+    if off and "friction_slip" not in answer.names:
+        answer.candidates.insert(0, "friction_slip")
+        answer.remainder = True
+        answer.reasons.append(f"the sideways force is off by {off:.0%} of itself: the tip may slip")
+
+
+def _finite_strain(evidence: Evidence, answer: Answer) -> None:
+    if "finite_strain" in evidence.excluded:
+        return
+    found = evidence.found
+    size_n = predicted_size(evidence.forward, found.base.found)
+    if size_n <= FINITE_STRAIN_LEAST * evidence.noise_n:
+        return
+    if found.finite_strain_gain > FINITE_STRAIN_GAIN:
+        sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
+        beyond = FINITE_STRAIN_BEYOND_SCALE * size_n
+        names = answer.names
+        names.insert(
+            next((i for i, n in enumerate(names) if sizes.get(n, np.inf) < beyond), len(names)),
+            "finite_strain",
+        )
+        answer.reasons.append(
+            f"the presses are deep enough that small-strain elasticity is off by about {size_n:.3f} N"
+        )
+    elif any(n in (*EVERYWHERE, "skin_layer") for n in found.chosen):
+        # deep enough for it, and it fitted no worse than the linear law until another took its place
+        if "finite_strain" in (*found.final.found.names, *found.base.found.names):
+            answer.candidates.append("finite_strain")
+
+
+def _shape(evidence: Evidence, answer: Answer) -> None:
+    """Sites that differ by more than the shape's uncertainty, by what no effect explains, enough to be
+    felt."""
+    found, t = evidence.found, evidence.forward.touches
+    factor, error = site_factors(found.final.found, t)
+    per_site = np.array([evidence.site_sd[t.site == s].mean() for s in range(t.sites)])
+    gain, spread = heterogeneity(factor, error, per_site)
+    felt_n = spread * float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
+    if gain <= evidence.shape_gain or felt_n <= SHAPE_FELT * evidence.noise_n:
+        return
+    if "inclusion" not in found.chosen:
+        if "surface_shape" not in evidence.excluded and not answer.remainder:
+            answer.names.append("surface_shape")
+            ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
+            answer.candidates += [s.name for s in ranked if s.name in SHAPE_RIVALS and s.gain > 10][:2]
+        answer.reasons.append(
+            f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"
+        )
+    answer.nameless_shape = "surface_shape" in evidence.excluded
