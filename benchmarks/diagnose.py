@@ -55,6 +55,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="K/N",
         help="only every N-th case, from the K-th (runs beside others)",
     )
+    parser.add_argument(
+        "--seen",
+        metavar="FOLDER",
+        help="leave cases with a verdict in this folder out of the table: rules were chosen after those",
+    )
     parser.add_argument("--picture", metavar="PNG", help="write the pictures")
     parser.add_argument("--seed", type=int, default=0, help="first seed")
 
@@ -93,9 +98,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         fresh += 1
         print(f"{number + 1}/{len(own)} {case.key}: {said} ({time.process_time() - clock:.0f} CPU s)",
               flush=True)  # fmt: skip
-    done = [opened_case(c, work) for c in todo if verdict_path(c, work).exists()]
+    counted = [c for c in todo if not (arguments.seen and (Path(arguments.seen) / f"{c.key}.json").exists())]
+    done = [opened_case(c, work) for c in counted if verdict_path(c, work).exists()]
     summary = summarise(done)
-    summary["size"] = {"asked": len(todo), "done": len(done), "not_solved": unsolved, "fast": fast}
+    summary["size"] = {"asked": len(counted), "done": len(done), "not_solved": unsolved, "fast": fast}
     show(summary)
     if arguments.picture and done:
         print(f"picture: {pictures(summary, arguments.picture)}")

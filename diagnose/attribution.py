@@ -186,8 +186,8 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
     over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.slowness
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
-    # the site that speaks loudest may be one that slipped
-    gain = (each.sum() - each[np.argmax(np.abs(each))]) / over
+    # the site that speaks loudest, for or against, may be one that slipped
+    gain = (each.sum() - each.max() - each.min()) / over
     return (deep if gain > LINEAR_UNLESS else without), float(gain)
 
 

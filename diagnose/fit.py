@@ -14,6 +14,10 @@ from diagnose.whiten import Whitener
 
 MODULUS_STEP = 0.01
 
+MOST_PLAINLY = 1.5
+"""A first touch is not moved where the press then misses plainly by this much more: a drag that no law here
+follows would move it."""
+
 
 @dataclass(frozen=True)
 class Fit:
@@ -207,9 +211,16 @@ class Descent:
             target = self.refined(values, residual, onset)
             tried = np.nan_to_num(self.residual(values, target), nan=1e3)
             better = self.press_cost(tried, target) < self.press_cost(residual, onset)
+            better &= self.plain_cost(tried) < MOST_PLAINLY * self.plain_cost(residual)
             onset = np.where(better, target, onset)
             residual = np.where(better[press][:, None], tried, residual)
         return onset, residual
+
+    def plain_cost(self, residual: np.ndarray) -> np.ndarray:
+        """(p,) N^2, plain sum of squares of every press."""
+        t = self.forward.touches
+        each = np.where(t.counted, (residual**2).sum(axis=1), 0.0)
+        return np.bincount(t.press, weights=each, minlength=t.presses)
 
     def press_cost(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(p,) misfit of every press beside the likeliest factor on its force, and the price of its shift."""
