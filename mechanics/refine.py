@@ -51,6 +51,8 @@ def _halved(mesh: TetMesh, chosen: np.ndarray, edge_m: float) -> tuple[TetMesh, 
     pairs = np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0)
     length = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
     marked = pairs[chosen[pairs].any(axis=1) & (length > edge_m)]
+    if not len(marked):
+        return mesh, np.arange(len(tets))
     length = np.linalg.norm(mesh.points[marked[:, 0]] - mesh.points[marked[:, 1]], axis=1)
     marked = marked[np.argsort(-length, kind="stable")]
     points = np.vstack([mesh.points, mesh.points[marked].mean(axis=1)])

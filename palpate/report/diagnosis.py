@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnose.library import effect
 from diagnose.result import Diagnosis
 from mechanics.model import Model
 from mechanics.recording import Recording
@@ -16,6 +15,7 @@ from palpate.report.diagnosis_words import (
     ERROR_WORDS,
     answers,
     force_words,
+    meaning,
     parameter_rows,
     share_words,
     short,
@@ -50,6 +50,7 @@ def _caption(result: Diagnosis) -> str:
         "millinewtons (1 mN: the weight of a tenth of a gram). Middle: measured and simulated force of one "
         f"press{after}. Right: how much of the difference each effect alone would take away at places that "
         "the fit had not seen."
+        + ("" if result.effects else " None of them is large and steady enough to be named.")
     )
 
 
@@ -72,7 +73,9 @@ def _how_large(page: Page, result: Diagnosis) -> None:
     rows = parameter_rows(result)
     if rows:
         page.heading("How large, and how sure")
-        page.table(["effect", "quantity", "found", "95 % sure between", "unit"], rows)
+        page.table(["effect", "quantity", "found", "95% sure between", "unit"], rows)
+    elif result.reasons:
+        page.heading("Remarks")
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
     if result.held_out_n:
@@ -99,7 +102,7 @@ def _tried(page: Page, result: Diagnosis) -> None:
         [
             [
                 e.name.replace("_", " "),
-                effect(e.name).words,
+                meaning(e.name),
                 f"{e.probability:.0%}",
                 f"{e.gap_after_n * 1e3:.0f}",
                 share_words(e.gap_closed),

@@ -70,6 +70,23 @@ WORDS = {
 }
 
 
+MEANINGS = {
+    "finite_strain": "the presses are so deep that the material is stretched and squeezed strongly, where "
+    "force no longer follows the simple law of elasticity",
+    "force_gain": "the force sensor's axes read too much or too little, or into one another",
+}
+"""Where the library's own words need knowledge of mechanics."""
+
+
+def meaning(name: str) -> str:
+    """What an effect is, for a person who has never heard of it."""
+    return MEANINGS.get(name, effect(name).words)
+
+
+LITTLE = 0.1
+"""A share of the difference below which it is not said to depend on something."""
+
+
 def spoken(names: tuple[str, ...] | list[str], last: str = "and") -> str:
     """Effects' names as a list in a sentence."""
     words = [n.replace("_", " ") for n in names]
@@ -99,7 +116,7 @@ def verdict(result: Diagnosis) -> str:
         "ambiguous": f"The simulation leaves something out: most likely {effects}, but these touches cannot "
         f"rule out {rivals}.",
         "unknown": "The simulation differs from the measured force, and nothing that this program knows "
-        "explains it.",
+        "explains it" + (f"; {rivals} is suspected." if rivals else "."),
         "effect+unknown": f"The simulation leaves out {effects}, which explains part of the difference; "
         "something that this program does not know remains.",
     }[result.kind]
@@ -121,13 +138,17 @@ def _where(result: Diagnosis) -> tuple[str, str, str]:
             f"largest difference is {force_words(rms)}, at {largest} (ringed)."
         )
         return question, "Nowhere in particular", text
-    answer = f"It depends on {AXIS_WORDS[axis.axis]}"
+    there = f"largest at {largest} (ringed): {force_words(rms)} there."
+    if axis.share < LITTLE:
+        text = f"What it follows most is {AXIS_WORDS[axis.axis]}, and that is {axis.share:.0%} of it. It is "
+        text += there
+        return question, "It follows no single thing", text
     chance = "" if axis.p < 0.05 else " This may be chance."
     text = (
         f"{axis.share:.0%} of the difference between measured and simulated force follows it.{chance} The "
-        f"difference is largest at {largest} (ringed): {force_words(rms)} there."
+        f"difference is {there}"
     )
-    return question, answer, text
+    return question, f"It depends on {AXIS_WORDS[axis.axis]}", text
 
 
 def _which(result: Diagnosis) -> tuple[str, str, str]:
@@ -142,8 +163,9 @@ def _which(result: Diagnosis) -> tuple[str, str, str]:
     parameters = {e.name: e.parameters for e in result.entries}
     parts = []
     for name in result.effects:
-        said = short(parameters.get(name, {}))
-        parts.append(effect(name).words + (f" ({said})" if said else ""))
+        keys = parameters.get(name, {})
+        said = _fading(keys) if name == "viscoelasticity" and keys else short(keys)
+        parts.append(meaning(name) + (f" ({said})" if said else ""))
     text = "; ".join(parts)
     text = text[0].upper() + text[1:] + ". " + _suspects(result)
     if "unknown" in result.kind:
@@ -154,10 +176,17 @@ def _which(result: Diagnosis) -> tuple[str, str, str]:
     return question, answer[0].upper() + answer[1:], text.strip()
 
 
+def _fading(keys: dict[str, Any]) -> str:
+    """A Prony series in words."""
+    pairs = zip(keys["g"], keys["tau_s"], strict=True)
+    terms = [f"{g:.0%} that fades within {tau:.2g} s" for g, tau in pairs]
+    return f"extra force right after a fast press: {' and '.join(terms)}"
+
+
 def _suspects(result: Diagnosis) -> str:
     if not result.candidates:
         return ""
-    also = "; ".join(f"{n.replace('_', ' ')}: {effect(n).words}" for n in result.candidates)
+    also = "; ".join(f"{n.replace('_', ' ')}: {meaning(n)}" for n in result.candidates)
     return f"Not ruled out by these touches - {also}."
 
 
@@ -176,14 +205,14 @@ def _how_far(result: Diagnosis, force_rms_n: float) -> tuple[str, str, str]:
             )  # fmt: skip
         text = (
             f"{typical}: {before} before ({size}), {after} with what was found. The sensor's own noise is "
-            f"{noise}, so {result.gap_closed:.0%} of what lies above it is gone (95 % sure: {low:.0%} to "
+            f"{noise}, so {result.gap_closed:.0%} of what lies above it is gone (95% sure: {low:.0%} to "
             f"{high:.0%})."
         )
         return question, f"From {before} to {after}", text
     text = f"{typical}: {before} ({size}). The sensor's own noise is {noise}."
-    if result.kind != "none":
-        text += " With no effect found, nothing of it is gone."
-    return question, f"{before}; the sensor's noise is {noise}", text
+    if result.kind == "none":
+        return question, "There is nothing to shrink", text
+    return question, f"It stays at {before}", text + " With no effect found, nothing of it is gone."
 
 
 def plain_key(key: str) -> tuple[str, float, str]:

@@ -19,7 +19,8 @@ h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.25rem; margin-
 p.lead { font-size: 1.15rem; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
 figcaption { color: #55606e; font-size: .92rem; } table { border-collapse: collapse; margin: .8rem 0; }
 th, td { padding: .3rem .8rem; border-bottom: 1px solid #d9dee5; text-align: right; }
-th:first-child, td:first-child { text-align: left; } th { border-bottom: 2px solid #8a96a5; }
+th:first-child, td:first-child, td.words, th.words { text-align: left; }
+th { border-bottom: 2px solid #8a96a5; }
 .cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(16rem, 1fr)); gap: .9rem;
          margin: .9rem 0; }
 .card { border: 1px solid #d9dee5; border-top: 4px solid #2a9d8f; border-radius: 4px; padding: .6rem .9rem;
@@ -61,8 +62,13 @@ class Page:
 
     def table(self, header: Sequence[str], rows: Sequence[Sequence[Any]]) -> None:
         """A table; floats to four significant digits."""
-        head = "".join(f"<th>{html.escape(h)}</th>" for h in header)
-        body = "".join("<tr>" + "".join(f"<td>{_cell(v)}</td>" for v in row) + "</tr>" for row in rows)
+        wordy = [any(_is_words(row[k]) for row in rows) for k in range(len(header))]
+        kind = [' class="words"' if w else "" for w in wordy]
+        head = "".join(f"<th{k}>{html.escape(h)}</th>" for k, h in zip(kind, header, strict=True))
+        body = "".join(
+            "<tr>" + "".join(f"<td{k}>{_cell(v)}</td>" for k, v in zip(kind, row, strict=True)) + "</tr>"
+            for row in rows
+        )
         self._parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
     def figure(self, picture: Any, caption: str) -> None:
@@ -110,6 +116,11 @@ def save_figures(folder: Path | str, figures: dict[str, Any]) -> dict[str, Path]
         with atomic_file(paths[name]) as temporary:
             temporary.write_bytes(png_bytes(picture))
     return paths
+
+
+def _is_words(value: Any) -> bool:
+    """Whether a cell holds a phrase, which reads better from the left."""
+    return isinstance(value, str) and sum(c.isalpha() for c in value) > 12
 
 
 def _cell(value: Any) -> str:
