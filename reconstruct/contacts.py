@@ -24,6 +24,8 @@ from reconstruct.tool_weight import tool_weight
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW, _HIGH, _PEAK = 5.0, 10.0, 12.0  # in standard deviations of the noise
+_PULL_S, _AGAINST = 0.15, -0.5
+"""A force so soon after a press, against it by this cosine, is the surface that holds on to the tip."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -182,14 +184,18 @@ def _explored(recording: Recording, given: _Given) -> tuple[Exploration, Signals
     contacts: list[Contact] = []
     rejected: list[tuple[float, str]] = []
     touches = runs(touching)
+    left, last = 0, np.zeros(3)
     for a, b in touches:
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
             contact = (paper_contact if method == "paper" else fitted_contact)(signals, a, b)
             reason = "" if contact else "shows no rise of force with depth"
+        if contact and contact.normal @ last < _AGAINST and recording.t[a] - recording.t[left] < _PULL_S:
+            contact, reason = None, "pulls at the surface that it has just left (adhesion)"
         if contact:
             contacts.append(contact)
+            left, last = b - 1, contact.normal
         else:
             rejected.append((float(recording.t[a]), reason))
     if len(contacts) < options.least_palpations:

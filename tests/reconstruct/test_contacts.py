@@ -115,6 +115,17 @@ def test_a_rise_that_would_begin_beyond_the_deepest_travel_is_no_press(monkeypat
     assert [reason for _, reason in exploration.rejected if "no rise" in reason]
 
 
+def test_a_surface_that_holds_on_to_the_leaving_tip_is_no_press():
+    recording, onsets = explore_cylinder()
+    force = recording.force_on_tool.copy()
+    for contact in explore(recording).contacts[2:6]:
+        pull = 0.4 * np.sin(np.linspace(0, np.pi, 120))[:, None] * contact.normal
+        force[contact.end : contact.end + 120] -= pull
+    exploration = explore(dataclasses.replace(recording, force_on_tool=force))
+    assert len(exploration.contacts) == len(onsets)
+    assert sum("adhesion" in reason for _, reason in exploration.rejected) == 4
+
+
 def test_a_press_on_the_support_is_rejected_and_named():
     recording, onsets = explore_cylinder(support_press=True)
     exploration = explore(recording)
