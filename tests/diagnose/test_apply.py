@@ -1,0 +1,202 @@
+"""Improved models: what was found is written, read back and rendered; instruments stay out of it."""
+
+from __future__ import annotations
+
+import json
+from functools import partial
+
+import numpy as np
+import pytest
+
+import mechanics.surface_compliance as made
+from diagnose.apply import improved, rendered, with_effects
+from diagnose.pipeline import DiagnoseOptions, diagnose
+from mechanics.inclusion import Ball
+from mechanics.model import read_model, write_model
+from mechanics.near_field import surface_softness
+from mechanics.sites import touch_solver
+from render.fem import FemRenderer
+from render.options import RenderOptions
+
+UP = np.array([0.0, 0.0, 1.0])
+DEPTH = 0.004
+COARSE_M = 0.05
+
+
+@pytest.fixture(scope="module", autouse=True)
+def coarse():  # type: ignore[no-untyped-def]
+    """Compliances on the block's own mesh: what is asked here needs no finer one."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
+        patch.setattr(made, "sharpening", lambda *arguments: 0.0)
+        patch.setattr(made, "touch_solver", partial(touch_solver, surface_edge_m=COARSE_M))
+        yield
+
+
+@pytest.fixture(scope="module")
+def model(bench):  # type: ignore[no-untyped-def]
+    """The block's model, as the ideal: linear dent, nothing left out."""
+    return bench.record()[1].replaced(provenance={"dent_law": "linear"})
+
+
+@pytest.fixture(scope="module")
+def folder(model, tmp_path_factory):  # type: ignore[no-untyped-def]
+    """Written once: compliances of every variant are kept in it."""
+    return write_model(tmp_path_factory.mktemp("models") / "block", model)
+
+
+def made_once(model, folder, effects, known={}):  # type: ignore[no-untyped-def]  # noqa: B006
+    """A renderer of the model with effects, its compliance kept in the folder."""
+    key = json.dumps(effects, sort_keys=True)
+    if key not in known:
+        quick = RenderOptions(surface_edge_m=0.01, snap_to_touches=False)
+        known[key] = FemRenderer(with_effects(model, effects).replaced(path=folder), quick)
+    return known[key]
+
+
+def felt(model, folder, effects, points=((0.0, 0.0, 0.04),), normal=UP, drag=0.0):  # type: ignore[no-untyped-def]
+    """(k, n, 3) N on the tool: pressed, held for 0.5 s, dragged, let go, at points of the surface."""
+    renderer = made_once(model, folder, effects)
+    down, up = np.linspace(-1e-3, DEPTH, 200), np.linspace(DEPTH, -2e-3, 240)
+    into = np.concatenate([down, np.full(500, DEPTH), up])
+    aside = np.concatenate([np.zeros(200), np.linspace(0, drag, 500), np.zeros(240)])
+    forces = []
+    for point in points:
+        centre = np.array(point) + model.tip_radius_m * normal
+        path = centre - into[:, None] * normal + aside[:, None] * np.array([0.0, 1.0, 0.0])
+        forces.append(renderer.follow(renderer.start(), path[:, None], np.full(len(path), 1e-3))[:, 0])
+    return np.array(forces)
+
+
+def test_a_lump_is_drawn_once_and_its_key_makes_the_compliance_anew(model, folder):
+    lump = {"centre_m": [0.0, 0.0, 0.022], "radius_m": 0.014, "modulus_ratio": 6.0}
+    better = with_effects(model, {"inclusion": lump})
+    assert list(better.extra["inclusions"].values()) == [lump]
+    assert better.modulus_ratio.max() > 1.5
+    places = [(0.0, 0.0, 0.04), (0.03, 0.03, 0.04)]
+    plain, hard = felt(model, folder, {}, places), felt(model, folder, {"inclusion": lump}, places)
+    over, aside = (hard[:, 650, 2] / plain[:, 650, 2]) - 1
+    assert over > 0.01 and over > 2 * abs(aside)
+
+
+def test_written_and_read_back_it_renders_the_same(model, tmp_path):
+    effects = {
+        "inclusion": {"centre_m": [0.01, 0.0, 0.02], "radius_m": 0.008, "modulus_ratio": 4.0},
+        "viscoelasticity": {"g": [0.3], "tau_s": [0.3]},
+        "adhesion": {"pull_off_n": 0.1, "range_m": 6e-4, "inside": 0.4},
+    }
+    better = with_effects(model, effects)
+    again = read_model(write_model(tmp_path / "model", better))
+    assert {k: dict(v) for k, v in again.effects.items()} == effects
+    assert again.modulus_ratio == pytest.approx(better.modulus_ratio, rel=1e-12)
+    assert again.extra["inclusions"] == better.extra["inclusions"]
+
+
+def test_a_softer_top_makes_the_dent_softer_too(model, folder):
+    """The modulus under the tip is the dent's: a gradient that is felt alike in far field and dent."""
+    gradient = {"modulus_gradient": {"ratio_base": 0.5, "ratio_top": 0.5}}
+    path = np.array([[0.0, 0.0, 0.045 + 1e-3 - d] for d in np.linspace(0, 5e-3, 50)])[:, None]
+    forces = []
+    for effects in (gradient, {}):
+        renderer = made_once(model, folder, effects)
+        forces.append(renderer.follow(renderer.start(), path, np.full(50, 1e-3))[:, 0, 2])
+    soft, ideal = forces
+    assert soft[1:] == pytest.approx(0.5 * ideal[1:], rel=2e-3, abs=1e-6)
+
+
+def test_a_gradient_is_softer_on_top_and_stiffer_at_the_base(model, folder):
+    gradient = {"modulus_gradient": {"ratio_base": 1.5, "ratio_top": 0.7}}
+    plain, graded = felt(model, folder, {}), felt(model, folder, gradient)
+    assert graded[0, 650, 2] < 0.9 * plain[0, 650, 2]
+    low, side = [(0.04, 0.0, 0.008)], np.array([1.0, 0.0, 0.0])
+    plain, graded = (felt(model, folder, e, low, side) for e in ({}, gradient))
+    assert graded[0, 650, 0] > 1.1 * plain[0, 650, 0]
+
+
+def test_a_skin_is_stiffer_at_first_touch_than_deep(model, folder):
+    skin = {"skin_layer": {"thickness_m": 0.003, "modulus_ratio": 3.0}}
+    ratio = felt(model, folder, skin)[0, :, 2] / np.maximum(felt(model, folder, {})[0, :, 2], 1e-9)
+    assert ratio[60] > ratio[199] > 1.1
+    ratios = with_effects(model, skin).modulus_ratio
+    assert 1.1 < ratios.max() <= 3.0 and ratios.min() >= 1.0
+
+
+def test_a_loose_base_carries_what_presses_on_it_and_lets_go_of_what_lifts(model, folder):
+    loose = {"unbonded_base": {"bonded_fraction": 0.5, "direction": [1.0, 0.0, 0.0]}}
+    top = [(0.02, 0.0, 0.04)]
+    plain, own = felt(model, folder, {}, top), felt(model, folder, loose, top)
+    # straight down over the loose half: the floor is there
+    assert 0.9 < own[0, 650, 2] / plain[0, 650, 2] < 1.0
+    left, side = [(-0.04, 0.0, 0.03)], np.array([-1.0, 0.0, 0.0])
+    plain, own = (felt(model, folder, e, left, side) for e in ({}, loose))
+    towards = own[0, 650, 0] / plain[0, 650, 0]
+    right, other = [(0.04, 0.0, 0.03)], np.array([1.0, 0.0, 0.0])
+    plain, own = (felt(model, folder, e, right, other) for e in ({}, loose))
+    # pushed away from it the loose half lifts, pushed onto it it is carried
+    assert own[0, 650, 0] / plain[0, 650, 0] < towards < 1.0 or towards < 0.995
+
+
+def test_springs_under_the_base_and_a_compressible_material_are_softer(model, folder):
+    plain = felt(model, folder, {})[0, 650, 2]
+    k = model.young_modulus_pa / 0.04
+    springs = {"compliant_base": {"k_normal_pa_per_m": k, "k_tangential_pa_per_m": k / 3}}
+    assert felt(model, folder, springs)[0, 650, 2] < 0.97 * plain
+    assert felt(model, folder, {"poisson_ratio": {"poisson_ratio": 0.35}})[0, 650, 2] < 0.97 * plain
+    assert felt(model, folder, {"finite_strain": {}})[0, 650, 2] < 0.99 * plain
+
+
+def test_adhesion_that_holds_inside_pulls_all_the_way_out(model, folder):
+    keys = {"pull_off_n": 0.1, "range_m": 6e-4}
+    plain = felt(model, folder, {})[0, :, 2]
+    edge = felt(model, folder, {"adhesion": keys})[0, :, 2]
+    inside = felt(model, folder, {"adhesion": {**keys, "inside": 1.0}})[0, :, 2]
+    half_way_out = 200 + 500 + 100
+    assert edge[half_way_out] == pytest.approx(plain[half_way_out], abs=1e-9)
+    assert inside[half_way_out] == pytest.approx(plain[half_way_out] - 0.1, abs=1e-3)
+    assert edge.min() == pytest.approx(-0.1, abs=0.01) and inside.min() == pytest.approx(-0.1, abs=0.01)
+    assert np.abs(np.diff(inside)).max() < 0.03  # nothing steps
+
+
+def test_only_what_belongs_into_a_model_is_put_there(model):
+    assert [n for n in ("force_bias", "time_delay", "surface_shape", "surface_offset") if rendered(n)] == []
+    better = with_effects(model, {"time_delay": {"delay_s": 0.02}, "friction_slip": {"mu": 0.1}})
+    assert list(better.effects) == ["friction_slip"]
+    assert with_effects(better, {"adhesion": {"pull_off_n": 0.1, "range_m": 1e-3}}).effects.keys() == {
+        "friction_slip", "adhesion",
+    }  # fmt: skip
+
+
+def test_the_improved_model_is_what_was_fitted(bench, tmp_path):
+    g, tau = 0.3, 0.3
+
+    def alter(t, x, f):  # type: ignore[no-untyped-def]
+        out, branch, last = f.copy(), np.zeros(3), f[0]
+        step = np.diff(t, prepend=t[0] - 0.002)
+        for i in range(len(t)):
+            decay = np.exp(-step[i] / tau)
+            branch = decay * branch + tau / step[i] * (1 - decay) * (f[i] - last)
+            last, out[i] = f[i], f[i] + g * branch
+        return x, out
+
+    recording, plain = bench.record(alter)
+    plain = plain.replaced(provenance={"dent_law": "linear"})
+    result = diagnose(recording, plain, DiagnoseOptions(fast=True))
+    better, kept = improved(plain, result)
+    again = read_model(write_model(tmp_path / "model", better))
+    assert "viscoelasticity" in kept
+    assert sum(again.effects["viscoelasticity"]["g"]) == pytest.approx(g, rel=0.15)
+    assert again.young_modulus_pa == pytest.approx(20e3, rel=0.05)
+    fitted = "finite_strain" in result.attribution.final.found.names
+    assert again.provenance["dent_law"] == ("neo-hookean" if fitted else "linear")
+    assert fitted  # as the presses were made
+
+
+def test_softness_of_the_surface_leaves_balls_out(model):
+    lump = {"centre_m": [0.0, 0.0, 0.03], "radius_m": 0.008, "modulus_ratio": 6.0}
+    better = with_effects(model, {"inclusion": lump})
+    ball = Ball((0.0, 0.0, 0.03), 0.008, 6.0)
+    points = np.array([[0.0, 0.0, 0.04], [0.03, 0.0, 0.04]])
+    assert surface_softness(better.mesh, better.modulus_ratio, points, 0.005, [ball]) == pytest.approx(1.0)
+    assert surface_softness(better.mesh, np.full_like(better.modulus_ratio, 2.0), points, 0.005) == (
+        pytest.approx(0.5)
+    )
