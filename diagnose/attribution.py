@@ -25,6 +25,9 @@ IN_TIME = ("time_delay", "viscoelasticity", "backlash", "adhesion", "mullins_sof
 OUT_OF_SET = 0.1
 """An effect with a smaller p value is not in the model confidence set of 90 %."""
 
+HIDDEN_LEAST = 10.0
+"""Such an effect gains this much alone before it is tried with finite strain as well."""
+
 RIVAL_CLOSES = 0.3
 """A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
 
@@ -75,7 +78,10 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
             if effect.name in current.found.names:
                 continue
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(library)) / search.options.most)
-            scores[effect.name] = search.score(effect.name, _added(search, effect, current), current)
+            candidate = search.judge([*current.found.effects, effect], like=current)
+            if not chosen:
+                candidate = _with_hidden_strain(search, effect, candidate, current)
+            scores[effect.name] = search.score(effect.name, candidate, current)
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
             if score.gain > search.options.plain_gain and not search.passes(score, first=first):
@@ -119,12 +125,15 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
     )
 
 
-def _added(search: Search, effect: Effect, current: Candidate) -> Candidate:
-    """The current set and one effect more; with finite strain where each may have hidden the other."""
-    candidate = search.judge([*current.found.effects, effect], like=current)
+def _with_hidden_strain(
+    search: Search, effect: Effect, candidate: Candidate, current: Candidate
+) -> Candidate:
+    """The candidate, or with finite strain beside it where each may have hidden the other."""
     if effect.name not in HIDING or "finite_strain" in current.found.names:
         return candidate
-    both = search.judge([search.finite_strain, *current.found.effects, effect], like=candidate)
+    if current.found.loss - candidate.found.loss < HIDDEN_LEAST * search.forward.touches.slowness:
+        return candidate
+    both = search.judge([search.finite_strain, *candidate.found.effects], like=candidate)
     return both if both.found.loss < candidate.found.loss else candidate
 
 

@@ -19,6 +19,8 @@ FINITE_STRAIN_LEAST = 0.7
 """Finite strain is named where it must be larger than this share of the noise ..."""
 FINITE_STRAIN_GAIN = 2.0
 """... and the neo-Hookean law fits better than the linear one by this log likelihood."""
+DOUBTED_STRAIN_GAIN = 20.0
+"""The same where something is left that no law explains: it may bend the presses as finite strain does."""
 FINITE_STRAIN_BEYOND_SCALE = 0.65
 """Share of its size that another modulus cannot take up; by it the asserted effects are put in order."""
 SHAPE_FELT = 0.6
@@ -133,7 +135,7 @@ def _finite_strain(evidence: Evidence, answer: Answer) -> None:
     size_n = predicted_size(evidence.forward, found.base.found)
     if size_n <= FINITE_STRAIN_LEAST * evidence.noise_n:
         return
-    if found.finite_strain_gain > FINITE_STRAIN_GAIN:
+    if found.finite_strain_gain > (DOUBTED_STRAIN_GAIN if answer.remainder else FINITE_STRAIN_GAIN):
         sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
         beyond = FINITE_STRAIN_BEYOND_SCALE * size_n
         names = answer.names
