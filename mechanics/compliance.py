@@ -206,7 +206,7 @@ def load_or_condense(
         model.modulus_ratio,
         *held,
         *form,
-        *([model.tip_radius_m] if np.ptp(model.modulus_ratio) > 0 else []),
+        *([model.tip_radius_m] if balls else []),
         *(value for ball in balls for value in dataclasses.astuple(ball)),
     )
 

@@ -114,8 +114,8 @@ def surface_compliance(
     support: None, bonded.
 
     low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
-    a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where the modulus varies close below the
-    surface (mechanics.near_field).
+    a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where a ball lies close below the surface
+    (mechanics.near_field).
     """
     # between places a loose base rests on the floor: never softer than what each place has of its own
     resting = None if support is None else replace(support, resting=True)
@@ -142,7 +142,8 @@ def surface_compliance(
     own_normals = _normals(fine.mesh, own_nodes)
     own_width = patch_width(fine.mesh)
     own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.5 * f))
-    own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
+    if balls:  # what covers the whole surface is in the dent: its law, and the modulus under the tip
+        own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
     if loose:
         own -= carried_by_floor(fine, own_points, own_normals, own_width)
     progress("give of each place", 1.0)
