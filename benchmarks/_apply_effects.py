@@ -201,16 +201,21 @@ def felt_on(model: Model, position: np.ndarray, force: np.ndarray) -> dict[str, 
     normal = force[dragged] @ n
     shear = np.linalg.norm(force[dragged] - normal[:, None] * n, axis=1)
     moving_in = np.gradient(depth) > 0
-    down = on_top & (np.abs(depth - 0.5 * DEPTH_M) < 1e-4) & moving_in
+    down = on_top & (np.abs(depth - 0.5 * DEPTH_M) < 1e-3) & moving_in
     later = np.arange(len(depth)) > dragged[-1]
+
+    def half_way(rows: np.ndarray) -> float:
+        order = np.argsort(depth[rows])  # between ticks: some may have been missed
+        return float(np.interp(0.5 * DEPTH_M, depth[rows][order], push[rows][order]))
+
     out = on_top & (depth > -1e-3) & (depth < DEPTH_M) & ~moving_in
     into = radius - (position - edge) @ m
     pressed = np.linalg.norm(position - edge, axis=1) < 2 * radius
     return {
         "reached": float(push[first_hold[:15]].mean()),
         "held": float(push[first_hold[-150:-50]].mean()),
-        "first": float(push[down & ~later].mean()),
-        "second": float(push[down & later].mean()),
+        "first": half_way(down & ~later),
+        "second": half_way(down & later),
         "sideways": float(np.median(shear / normal)),
         "pull": float(-push[out].min()),
         "side": float((force @ m)[pressed & (into > DEPTH_M - 2e-5)].mean()),

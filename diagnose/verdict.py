@@ -25,6 +25,8 @@ FINITE_STRAIN_BEYOND_SCALE = 0.65
 """Share of its size that another modulus cannot take up; by it the asserted effects are put in order."""
 SHAPE_FELT = 0.6
 """Sites that differ by more than their shape may are a cause where that is this share of the noise."""
+LUMP_CLOSES = 0.1
+"""Share of the held-out gap that a lump closes, or its rival is the shape."""
 SHAPE_RIVALS = ("inclusion", "modulus_gradient", "unbonded_base", "compliant_base")
 
 
@@ -88,6 +90,7 @@ def answer_of(evidence: Evidence, counts: np.ndarray) -> Answer:
     _slipping(evidence, answer)
     _finite_strain(evidence, answer)
     _shape(evidence, answer)
+    _unconfirmed_lump(evidence, answer)
     # with nothing named the gap is there all the same
     answer.remainder = answer.remainder or (lone and not answer.names)
     if not answer.names and not answer.remainder:
@@ -150,6 +153,17 @@ def _finite_strain(evidence: Evidence, answer: Answer) -> None:
         # deep enough for it, and it fitted no worse than the linear law until another took its place
         if "finite_strain" in (*found.final.found.names, *found.base.found.names):
             answer.candidates.append("finite_strain")
+
+
+def _unconfirmed_lump(evidence: Evidence, answer: Answer) -> None:
+    """A lump that closes nothing where it was not fitted may be a shape that is wrong there."""
+    found = evidence.found
+    for scores, name in zip(found.steps, found.picked, strict=False):
+        if name == "inclusion" and name in found.chosen and scores[name].share < LUMP_CLOSES:
+            answer.candidates.append("surface_shape")
+            answer.reasons.append(
+                "places that were not fitted do not confirm the lump: the shape may be wrong there instead"
+            )
 
 
 def _shape(evidence: Evidence, answer: Answer) -> None:
