@@ -166,7 +166,7 @@ def path_of(model: Model) -> Recording:
     outside, inside = edge + (radius + ABOVE_M) * m, edge + (radius - DEPTH_M) * m
     high = outside + ((above - outside) @ n + 0.01) * n
     stops = [
-        (0.8, above), (ramp, below), (0.6, below), (0.15, aside), (0.1, aside), (0.15, below), (ramp, above),
+        (2.0, above), (ramp, below), (0.6, below), (0.15, aside), (0.1, aside), (0.15, below), (ramp, above),
         (0.2, above), (ramp, below), (ramp, above), (0.5, high), (0.7, outside), (ramp, inside),
         (0.2, inside), (ramp, outside), (0.2, outside),
     ]  # fmt: skip
@@ -206,7 +206,8 @@ def felt_on(model: Model, position: np.ndarray, force: np.ndarray) -> dict[str, 
 
     def half_way(rows: np.ndarray) -> float:
         order = np.argsort(depth[rows])  # between ticks: some may have been missed
-        return float(np.interp(0.5 * DEPTH_M, depth[rows][order], push[rows][order]))
+        near = np.abs(depth[rows] - 0.5 * DEPTH_M).min(initial=np.inf) < 1e-4
+        return float(np.interp(0.5 * DEPTH_M, depth[rows][order], push[rows][order])) if near else np.nan
 
     out = on_top & (depth > -1e-3) & (depth < DEPTH_M) & ~moving_in
     into = radius - (position - edge) @ m
