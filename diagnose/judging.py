@@ -45,6 +45,10 @@ SURE_Z = 3.0
 CLOSING_GAIN, CLOSING_SHARE = 50.0, 0.5
 """... or if the gain is not that small and half of the gap closes on held-out sites."""
 
+FELT, PLENTY = 0.7, 150.0
+"""What every site feels must change the force by this share of the noise (of the 3-vector), unless the
+evidence is plenty: a surface that is off everywhere by the same little bends all presses alike, a few millinewtons."""
+
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
 
@@ -156,6 +160,7 @@ class Search:
         onset = first_touches(forward, whitener, modulus)
         rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
         self.finite_strain = finite_strain
+        self.felt_n = FELT * float(np.sqrt(3)) * forward.touches.raw_noise_n
         self.renew(rough)
 
     def renew(self, found: Fit) -> None:
@@ -239,8 +244,10 @@ class Search:
             return False
         if score.name == "inclusion":
             return score.evidence > o.lump_gain and score.share > -0.3 and score.toward > o.toward
-        if score.name in EVERYWHERE and score.z < STEADY_Z:
-            return False
+        if score.name in EVERYWHERE:
+            unfelt = score.size_n < self.felt_n and score.evidence < PLENTY
+            if score.z < STEADY_Z or unfelt:
+                return False
         if not first and score.name in SPATIAL and score.z < STEADY_Z:
             # one place that a law misses by far must not name a second effect; a lump lives in few places
             if score.name != "inclusion" or score.candidate.chi > 1.5:

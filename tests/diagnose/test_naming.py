@@ -21,6 +21,7 @@ def score(name, per_group, **changes):
 def search():
     search = Search.__new__(Search)
     search.options = AttributionOptions()
+    search.felt_n = 0.010
     return search
 
 
@@ -56,6 +57,13 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
     search.forward = SimpleNamespace(touches=SimpleNamespace(slowness=1.0))
     _, gain = _with_strain(search, [])
     assert (gain > FINITE_STRAIN_GAIN) == named
+
+
+def test_what_bends_every_press_by_less_than_the_noise_needs_plenty_of_evidence(search):
+    search.felt_n = 0.0145
+    assert not search.passes(score("strain_stiffening", [3.0, 2.0, 2.5] * 13))
+    assert search.passes(score("strain_stiffening", [3.0, 2.0, 2.5] * 13, size_n=0.02))
+    assert search.passes(score("strain_stiffening", [6.0, 4.0, 5.0] * 13))
 
 
 def test_one_site_may_name_a_lump(search):
