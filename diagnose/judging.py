@@ -47,7 +47,7 @@ CLOSING_GAIN, CLOSING_SHARE = 50.0, 0.5
 
 FELT, PLENTY = 0.7, 150.0
 """What every site feels must change the force by this share of the noise (of the 3-vector), unless the
-evidence is plenty: a surface that is off everywhere by the same little bends all presses alike, a few millinewtons."""
+evidence is plenty: a surface that is off everywhere by the same little bends all presses alike, by little."""
 
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
