@@ -18,13 +18,13 @@ from diagnose.fields import energy_fields
 from diagnose.forward import Forward, places_of
 from diagnose.stages import stored
 from mechanics.elasticity import stiffness, triangle_mass
+from mechanics.floor import resting
 from mechanics.model import Model
 from mechanics.support import base_triangles
 from mechanics.tetmesh import EDGES, TetMesh
 
 ANGLES = 8
 FREE_FRACTIONS = (0.25, 0.5, 0.75)
-_ROUNDS = 12
 _BATCH = 128
 
 
@@ -188,27 +188,9 @@ def loosened(motion: SupportMotion, fraction: float, angle: float) -> np.ndarray
     carried = np.empty_like(free)
     for k in range(q):
         motion_free = -inverse[normal] @ reaction[k]
-        held = _touching(give_normal, -motion_free[:, 0])
+        held = resting(give_normal, -motion_free[:, 0])
         carried[k] = free[k]
         if held.any():
             part = motion_free[held]
             carried[k] -= part.T @ solve(give_normal[np.ix_(held, held)], part, assume_a="pos")
     return np.stack([free, carried])
-
-
-def _touching(give: np.ndarray, motion: np.ndarray) -> np.ndarray:
-    """(b,) bool: nodes that rest on the floor where `motion` (upward, without pressure) may not be negative.
-
-    Complementarity by switching the wrong ones until none is left (or a few rounds are over).
-    """
-    held = motion < 0
-    for _ in range(_ROUNDS):
-        pressure = np.zeros(len(motion))
-        if held.any():
-            pressure[held] = solve(give[np.ix_(held, held)], -motion[held], assume_a="pos")
-        gap = motion + give @ pressure
-        wrong = (held & (pressure < 0)) | (~held & (gap < -1e-12 * np.abs(motion).max()))
-        if not wrong.any():
-            break
-        held ^= wrong
-    return held

@@ -7,21 +7,13 @@ import numpy as np
 
 from diagnose.effects.base import Effect, Parameter
 from diagnose.fields import energy_fields, far_with_weights
-
-
-def film_weight(thickness_over_contact: np.ndarray, nu: float) -> np.ndarray:
-    """Gao's I0: share of the film in the effective modulus, 0 thin to 1 thick."""
-    x = np.maximum(thickness_over_contact, 1e-9)
-    return 2 / np.pi * np.arctan(x) + ((1 - 2 * nu) * x * np.log((1 + x * x) / (x * x)) - x / (1 + x * x)) / (
-        2 * np.pi * (1 - nu)
-    )
+from mechanics.effects.skin_layer import film_factor
 
 
 def _change(settings, values, forward):  # type: ignore[no-untyped-def]
     thickness, ratio = values[0], np.exp(values[1])
     contact = forward.tip_radius * np.sqrt(np.maximum(forward.dents, 1e-6))
-    weight = film_weight(thickness / contact, settings.nu)
-    own = ratio**weight
+    own = film_factor(contact, thickness, ratio, settings.nu)
     settings.scale_table(own, own)
     fields = energy_fields(forward)
     # only what lies deeper than the dent's own reach counts as far field
