@@ -6,6 +6,7 @@ folder keeps all three away from the caller.
 
 from __future__ import annotations
 
+import contextlib
 import subprocess
 import sys
 import tempfile
@@ -41,33 +42,37 @@ def tetrahedralize(
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
     and comes out better in half the time. energy: the optimisation stops at this AMIPS energy (3 is ideal).
-    Raises MeshError where nothing comes back.
+    timeout_s: for the second try, with one thread; the first has a third of it. Raises MeshError where
+    nothing comes back.
     """
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
-        np.savez(
-            Path(folder) / "surface.npz",
-            vertices=np.asarray(vertices, dtype=np.float64),
-            triangles=np.asarray(triangles, dtype=np.int32),
-            edge_length_abs=edge_m,
-            epsilon=envelope_m / diagonal,
-            simplify=simplify,
-            stop_energy=energy,
-            num_opt_iter=passes,
-            num_threads=threads,
-        )
-        try:
-            done = subprocess.run(
-                [sys.executable, "-c", _CHILD],
-                cwd=folder,
-                capture_output=True,
-                timeout=timeout_s,
-                check=False,
-            )
-        except subprocess.TimeoutExpired as error:
+        given = {
+            "vertices": np.asarray(vertices, dtype=np.float64),
+            "triangles": np.asarray(triangles, dtype=np.int32),
+            "edge_length_abs": edge_m,
+            "epsilon": envelope_m / diagonal,
+            "simplify": simplify,
+            "stop_energy": energy,
+            "num_opt_iter": passes,
+        }
+        done = None
+        # now and then its threads wait for each other for ever; one thread alone does not
+        for count, limit_s in ((threads, timeout_s / 3), (1, timeout_s)):
+            np.savez(Path(folder) / "surface.npz", **given, num_threads=count)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                done = subprocess.run(
+                    [sys.executable, "-c", _CHILD],
+                    cwd=folder,
+                    capture_output=True,
+                    timeout=limit_s,
+                    check=False,
+                )
+                break
+        if done is None:
             raise MeshError(
                 f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size than {edge_m} m"
-            ) from error
+            )
         result = Path(folder) / "mesh.npz"
         if not result.is_file():
             words = done.stderr.decode(errors="replace").strip().splitlines()

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import subprocess
+
 import numpy as np
 import pytest
+import trimesh
 from scipy.spatial import Delaunay
 
 from benchmarks._surface_truth import phantom_truth, touch
@@ -13,6 +16,7 @@ from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.voxels import labels, voxel_surface
 from reconstruct.surface import Surface, SurfaceOptions, reconstruct_surface
+from reconstruct.tetwild import tetrahedralize
 
 
 @pytest.fixture(scope="module")
@@ -177,3 +181,22 @@ def test_no_label_is_lost_where_a_line_meets_an_edge():
     assert inside.sum() * 0.002**3 == pytest.approx(
         volume(*Cap.sphere(np.array([0.0, 0, 0.01]), 0.03).mesh(0.006)), rel=0.02
     )
+
+
+def test_a_mesher_that_hangs_is_tried_again_with_one_thread(monkeypatch):
+
+    run, limits = subprocess.run, []
+
+    def stuck_at_first(*arguments, **options):
+        limits.append(options["timeout"])
+        if len(limits) == 1:
+            raise subprocess.TimeoutExpired("mesher", options["timeout"])
+        return run(*arguments, **options)
+
+    monkeypatch.setattr(subprocess, "run", stuck_at_first)
+    box = trimesh.creation.box(extents=(0.06, 0.06, 0.03))
+    points, cells = tetrahedralize(box.vertices, box.faces, edge_m=0.02, envelope_m=0.001)
+    corner = points[cells]
+    volume = np.linalg.det(corner[:, 1:] - corner[:, :1]).sum() / 6
+    assert len(limits) == 2
+    assert volume == pytest.approx(0.06 * 0.06 * 0.03, rel=0.01)
