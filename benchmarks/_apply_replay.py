@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.apply import corrected, improved, rendered, with_effects
+from diagnose.apply import corrected, improved, rendered, with_effects, with_replayed_modulus
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file
@@ -57,7 +57,8 @@ def one(path: Path, share: float, work: Path) -> dict[str, Any]:
     }
     ideal = plain.replaced(effects={}, provenance={**plain.provenance, "dent_law": "linear"})
     row["ideal_n"] = replayed(ideal, recording, after, fit=before)
-    row["improved_n"] = replayed(better.replaced(path=folder), recording, after)
+    better = with_replayed_modulus(better.replaced(path=folder), corrected(first, result))
+    row["improved_n"] = replayed(better, recording, after)
     true = {n: k for n, k in truth_effects(recording).items() if rendered(n)}
     if true:
         stated = plain.replaced(effects={}, young_modulus_pa=recording.truth["young_modulus_pa"])

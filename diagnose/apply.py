@@ -27,7 +27,8 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
     """(model with the asserted effects, their names). Instrument effects are left out: they must not be
     rendered.
 
-    The modulus, and the dent law that is rendered, are those of the diagnosis's own fit.
+    The modulus, and the dent law that is rendered, are those of the diagnosis's own fit; see
+    `with_replayed_modulus`.
     """
     parameters = {e.name: dict(e.parameters) for e in diagnosis.entries}
     asserted = {name: parameters.get(name, {}) for name in diagnosis.effects}
@@ -45,6 +46,32 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
         provenance=provenance,
     )
     return better, [name for name in asserted if rendered(name)]
+
+
+REPLAYS = 2
+
+
+def with_replayed_modulus(model: Model, recording: Recording) -> Model:
+    """The model with the Young's modulus at which the renderer's own replay meets the recording best.
+
+    A fit moves first touches and sites' stiffnesses beside the modulus, which a renderer cannot; what they
+    leave to the modulus is made good here. recording: read right (`corrected`). Where the replay gives no
+    force the model stays.
+    """
+    from render.fem import FemRenderer
+    from render.replay import contact_samples, replay_recording
+
+    counted = contact_samples(recording, model)
+    measured = recording.force_on_tool[counted]
+    renderer, modulus = FemRenderer(model), model.young_modulus_pa
+    for _ in range(REPLAYS):
+        forces = replay_recording(renderer, recording)[counted]
+        power = float((forces**2).sum())
+        if power == 0:
+            return model
+        modulus *= float((forces * measured).sum()) / power
+        renderer = renderer.with_modulus(modulus)
+    return model.replaced(young_modulus_pa=modulus)
 
 
 def rendered(name: str) -> bool:

@@ -51,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Diagnose, say it, and write what was asked for."""
-    from diagnose.apply import corrected, improved
+    from diagnose.apply import corrected, improved, with_replayed_modulus
     from diagnose.judging import AttributionOptions
     from diagnose.pipeline import DiagnoseOptions, diagnose
     from diagnose.whiten import NuisanceOptions
@@ -87,6 +87,7 @@ def run(arguments: argparse.Namespace) -> int:
     say(arguments, *result.words())
     if arguments.apply:
         better, kept = improved(model, result)
+        better = with_replayed_modulus(better, corrected(recording, result))
         write_model(arguments.apply, better)
         say(arguments, f"improved model ({', '.join(kept) or 'modulus only'}): {arguments.apply}")
     if arguments.corrected:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import mechanics.surface_compliance as made
-from diagnose.apply import improved, rendered, with_effects
+from diagnose.apply import improved, rendered, with_effects, with_replayed_modulus
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from mechanics.inclusion import Ball
 from mechanics.model import read_model, write_model
@@ -77,6 +77,18 @@ def test_a_lump_is_drawn_once_and_its_key_makes_the_compliance_anew(model, folde
     plain, hard = felt(model, folder, {}, places), felt(model, folder, {"inclusion": lump}, places)
     over, aside = (hard[:, 650, 2] / plain[:, 650, 2]) - 1
     assert over > 0.01 and over > 2 * abs(aside)
+
+
+def test_the_modulus_is_the_one_that_the_renderer_needs(bench, folder):
+    """Whatever modulus a fit leaves, the replay finds the same, and it is that of the object (20 kPa)."""
+    recording, model = bench.record()
+    model = model.replaced(provenance={"dent_law": "linear"}, path=folder)
+    found = [
+        with_replayed_modulus(model.replaced(young_modulus_pa=e), recording).young_modulus_pa
+        for e in (0.8 * model.young_modulus_pa, 1.3 * model.young_modulus_pa)
+    ]
+    assert found[0] == pytest.approx(found[1], rel=0.01)
+    assert found[0] == pytest.approx(20e3, rel=0.08)
 
 
 def test_written_and_read_back_it_renders_the_same(model, tmp_path):
