@@ -58,11 +58,11 @@ def next_touch(
         predicted = [
             virtual.predict(settings_of(virtual, c.found.effects, c.found.values)) for _, c in (first, second)
         ]
-        difference = np.nan_to_num(predicted[0] - predicted[1])
+        difference = np.nan_to_num(predicted[0] - predicted[1])  # a press that no law carries through is none
         modulus = settings_of(virtual, first[1].found.effects, first[1].found.values)
         whitener = Whitener(virtual, modulus, options)
         # what another modulus would do is taken out as well
-        both = np.stack([difference, predicted[0]], axis=2)
+        both = np.stack([difference, np.nan_to_num(predicted[0])], axis=2)
         gram = whitener.gram(both)
         worth = gram[:, 0, 0] - gram[:, 0, 1] ** 2 / np.maximum(gram[:, 1, 1], 1e-12)
         press = int(np.argmax(worth))

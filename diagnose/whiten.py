@@ -108,7 +108,7 @@ def nuisance_columns(
 ) -> list[tuple[str, np.ndarray]]:
     """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance."""
     t = forward.touches
-    f = forward.predict(settings)
+    f = np.nan_to_num(forward.predict(settings))
     moved = forward.ideal(settings.modulus)
     moved.__dict__.update(settings.__dict__)
     small = 2e-5
@@ -120,7 +120,7 @@ def nuisance_columns(
     zero = np.zeros_like(normal)
     tangential = np.column_stack([zero, f[:, 1], f[:, 2]])
     return [
-        ("press", (forward.predict(moved) - f) * (options.onset_m / small)),
+        ("press", (np.nan_to_num(forward.predict(moved)) - f) * (options.onset_m / small)),
         ("site", f * site_sd[t.press][:, None]),
         ("press", f * options.press_stiffness),
         ("site", np.column_stack([zero, normal, zero]) * options.tilt),

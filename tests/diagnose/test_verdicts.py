@@ -9,8 +9,11 @@ import numpy as np
 import pytest
 
 from diagnose.apply import corrected, improved
+from diagnose.forward import Forward
+from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.placing import placed
+from diagnose.whiten import NuisanceOptions
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 
@@ -109,6 +112,27 @@ def test_the_next_touch_parts_the_two_that_stand_closest(delayed):
     assert np.linalg.norm(touch.direction) == pytest.approx(1.0)
     places = np.array([p.point for p in delayed[1].palpations])
     assert np.linalg.norm(places - [touch.x, touch.y, touch.z], axis=1).min() < 1e-6
+
+
+def test_a_press_that_no_law_carries_through_is_not_proposed(delayed, monkeypatch):
+    result = delayed[2]
+    found, forward = result.attribution, result.forward
+    names = sorted(found.scores, key=lambda n: -found.scores[n].gain)[:2]
+    pair = [(n, found.scores[n].candidate) for n in names]
+    usual = next_touch(forward, *pair, NuisanceOptions())
+    places = forward.touches.point
+    lost = np.flatnonzero(np.linalg.norm(places - [usual.x, usual.y, usual.z], axis=1) < 5e-3)
+    predict = Forward.predict
+
+    def lose(self, settings):
+        force = predict(self, settings).copy()
+        force[np.isin(self.touches.press, lost)] = np.nan
+        return force
+
+    monkeypatch.setattr(Forward, "predict", lose)
+    other = next_touch(forward, *pair, NuisanceOptions())
+    assert np.isfinite(other.sigmas) and 0 < other.sigmas <= usual.sigmas * 1.001
+    assert np.linalg.norm(places[lost] - [other.x, other.y, other.z], axis=1).min() > 0
 
 
 def test_without_its_name_the_delay_is_not_called_something_else_alone(bench):
