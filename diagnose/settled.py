@@ -19,7 +19,7 @@ Z = 6.0
 LEAST_BIAS_N = 0.008
 LEAST_MASS_KG = 0.003
 MASS_SHARE = 0.03
-"""Of the mass: what smoothing and false touches do to it, beyond noise (six known ones came out 1 to 5 % large)."""
+"""Of the mass, beyond noise: what smoothing does to it (six known ones came out 1 to 5 % large)."""
 
 
 @dataclass(frozen=True)
