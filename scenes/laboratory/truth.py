@@ -12,7 +12,7 @@ from scenes.laboratory.motion import Motion
 from scenes.laboratory.tracing import RATE_HZ
 
 if TYPE_CHECKING:
-    from scenes.laboratory.simulate import Session
+    from scenes.laboratory.session import Session
 
 
 def truth_of(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.laboratory import simulate as module
+from scenes.laboratory import session as module
 from scenes.laboratory.paths import Leg, TouchForce
 
 
