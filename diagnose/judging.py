@@ -249,9 +249,8 @@ class Search:
             if score.z < STEADY_Z or unfelt:
                 return False
         if not first and score.name in SPATIAL and score.z < STEADY_Z:
-            # one place that a law misses by far must not name a second effect; a lump lives in few places
-            if score.name != "inclusion" or score.candidate.chi > 1.5:
-                return False
+            # one place that a law misses by far must not name a second effect
+            return False
         if first and score.evidence > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
             return True
         if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
