@@ -18,6 +18,7 @@ from reconstruct.surface import Surface
 from reconstruct.tetwild import tetrahedralize
 
 _SAMPLES = 4000
+_TRIES = 3
 _PITCH = 0.8  # of sigma, a voxel: corners are cut by as much, and the mesh keeps to it within 0.4
 
 
@@ -81,25 +82,32 @@ def mesh_surface(
     voxels = options.mesh_source == "voxels"
     # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
     envelope = 0.4 * sigma if voxels else min(0.15 * sigma, 0.03 * options.mesh_size_m)
-    points, cells = tetrahedralize(
-        vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope, simplify=voxels
-    )
-    progress("meshing", 0.8)
+    for rest in reversed(range(_TRIES)):
+        progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
+        points, cells = tetrahedralize(
+            vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope, simplify=voxels
+        )
+        try:
+            mesh = _standing(points, cells, surface, envelope, options.radius_edge_ratio)
+            break
+        except MeshError:
+            # putting the base on the support may flatten a tetrahedron; the mesher's next mesh is another
+            if not rest:
+                raise
+    progress("meshing", 1.0)
+    return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
+
+
+def _standing(
+    points: np.ndarray, cells: np.ndarray, surface: Surface, envelope: float, ratio: float
+) -> TetMesh:
+    """The mesh put on its support and relaxed; raises MeshError where that leaves a flat tetrahedron."""
+    up, origin = surface.support_normal, surface.support_point
     points, cells, fixed = _stand(points, cells, origin, up, 1.01 * envelope + 1e-6)
     on_surface = np.zeros(len(points), dtype=bool)
     on_surface[_boundary(cells)] = True
-    points = relaxed(
-        points,
-        cells,
-        options.radius_edge_ratio,
-        on_surface=on_surface,
-        fixed=fixed,
-        up=up,
-        limit_m=envelope,
-    )
-    mesh = TetMesh(points, cells, fixed, on_surface & ~fixed)
-    progress("meshing", 1.0)
-    return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
+    points = relaxed(points, cells, ratio, on_surface=on_surface, fixed=fixed, up=up, limit_m=envelope)
+    return TetMesh(points, cells, fixed, on_surface & ~fixed)
 
 
 def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:

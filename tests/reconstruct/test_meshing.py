@@ -9,6 +9,7 @@ import pytest
 import trimesh
 from scipy.spatial import Delaunay
 
+import reconstruct.meshing as meshing_module
 from benchmarks._surface_truth import phantom_truth, touch
 from mechanics.errors import MeshError, SurfaceError
 from reconstruct.meshing import MeshingOptions, mesh_surface
@@ -200,3 +201,18 @@ def test_a_mesher_that_hangs_is_tried_again_with_one_thread(monkeypatch):
     volume = np.linalg.det(corner[:, 1:] - corner[:, :1]).sum() / 6
     assert len(limits) == 2
     assert volume == pytest.approx(0.06 * 0.06 * 0.03, rel=0.01)
+
+
+def test_a_mesh_that_the_support_flattens_is_made_again(surface, monkeypatch):
+    relax, made = meshing_module.relaxed, []
+
+    def flattened_at_first(points, cells, *arguments, **options):
+        made.append(len(cells))
+        moved = relax(points, cells, *arguments, **options)
+        if len(made) == 1:
+            moved[cells[0, 1]] = moved[cells[0, 0]]
+        return moved
+
+    monkeypatch.setattr(meshing_module, "relaxed", flattened_at_first)
+    assert (mesh_surface(surface, MeshingOptions(mesh_size_m=0.015)).mesh.volumes > 0).all()
+    assert len(made) == 2
