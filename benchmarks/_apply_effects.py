@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.apply import with_effects
 from mechanics.model import Model
 from mechanics.recording import Recording
 from mechanics.sites import tangents
@@ -120,11 +119,6 @@ def cases(model: Model) -> list[Case]:
             lambda x: x > 1.05,
         ),
     ]  # fmt: skip
-
-
-def improved_model(model: Model, case: Case) -> Model:
-    """The model with a case's effects."""
-    return with_effects(model, case.effects)
 
 
 def _side(model: Model) -> np.ndarray:

@@ -9,9 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._apply_effects import Case, cases, felt_on, improved_model, path_of
+from benchmarks._apply_effects import Case, cases, felt_on, path_of
 from benchmarks.timing import table
 from devices.registry import DeviceChoice
+from diagnose.apply import with_effects
 from mechanics.compliance import load_or_condense
 from mechanics.model import Model, read_model, write_model
 from mechanics.recording import write_recording
@@ -30,7 +31,7 @@ def run_all(model: Model, work: Path, only: list[str]) -> list[dict[str, Any]]:
     for case in cases(plain):
         if only and case.name not in only:
             continue
-        row = _one(case.name, improved_model(plain, case), path, work)
+        row = _one(case.name, with_effects(plain, case.effects), path, work)
         row |= _judged(case, row["felt"], base["felt"])
         row["ratio"] = row["median_us"] / base["median_us"]
         rows.append(row)

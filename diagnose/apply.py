@@ -21,6 +21,8 @@ MODULUS_LIMITS = (0.05, 50.0)
 NOT_RENDERED = ("surface_shape", "surface_offset")
 """They say that the model's surface is wrong, not what it should be."""
 FOUND_INCLUSION = "diagnosed"
+REPLAYS = 2
+"""Of the modulus's refit: a force goes with the modulus but for friction and adhesion."""
 
 
 def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
@@ -46,9 +48,6 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
         provenance=provenance,
     )
     return better, [name for name in asserted if rendered(name)]
-
-
-REPLAYS = 2
 
 
 def with_replayed_modulus(model: Model, recording: Recording) -> Model:

@@ -25,14 +25,14 @@ IN_TIME = ("time_delay", "viscoelasticity", "backlash", "adhesion", "mullins_sof
 OUT_OF_SET = 0.1
 """An effect with a smaller p value is not in the model confidence set of 90 %."""
 
-HIDDEN_LEAST = 10.0
-"""Such an effect gains this much alone before it is tried with finite strain as well."""
-
 RIVAL_CLOSES = 0.3
 """A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
 
 HIDING = (*EVERYWHERE, "skin_layer", "compliant_base")
 """Effects that bend the depth law the other way than finite strain does, so that neither shows alone."""
+
+HIDDEN_LEAST = 10.0
+"""Such an effect gains this much alone before it is tried with finite strain as well."""
 
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
@@ -108,7 +108,8 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
     current, chosen = _without_idle(search, chosen, current)
     if "inclusion" in chosen:
         current = _solved_again(search, current)
-    rivals = _rivals(search, picked, chosen)
+    sets = [standing(scores) for scores in steps]
+    rivals = _rivals(search, picked, sets, chosen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
         base,
@@ -121,7 +122,7 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         tuple(steps),
         tuple(name for _, name in picked),
         float(strain_gain),
-        standing(steps[0]),
+        sets[0],
     )
 
 
@@ -224,15 +225,19 @@ def standing(scores: dict[str, Score]) -> dict[str, float]:
     return dict(zip(names, confidence_p(losses, np.random.default_rng(0)), strict=True))
 
 
-def _rivals(search: Search, picked: list[tuple[dict[str, Score], str]], chosen: list[str]) -> tuple[str, ...]:
+def _rivals(
+    search: Search,
+    picked: list[tuple[dict[str, Score], str]],
+    sets: list[dict[str, float]],
+    chosen: list[str],
+) -> tuple[str, ...]:
     """Effects whose gain comes so close to that of the one picked in the same step that the sites do not tell
     them apart."""
     found: dict[str, float] = {}
-    for scores, name in picked:
+    for (scores, name), p in zip(picked, sets, strict=False):
         if name not in chosen:
             continue
         first = scores[name]
-        p = standing(scores)
         for score in scores.values():
             if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
                 continue

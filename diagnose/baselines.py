@@ -47,5 +47,4 @@ def regressed_gap(forward: Forward, residual: np.ndarray, penalty: float = 1.0) 
         x, y = features[held], r[held]
         weight = np.linalg.solve(gram - x.T @ x + penalty * np.eye(x.shape[1]), side - x.T @ y)
         total += ((y - x @ weight) ** 2).sum()
-    added = 3 * (t.raw_noise_n**2 - t.noise_n**2)
-    return float(np.sqrt(total / len(rows) + added))
+    return float(np.sqrt(total / len(rows) + t.thinned_away))

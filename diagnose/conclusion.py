@@ -35,7 +35,11 @@ class Gaps:
 def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
     """The answer to where, which and how far. lap(name) is called where a timed part ends."""
     found, forward = evidence.found, evidence.forward
-    counts, noise, added = evidence.search.whitener.counts(), evidence.noise_n, evidence.thinned_away
+    counts, noise, added = (
+        evidence.search.whitener.counts(),
+        evidence.noise_n,
+        evidence.forward.touches.thinned_away,
+    )
     rng = np.random.default_rng(evidence.seed)
     gaps = _gaps(evidence)
     lap("held out")
@@ -78,7 +82,7 @@ def _gaps(evidence: Evidence) -> Gaps:
     search, found, settled = evidence.search, evidence.found, evidence.settled
     if not evidence.refit:
         return Gaps(found.ideal.plain + settled.plain(search.whitener, found.ideal), found.final.plain, {})
-    added = evidence.thinned_away
+    added = evidence.forward.touches.thinned_away
     old = held_out_by_refit(search, found.ideal.found, settled.residual, added)
     new = held_out_by_refit(search, found.final.found, None, added)
     held = {"deepest": (old.deepest_n, new.deepest_n), "fastest": (old.fastest_n, new.fastest_n)}
@@ -94,7 +98,7 @@ def _entries(
     rng: np.random.Generator,
 ) -> tuple[EffectEntry, ...]:
     forward, search, found, settled = evidence.forward, evidence.search, evidence.found, evidence.settled
-    noise, added = evidence.noise_n, evidence.thinned_away
+    noise, added = evidence.noise_n, evidence.forward.touches.thinned_away
     best = max((max(s.gain, 0.0) for s in found.scores.values()), default=0.0)
     draws = max(100, evidence.bootstrap // 4)
     entries = []

@@ -160,7 +160,7 @@ class Search:
         onset = first_touches(forward, whitener, modulus)
         rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
         self.finite_strain = finite_strain
-        self.felt_n = FELT * float(np.sqrt(3)) * forward.touches.raw_noise_n
+        self.felt_n = FELT * forward.touches.vector_noise_n
         self.renew(rough)
 
     def renew(self, found: Fit) -> None:

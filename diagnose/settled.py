@@ -123,10 +123,11 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
     if not parts:
         return Settled((), {}, {}, nothing, ())
     turn_se = np.inf if turning is None else turning.se_n / STANDARD_GRAVITY
+    mass_kg = parameters.get("tool_gravity_inertia", {}).get("mass_kg", 0.0)
     error = {
         "bias_n": level_se,
         "rate_n_per_s": free.rate_se_n_per_s,
-        "mass_kg": np.hypot(turn_se if turns else free.mass_se_kg, MASS_SHARE * abs(free.mass_kg)),
+        "mass_kg": np.hypot(turn_se if turns else free.mass_se_kg, MASS_SHARE * abs(mass_kg)),
     }
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}

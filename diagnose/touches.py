@@ -73,6 +73,16 @@ class Touches:
         """How many sites."""
         return int(self.site.max()) + 1
 
+    @property
+    def vector_noise_n(self) -> float:
+        """N, rms of the noise of a raw force 3-vector."""
+        return float(np.sqrt(3) * self.raw_noise_n)
+
+    @property
+    def thinned_away(self) -> float:
+        """N^2, what thinning took off the mean square of the 3-vector."""
+        return 3 * (self.raw_noise_n**2 - self.noise_n**2)
+
     @cached_property
     def site_point(self) -> np.ndarray:
         """(s, 3) m, device frame: the mean place of each site's presses."""

@@ -49,13 +49,7 @@ class Evidence:
     @property
     def noise_n(self) -> float:
         """N, rms of the force 3-vector's noise."""
-        return float(np.sqrt(3) * self.forward.touches.raw_noise_n)
-
-    @property
-    def thinned_away(self) -> float:
-        """N^2, what thinning took off the mean square of the 3-vector."""
-        t = self.forward.touches
-        return 3 * (t.raw_noise_n**2 - t.noise_n**2)
+        return self.forward.touches.vector_noise_n
 
 
 @dataclass

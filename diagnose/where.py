@@ -60,10 +60,9 @@ def locate(
     shares["free_air"] = _free_share(t, residual, free)
     axes = tuple(Axis(a, float(np.clip(shares.get(a, 0.0), 0, 1)), float(p_values.get(a, 1.0))) for a in AXES)
     rmse = np.zeros(t.sites)
-    noise = 3 * (t.raw_noise_n**2 - t.noise_n**2)
     for site in range(t.sites):
         rows = (t.site[t.press] == site) & t.counted
-        rmse[site] = np.sqrt((residual[rows] ** 2).sum(axis=1).mean() + noise)
+        rmse[site] = np.sqrt((residual[rows] ** 2).sum(axis=1).mean() + t.thinned_away)
     order = np.argsort(-rmse)[:5]
     worst = tuple((*map(float, t.site_point[s]), float(rmse[s])) for s in order)
     return Where(axes, worst, rmse, _curves(t, residual))

@@ -112,7 +112,7 @@ def _tried(page: Page, result: Diagnosis) -> None:
         ],
     )
     if result.confusable:
-        pairs = (f"{spoken((a, b))}" for a, b, _ in result.confusable[:6])
+        pairs = (spoken((a, b)) for a, b, _ in result.confusable[:6])
         page.paragraph("With these touches the following look alike: " + "; ".join(pairs) + ".")
     if result.left_out:
         page.paragraph(f"The fast setting did not try: {spoken(result.left_out)}.")

@@ -39,7 +39,7 @@ def _ranked(result: Diagnosis) -> np.ndarray:
 
 def _object(ax: Any, model: Model, result: Diagnosis) -> None:
     t = result.forward.touches
-    places = np.array([t.point[t.site == s].mean(axis=0) for s in range(t.sites)])
+    places = t.site_point
     nodes = model.mesh.points
     distance = np.linalg.norm(nodes[:, None] - places[None], axis=2)
     weight = np.exp(-((distance / SPREAD_M) ** 2)) + 1e-9
