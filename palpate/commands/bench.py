@@ -6,8 +6,8 @@ import argparse
 import importlib
 import pkgutil
 
-import benchmarks
 from mechanics.errors import OptionError
+from palpate import benchmarks
 from palpate.arguments import add_json, emit_json
 
 SUMMARY = "benchmarks: medians, spreads and ratios"
@@ -31,7 +31,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Run one benchmark."""
     if arguments.name not in names():
         raise OptionError(f"'{arguments.name}' is no benchmark; allowed are {', '.join(names())}")
-    module = importlib.import_module(f"benchmarks.{arguments.name.replace('-', '_')}")
+    module = importlib.import_module(f"palpate.benchmarks.{arguments.name.replace('-', '_')}")
     parser = argparse.ArgumentParser(prog=f"palpate bench {arguments.name}", description=module.__doc__)
     module.add_arguments(parser)
     parser.add_argument("--json", metavar="PATH", default=arguments.json, help="write the figures as JSON")

@@ -10,8 +10,8 @@ import trimesh
 from scipy.spatial import Delaunay
 
 import reconstruct.meshing as meshing_module
-from benchmarks._surface_truth import phantom_truth, touch
 from mechanics.errors import MeshError, SurfaceError
+from palpate.benchmarks._surface_truth import phantom_truth, touch
 from reconstruct.meshing import MeshingOptions, mesh_surface
 from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.balance import balanced

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from benchmarks._surface_truth import OWN, phantom_truth, touch
-from benchmarks.surface import deviation
 from mechanics.errors import SurfaceError
+from palpate.benchmarks._surface_truth import OWN, phantom_truth, touch
+from palpate.benchmarks.surface import deviation
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.surface import SurfaceOptions, reconstruct_surface
 
@@ -74,7 +74,7 @@ def test_an_outline_that_no_point_sees_whole():
 
 @pytest.mark.slow
 def test_every_known_shape_within_the_targets():
-    from benchmarks.surface import truths
+    from palpate.benchmarks.surface import truths
 
     for name, make in truths().items():
         _, error = reconstructed(make(), seed=3)

@@ -14,11 +14,11 @@ import time
 from pathlib import Path
 from typing import Any
 
-from benchmarks._diagnosis_blind import NotSolved, judge, opened_case, prepare, prepared, verdict_path
-from benchmarks._diagnosis_cases import Case, cases
-from benchmarks._diagnosis_scores import summarise
-from benchmarks._diagnosis_tables import pictures, show
 from mechanics.errors import OptionError
+from palpate.benchmarks._diagnosis_blind import NotSolved, judge, opened_case, prepare, prepared, verdict_path
+from palpate.benchmarks._diagnosis_cases import Case, cases
+from palpate.benchmarks._diagnosis_scores import summarise
+from palpate.benchmarks._diagnosis_tables import pictures, show
 
 SUMMARY = "blind diagnosis of sealed recordings: detection, names, false alarms, gap closed"
 

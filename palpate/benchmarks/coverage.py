@@ -12,11 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._rates import wilson
-from benchmarks._surface_truth import phantom_truth
-from benchmarks.surface import deviation
-from benchmarks.timing import table
 from palpate.arguments import progress_bar
+from palpate.benchmarks._rates import wilson
+from palpate.benchmarks._surface_truth import phantom_truth
+from palpate.benchmarks.surface import deviation
+from palpate.benchmarks.timing import table
 from reconstruct.pipeline import reconstruct_fully
 from scenes.laboratory.hand import cohort_hand
 from scenes.laboratory.presses import PROTOCOLS

@@ -16,7 +16,6 @@ import time
 
 import numpy as np
 
-from benchmarks.timing import measure, table
 from mechanics.box_mesh import box_mesh
 from mechanics.compliance import ComplianceOptions
 from mechanics.model import Model
@@ -28,6 +27,7 @@ from mechanics.solver import Solver
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import touch_forces
+from palpate.benchmarks.timing import measure, table
 from render.fem import FemRenderer
 
 SUMMARY = "compressed compliance of 5,000 to 20,000 touchable nodes"

@@ -16,7 +16,6 @@ from scipy.spatial import cKDTree
 from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, ElementVector, MeshTet
 from skfem.helpers import ddot, div, sym_grad
 
-from benchmarks.timing import table
 from mechanics.box_mesh import box_mesh
 from mechanics.elasticity import lame_parameters
 from mechanics.errors import OptionError
@@ -24,6 +23,7 @@ from mechanics.pardiso import Pardiso, available
 from mechanics.patch import PatchSampler
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
+from palpate.benchmarks.timing import table
 
 SUMMARY = "locking: linear, quadratic and mean-dilatation tetrahedra near nu = 0.5"
 KINDS = {"linear": (1, False), "quadratic": (2, False), "quadratic, mean dilatation": (2, True)}

@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._servo_load import TIP_RADIUS_M, block_model, renderer_of
-from benchmarks.compliance import block
-from benchmarks.timing import table
 from mechanics.tetmesh import TetMesh
+from palpate.benchmarks._servo_load import TIP_RADIUS_M, block_model, renderer_of
+from palpate.benchmarks.compliance import block
+from palpate.benchmarks.timing import table
 
 YOUNG_PA, POISSON = 30e3, 0.49
 DEPTHS_M = (0.001, 0.002, 0.003)

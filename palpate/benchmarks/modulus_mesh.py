@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import table
 from mechanics.errors import ContactError
 from mechanics.recording import read_recording
+from palpate.benchmarks.timing import table
 from reconstruct.meshing import MeshingOptions
 from reconstruct.modulus_paper import PaperOptions
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully

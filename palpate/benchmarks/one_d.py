@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from benchmarks._recording import add_recording, recording_of, timed
+from palpate.benchmarks._recording import add_recording, recording_of, timed
 from reconstruct.contacts import explore
 from reconstruct.one_d import fit_paper, fit_robust
 from reconstruct.uniaxial import profiles

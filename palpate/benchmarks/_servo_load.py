@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
 from mechanics.model import Model, read_model, write_model
+from palpate.benchmarks.compliance import block
 from palpate.servo.clock import compiled_now_ns, compiled_sleep_until, compiled_thread_cpu_ns
 from palpate.servo.histogram import BINS, Histogram, count
 from palpate.servo.layout import (

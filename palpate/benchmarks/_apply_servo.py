@@ -9,13 +9,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._apply_effects import Case, cases, felt_on, path_of
-from benchmarks.timing import table
 from devices.registry import DeviceChoice
 from diagnose.apply import with_effects
 from mechanics.compliance import load_or_condense
 from mechanics.model import Model, read_model, write_model
 from mechanics.recording import write_recording
+from palpate.benchmarks._apply_effects import Case, cases, felt_on, path_of
+from palpate.benchmarks.timing import table
 from palpate.servo.client import Servo
 
 BUDGET_US = 1000.0

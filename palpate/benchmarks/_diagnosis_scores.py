@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._rates import wilson
+from palpate.benchmarks._rates import wilson
 
 FAMILIES = {"poroelasticity": ("viscoelasticity",), "plasticity": ("mullins_softening",)}
 """What effects that the library has never had may be taken for, as declared; 'unknown' is right as well."""

@@ -4,7 +4,7 @@ Every combination of hand, modulus, rate, quantisation and delay is pressed, hel
 counts is the greatest net energy that the hand ever got back (aim: at most 1 mJ), and what staying stable
 cost: the share of the force that the controller changed, and the share of its stiffness that the plane lost
 to the virtual coupling. The same grid without controller and coupling stands beside it. A smaller second grid
-drags one tip and two with friction over a dome of silicone (benchmarks/_stability_objects.py).
+drags one tip and two with friction over a dome of silicone (palpate/benchmarks/_stability_objects.py).
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks import _stability_objects
-from benchmarks.timing import table
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
+from palpate.benchmarks import _stability_objects
+from palpate.benchmarks.timing import table
 from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from palpate.servo.elastic_plane import ElasticPlane
 from render.passivity import PassivityOptions

@@ -15,9 +15,6 @@ import time
 
 import numpy as np
 
-from benchmarks._axisymmetric_nodule import press_force
-from benchmarks._sample_shapes import sample_mesh
-from benchmarks.timing import measure, table
 from mechanics.box_mesh import box_mesh
 from mechanics.inclusion import Ball, Region, inclusion_ratio, mixed_ratio, share_inside
 from mechanics.patch import PatchSampler
@@ -25,6 +22,9 @@ from mechanics.sites import patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.surface_compliance import patch_blocks
 from mechanics.touch import touch_force
+from palpate.benchmarks._axisymmetric_nodule import press_force
+from palpate.benchmarks._sample_shapes import sample_mesh
+from palpate.benchmarks.timing import measure, table
 
 SUMMARY = "a stiff nodule: its contrast against a fine reference, and moving it against a recompute"
 NU, TIP, UP = 0.49, 0.005, np.array([0.0, 0.0, 1.0])

@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._recording import add_indentation, add_recording, recording_of
-from benchmarks.timing import table
+from palpate.benchmarks._recording import add_indentation, add_recording, recording_of
+from palpate.benchmarks.timing import table
 from reconstruct.modulus_paper import PaperOptions
 from reconstruct.pipeline import METHODS, ReconstructOptions, reconstruct_fully
 

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import table
 from mechanics.dent import dent_law
 from mechanics.recording import read_recording
+from palpate.benchmarks.timing import table
 from scenes.laboratory.comparison import block_shape, by_depth, compare, cylinder_shape
 from scenes.laboratory.solid import Material, Solid
 from scenes.laboratory.specimen import Fineness, Specimen

@@ -16,7 +16,7 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
-from benchmarks.timing import table
+from palpate.benchmarks.timing import table
 
 SUMMARY = "improved models: cost of a step, effect felt, error on presses that were not fitted"
 
@@ -43,7 +43,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         work.mkdir(parents=True, exist_ok=True)
         result: dict[str, Any] = {"servo": [], "recordings": [], "corrected": []}
         if not arguments.no_servo:
-            from benchmarks import _apply_servo
+            from palpate.benchmarks import _apply_servo
             from scenes.build import model_of
             from scenes.scene import load_scene
 
@@ -51,14 +51,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             result["servo"] = _apply_servo.run_all(model, work, arguments.effects)
             _apply_servo.show(result["servo"])
         if arguments.recordings:
-            from benchmarks._apply_replay import one
+            from palpate.benchmarks._apply_replay import one
 
             for path in arguments.recordings:
                 result["recordings"].append(one(Path(path), arguments.share, work))
                 _show(result["recordings"][-1:])
             _show(result["recordings"])
         for path in arguments.correct:
-            from benchmarks._apply_replay import corrected_again
+            from palpate.benchmarks._apply_replay import corrected_again
 
             result["corrected"].append(corrected_again(Path(path), work))
             _show_corrected(result["corrected"][-1:])

@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from benchmarks._recording import add_indentation, add_recording, recording_of, timed
 from mechanics.sites import touch_sites, touch_solver
+from palpate.benchmarks._recording import add_indentation, add_recording, recording_of, timed
 from reconstruct.modulus import fit_modulus
 from reconstruct.modulus_paper import PaperOptions, fit_paper_modulus
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully

@@ -16,12 +16,12 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import table
 from mechanics.model import Model, read_model
 from mechanics.recording import Recording, read_recording
 from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import forces_at
+from palpate.benchmarks.timing import table
 from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.replay import contact_samples, replay_recording, rms_n

@@ -14,9 +14,9 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
-from benchmarks.timing import table
 from palpate.arguments import progress_bar
+from palpate.benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
+from palpate.benchmarks.timing import table
 from reconstruct.proximity import distance, sample
 from reconstruct.surface import SURFACES, SurfaceOptions, reconstruct_surface
 

@@ -14,8 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
-from benchmarks.timing import table
+from palpate.benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
+from palpate.benchmarks.timing import table
 from palpate.servo.free_air import FreeAir
 from palpate.servo.report import ring_rows, snapshot
 
@@ -73,7 +73,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             )
     _print_late(result["late"])
     if not arguments.no_peer:
-        from benchmarks._mujoco_peer import compare
+        from palpate.benchmarks._mujoco_peer import compare
 
         result["peer"] = compare()
     return result

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.timing import table
+from palpate.benchmarks.timing import table
 
 TARGETS = {
     "false alarms (controls)": "at most 2 %",

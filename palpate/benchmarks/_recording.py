@@ -6,8 +6,8 @@ import argparse
 from collections.abc import Callable
 from typing import Any
 
-from benchmarks.timing import measure, table
 from mechanics.recording import Recording, read_recording
+from palpate.benchmarks.timing import measure, table
 from scenes.embedded import embedded_recording
 
 

@@ -6,9 +6,9 @@ import json
 from pathlib import Path
 from typing import Any
 
-from benchmarks._diagnosis_cases import Case
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file
+from palpate.benchmarks._diagnosis_cases import Case
 
 
 class NotSolved(Exception):

@@ -15,13 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks.timing import measure, table
 from mechanics.box_mesh import box_mesh
 from mechanics.compliance import condense, inverse
 from mechanics.errors import OptionError
 from mechanics.pardiso import Pardiso, available
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
+from palpate.benchmarks.timing import measure, table
 
 SUMMARY = "condensed compliance against the dense inverse and column solves"
 
