@@ -58,9 +58,9 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     not decide. recording: read right (`corrected`). Where the replay gives no force the model stays.
     """
     from render.fem import FemRenderer
-    from render.replay import contact_samples, replay_recording
+    from render.replay import replay_recording
 
-    counted = contact_samples(recording, model)
+    counted = model.presses.touching(recording.t)
     begins = np.flatnonzero(np.diff(np.concatenate([[False], counted])) & counted)
     if not len(begins):
         return model

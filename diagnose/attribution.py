@@ -132,7 +132,10 @@ def _with_hidden_strain(
     """The candidate, or with finite strain beside it where each may have hidden the other."""
     if effect.name not in HIDING or "finite_strain" in current.found.names:
         return candidate
-    if current.found.loss - candidate.found.loss < HIDDEN_LEAST * search.forward.touches.slowness:
+    if (
+        current.found.loss - candidate.found.loss
+        < HIDDEN_LEAST * search.forward.touches.noise.variance_inflation
+    ):
         return candidate
     both = search.judge([search.finite_strain, *candidate.found.effects], like=candidate)
     return both if both.found.loss < candidate.found.loss else candidate
@@ -194,7 +197,7 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
     """The set with or without finite strain, whichever fits better, and the gain of having it."""
     rest = [e for e in effects if e.name != "finite_strain"]
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
-    over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.slowness
+    over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.noise.variance_inflation
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
     # the site that speaks loudest, for or against, may be one that slipped
     gain = (each.sum() - each.max() - each.min()) / over

@@ -17,7 +17,7 @@ def first_touches(
     """
     t = forward.touches
     shifts = np.linspace(-reach_m, reach_m, 25)
-    cost = np.empty((len(shifts), t.presses))
+    cost = np.empty((len(shifts), len(t)))
     measured = np.where(t.counted, t.f[:, 0], 0.0)
     for i, shift in enumerate(shifts):
         settings = forward.ideal(modulus)
@@ -25,7 +25,7 @@ def first_touches(
         predicted = np.where(t.counted, forward.predict(settings)[:, 0], 0.0)
 
         def sums(a: np.ndarray) -> np.ndarray:
-            return np.bincount(t.press, weights=a, minlength=t.presses)
+            return np.bincount(t.press, weights=a, minlength=len(t))
 
         pp, pf, ff = sums(predicted**2), sums(predicted * measured), sums(measured**2)
         factor = np.clip(pf / np.maximum(pp, 1e-12), 0.5, 2.0)
@@ -36,7 +36,7 @@ def first_touches(
         )
     best = np.argmin(cost, axis=0)
     inner = np.clip(best, 1, len(shifts) - 2)
-    rows = np.arange(t.presses)
+    rows = np.arange(len(t))
     left, mid, right = cost[inner - 1, rows], cost[inner, rows], cost[inner + 1, rows]
     curve = np.maximum(left - 2 * mid + right, 1e-12)
     return shifts[inner] + np.clip(0.5 * (left - right) / curve, -0.5, 0.5) * (shifts[1] - shifts[0])

@@ -102,7 +102,7 @@ def fit(
         for effect in effects:
             starts = [np.concatenate([s, own]) for s in starts for own in effect.starts(forward)]
     descent = Descent(forward, whitener, effects, weights)
-    onset = np.zeros(forward.touches.presses) if onset is None else onset
+    onset = np.zeros(len(forward.touches)) if onset is None else onset
     if len(starts) > 3:
         scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
         starts = [starts[i] for i in np.argsort(scored)[:3]]
@@ -134,9 +134,8 @@ class Descent:
     """One bounded Gauss-Newton descent. First touches are refined beside it, press by press.
 
     A late or early first touch is a nuisance that bends the force, so it is moved in the model itself; the
-    linear
-    column that the whitener holds for it is added back, so that the loss stays the one with its Gaussian
-    width.
+    linear column that the whitener holds for it is added back, so that the loss stays the one with its
+    Gaussian width.
     """
 
     def __init__(self, forward: Forward, whitener: Whitener, effects: tuple[Effect, ...], weights) -> None:  # type: ignore[no-untyped-def]
@@ -220,7 +219,7 @@ class Descent:
         """(p,) N^2, plain sum of squares of every press."""
         t = self.forward.touches
         each = np.where(t.counted, (residual**2).sum(axis=1), 0.0)
-        return np.bincount(t.press, weights=each, minlength=t.presses)
+        return np.bincount(t.press, weights=each, minlength=len(t))
 
     def press_cost(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(p,) misfit of every press beside the likeliest factor on its force, and the price of its shift."""
@@ -230,7 +229,7 @@ class Descent:
 
         def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             each = (a * b).sum(axis=1)
-            return np.bincount(t.press, weights=each, minlength=t.presses) / self.whitener.variance
+            return np.bincount(t.press, weights=each, minlength=len(t)) / self.whitener.variance
 
         ff = sums(f, f) + 1 / self.whitener.stiffness_sd**2
         return sums(r, r) - sums(r, f) ** 2 / ff + (onset / self.whitener.onset_sd) ** 2
@@ -245,7 +244,7 @@ class Descent:
         slope[~t.counted] = 0.0
         keep = t.counted[:, None]
         force = np.where(keep, predicted, 0.0)
-        press, p = t.press, t.presses
+        press, p = t.press, len(t)
 
         def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             return np.bincount(press, weights=(a * b).sum(axis=1), minlength=p) / self.whitener.variance

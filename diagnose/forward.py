@@ -15,9 +15,9 @@ from numba import njit
 
 from diagnose import kernel
 from diagnose.stages import stored
-from diagnose.touches import OUTSIDE, Touches
 from mechanics.dent import dent_law, effective_radius, grid
 from mechanics.model import Model
+from mechanics.presses import Presses
 from mechanics.sites import touch_sites
 
 STANDARD_GRAVITY = 9.80665
@@ -66,13 +66,13 @@ class Settings:
 
 @dataclass
 class Forward:
-    """Touches with the site mechanics of a model; `predict(settings)` is the forward model.
+    """Presses with the site mechanics of a model; `predict(settings)` is the forward model.
 
     far: (p, 3, 3) local frames, unit modulus, 1/m. curvature: (p,) 1/m. stages: what effects asked to
     compute.
     """
 
-    touches: Touches
+    touches: Presses
     model: Model
     far: np.ndarray
     curvature: np.ndarray
@@ -88,7 +88,7 @@ class Forward:
         self.clock = t.t - t.t[0]
         self.acceleration = _acceleration(t)
         self.dents = grid()
-        self.onset = np.zeros(t.presses)
+        self.onset = np.zeros(len(t))
         self.centre = t.point.mean(axis=0)
         self.height = float(
             ((self.model.mesh.points - self.model.support_point) @ self.model.support_normal).max()
@@ -96,7 +96,7 @@ class Forward:
 
     def ideal(self, modulus: float) -> Settings:
         """Settings of the ideal model."""
-        p = self.touches.presses
+        p = len(self.touches)
         return Settings(
             modulus=modulus,
             nu=self.nu,
@@ -119,12 +119,12 @@ class Forward:
             f = f * _mullins(t, y[:, 0], f[:, 0], *s.mullins)[:, None]
         if s.g is not None and len(s.g):
             slow = f.copy()
-            kernel.relax(t.start, t.t, f, np.asarray(s.g), np.asarray(s.tau), slow)
+            kernel.relax(t.starts, t.t, f, np.asarray(s.g), np.asarray(s.tau), slow)
             # a surface that comes back more slowly than the tip leaves lets go of it: it cannot pull
             f = np.where(slow[:, :1] > 0, slow, 0.0)
         if s.adhesion is not None:
             pull = np.empty(len(f))
-            _pull(t.start, np.ascontiguousarray(y[:, 0]), *s.adhesion, pull)
+            _pull(t.starts, np.ascontiguousarray(y[:, 0]), *s.adhesion, pull)
             f[:, 0] -= pull
         if s.delay != 0:
             f = _shifted(t, f, s.delay)
@@ -150,13 +150,13 @@ class Forward:
         f = self._kept.get(key)
         if f is None:
             radius = np.ascontiguousarray(
-                np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (t.presses,))
+                np.broadcast_to(effective_radius(s.tip_radius, self.curvature), (len(t),))
             )
             f = np.zeros_like(y)
             modulus = usual * s.stiffness
             far = np.ascontiguousarray(s.far)
             kernel.integrate(
-                t.start, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, give, s.mu, f
+                t.starts, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, give, s.mu, f
             )
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
@@ -173,11 +173,11 @@ class Forward:
         t = self.touches
         down = -self.model.support_normal / np.linalg.norm(self.model.support_normal)
         weight = mass_kg * STANDARD_GRAVITY * down
-        if "quaternion" not in t.extra:
+        if t.quaternion is None:
             return np.broadcast_to(share * weight, t.f.shape)
         from scipy.spatial.transform import Rotation
 
-        turn = Rotation.from_quat(t.extra["quaternion"], scalar_first=True)
+        turn = Rotation.from_quat(t.quaternion, scalar_first=True)
         tared = turn.apply(turn[0].inv().apply(weight))
         return weight - (1 - share) * tared
 
@@ -187,10 +187,10 @@ class Forward:
         frame = t.frame[t.press]
         if width < 0:
             # the hand moves the tip and the reading follows once the play is taken up
-            return y + 0.5 * width * np.einsum("nij,nj->ni", frame, t.extra["lead"])
+            return y + 0.5 * width * np.einsum("nij,nj->ni", frame, t.columns["lead"])
         device = np.ascontiguousarray(np.einsum("nij,ni->nj", frame, y))
         played = np.empty_like(device)
-        kernel.play(t.start, device, width, played)
+        kernel.play(t.starts, device, width, played)
         return np.einsum("nij,nj->ni", frame, played)
 
     def _read(self, s: Settings, f: np.ndarray) -> np.ndarray:
@@ -211,7 +211,7 @@ class Forward:
         return np.einsum("nij,nj->ni", frame, device)
 
 
-def build_forward(touches: Touches, model: Model, *, solver: Any = None) -> Forward:
+def build_forward(touches: Presses, model: Model, *, solver: Any = None) -> Forward:
     """Solve the far field at every press's place (one factorisation, three solves a place)."""
     unique, first, inverse = places_of(touches)
 
@@ -230,21 +230,21 @@ def build_forward(touches: Touches, model: Model, *, solver: Any = None) -> Forw
         np.ascontiguousarray(far),
         sites["curvature"][inverse],
         model.poisson_ratio,
-        model.tip_radius_m,
+        touches.tip_radius_m,
     )
 
 
-def places_of(touches: Touches, grain: float = 0.0008) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def places_of(touches: Presses, grain: float = 0.0008) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Presses of nearly the same place and normal share a solve."""
     key = np.round(np.hstack([touches.point / grain, touches.normal / 0.05])).astype(int)
     return np.unique(key, axis=0, return_index=True, return_inverse=True)
 
 
-def _acceleration(t: Touches) -> np.ndarray:
+def _acceleration(t: Presses) -> np.ndarray:
     """(n, 3) m/s^2, device frame, from the thinned positions, smoothed over three steps."""
-    position = t.extra["position"]
+    position = t.position
     out = np.zeros_like(position)
-    for a, b in zip(t.start[:-1], t.start[1:], strict=True):
+    for a, b in zip(t.starts[:-1], t.starts[1:], strict=True):
         x, clock = position[a:b], t.t[a:b]
         step = np.median(np.diff(clock))
         second = np.zeros_like(x)
@@ -274,9 +274,9 @@ def _shift_rows(start, t, f, delay, out):  # type: ignore[no-untyped-def]
             out[i] = (1 - w) * f[j] + w * f[j + 1]
 
 
-def _shifted(t: Touches, f: np.ndarray, delay: float) -> np.ndarray:
+def _shifted(t: Presses, f: np.ndarray, delay: float) -> np.ndarray:
     out = np.empty_like(f)
-    _shift_rows(t.start, t.t, f, delay, out)
+    _shift_rows(t.starts, t.t, f, delay, out)
     return out
 
 
@@ -309,7 +309,7 @@ def _pull(start, depth, pull_off, reach, inside, out):  # type: ignore[no-untype
                 out[i] += 0.2 * pull_off * grip
 
 
-def _mullins(t: Touches, depth: np.ndarray, force: np.ndarray, r: float, m_rel: float) -> np.ndarray:
+def _mullins(t: Presses, depth: np.ndarray, force: np.ndarray, r: float, m_rel: float) -> np.ndarray:
     """Softening factor (n,): Ogden and Roxburgh's 1 - erf((W_max - W) / m) / r with W ~ depth^2.5 at the
     site."""
     from scipy.special import erf
@@ -318,15 +318,10 @@ def _mullins(t: Touches, depth: np.ndarray, force: np.ndarray, r: float, m_rel: 
     greatest = energy.max() or 1.0
     before = np.zeros(t.sites)
     factor = np.ones(len(depth))
-    for p, (a, b) in enumerate(zip(t.start[:-1], t.start[1:], strict=True)):
+    for p, (a, b) in enumerate(zip(t.starts[:-1], t.starts[1:], strict=True)):
         if t.site[p] < 0:
             continue
         most = np.maximum(np.maximum.accumulate(energy[a:b]), before[t.site[p]])
         factor[a:b] = 1 - erf((most - energy[a:b]) / (m_rel * greatest)) / r
         before[t.site[p]] = most[-1]
     return factor
-
-
-def in_contact(t: Touches) -> np.ndarray:
-    """(n,) bool: between first and last touch."""
-    return t.phase != OUTSIDE

@@ -7,8 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.touches import free_air
-from mechanics.model import Model
+from mechanics.presses import Presses
 from mechanics.recording import Recording
 
 BLOCK_S = 0.25
@@ -50,9 +49,9 @@ class Turning:
     first: np.ndarray
 
 
-def free_air_of(recording: Recording, model: Model, noise_n: float) -> FreeAir | None:
-    """Analyse free air; None with less than two seconds of it."""
-    free = free_air(recording, model)
+def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
+    """Analyse the free air that the table names; None with less than two seconds of it."""
+    free, noise_n = presses.within("free", recording.t), presses.noise.raw_n
     rate = recording.sample_rate_hz
     if free.sum() < 2 * rate:
         return None

@@ -18,8 +18,8 @@ def inclusion_starts(forward: Forward, base: Fit, site_sd: np.ndarray, most: int
     """Start vectors (centre, radius, log ratio) for a fit; also kept in forward.stages['inclusion_starts'].
 
     First order: the share of each place's give that lies in the ball, times how its force answers to its
-    give,
-    against each press's factor on the force, weighted by noise and shape prior, with a free common factor.
+    give, against each press's factor on the force, weighted by noise and shape prior, with a free common
+    factor.
     """
     fields = energy_fields(forward)
     t = forward.touches
@@ -28,7 +28,7 @@ def inclusion_starts(forward: Forward, base: Fit, site_sd: np.ndarray, most: int
     residual = np.where(rows[:, None], base.residual, 0.0)
 
     def sums(a: np.ndarray) -> np.ndarray:
-        return np.bincount(t.press, weights=a, minlength=t.presses)
+        return np.bincount(t.press, weights=a, minlength=len(t))
 
     power = np.maximum(sums(predicted[:, 0] ** 2), 1e-12)
     level = sums(predicted[:, 0] * residual[:, 0]) / power

@@ -42,7 +42,7 @@ def parameter_intervals(
     if k == 0:
         return {}
     own = found.place_of(name)
-    spread = covariance(found, forward.touches.slowness, dof)[own, own]
+    spread = covariance(found, forward.touches.noise.variance_inflation, dof)[own, own]
     systematic = np.asarray(effect.extra.get("systematic", np.zeros(k)))
     share = np.asarray(effect.extra.get("systematic_share", np.zeros(k)))
     spread = spread + np.diag(systematic**2 + (share * found.values[own]) ** 2)

@@ -212,7 +212,7 @@ class Search:
     def score(self, name: str, new: Candidate, old: Candidate) -> Score:
         """Compare two candidates."""
         extra = len(new.found.values) - len(old.found.values)
-        over = max(1.0, new.chi) * self.forward.touches.slowness
+        over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
         per_group = old.held - new.held
         gain = float(per_group.sum())
         if name in SPATIAL:
@@ -279,6 +279,6 @@ def sideways_off(forward: Forward, candidate: Candidate) -> float:
     residual = candidate.residual[t.counted, 1:]
     predicted = t.f[t.counted, 1:] - residual
     missed, force = (float(np.sqrt((x**2).sum(axis=1).mean())) for x in (residual, predicted))
-    if missed < np.sqrt(2) * t.raw_noise_n or missed < SIDEWAYS_SHARE * force:
+    if missed < np.sqrt(2) * t.noise.raw_n or missed < SIDEWAYS_SHARE * force:
         return 0.0
     return missed / force

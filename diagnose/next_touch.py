@@ -18,8 +18,8 @@ from diagnose.forward import Forward
 from diagnose.judging import Candidate
 from diagnose.leads import leads
 from diagnose.result import NextTouch
-from diagnose.touches import HOLDING, LOADING, MARGIN_S, OUTSIDE, UNLOADING, Touches
 from diagnose.whiten import NuisanceOptions, Whitener
+from mechanics.presses import Presses
 
 DEPTHS = (0.35, 0.8, 1.2)
 SPEEDS = (0.004, 0.02, 0.08)
@@ -103,49 +103,40 @@ def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str
     )
 
 
-def _depth(t: Touches, plan: Plan) -> float:
-    return min(plan.depth * float(t.depth.max()), DEEPEST_M)
+def _depth(t: Presses, plan: Plan) -> float:
+    return min(plan.depth * float(t.deepest.max()), DEEPEST_M)
 
 
 def _sideways(forward: Forward, press: int) -> np.ndarray:
     return forward.touches.frame[press][1]
 
 
-def _pressed(forward: Forward, plan: Plan) -> Touches:
+def _pressed(forward: Forward, plan: Plan) -> Presses:
     """Every known press done over by a plan, each a site of its own."""
     t = forward.touches
     into, along = _path(_depth(t, plan), plan)
-    n, p = len(into), t.presses
+    n, p = len(into), len(t)
     local = np.column_stack([into, along, np.zeros(n)])
     clock = STEP_S * np.arange(n)
     contact = np.flatnonzero(into > 0)
-    phase = np.full(n, HOLDING)
-    deepest = into > 0.97 * into.max()
-    ends = np.flatnonzero(deepest)
-    phase[: ends[0]] = LOADING
-    phase[ends[-1] + 1 :] = UNLOADING
-    phase[into <= 0] = OUTSIDE
-    margin = round(MARGIN_S / STEP_S)
-    counted = np.zeros(n, dtype=bool)
-    counted[max(contact[0] - margin, 0) : contact[-1] + margin + 1] = True
     centre = t.point + forward.tip_radius * t.normal
     position = (centre[:, None] - np.einsum("pij,ni->pnj", t.frame, local)).reshape(-1, 3)
     lead = np.concatenate([leads(clock, position[i * n : (i + 1) * n]) for i in range(p)])
-    extra = {"position": position, "lead": lead}
-    if "quaternion" in t.extra:
-        extra["quaternion"] = np.repeat(t.extra["quaternion"][t.start[:-1]], n, axis=0)
+    turned = None if t.quaternion is None else np.repeat(t.quaternion[t.starts[:-1]], n, axis=0)
+    none = np.zeros_like(position)
     return dataclasses.replace(
         t,
-        start=n * np.arange(p + 1),
+        starts=n * np.arange(p + 1),
         t=np.tile(clock, p),
-        y=np.tile(local, (p, 1)),
-        f=np.zeros((n * p, 3)),
-        counted=np.tile(counted, p),
-        phase=np.tile(phase, p),
+        position=position,
+        force=none,
+        free_air=none,
+        quaternion=turned,
+        columns={"lead": lead},
         site=np.arange(p),
-        repeat=np.zeros(p, dtype=int),
         onset_s=np.full(p, clock[contact[0]]),
-        extra=extra,
+        peak_s=np.full(p, clock[int(np.argmax(into))]),
+        end_s=np.full(p, clock[contact[-1]]),
     )
 
 

@@ -23,6 +23,7 @@ from mechanics.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
+from reconstruct.placing import presses_on
 
 FAST_LEAVES_OUT = (
     "poisson_ratio",
@@ -72,8 +73,9 @@ def diagnose(
         clock = now
 
     progress("touches", 0.02)
-    touches = touches_of(recording, model)
-    free = free_air_of(recording, model, touches.raw_noise_n)
+    presses = presses_on(recording, model)
+    touches = touches_of(presses)
+    free = free_air_of(recording, presses)
     lap("touches")
     progress("sites", 0.05)
     forward = build_forward(touches, model)

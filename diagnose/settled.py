@@ -83,11 +83,11 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
     turns = turning is not None and np.linalg.norm(turning.tool_n) > max(
         Z * turning.se_n, LEAST_MASS_KG * STANDARD_GRAVITY
     )
-    if turns and "tool_gravity_inertia" not in excluded and "quaternion" in t.extra:
+    if turns and "tool_gravity_inertia" not in excluded and t.quaternion is not None:
         # a tare took the weight off as it lay in the tool at first; it stays where the tool turns
         mass = float(np.linalg.norm(turning.tool_n)) / STANDARD_GRAVITY
         weight = -turning.first @ turning.tool_n
-        turned = np.einsum("nij,j->ni", matrices(t.extra["quaternion"]), turning.tool_n)
+        turned = np.einsum("nij,j->ni", matrices(t.quaternion), turning.tool_n)
         parts["tool_gravity_inertia"] = weight + turned - mass * forward.acceleration
         parameters["tool_gravity_inertia"] = {
             "mass_kg": mass,
@@ -132,7 +132,7 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
     taken = sum(local.values())
-    forward.touches = dataclasses.replace(t, f=t.f - taken)
+    forward.touches = dataclasses.replace(t, force=t.force - sum(parts.values()))
     order = sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum()))
     intervals = {
         n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters

@@ -6,20 +6,20 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from diagnose.fit import Fit
-from diagnose.touches import Touches
 from diagnose.whiten import NuisanceOptions
 from mechanics.model import Model
+from mechanics.presses import Presses
 
 SHARE_PER_HEIGHT = 2.5
 """Relative stiffness error a unit of surface error over the object's height (edges near a press count
 double)."""
 
 
-def site_stiffness_sd(touches: Touches, model: Model, options: NuisanceOptions) -> np.ndarray:
+def site_stiffness_sd(touches: Presses, model: Model, options: NuisanceOptions) -> np.ndarray:
     """(p,) share by which a press's stiffness may be wrong: mesh and law, and the surface's own
     uncertainty."""
     if model.shape_uncertainty_m is None:
-        return np.full(touches.presses, options.site_stiffness)
+        return np.full(len(touches), options.site_stiffness)
     surface = np.flatnonzero(model.mesh.touchable)
     height = np.ptp((model.mesh.points - model.support_point) @ model.support_normal)
     tree = cKDTree(model.mesh.points[surface])
@@ -30,7 +30,7 @@ def site_stiffness_sd(touches: Touches, model: Model, options: NuisanceOptions) 
     return np.sqrt(options.site_stiffness**2 + (SHARE_PER_HEIGHT * spread / height) ** 2)
 
 
-def site_factors(found: Fit, touches: Touches) -> tuple[np.ndarray, np.ndarray]:
+def site_factors(found: Fit, touches: Presses) -> tuple[np.ndarray, np.ndarray]:
     """(s,) factor by which each site is stiffer than predicted, and its standard error (repeats and
     noise)."""
     factor, error = np.ones(touches.sites), np.ones(touches.sites)
@@ -44,11 +44,11 @@ def site_factors(found: Fit, touches: Touches) -> tuple[np.ndarray, np.ndarray]:
     return factor, error
 
 
-def repeat_scatter(residual: np.ndarray, touches: Touches) -> float:
+def repeat_scatter(residual: np.ndarray, touches: Presses) -> float:
     """N rms by which presses of one place differ in what they leave of their force; nan without repeats."""
     t = touches
-    each = np.zeros(t.presses)
-    for press in range(t.presses):
+    each = np.zeros(len(t))
+    for press in range(len(t)):
         rows = (t.press == press) & t.counted
         f, r = (t.f[rows] - residual[rows]).ravel(), residual[rows].ravel()
         each[press] = f @ r / max(f @ f, 1e-12)

@@ -6,15 +6,15 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from diagnose.touches import Touches
 from mechanics.model import Model
+from mechanics.presses import Presses
 from mechanics.store import content_key, load_or_build
 
 VERSION = 1
 
 
 def stored(
-    name: str, model: Model, touches: Touches, build: Callable[[], Mapping[str, np.ndarray]]
+    name: str, model: Model, touches: Presses, build: Callable[[], Mapping[str, np.ndarray]]
 ) -> dict[str, np.ndarray]:
     """The arrays of a stage: from the model's folder where they are there, else of `build` and kept there.
 

@@ -9,7 +9,7 @@ import numpy as np
 from diagnose.fit import Descent, Fit
 from diagnose.gaps import gap
 from diagnose.judging import Search
-from diagnose.touches import Touches
+from mechanics.presses import Presses
 
 FOLDS = 6
 ITERATIONS = 6
@@ -60,7 +60,7 @@ def _without(search: Search, found: Fit, fold: np.ndarray, extra: np.ndarray | N
     return raw[:, 0, 0] - 2 * level * raw[:, 0, 1] + level**2 * raw[:, 1, 1]
 
 
-def neighbours(t: Touches) -> list[np.ndarray]:
+def neighbours(t: Presses) -> list[np.ndarray]:
     """Site numbers of each fold: sites nearest to one of FOLDS centres, spread by farthest points."""
     place = t.site_point
     centres = [int(np.argmax(np.linalg.norm(place - place.mean(axis=0), axis=1)))]
@@ -71,14 +71,14 @@ def neighbours(t: Touches) -> list[np.ndarray]:
     return [np.flatnonzero(nearest == k) for k in range(len(centres))]
 
 
-def deepest(t: Touches) -> np.ndarray:
+def deepest(t: Presses) -> np.ndarray:
     """Sites that hold the deepest presses."""
-    return _most(np.array([t.depth[t.site == s].max() for s in range(t.sites)]))
+    return _most(np.array([t.deepest[t.site == s].max() for s in range(t.sites)]))
 
 
-def fastest(t: Touches) -> np.ndarray:
+def fastest(t: Presses) -> np.ndarray:
     """Sites that hold the fastest presses."""
-    speed = np.array([t.speed[a:b].max() for a, b in zip(t.start[:-1], t.start[1:], strict=True)])
+    speed = np.array([t.speed[a:b].max() for a, b in zip(t.starts[:-1], t.starts[1:], strict=True)])
     return _most(np.array([speed[t.site == s].max() for s in range(t.sites)]))
 
 

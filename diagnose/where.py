@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir
-from diagnose.touches import HOLDING, LOADING, UNLOADING, Touches
+from mechanics.presses import HOLDING, LOADING, UNLOADING, Presses
 
 AXES = ("depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air")
 FLIPS = 2000
@@ -68,14 +68,13 @@ def locate(
     return Where(axes, worst, rmse, _curves(t, residual))
 
 
-def _contrasts(t: Touches, residual: np.ndarray) -> dict[str, np.ndarray]:
+def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:
     """(p,) per press: one signed number an axis (nan where the press cannot tell)."""
     out = {
-        name: np.full(t.presses, np.nan)
-        for name in ("depth", "rate", "phase", "direction", "order", "repeat")
+        name: np.full(len(t), np.nan) for name in ("depth", "rate", "phase", "direction", "order", "repeat")
     }
-    level = np.full(t.presses, np.nan)
-    for p in range(t.presses):
+    level = np.full(len(t), np.nan)
+    for p in range(len(t)):
         rows = np.flatnonzero((t.press == p) & t.counted & (t.phase != 3))
         if len(rows) < 8:
             continue
@@ -142,7 +141,7 @@ def _max_t(contrasts: dict[str, np.ndarray], sites_count: int, seed: int) -> dic
     return result
 
 
-def _levels(t: Touches, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _levels(t: Presses, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(s,) relative residual of each site and its standard error from repeats and noise."""
     level, se = np.zeros(t.sites), np.zeros(t.sites)
     for site in range(t.sites):
@@ -154,7 +153,7 @@ def _levels(t: Touches, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return level, se
 
 
-def _space(t: Touches, residual: np.ndarray, site_sd: np.ndarray) -> float:
+def _space(t: Presses, residual: np.ndarray, site_sd: np.ndarray) -> float:
     level, se = _levels(t, residual)
     prior = np.array([site_sd[t.site == s].mean() for s in range(t.sites)])
     weight = 1 / (prior**2 + se**2 + 0.01**2)
@@ -173,14 +172,14 @@ def _free_p(free: FreeAir | None) -> float:
     return float(min(1.0, 7 * chi2.sf(z**2, 1)))
 
 
-def _free_share(t: Touches, residual: np.ndarray, free: FreeAir | None) -> float:
+def _free_share(t: Presses, residual: np.ndarray, free: FreeAir | None) -> float:
     if free is None:
         return 0.0
     total = (residual[t.counted] ** 2).sum(axis=1).mean()
     return float((free.bias_n**2).sum() / max(total, 1e-12))
 
 
-def _shares(t: Touches, residual: np.ndarray) -> dict[str, float]:
+def _shares(t: Presses, residual: np.ndarray) -> dict[str, float]:
     """Share of the mean square that each axis's own patterns explain, alone, by least squares."""
     rows = np.flatnonzero(t.counted)
     r = residual[rows]
@@ -214,7 +213,7 @@ def _shares(t: Touches, residual: np.ndarray) -> dict[str, float]:
     return shares
 
 
-def _curves(t: Touches, residual: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _curves(t: Presses, residual: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     rows = np.flatnonzero(t.counted)
     normal = residual[rows, 0]
     result = {}

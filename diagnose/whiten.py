@@ -4,8 +4,7 @@ site.
 A residual is weighed against the covariance sigma^2 I + N N^T of its site, N holding one column a nuisance:
 how the force would change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its
 normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space
-between
-them, against what an error of shape could do. Woodbury keeps it to small matrices.
+between them, against what an error of shape could do. Woodbury keeps it to small matrices.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
 from diagnose.forward import Forward, Settings
-from diagnose.touches import Touches
 from mechanics.options import option
+from mechanics.presses import Presses
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ class Whitener:
         self.onset_sd = options.onset_m
         self.onset_column = columns[0][1] / options.onset_m
         site = options.site_stiffness if site_sd is None else site_sd
-        self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(self.touches.presses)
+        self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(len(self.touches))
         for rows, matrix in _by_site(self.touches, columns):
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)
@@ -113,8 +112,8 @@ def nuisance_columns(
     moved.__dict__.update(settings.__dict__)
     small = 2e-5
     moved.onset = settings.onset + small
-    site_sd = np.full(t.presses, options.site_stiffness) if site_sd is None else site_sd
-    deepest = np.maximum(t.depth[t.press], 1e-4)
+    site_sd = np.full(len(t), options.site_stiffness) if site_sd is None else site_sd
+    deepest = np.maximum(t.deepest[t.press], 1e-4)
     bend = np.clip(t.y[:, 0], 0, None) / deepest - 0.7
     normal = f[:, 0]
     zero = np.zeros_like(normal)
@@ -130,7 +129,7 @@ def nuisance_columns(
     ]
 
 
-def _by_site(t: Touches, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
+def _by_site(t: Presses, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
     result = []
     site_of_row = t.site[t.press]
     for site in range(t.sites):

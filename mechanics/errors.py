@@ -16,6 +16,10 @@ class ContactError(PalpateError):
     """A recording holds no usable boundary phase or too few palpations."""
 
 
+class NoBaseError(ContactError):
+    """A recording does not trace a base, and none was given."""
+
+
 class SurfaceError(PalpateError):
     """No closed, oriented surface could be made of the touched points."""
 

@@ -2,9 +2,8 @@
 
 MODEL/model.toml       material, tool, mesh, frame, effects, provenance
 MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, young_modulus_pa, shape uncertainty
-MODEL/palpations.csv   one row a palpation
-MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content
-"""
+MODEL/presses.bin      the table of presses, samples and all (mechanics.presses) MODEL/palpations.csv   one
+row a palpation MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content"""
 
 from __future__ import annotations
 
@@ -20,7 +19,7 @@ import numpy as np
 
 from mechanics.errors import MeshError, ModelError
 from mechanics.files import atomic_folder
-from mechanics.palpation import Palpation, read_palpations, write_palpations
+from mechanics.presses import Presses, no_presses, read_csv, read_presses, write_csv, write_presses
 from mechanics.recording import dump_toml
 from mechanics.tetmesh import TetMesh, vertex_normals
 
@@ -33,7 +32,8 @@ class Model:
     modulus_ratio: (m,) modulus of each tetrahedron over the global one (1 where homogeneous).
     support_point, support_normal: (3,), the support plane; the normal points into the object.
     shape_uncertainty_m: (n,) standard deviation of the surface along its normal at each node, or None.
-    effects: parameters of every effect that a diagnosis added, by name. provenance: where it came from.
+    presses: the table of what was pressed. effects: parameters of every effect that a diagnosis added, by
+    name. provenance: where it came from.
     """
 
     mesh: TetMesh
@@ -46,7 +46,7 @@ class Model:
     young_modulus_ci95_pa: tuple[float, float] = (float("nan"), float("nan"))
     modulus_ratio: np.ndarray | None = None
     shape_uncertainty_m: np.ndarray | None = None
-    palpations: tuple[Palpation, ...] = ()
+    presses: Presses = field(default_factory=lambda: no_presses(0.005))
     effects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     extra: Mapping[str, Any] = field(default_factory=dict)
@@ -115,7 +115,8 @@ def write_model(path: Path | str, model: Model) -> Path:
     with atomic_folder(path) as folder:
         (folder / "model.toml").write_text(dump_toml(table), encoding="utf-8")
         grid.save(folder / "mesh.vtu")
-        write_palpations(folder / "palpations.csv", model.palpations)
+        write_csv(folder / "palpations.csv", model.presses)
+        write_presses(folder / "presses.bin", model.presses)
     return path
 
 
@@ -170,7 +171,7 @@ def read_model(path: Path | str) -> Model:
             support_normal=np.array(frame["support_normal"], dtype=float),
             modulus_ratio=np.asarray(grid.cell_data["young_modulus_pa"], dtype=float) / modulus,
             shape_uncertainty_m=None if uncertainty is None else np.asarray(uncertainty, dtype=float),
-            palpations=read_palpations(path / "palpations.csv"),
+            presses=_presses(path, float(table["tool"]["tip_radius_m"])),
             effects=table.get("effects", {}),
             provenance=table.get("provenance", {}),
             extra={k: v for k, v in table.items() if k not in _KNOWN_TABLES},
@@ -180,3 +181,9 @@ def read_model(path: Path | str) -> Model:
         raise ModelError(f"'{path}' lacks {error}: reconstruct it again") from error
     except (MeshError, TypeError, ValueError) as error:
         raise ModelError(f"'{path}' is damaged: {error}") from error
+
+
+def _presses(path: Path, tip_radius_m: float) -> Presses:
+    """The table of a MODEL folder; folders of before have palpations.csv alone, without samples."""
+    table = path / "presses.bin"
+    return read_presses(table) if table.is_file() else read_csv(path / "palpations.csv", tip_radius_m)

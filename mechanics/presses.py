@@ -1,4 +1,5 @@
-"""The one table of presses: what a recording says of every press, made once by reconstruction and kept in the MODEL.
+"""The one table of presses: what a recording says of every press, made once by reconstruction and kept in the
+MODEL.
 
 A frozen, ragged table: p presses, their n samples one after another. Everything that asks about a press reads
 it or a view of it (net of free air, thinned, contact only, one site), and whatever reconstruction found out
@@ -18,7 +19,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-from scipy.sparse.csgraph import connected_components
+from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
 from mechanics.errors import CacheError, ModelError
@@ -27,13 +28,14 @@ from mechanics.recording import Recording
 from mechanics.store import read_arrays, write_arrays
 
 KINDS = ("trace", "press", "free", "rigid", "retrace")
-"""Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once more."""
+"""Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
+more."""
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc
-N/m^r, b_hc N s/m^(r+1), r_hc; without damping k_v N/m, eq. (5), k_c N/m^r, r_c, eq. (6), and k_h N/m^r, eq. (6)
-at the mean exponent; e_pa Pa, the modulus of this press alone, eq. (13). Equations: Goksel et al."""
+N/m^r, b_hc N s/m^(r+1), r_hc; without damping k_v N/m, eq. (5), k_c N/m^r, r_c, eq. (6), and k_h N/m^r, eq.
+(6) at the mean exponent; e_pa Pa, the modulus of this press alone, eq. (13). Equations: Goksel et al."""
 SITE_M = 0.008
-"""Presses nearer than this to one another, on faces that look the same way, are repeats at one site."""
+"""Presses further than this from one another are never repeats at one site."""
 MARGIN_S = 0.05
 """Contact samples reach this far beyond first and last touch: adhesion and delay show there."""
 LEAD_S = 0.12
@@ -50,6 +52,8 @@ USUAL_NOISE_N = 0.012
 LOADING, HOLDING, UNLOADING, OUTSIDE = 0, 1, 2, 3
 PHASES = ("loading", "hold", "unloading", "outside")
 _SAME_FACE = 0.7
+_REPEAT_M = 0.001
+_TOUCHING_M = 1e-9
 _SMOOTH_S = 0.015
 _LET_GO = 0.02
 _FORMAT = "presses 1"
@@ -81,9 +85,9 @@ class Noise:
 class Presses:
     """p presses in order of time with n samples; arrays are read-only.
 
-    starts: (p + 1,) first row of each press. Rows: t (n,) s; position (n, 3) m, the tip's centre; force (n, 3)
-    N as read; free_air (n, 3) N, what is read at that time in the air; quaternion (n, 4) scalar first, tool to
-    device, or None; columns: further ones by name, (n, ...).
+    starts: (p + 1,) first row of each press. Rows: t (n,) s; position (n, 3) m, the tip's centre; force (n,
+    3) N as read; free_air (n, 3) N, what is read at that time in the air; quaternion (n, 4) scalar first,
+    tool to device, or None; columns: further ones by name, (n, ...).
     Presses: onset_s, peak_s, end_s (p,) s: first touch, greatest force, loss of touch. centre (p, 3) m, the
     tip's centre at first touch; contact_normal (p, 3), outward, from the force; onset_error_m (p,), standard
     error of the first touch along it. point, normal (p, 3): of the object's surface at first touch, outward.
@@ -253,6 +257,40 @@ class Presses:
             out[a:b][(t < self.onset_s[p]) | (t > self.end_s[p])] = OUTSIDE
         return out
 
+    @cached_property
+    def deepest(self) -> np.ndarray:
+        """(p,) m, greatest depth below the surface."""
+        return np.array(
+            [self.y[a:b, 0].max() for a, b in zip(self.starts[:-1], self.starts[1:], strict=True)]
+        )
+
+    @cached_property
+    def speed(self) -> np.ndarray:
+        """(n,) m/s, rate of the depth below the surface, smoothed over five rows."""
+        out = np.zeros(len(self.t))
+        for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
+            smooth = np.convolve(np.pad(self.y[a:b, 0], 2, mode="edge"), np.full(5, 0.2), mode="valid")
+            out[a:b] = np.gradient(smooth, self.t[a:b])
+        return out
+
+    # noise
+
+    @property
+    def noise_n(self) -> float:
+        """N, of one force component of a row."""
+        step = max(1, round(STEP_S * self.sample_rate_hz))
+        return self.noise.step_n if self.block == step else self.noise.raw_n / float(np.sqrt(self.block))
+
+    @property
+    def vector_noise_n(self) -> float:
+        """N, rms of the noise of a raw force 3-vector."""
+        return float(np.sqrt(3) * self.noise.raw_n)
+
+    @property
+    def thinned_away(self) -> float:
+        """N^2, what thinning took off the mean square of the 3-vector."""
+        return 3 * (self.noise.raw_n**2 - self.noise_n**2)
+
     # views
 
     @cached_property
@@ -299,8 +337,8 @@ class Presses:
         )
 
     def thinned(self, step_s: float) -> Presses:
-        """Means over whole steps, from each press's first row on: keeps white noise white, and turns the steps
-        of an encoder into a fine scale. A press shorter than a step keeps one row."""
+        """Means over whole steps, from each press's first row on: keeps white noise white, and turns the
+        steps of an encoder into a fine scale. A press shorter than a step keeps one row."""
         size = max(1, round(step_s * self.sample_rate_hz))
         spans = []
         for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
@@ -372,12 +410,22 @@ def _frozen(value: Any, kind: type) -> np.ndarray:
 
 
 def sites_of(point: np.ndarray, normal: np.ndarray, reach_m: float = SITE_M) -> np.ndarray:
-    """(k,) the site of each press, numbered in order of time: chains of presses (k, 3) m nearer than `reach_m`
-    whose outward normals (k, 3) look the same way."""
+    """(k,) the site of each press, numbered in order of time: chains of presses (k, 3) m that lie nearer to
+    one another than the cut, with outward normals (k, 3) that look the same way.
+
+    The cut is the data's own: repeats scatter by a little and sites stand apart, so among the lengths of the
+    shortest tree that joins the presses it lies in the widest gap (by ratio) between _REPEAT_M and `reach_m`.
+    """
     if not len(point):
         return np.zeros(0, dtype=int)
-    close = (cdist(point, point) < reach_m) & (normal @ normal.T > _SAME_FACE)
-    label = connected_components(close, directed=False)[1]
+    gap = cdist(point, point)
+    gap[normal @ normal.T <= _SAME_FACE] = np.inf
+    joined = np.where(np.isfinite(gap), np.maximum(gap, _TOUCHING_M), 0.0)
+    edges = np.sort(minimum_spanning_tree(joined).data)
+    steps = np.concatenate([[_REPEAT_M], edges[(edges > _REPEAT_M) & (edges < reach_m)], [reach_m]])
+    ratios = steps[1:] / steps[:-1]
+    cut_m = steps[:-1][ratios >= ratios.max() - 1e-12][-1]
+    label = connected_components(gap <= max(cut_m, _TOUCHING_M), directed=False)[1]
     first = np.unique(label, return_index=True)[1]
     order = np.empty(len(first), dtype=int)
     order[np.argsort(first)] = np.arange(len(first))
@@ -396,9 +444,9 @@ def loss_of_touch(
 ) -> float:
     """The time, s, at which a press's force is back at what it was in the air.
 
-    t: (n,) s at about rate_hz; push: (n,) N, as read along the outward normal, of noise_n a sample. limit_s: no
-    later than this. Back: the mean over 15 ms within 2 % of the greatest, or three times its own noise, of the median from
-    150 to 30 ms before first touch.
+    t: (n,) s at about rate_hz; push: (n,) N, as read along the outward normal, of noise_n a sample. limit_s:
+    no later than this. Back: the mean over 15 ms within 2 % of the greatest, or three times its own noise, of
+    the median from 150 to 30 ms before first touch.
     """
     size = max(1, round(_SMOOTH_S * rate_hz))
     begin, stop = np.searchsorted(t, [peak_s, limit_s])
@@ -476,8 +524,8 @@ def cut(
     delay_error_s: float = 0.0,
     site_m: float = SITE_M,
 ) -> Presses:
-    """The table of a recording whose presses were found: first touches onset_s (p,) and greatest forces peak_s
-    (p,) s, in order, the tip's centre (p, 3) m and the outward normal (p, 3) at first touch.
+    """The table of a recording whose presses were found: first touches onset_s (p,) and greatest forces
+    peak_s (p,) s, in order, the tip's centre (p, 3) m and the outward normal (p, 3) at first touch.
 
     onset_error_m: (p,) standard errors. free_air: (n, 3) N, as late as the force. trace_s: when the base was
     traced. others_s: further contacts, which are neither presses nor free air. noise_n: N, of a sample; None:
@@ -532,8 +580,59 @@ def cut(
         recording_sha256=recording.sha256,
     )
     quiet = table.within("free", t)
-    return dataclasses.replace(
-        table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet)
+    return dataclasses.replace(table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet))
+
+
+def of_paths(
+    starts: np.ndarray,
+    position: np.ndarray,
+    force: np.ndarray,
+    centre: np.ndarray,
+    normal: np.ndarray,
+    *,
+    tip_radius_m: float,
+    sample_rate_hz: float,
+    onset_error_m: np.ndarray | float = 0.0,
+    noise_n: float = USUAL_NOISE_N,
+) -> Presses:
+    """A table of paths that nobody recorded: press i holds the rows starts[i] to starts[i + 1] of position
+    (n, 3) m and force (n, 3) N on the tool, and touches where the tip's centre passes centre[i] (3,) m along
+    -normal[i]. One second lies between two presses; the forces' noise (an axis, white) is noise_n.
+    """
+    p, lengths = len(starts) - 1, np.diff(starts)
+    press = np.repeat(np.arange(p), lengths)
+    row = np.arange(len(position)) - np.asarray(starts)[press]
+    begin = np.concatenate([[0.0], np.cumsum(lengths / sample_rate_hz + 1.0)[:-1]])
+    t = begin[press] + row / sample_rate_hz
+    depth = -np.einsum("ni,ni->n", position - centre[press], normal[press])
+    onset, peak, end, deepest = (np.empty(p) for _ in range(4))
+    for i in range(p):
+        rows = slice(starts[i], starts[i + 1])
+        inside = np.flatnonzero(depth[rows] > 0)
+        first, last = (inside[0], inside[-1]) if len(inside) else (0, 0)
+        top = int(np.argmax(depth[rows]))
+        onset[i], peak[i], end[i] = t[rows][first], t[rows][top], t[rows][last] + 1 / sample_rate_hz
+        deepest[i] = depth[rows][top]
+    point = centre - tip_radius_m * normal
+    return Presses(
+        starts=starts,
+        t=t,
+        position=position,
+        force=force,
+        free_air=np.zeros_like(force),
+        onset_s=onset,
+        peak_s=peak,
+        end_s=end,
+        centre=centre,
+        contact_normal=normal,
+        onset_error_m=np.broadcast_to(np.asarray(onset_error_m, float), p),
+        point=point,
+        normal=normal,
+        depth_m=deepest,
+        site=sites_of(point, normal),
+        tip_radius_m=tip_radius_m,
+        sample_rate_hz=sample_rate_hz,
+        noise=Noise(noise_n, noise_n / np.sqrt(max(1, round(STEP_S * sample_rate_hz)))),
     )
 
 
@@ -597,8 +696,8 @@ def write_csv(path: Path | str, presses: Presses) -> None:
 
 
 def read_csv(path: Path | str, tip_radius_m: float) -> Presses:
-    """The table that `palpations.csv` holds, without samples; raises ModelError where a column is missing or a
-    value is no number."""
+    """The table that `palpations.csv` holds, without samples; raises ModelError where a column is missing or
+    a value is no number."""
     try:
         with open(path, newline="", encoding="utf-8") as file:
             rows = list(csv.DictReader(file))

@@ -12,29 +12,27 @@ same first touches, at the same places with the same normals; of the model only 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from mechanics.errors import ContactError
 from mechanics.model import Model
 from mechanics.options import option
+from mechanics.presses import MARGIN_S, Presses, sites_of
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
 from mechanics.touch import forces_at
 from palpate.regions import Region, regions
-from reconstruct.casting import cast
-from reconstruct.contacts import Exploration, explore
-from reconstruct.modulus import site_labels
-from reconstruct.one_d import fit_robust
+from reconstruct.one_d import columns, fit_robust
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-from reconstruct.uniaxial import profiles
+from reconstruct.placing import presses_on
+from reconstruct.uniaxial import low_passed
 from render.one_d import Law, spread_law
 
 MODELS = ("fem", "kelvin-voigt", "hunt-crossley")
 LAWS = ("linear", "neo-hookean")
-_AROUND_S = 0.05
 
 
 @dataclass(frozen=True)
@@ -42,36 +40,22 @@ class CompareOptions:
     """How presses are held out."""
 
     folds: int = option(8, "parts that the sites are split into")
-    site_m: float = option(0.008, "presses closer than this are one site", unit="m", flag="--site-size")
+    site_m: float | None = option(
+        None, "presses closer than this are one site; None: as reconstructed", unit="m", flag="--site-size"
+    )
     interpolation: str = option("rbf", "of the 1D parameters", choices=("rbf", "nearest"))
 
 
 @dataclass(frozen=True)
-class Presses:
-    """p presses, their contact samples one after another (n rows; starts (p + 1,)); device frame, SI units.
+class Prepared:
+    """The contact samples of the presses, net of free air, and what each model needs of them.
 
-    path: (n, 3) m, travel of the tip's centre since first touch. depth, rate: (n,) along -n. force: (n, 3) N
-    measured, on the tool. points, normals: (p, 3). site: (p,). unit: law -> (n, 3) m^2, force for unit
-    modulus. laws: 1D name -> Law of each press's own fit.
+    unit: dent law -> (n, 3) m^2, force for unit modulus. laws: 1D name -> Law of each press's own fit.
     """
 
-    starts: np.ndarray
-    path: np.ndarray
-    depth: np.ndarray
-    rate: np.ndarray
-    force: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
-    site: np.ndarray
+    presses: Presses
     unit: dict[str, np.ndarray]
     laws: dict[str, Law]
-
-    def __len__(self) -> int:
-        return len(self.points)
-
-    def rows(self, presses: np.ndarray) -> np.ndarray:
-        """Sample indices of these presses, in order."""
-        return np.concatenate([np.arange(self.starts[i], self.starts[i + 1]) for i in presses])
 
 
 @dataclass(frozen=True)
@@ -91,7 +75,7 @@ class RegionResult:
 class Comparison:
     """Held-out errors. press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM."""
 
-    presses: Presses
+    prepared: Prepared
     model: Model
     rmse_n: dict[str, float]
     relative_rmse: dict[str, float]
@@ -101,6 +85,11 @@ class Comparison:
     noise_n: float
     predicted: dict[str, np.ndarray]
     regions: tuple[RegionResult, ...] = field(default_factory=tuple)
+
+    @property
+    def presses(self) -> Presses:
+        """Contact samples of all presses; force net of free air."""
+        return self.prepared.presses
 
     def wins(self, name: str) -> int:
         """On how many held-out presses the model errs least."""
@@ -121,10 +110,9 @@ def compare(
     options = options or CompareOptions()
     if model is None:
         made = reconstruct_fully(recording, ReconstructOptions(seed=seed), lambda s, f: progress(s, 0.6 * f))
-        model, exploration = made.model, made.exploration
-    else:
-        exploration = explore(recording)
-    presses = gather(exploration, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f))
+        model = made.model
+    prepared = prepare(recording, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f))
+    presses = prepared.presses
     sites = np.unique(presses.site)
     folds = min(options.folds, len(sites))
     if folds < 2:
@@ -139,14 +127,14 @@ def compare(
         progress("folds", 0.8 + 0.1 * k / folds)
         held = np.flatnonzero(fold == k)
         rows = presses.rows(held)
-        forces, moduli[k] = _predict(presses, np.flatnonzero(fold != k), held, options.interpolation)
+        forces, moduli[k] = _predict(prepared, np.flatnonzero(fold != k), held, options.interpolation)
         for name in MODELS:
             predicted[name][rows] = forces[name]
     found = []
-    for region in regions(model, presses.points, presses.normals):
+    for region in regions(model, presses.point, presses.normal):
         progress(region.name, 0.95)
         held = np.flatnonzero(region.members)
-        forces, _ = _predict(presses, np.flatnonzero(~region.members), held, options.interpolation)
+        forces, _ = _predict(prepared, np.flatnonzero(~region.members), held, options.interpolation)
         measured = presses.force[presses.rows(held)]
         found.append(
             RegionResult(
@@ -162,14 +150,14 @@ def compare(
         for m in MODELS
     }
     return Comparison(
-        presses=presses,
+        prepared=prepared,
         model=model,
         rmse_n={m: _rms(error[m]) for m in MODELS},
         relative_rmse={m: _rms(error[m]) / _rms(presses.force) for m in MODELS},
         press_rmse_n=each,
         fold=fold,
         moduli_pa=moduli,
-        noise_n=exploration.noise_n * np.sqrt(3.0),
+        noise_n=presses.noise.raw_n * np.sqrt(3.0),
         predicted=predicted,
         regions=tuple(found),
     )
@@ -197,84 +185,63 @@ def verdict(result: Comparison) -> str:
     return words
 
 
-def gather(exploration: Exploration, model: Model, site_m: float, progress: Progress = silent) -> Presses:
-    """Contact samples, sites and what each model needs; the touch sites are solved here."""
-    recording = exploration.recording
-    mesh = model.mesh
-    where = cast(mesh.points, mesh.touchable_surface, exploration.points, exploration.normals)
-    solved = touch_sites(mesh, where.points, where.normals, model.poisson_ratio, progress=progress)
-    normals = solved.normals
-    around = round(_AROUND_S * recording.sample_rate_hz)
-    paths, rates, forces, starts = [], [], [], [0]
-    for contact, normal in zip(exploration.contacts, normals, strict=True):
-        rows = slice(max(contact.start - around, 0), min(contact.end + around, len(recording.t)))
-        path = exploration.position[rows] - contact.centre
-        paths.append(path)
-        rates.append(np.gradient(-(path @ normal), recording.t[rows]))
-        forces.append(recording.force_on_tool[rows])
-        starts.append(starts[-1] + len(path))
-    path = np.concatenate(paths)
-    press = np.repeat(np.arange(len(normals)), np.diff(starts))
+def prepare(
+    recording: Recording, model: Model, site_m: float | None = None, progress: Progress = silent
+) -> Prepared:
+    """Contact samples and what each model needs; the touch sites are solved here. site_m: None keeps the
+    table's sites."""
+    table = presses_on(recording, model)
+    if site_m is not None:
+        table = replace(table, site=sites_of(table.point, table.normal, site_m))
+    solved = touch_sites(model.mesh, table.point, table.normal, model.poisson_ratio, progress=progress)
+    smooth = low_passed(table)
+    presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
     unit = {
         law: forces_at(
             solved,
-            path,
-            np.array(starts),
+            presses.displacement,
+            presses.starts,
             young_modulus_pa=1.0,
-            tip_radius_m=recording.tip_radius_m,
+            tip_radius_m=presses.tip_radius_m,
             law=law,
         )
         for law in LAWS
     }
-    fits = fit_robust(profiles(exploration, normals))
-
-    def column(name: str) -> np.ndarray:
-        return np.array([getattr(fit, name) for fit in fits])
-
-    one, none = np.ones(len(fits)), np.zeros(len(fits))
-    return Presses(
-        starts=np.array(starts),
-        path=path,
-        depth=-(path * normals[press]).sum(axis=1),
-        rate=np.concatenate(rates),
-        force=np.concatenate(forces),
-        points=where.points,
-        normals=normals,
-        site=site_labels(where.points, site_m),
-        unit=unit,
-        laws={
-            "kelvin-voigt": Law(column("k_kv"), column("b_kv"), one, none),
-            "hunt-crossley": Law(column("k_hc"), column("b_hc"), column("r_hc"), column("r_hc")),
+    fitted = columns(fit_robust(smooth.window(0.0, 0.0), table.noise.raw_n), np.zeros(len(table)))
+    one, none = np.ones(len(table)), np.zeros(len(table))
+    return Prepared(
+        presses,
+        unit,
+        {
+            "kelvin-voigt": Law(fitted["k_kv"], fitted["b_kv"], one, none),
+            "hunt-crossley": Law(fitted["k_hc"], fitted["b_hc"], fitted["r_hc"], fitted["r_hc"]),
         },
     )
 
 
 def _predict(
-    presses: Presses, train: np.ndarray, test: np.ndarray, interpolation: str
+    prepared: Prepared, train: np.ndarray, test: np.ndarray, interpolation: str
 ) -> tuple[dict[str, np.ndarray], float]:
     """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM's modulus, Pa."""
+    presses = prepared.presses
     seen, rows = presses.rows(train), presses.rows(test)
     measured = presses.force[seen]
     fits = []
-    for law, unit in presses.unit.items():
+    for law, unit in prepared.unit.items():
         modulus = float((unit[seen] * measured).sum() / (unit[seen] ** 2).sum())
         fits.append((_rms(modulus * unit[seen] - measured), modulus, law))
     _, modulus, law = min(fits)
-    forces = {"fem": modulus * presses.unit[law][rows]}
+    forces = {"fem": modulus * prepared.unit[law][rows]}
     counts = np.diff(presses.starts)[test]
-    for name, fitted in presses.laws.items():
-        at = spread_law(
-            presses.points[train],
-            Law(*(column[train] for column in fitted)),
-            presses.points[test],
-            interpolation,
-        )
+    for name, fitted in prepared.laws.items():
+        own = Law(*(column[train] for column in fitted))
+        at = spread_law(presses.point[train], presses.site[train], own, presses.point[test], interpolation)
         k, b, r, s = (np.repeat(column, counts) for column in at)
         u = np.maximum(presses.depth[rows], 0.0)
         inside = u > 0
         safe = np.where(inside, u, 1.0)
         push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate[rows], 0.0), 0.0)
-        forces[name] = push[:, None] * np.repeat(presses.normals[test], counts, axis=0)
+        forces[name] = push[:, None] * np.repeat(presses.normal[test], counts, axis=0)
     return forces, modulus
 
 
@@ -283,13 +250,19 @@ def _rms(forces: np.ndarray) -> float:
 
 
 def stiffness_along(
-    presses: Presses, train: np.ndarray, places: np.ndarray, normals: np.ndarray, model: Model, depth_m: float
+    prepared: Prepared,
+    train: np.ndarray,
+    places: np.ndarray,
+    normals: np.ndarray,
+    model: Model,
+    depth_m: float,
 ) -> dict[str, np.ndarray]:
     """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
     solved = touch_sites(model.mesh, places, normals, model.poisson_ratio)
-    _, modulus = _predict(presses, train, train[:1], "rbf")
+    presses = prepared.presses
+    _, modulus = _predict(prepared, train, train[:1], "rbf")
     seen = presses.rows(train)
-    law = min(LAWS, key=lambda name: _rms(_scaled(presses.unit[name][seen], presses.force[seen])))
+    law = min(LAWS, key=lambda name: _rms(_scaled(prepared.unit[name][seen], presses.force[seen])))
     steps = np.linspace(0.0, depth_m, 60)
     path = (-steps[None, :, None] * solved.normals[:, None, :]).reshape(-1, 3)
     force = forces_at(
@@ -302,8 +275,9 @@ def stiffness_along(
     )
     deepest = force.reshape(len(places), len(steps), 3)[:, -1]
     result = {"fem": (deepest * solved.normals).sum(axis=1)}
-    for name, fitted in presses.laws.items():
-        at = spread_law(presses.points[train], Law(*(c[train] for c in fitted)), places)
+    for name, fitted in prepared.laws.items():
+        own = Law(*(c[train] for c in fitted))
+        at = spread_law(presses.point[train], presses.site[train], own, places)
         result[name] = at.k * depth_m**at.r
     return result
 

@@ -87,7 +87,7 @@ def run_demo(
         renderer = render.create(options.renderer, model, progress=progress)
     with stage("replay") as progress:
         rendered = replay_recording(renderer, recording, progress)
-        touching = contact_samples(done, recording)
+        touching = model.presses.touching(recording.t)
         error = rms_n((rendered - recording.force_on_tool)[touching])
         whole = rms_n(recording.force_on_tool[touching])
     with stage("feel at 1 kHz") as progress:
@@ -99,12 +99,3 @@ def run_demo(
         with stage("diagnose") as progress:
             diagnosis = diagnose(recording, model, DiagnoseOptions(fast=True, seed=seed), progress)
     return DemoResult(recording, done, rendered, error, whole, servo, diagnosis, seconds)
-
-
-def contact_samples(done: Reconstruction, recording: Recording, margin_s: float = 0.05) -> np.ndarray:
-    """(n,) bool: from first touch to loss of touch of every palpation, and `margin_s` before and after."""
-    mask = np.zeros(len(recording.t), dtype=bool)
-    for contact in done.exploration.contacts:
-        first, last = recording.t[contact.start] - margin_s, recording.t[contact.end - 1] + margin_s
-        mask |= (recording.t >= first) & (recording.t <= last)
-    return mask

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
-from mechanics.errors import ContactError, OptionError
+from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.options import option
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
@@ -106,7 +106,7 @@ def find_interval(
         inside = [(a, b) for a, b in found if t[min(b, len(t) - 1)] > given[0] and t[a] < given[1]]
         inside = [(a, b) for a, b in inside if _travel(position[a:b]) > 2 * tip_radius_m]
         if not inside:
-            raise ContactError(
+            raise NoBaseError(
                 f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): "
                 "trace the object's base first, or give [object] model = PATH of a model whose base stands in"
             )
@@ -126,7 +126,7 @@ def find_interval(
         ):
             last += 1
         return found[first][0], found[last][1]
-    raise ContactError(
+    raise NoBaseError(
         "no boundary phase found: no contact slides further than 8 tip radii in one plane; trace "
         "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
         "model whose base stands in"

@@ -13,12 +13,13 @@ import numpy as np
 
 from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
+from mechanics.presses import SITE_M, Presses, cut
 from mechanics.recording import Recording
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval, runs
 from reconstruct.delay import force_delay
 from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
-from reconstruct.presses import Contact, Signals, fitted_contact, paper_contact
+from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.tool_weight import tool_weight
 
 PAPER_THRESHOLD_N = 1.0
@@ -54,42 +55,36 @@ class ContactOptions:
         True, "shift a force that reads late (first against last touch); never in the paper's mode",
         flag="--correct-delay",
     )  # fmt: skip
+    site_m: float = option(SITE_M, "presses closer than this repeat one site", unit="m", flag="--site-size")
+
+    def __post_init__(self) -> None:
+        """Raises OptionError for a site without size."""
+        if not self.site_m > 0:
+            raise OptionError(f"--site-size is {self.site_m} m; it must be greater than 0")
 
 
 @dataclass(frozen=True)
 class Exploration:
-    """Everything read off a recording before any shape: both phases, filtered signals, noise.
+    """Everything read off a recording before any shape: both phases, filtered signals, noise, the presses.
 
-    position, force: (n, 3) low-passed, force on the tool with the free-air force taken off. raw_force: (n, 3)
-    N, the same without the low-pass. free_air: (n, 3) N. noise_n: standard deviation of the raw force an
-    axis. rejected: (t, reason) of contacts not used. threshold_n: tau. method: 'noise' or 'paper'. delay_s:
-    how late the recording's force reads; force, raw_force and free_air are shifted earlier by so much.
-    delay_error_s: its standard error.
+    recording: as given. position, force: (n, 3) low-passed, force on the tool with the free-air force taken
+    off and read earlier by delay_s, as late as it comes (standard error: delay_error_s).
+    noise_n: standard deviation of the raw force an axis. presses: the table, forces in it as read; places and
+    normals those of the touches themselves. rejected: (t, reason) of contacts not used. threshold_n: tau.
+    method: 'noise' or 'paper'.
     """
 
     recording: Recording
     position: np.ndarray
     force: np.ndarray
-    raw_force: np.ndarray
-    free_air: np.ndarray
     noise_n: float
     boundary: Boundary
-    contacts: tuple[Contact, ...]
+    presses: Presses
     rejected: tuple[tuple[float, str], ...]
     threshold_n: float
     method: str
     delay_s: float = 0.0
     delay_error_s: float = 0.0
-
-    @property
-    def points(self) -> np.ndarray:
-        """(k, 3) P_S of the paper: surface points at first touch."""
-        return np.array([c.point for c in self.contacts])
-
-    @property
-    def normals(self) -> np.ndarray:
-        """(k, 3) outward normals at first touch, from the force."""
-        return np.array([c.normal for c in self.contacts])
 
 
 def explore(
@@ -104,8 +99,7 @@ def explore(
     """Phases, support, base outline and palpations of a recording.
 
     boundary: a known base, for recordings without phase I. Raises ContactError where phase I is missing,
-    nothing
-    is touched or too few presses can be used.
+    nothing is touched or too few presses can be used.
     """
     options = contact_options or ContactOptions()
     if method not in METHODS:
@@ -116,21 +110,21 @@ def explore(
         )
     cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
     given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary)
-    found, signals = _explored(recording, given)
+    found = _searched(recording, given)
     if method == "paper" or not options.correct_delay:
-        return found
-    step = force_delay(signals, found.contacts)
+        return _tabled(recording, found, given)
+    step = force_delay(found.signals, found.contacts)
     if not step.certain:
-        return found
+        return _tabled(recording, found, given)
     delay = 0.0
     for _ in range(_DELAY_ROUNDS):
         samples = round(step.seconds * recording.sample_rate_hz)
         if not samples:
             break
         delay += samples / recording.sample_rate_hz
-        found, signals = _explored(read_earlier(recording, delay), given)
-        step = force_delay(signals, found.contacts)
-    return _with_delay(found, recording, delay, step.error_s)
+        found = _searched(read_earlier(recording, delay), given)
+        step = force_delay(found.signals, found.contacts)
+    return _tabled(recording, found, given, delay, step.error_s)
 
 
 @dataclass(frozen=True)
@@ -148,20 +142,66 @@ def read_earlier(recording: Recording, delay_s: float) -> Recording:
     return replace(recording, force_on_tool=recording.force_on_tool[np.clip(rows, 0, len(rows) - 1)])
 
 
-def _with_delay(found: Exploration, recording: Recording, delay_s: float, error_s: float) -> Exploration:
-    """As found on the shifted force; first touches carry what the delay's error moves them by."""
-    half = round(0.015 * recording.sample_rate_hz)
-    contacts = []
-    for c in found.contacts:
-        path = found.position[max(c.start - half, 0) : c.start + half] @ c.normal
-        moved = error_s * np.ptp(path) / max(len(path) - 1, 1) * recording.sample_rate_hz
-        contacts.append(replace(c, onset_error_m=float(np.hypot(c.onset_error_m, moved))))
-    return replace(
-        found, recording=recording, contacts=tuple(contacts), delay_s=delay_s, delay_error_s=error_s
+@dataclass(frozen=True)
+class _Found:
+    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations."""
+
+    signals: Signals
+    free_air: np.ndarray
+    boundary: Boundary
+    contacts: tuple[Found, ...]
+    unused: tuple[tuple[int, int, str], ...]
+    threshold_n: float
+
+
+def _tabled(
+    recording: Recording, found: _Found, given: _Given, delay_s: float = 0.0, delay_error_s: float = 0.0
+) -> Exploration:
+    """The table of what was found; first touches carry what the delay's error moves them by."""
+    signals, contacts = found.signals, found.contacts
+    t, first_last = recording.t, found.boundary.interval
+    late = np.clip(np.arange(len(t)) - round(delay_s * recording.sample_rate_hz), 0, len(t) - 1)
+    presses = cut(
+        recording,
+        onset_s=t[[c.start for c in contacts]],
+        peak_s=t[[c.peak for c in contacts]],
+        centre=np.array([c.centre for c in contacts]),
+        normal=np.array([c.normal for c in contacts]),
+        onset_error_m=np.array(
+            [np.hypot(c.onset_error_m, delay_error_s * _speed(signals, c)) for c in contacts]
+        ),
+        free_air=found.free_air[late],
+        trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
+        others_s=[(t[a], t[b - 1]) for a, b, _ in found.unused],
+        noise_n=signals.noise_n,
+        delay_s=delay_s,
+        delay_error_s=delay_error_s,
+        site_m=given.contact.site_m,
+    )
+    return Exploration(
+        recording=recording,
+        position=signals.position,
+        force=signals.force,
+        noise_n=signals.noise_n,
+        boundary=found.boundary,
+        presses=presses,
+        rejected=tuple((float(t[a]), reason) for a, _, reason in found.unused),
+        threshold_n=found.threshold_n,
+        method=given.method,
+        delay_s=delay_s,
+        delay_error_s=delay_error_s,
     )
 
 
-def _explored(recording: Recording, given: _Given) -> tuple[Exploration, Signals]:
+def _speed(signals: Signals, contact: Found) -> float:
+    """m/s, of the approach where it touches."""
+    rate = signals.recording.sample_rate_hz
+    half = round(0.015 * rate)
+    path = signals.position[max(contact.start - half, 0) : contact.start + half] @ contact.normal
+    return float(np.ptp(path)) / max(len(path) - 1, 1) * rate
+
+
+def _searched(recording: Recording, given: _Given) -> _Found:
     method, options, boundary = given.method, given.contact, given.known_base
     signals, free_air, spread = _signals(recording, given.cutoff_hz)
     magnitude = signals.magnitude
@@ -181,8 +221,8 @@ def _explored(recording: Recording, given: _Given) -> tuple[Exploration, Signals
         start = interval[1]
     touching[:start] = False
     least_peak = options.least_peak_n or (high if method == "paper" else _PEAK * signals.noise_n)
-    contacts: list[Contact] = []
-    rejected: list[tuple[float, str]] = []
+    contacts: list[Found] = []
+    unused: list[tuple[int, int, str]] = []
     touches = runs(touching)
     left, last = 0, np.zeros(3)
     for a, b in touches:
@@ -197,28 +237,15 @@ def _explored(recording: Recording, given: _Given) -> tuple[Exploration, Signals
             contacts.append(contact)
             left, last = b - 1, contact.normal
         else:
-            rejected.append((float(recording.t[a]), reason))
+            unused.append((a, b, reason))
     if len(contacts) < options.least_palpations:
-        why = f" (the first not used, at {rejected[0][0]:.1f} s, {rejected[0][1]})" if rejected else ""
+        why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
         hint = "lower --contact-threshold or press harder" if method == "paper" else "press at more places"
         raise ContactError(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    found = Exploration(
-        recording=recording,
-        position=signals.position,
-        force=signals.force,
-        raw_force=signals.raw_force,
-        free_air=free_air,
-        noise_n=signals.noise_n,
-        boundary=boundary,
-        contacts=tuple(contacts),
-        rejected=tuple(rejected),
-        threshold_n=high,
-        method=method,
-    )
-    return found, signals
+    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
 
 
 def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, float]:

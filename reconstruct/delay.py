@@ -12,8 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from reconstruct.finding import Found, Signals
 from reconstruct.onset import fit_rise
-from reconstruct.presses import Contact, Signals
 
 _TAIL_S = 0.15
 _AWAY_M = 0.004
@@ -39,7 +39,7 @@ class Delay:
         return abs(self.seconds) > max(_CERTAIN * self.error_s, _LEAST_S)
 
 
-def force_delay(signals: Signals, contacts: Sequence[Contact]) -> Delay:
+def force_delay(signals: Signals, contacts: Sequence[Found]) -> Delay:
     """How late the force reads; zero with an infinite error where fewer than 8 presses can tell.
 
     Presses that end over 1 mm beside their first touch are left out: a dragged surface lets go elsewhere.
@@ -62,7 +62,7 @@ def force_delay(signals: Signals, contacts: Sequence[Contact]) -> Delay:
     return Delay(float(seconds), float(scatter * np.sqrt(spread)), len(rows))
 
 
-def _gap_and_speed(signals: Signals, contact: Contact) -> tuple[float, float, float] | None:
+def _gap_and_speed(signals: Signals, contact: Found) -> tuple[float, float, float] | None:
     """Depth of first touch less that of loss of touch, its error (m), and both speeds' sum (m/s)."""
     rate, normal = signals.recording.sample_rate_hz, contact.normal
     until = min(len(signals.position), contact.end + int(_TAIL_S * rate))

@@ -17,8 +17,8 @@ from scipy.stats import theilslopes
 
 from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.presses import Presses
 from mechanics.sites import TouchSites
-from reconstruct.contacts import Exploration
 from reconstruct.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
 LAWS = ("linear", "neo-hookean", "sphere", "hertz")
@@ -47,13 +47,11 @@ class ModulusOptions:
         0.02, "standard error common to all presses (law, mesh), as a share of the modulus", flag="--law-bias"
     )
     bootstraps: int = option(1000, "resamples of the sites for the 95 % interval", flag="--bootstraps")
-    site_m: float = option(0.008, "presses closer than this repeat one site", unit="m", flag="--site-size")
 
     def __post_init__(self) -> None:
-        """Raises OptionError for sizes that are not positive, errors below 0, or fewer than 20 resamples."""
-        for flag, value in (("--site-size", self.site_m), ("--greatest-depth", self.greatest_depth_m)):
-            if value is not None and not value > 0:
-                raise OptionError(f"{flag} is {value} m; it must be greater than 0")
+        """Raises OptionError for a depth that is not positive, errors below 0, or fewer than 20 resamples."""
+        if self.greatest_depth_m is not None and not self.greatest_depth_m > 0:
+            raise OptionError(f"--greatest-depth is {self.greatest_depth_m} m; it must be greater than 0")
         for flag, value in (("--law-error", self.law_error), ("--law-bias", self.law_bias)):
             if not 0 <= value < 1:
                 raise OptionError(f"{flag} is {value}; it must lie between 0 and 1 (a share)")
@@ -84,26 +82,26 @@ class ModulusFit:
 
 
 def fit_modulus(
-    exploration: Exploration,
+    presses: Presses,
     sites: TouchSites,
+    noise_n: float,
     options: ModulusOptions | None = None,
     *,
     compliance_covariance: np.ndarray | None = None,
     seed: int = 0,
 ) -> ModulusFit:
-    """The global modulus of an exploration whose presses touch at `sites` (one a contact, in order).
+    """The global modulus of presses that touch at `sites` (one a press, in order).
 
-    compliance_covariance: (k, k) 1/m^2 from the shape's uncertainty (reconstruct.shape_error), or None.
+    noise_n: N, standard deviation of a raw force component. compliance_covariance: (k, k) 1/m^2 from the
+    shape's uncertainty (reconstruct.shape_error), or None.
     """
     options = options or ModulusOptions()
-    radius = exploration.recording.tip_radius_m
-    data = press_data(exploration)
-    site = site_labels(sites.points, options.site_m)
+    radius, data, site = presses.tip_radius_m, press_data(presses), presses.site
     along = np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)
-    deepest = float(max(c.depth_m for c in exploration.contacts)) + 1e-3
+    deepest = float(presses.depth_m.max()) + 1e-3
 
     def fitted(law: str, depth: float, start: LawFit | None = None) -> LawFit:
-        return fit_law(data, sites, radius, law, depth, options.law_error, start)
+        return fit_law(data, sites, radius, law, depth, options.law_error, noise_n, start)
 
     limit = options.greatest_depth_m or deepest
     laws = AUTO_LAWS if options.law == "auto" else (options.law,)
@@ -118,7 +116,7 @@ def fit_modulus(
     fits = [fitted(f.law, limit, f) for f in whole]
     shape = None
     if compliance_covariance is not None:
-        slope = far_sensitivity(data, sites, fits[0], radius, options.law_error)
+        slope = far_sensitivity(data, sites, fits[0], radius, options.law_error, noise_n)
         shape = slope[:, None] * compliance_covariance * slope
     logs, chosen = _bootstrap(fits, whole, site, options, shape, seed)
     shares = [float(np.mean(chosen == i)) for i in range(len(fits))]
@@ -170,16 +168,6 @@ def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
-
-
-def site_labels(points: np.ndarray, size_m: float) -> np.ndarray:
-    """(k,) a number for each site: presses within `size_m` of the site's first press belong to it."""
-    labels = np.full(len(points), -1)
-    for i in range(len(points)):
-        if labels[i] < 0:
-            near = (np.linalg.norm(points - points[i], axis=1) < size_m) & (labels < 0)
-            labels[near] = labels.max() + 1
-    return labels
 
 
 def _greatest_consistent(

@@ -1,9 +1,8 @@
 """The global modulus as the paper finds it: a point load on one node of linear tetrahedra (equations 7
 to 13).
 
-The displacement under a point load has no limit as the mesh is refined, so the answer depends on the
-mesh (the paper's
-own included); the finite-tip estimate of `reconstruct.modulus` does not.
+The displacement under a point load has no limit as the mesh is refined, so the answer depends on the mesh
+(the paper's own included); the finite-tip estimate of `reconstruct.modulus` does not.
 """
 
 from __future__ import annotations
@@ -15,9 +14,9 @@ import numpy as np
 from mechanics.elasticity import stiffness
 from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
+from mechanics.presses import Presses
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
-from reconstruct.contacts import Exploration
 
 
 @dataclass(frozen=True)
@@ -40,9 +39,8 @@ class PaperFit:
 
     modulus_pa, ci95_pa: global, and its interval by resampling palpations. press_modulus_pa: (k,) NaN where a
     palpation is not used. node: (k,) the loaded node, -1 where not used. measured, predicted: (k, 3)
-    displacement, m
-    and m Pa. reaction_error: greatest |sum of base reactions (9) + load| over the load. not_used: (t,
-    reason).
+    displacement, m and m Pa. reaction_error: greatest |sum of base reactions (9) + load| over the load.
+    not_used: (t, reason).
     """
 
     modulus_pa: float
@@ -56,52 +54,56 @@ class PaperFit:
 
 
 def readings(
-    exploration: Exploration, indentation_m: float
+    presses: Presses, indentation_m: float
 ) -> tuple[np.ndarray, np.ndarray, list[tuple[float, str]]]:
-    """Displacement (k, 3) m since first touch and force on the object (k, 3) N where each press reaches
-    the depth.
+    """Displacement (k, 3) m since first touch and force on the object (k, 3) N where each press reaches the
+    depth.
 
-    Rows are NaN for presses that stay shallower; the list names them.
+    presses: low-passed (reconstruct.uniaxial). Rows are NaN for presses that stay shallower; the list names
+    them.
     """
-    k = len(exploration.contacts)
+    k = len(presses)
     moved, pushed = np.full((k, 3), np.nan), np.full((k, 3), np.nan)
     shallow = []
-    for i, contact in enumerate(exploration.contacts):
-        rows = slice(contact.start, contact.end)
-        displacement = exploration.position[rows] - contact.centre
+    for i in range(k):
+        rows = presses.rows([i])
+        displacement = presses.displacement[rows]
         reached = np.flatnonzero(np.linalg.norm(displacement, axis=1) >= indentation_m)
         if not len(reached):
             deepest = float(np.linalg.norm(displacement, axis=1).max())
-            shallow.append(
-                (contact.t_onset, f"reaches {deepest * 1e3:.1f} mm, not {indentation_m * 1e3:g} mm")
-            )
+            why = f"reaches {deepest * 1e3:.1f} mm, not {indentation_m * 1e3:g} mm"
+            shallow.append((float(presses.onset_s[i]), why))
             continue
         moved[i] = displacement[reached[0]]
-        pushed[i] = -exploration.force[rows][reached[0]]
+        pushed[i] = -presses.force[rows][reached[0]]
     return moved, pushed, shallow
 
 
 def fit_paper_modulus(
-    exploration: Exploration,
+    presses: Presses,
     mesh: TetMesh,
     poisson_ratio: float,
     options: PaperOptions | None = None,
     *,
     seed: int = 0,
 ) -> PaperFit:
-    """Equations (8), (10) to (13) on a linear mesh. Raises ContactError where fewer than 2 presses are
-    deep enough."""
+    """Equations (8), (10) to (13) on a linear mesh, of low-passed presses (reconstruct.uniaxial). Raises
+    ContactError where fewer than 2 presses are deep enough."""
     options = options or PaperOptions()
-    moved, pushed, shallow = readings(exploration, options.indentation_m)
+    moved, pushed, shallow = readings(presses, options.indentation_m)
     used = np.flatnonzero(np.isfinite(moved[:, 0]))
     if len(used) < 2:
-        deepest = max(c.depth_m for c in exploration.contacts)
+        deepest = presses.depth_m.max()
         raise ContactError(
             f"{len(used)} of {len(moved)} palpations reach the indentation of "
             f"{options.indentation_m * 1e3:g} mm (the deepest {deepest * 1e3:.1f} mm); at least 2 are "
             "needed: give a smaller --indentation"
         )
-    node = np.where(np.isfinite(moved[:, 0]), nearest_nodes(mesh, exploration.points), -1)
+    node = np.where(
+        np.isfinite(moved[:, 0]),
+        nearest_nodes(mesh, presses.centre - presses.tip_radius_m * presses.contact_normal),
+        -1,
+    )
     solver = Solver(mesh, poisson_ratio)
     loads = np.zeros((len(mesh.points), 3, len(used)))
     loads[node[used], :, np.arange(len(used))] = pushed[used]

@@ -1,6 +1,7 @@
 """Uniaxial models of single presses: Kelvin-Voigt and Hunt-Crossley, equations (1) to (6) of the paper.
 
-f is the force on the object along -n (N), u the depth (m), v its rate (m/s). The paper's estimators are
+f is the force on the object along -n (N), u the depth (m), v its rate (m/s): push, depth and rate of the
+table's rows where the tip is in the object (reconstruct.uniaxial). The paper's estimators are
 linear least squares, Hunt-Crossley's on logarithms (4), which weights the noisy start of a press most. The
 robust ones beside them keep every coefficient physical (k > 0, b >= 0, 0.5 <= r <= 3), weight samples equally
 in newtons and bound the pull of a bad sample.
@@ -10,21 +11,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
+
+from mechanics.presses import FITS, Presses
 
 EXPONENTS = (0.5, 3.0)
 _SAMPLES = 200
 _HUBER = 2.0
-
-
-@dataclass(frozen=True)
-class Press:
-    """Samples of one press: t (n,) s, u (n,) m, v (n,) m/s, f (n,) N; only u > 0."""
-
-    u: np.ndarray
-    v: np.ndarray
-    f: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -50,18 +45,28 @@ class OneD:
     rms_hc_n: float
 
 
-def press_of(t: np.ndarray, depth: np.ndarray, push: np.ndarray, *, least_force_n: float = 0.0) -> Press:
-    """Samples of a press where the tip is in the object and pushed out with more than `least_force_n`."""
-    rate = np.gradient(depth, t) if len(t) > 2 else np.zeros_like(depth)
-    inside = (depth > 0) & (push > least_force_n)
-    return Press(depth[inside], rate[inside], push[inside])
+class _Profile(NamedTuple):
+    """Samples of one press in the object: u (n,) m, v (n,) m/s, f (n,) N."""
+
+    u: np.ndarray
+    v: np.ndarray
+    f: np.ndarray
 
 
-def fit_paper(presses: Sequence[Press]) -> list[OneD]:
+def _profiles(presses: Presses, least_force_n: float) -> list[_Profile]:
+    """Samples where the tip is in the object and pushed out with more than `least_force_n`."""
+    inside = (presses.depth > 0) & (presses.push > least_force_n)
+    columns = (presses.depth, presses.rate, presses.push)
+    rows = [presses.rows([i]) for i in range(len(presses))]
+    return [_Profile(*(c[r[inside[r]]] for c in columns)) for r in rows]
+
+
+def fit_paper(presses: Presses, least_force_n: float = 0.0) -> list[OneD]:
     """Equations (3), (4), (5), (6) as the paper fits them; k_h is (6) again at the mean exponent of all
     presses."""
+    seen = _profiles(presses, least_force_n)
     fits = []
-    for p in presses:
+    for p in seen:
         if len(p.u) < 4:
             fits.append(None)
             continue
@@ -75,7 +80,7 @@ def fit_paper(presses: Sequence[Press]) -> list[OneD]:
     exponents = [f[3][1] for f in fits if f]
     mean_r = float(np.mean(exponents)) if exponents else 1.0
     result = []
-    for p, f in zip(presses, fits, strict=True):
+    for p, f in zip(seen, fits, strict=True):
         if f is None:
             result.append(_nothing())
             continue
@@ -85,15 +90,16 @@ def fit_paper(presses: Sequence[Press]) -> list[OneD]:
     return result
 
 
-def fit_robust(presses: Sequence[Press]) -> list[OneD]:
+def fit_robust(presses: Presses, least_force_n: float = 0.0) -> list[OneD]:
     """The same models with bounded, robust estimators, all presses at once.
 
     For every exponent on a grid k and b follow in closed form (weighted least squares, b >= 0); the grid is
     refined four times. Weights are Huber's at 2 robust standard deviations of each press's residual.
     """
-    if not presses:
+    seen = _profiles(presses, least_force_n)
+    if not seen:
         return []
-    u, v, f, used = _padded(presses)
+    u, v, f, used = _padded(seen)
     still = np.zeros_like(v)
     k_kv, b_kv = _linear(np.where(used, u, 0.0), v, f, used)
     k_v, _ = _linear(np.where(used, u, 0.0), still, f, used)
@@ -105,11 +111,11 @@ def fit_robust(presses: Sequence[Press]) -> list[OneD]:
         _assembled(p, (k_kv[i], b_kv[i]), (k_hc[i], b_hc[i], r_hc[i]), k_v[i], (k_c[i], r_c[i]), k_h[i])
         if used[i].sum() >= 4
         else _nothing()
-        for i, p in enumerate(presses)
+        for i, p in enumerate(seen)
     ]
 
 
-def _padded(presses: Sequence[Press]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _padded(presses: Sequence[_Profile]) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     shape = (len(presses), _SAMPLES)
     u, v, f, used = np.ones(shape), np.zeros(shape), np.zeros(shape), np.zeros(shape, dtype=bool)
     for i, p in enumerate(presses):
@@ -170,13 +176,13 @@ def _exponent(
     return k, b, r
 
 
-def predicted(p: Press, k: float, b: float, r: float) -> np.ndarray:
+def predicted(p: _Profile, k: float, b: float, r: float) -> np.ndarray:
     """f = u^r (k + b v), equation (2)."""
     return p.u**r * (k + b * p.v)
 
 
 def _assembled(
-    p: Press, kv: Sequence[float], hc: Sequence[float], k_v: float, c: Sequence[float], k_h: float
+    p: _Profile, kv: Sequence[float], hc: Sequence[float], k_v: float, c: Sequence[float], k_h: float
 ) -> OneD:
     k, b, r = (float(x) for x in hc)
     limit = 0.1 * abs(k / b) if b else np.inf
@@ -192,3 +198,9 @@ def _assembled(
 def _nothing() -> OneD:
     nan = float("nan")
     return OneD(nan, nan, nan, nan, nan, nan, nan, nan, nan, False, 0.0, nan, nan)
+
+
+def columns(fits: Sequence[OneD], press_modulus_pa: np.ndarray) -> dict[str, np.ndarray]:
+    """The table's fitted columns, (p,) each."""
+    own = {n: np.array([getattr(f, n) for f in fits], dtype=float) for n in FITS if n != "e_pa"}
+    return own | {"e_pa": np.asarray(press_modulus_pa, dtype=float)}

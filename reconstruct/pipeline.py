@@ -25,10 +25,10 @@ from reconstruct.known_base import base_of_model
 from reconstruct.meshing import Meshing, MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
-from reconstruct.one_d import OneD, fit_paper, fit_robust
+from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface, shape_table
-from reconstruct.uniaxial import palpation_rows, profiles
+from reconstruct.uniaxial import profiles
 
 DEFAULT_POISSON_RATIO = 0.49
 METHODS = ("finite-tip", "paper")
@@ -59,8 +59,7 @@ class Reconstruction:
     """The model and everything on the way to it (for reports, comparison and diagnosis).
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
-    normals:
-    (k, 3), of the surface at the contacts. seconds: wall time of each step.
+    normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
 
     model: Model
@@ -108,12 +107,15 @@ def reconstruct_fully(
     clock.lap("surface")
     meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
     clock.lap("mesh")
-    where = cast(surface.vertices, surface.triangles, exploration.points, exploration.normals)
+    touched = exploration.presses
+    where = cast(surface.vertices, surface.triangles, touched.point, touched.contact_normal)
+    presses = touched.on_surface(where.points, where.normals)
+    curves = profiles(presses, options.filter.cutoff_hz)
     mesh = meshing.mesh if paper else meshing.mesh.quadratic()
     sites, fit, paper_fit = None, None, None
     if paper:
         progress("modulus", 0.6)
-        paper_fit = fit_paper_modulus(exploration, mesh, nu, options.paper, seed=options.seed)
+        paper_fit = fit_paper_modulus(curves, mesh, nu, options.paper, seed=options.seed)
         modulus, interval, each = paper_fit.modulus_pa, paper_fit.ci95_pa, paper_fit.press_modulus_pa
     else:
         solver = touch_solver(meshing.mesh, nu)
@@ -126,12 +128,17 @@ def reconstruct_fully(
         covariance = compliance_covariance(solver, sites, uncertainty_at(solver.mesh, surface))
         clock.lap("shape error")
         fit = fit_modulus(
-            exploration, sites, options.modulus, compliance_covariance=covariance, seed=options.seed
+            presses,
+            sites,
+            exploration.noise_n,
+            options.modulus,
+            compliance_covariance=covariance,
+            seed=options.seed,
         )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
     clock.lap("modulus")
     progress("1D models", 0.95)
-    one_d = (fit_paper if paper else fit_robust)(profiles(exploration, where.normals))
+    one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
     clock.lap("1D models")
     tables = {"shape": shape_table(surface)}
     if sites is not None:
@@ -146,7 +153,7 @@ def reconstruct_fully(
         support_point=exploration.boundary.support_point,
         support_normal=exploration.boundary.support_normal,
         shape_uncertainty_m=meshing.shape_uncertainty_m if paper else uncertainty_at(mesh, surface),
-        palpations=palpation_rows(exploration, where.points, where.normals, one_d, each),
+        presses=presses.with_fits(**columns(one_d, each)),
         provenance=_provenance(exploration, options, surface, fit),
         extra=tables,
     )

@@ -11,33 +11,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.presses import Presses
 from mechanics.sites import TouchSites
 from mechanics.touch import forces_at
-from reconstruct.contacts import Exploration
 
 _BLOCK_S = 0.004
 _LEAD_S = 0.03
 _CORRELATED = 10  # rows of one press that a lasting error of the law binds together
-
-
-@dataclass(frozen=True)
-class PressData:
-    """Block means of all presses: displacement since first touch (n, 3) m, force on the tool (n, 3) N.
-
-    starts: (k + 1,) first row of each press. noise_n: standard deviation of a row an axis. onset_sd_m: (k,)
-    prior of the first touch along the normal.
-    """
-
-    displacement: np.ndarray
-    force: np.ndarray
-    starts: np.ndarray
-    noise_n: float
-    onset_sd_m: np.ndarray
-
-    @property
-    def press(self) -> np.ndarray:
-        """(n,) the press of each row."""
-        return np.repeat(np.arange(len(self.starts) - 1), np.diff(self.starts))
 
 
 @dataclass(frozen=True)
@@ -59,48 +39,34 @@ class LawFit:
     rows: np.ndarray
 
 
-def press_data(exploration: Exploration) -> PressData:
-    """Block means (4 ms) of every press from 30 ms before first touch to loss of touch, free-air force
-    off."""
-    recording = exploration.recording
-    block = max(1, round(_BLOCK_S * recording.sample_rate_hz))
-    lead = int(_LEAD_S * recording.sample_rate_hz)
-    moved, pushed, starts = [], [], [0]
-    free = 0
-    for contact in exploration.contacts:
-        a, b = max(free, contact.start - lead), contact.end
-        free = b
-        rows = max(1, (b - a) // block)
-        size = min(block, b - a)
-        part = slice(a, a + rows * size)
-        moved.append(recording.position[part].reshape(rows, size, 3).mean(axis=1) - contact.centre)
-        pushed.append(exploration.raw_force[part].reshape(rows, size, 3).mean(axis=1))
-        starts.append(starts[-1] + rows)
-    prior = np.array([2 * max(c.onset_error_m, 2e-5) for c in exploration.contacts])
-    return PressData(
-        np.vstack(moved), np.vstack(pushed), np.array(starts), exploration.noise_n / np.sqrt(block), prior
-    )
+def press_data(presses: Presses) -> Presses:
+    """Means over 4 ms of every press from 30 ms before first touch to loss of touch, free-air force off."""
+    return presses.net.window(_LEAD_S, 0.0).thinned(_BLOCK_S)
 
 
 def fit_law(
-    data: PressData,
+    data: Presses,
     sites: TouchSites,
     tip_radius_m: float,
     law: str,
     depth_m: float,
     law_error: float,
+    noise_n: float,
     start: LawFit | None = None,
 ) -> LawFit:
     """Modulus and onset shift of every press from its samples shallower than `depth_m`.
 
-    start: an earlier fit whose onset shifts are a good guess. law_error: error of the law as a share of the
-    force; a sample's variance is noise^2 + (law_error |f|)^2.
+    data: `press_data`. noise_n: N, standard deviation of a raw force component. start: an earlier fit whose
+    onset shifts are a good guess. law_error: error of the law as a share of the force; a sample's variance is
+    noise^2 + (law_error |f|)^2.
     """
     press, k = data.press, len(sites)
+    noise_n = noise_n / np.sqrt(data.block)
+    onset_sd = 2 * np.maximum(data.onset_error_m, 2e-5)
     normals = sites.normals[press]
     used = -np.einsum("ij,ij->i", data.displacement, normals) < depth_m
     squared_force = np.einsum("ij,ij->i", data.force, data.force)
-    weight = np.where(used, 1.0 / (data.noise_n**2 + law_error**2 * squared_force / 3), 0.0)
+    weight = np.where(used, 1.0 / (noise_n**2 + law_error**2 * squared_force / 3), 0.0)
 
     def unit(shift: np.ndarray) -> np.ndarray:
         return forces_at(
@@ -126,8 +92,8 @@ def fit_law(
         slope = e[press, None] * (unit(shift + step) - g) / step
         residual = data.force - e[press, None] * g
         a_ee, a_eu = summed(g, g), summed(g, slope)
-        a_uu = summed(slope, slope) + data.onset_sd_m**-2.0
-        y_e, y_u = summed(g, residual), summed(slope, residual) - shift * data.onset_sd_m**-2.0
+        a_uu = summed(slope, slope) + onset_sd**-2.0
+        y_e, y_u = summed(g, residual), summed(slope, residual) - shift * onset_sd**-2.0
         det = np.maximum(a_ee * a_uu - a_eu**2, 1e-300)
         change = np.clip((a_ee * y_u - a_eu * y_e) / det, -2e-4, 2e-4)
         shift = np.clip(shift + change, -1e-3, 1e-3)
@@ -145,7 +111,7 @@ def fit_law(
 
 
 def far_sensitivity(
-    data: PressData, sites: TouchSites, fit: LawFit, tip_radius_m: float, law_error: float
+    data: Presses, sites: TouchSites, fit: LawFit, tip_radius_m: float, law_error: float, noise_n: float
 ) -> np.ndarray:
     """(k,) m: change of ln e of every press per unit of change of its far-field compliance along the normal,
     1/m."""
@@ -158,5 +124,5 @@ def far_sensitivity(
         sites.patch_width_m,
         sites.poisson_ratio,
     )
-    other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, fit)
+    other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, noise_n, fit)
     return np.log(other.modulus_pa / fit.modulus_pa) / step

@@ -120,9 +120,10 @@ def evidence_of(exploration: Exploration) -> Evidence:
         support_normal=boundary.support_normal,
         outline=boundary.outline,
         outline_centres=boundary.centres,
-        centres=np.array([c.centre for c in exploration.contacts]),
-        normals=exploration.normals,
-        centre_error_m=np.array([c.onset_error_m for c in exploration.contacts]),
+        centres=exploration.presses.centre,
+        normals=exploration.presses.contact_normal,
+        centre_error_m=exploration.presses.onset_error_m,
+        site=exploration.presses.site,
         tip_radius_m=exploration.recording.tip_radius_m,
     )
 

@@ -1,64 +1,27 @@
-"""Displacement-force profiles of the presses, their 1D fits, and the rows of `palpations.csv`."""
+"""Displacement-force profiles of the presses, as the 1D models are fitted to them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import dataclasses
 
 import numpy as np
 
-from mechanics.palpation import Palpation
-from reconstruct.contacts import Exploration
-from reconstruct.one_d import OneD, Press, press_of
+from mechanics.presses import Presses
+from reconstruct.filtering import FilterOptions, low_pass
 
 
-def profiles(exploration: Exploration, normals: np.ndarray) -> list[Press]:
-    """Depth along -n since first touch and force on the object along -n of every press, low-passed.
-
-    normals: (k, 3) outward unit normals, one a contact.
-    """
-    presses = []
-    for contact, n in zip(exploration.contacts, normals, strict=True):
-        rows = slice(contact.start, contact.end)
-        depth = -(exploration.position[rows] - contact.centre) @ n
-        push = exploration.force[rows] @ n
-        presses.append(
-            press_of(exploration.recording.t[rows], depth, push, least_force_n=exploration.noise_n)
-        )
-    return presses
+def low_passed(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> Presses:
+    """The presses net of free air, position and force low-passed without phase shift."""
+    net = presses.net
+    position, force = np.array(net.position), np.array(net.force)
+    for a, b in zip(net.starts[:-1], net.starts[1:], strict=True):
+        if b - a > 3:
+            position[a:b] = low_pass(position[a:b], net.sample_rate_hz, cutoff_hz)
+            force[a:b] = low_pass(force[a:b], net.sample_rate_hz, cutoff_hz)
+    return dataclasses.replace(net, position=position, force=force)
 
 
-def palpation_rows(
-    exploration: Exploration,
-    points: np.ndarray,
-    normals: np.ndarray,
-    one_d: Sequence[OneD],
-    moduli: np.ndarray,
-) -> tuple[Palpation, ...]:
-    """Rows of palpations.csv; points and normals (k, 3) are those of the reconstructed surface."""
-    rows = []
-    for contact, p, n, fit, e in zip(exploration.contacts, points, normals, one_d, moduli, strict=True):
-        depth = -(exploration.position[contact.start : contact.end] - contact.centre) @ n
-        rows.append(
-            Palpation(
-                t_onset=contact.t_onset,
-                t_peak=contact.t_peak,
-                x=float(p[0]),
-                y=float(p[1]),
-                z=float(p[2]),
-                nx=float(n[0]),
-                ny=float(n[1]),
-                nz=float(n[2]),
-                depth=float(depth.max()),
-                k_kv=fit.k_kv,
-                b_kv=fit.b_kv,
-                k_hc=fit.k_hc,
-                b_hc=fit.b_hc,
-                r_hc=fit.r_hc,
-                k_v=fit.k_v,
-                k_c=fit.k_c,
-                r_c=fit.r_c,
-                k_h=fit.k_h,
-                e_pa=float(e),
-            )
-        )
-    return tuple(rows)
+def profiles(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> Presses:
+    """`low_passed`, from first touch to loss of touch: depth, rate and push of this view (along the table's
+    normals) are u, v and f of equations (1) to (6)."""
+    return low_passed(presses, cutoff_hz).window(0.0, 0.0)

@@ -62,9 +62,8 @@ def effect_arrays(model: Model, options: RenderOptions) -> EffectArrays:
             g, tau = prony_series(effects["viscoelasticity"])
         if "mullins_softening" in effects:
             keys = effects["mullins_softening"]
-            deepest = max(
-                (p.depth for p in model.palpations if np.isfinite(p.depth)), default=model.tip_radius_m
-            )
+            known = model.presses.depth_m[np.isfinite(model.presses.depth_m)]
+            deepest = float(known.max(initial=0.0)) or model.tip_radius_m
             mullins = np.array([float(keys["r"]), float(keys["m_rel"]) * dent_energy(deepest)])
             _check(
                 mullins[0] >= 1 and mullins[1] > 0, "mullins_softening", "r at least 1, m_rel greater than 0"

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from render.one_d import Law, OneDRenderer, palpation_column
+from render.one_d import Law, OneDRenderer
 from render.options import RenderOptions
 
 NAME = "hunt-crossley"
@@ -12,6 +12,6 @@ NAME = "hunt-crossley"
 
 def create(model: Model, options: RenderOptions, progress: Progress = silent) -> OneDRenderer:
     """The registry's entry."""
-    k = palpation_column(model, "k_hc")
-    r = palpation_column(model, "r_hc")
-    return OneDRenderer(NAME, model, Law(k, palpation_column(model, "b_hc"), r, r), options)
+    k = model.presses.fits["k_hc"]
+    r = model.presses.fits["r_hc"]
+    return OneDRenderer(NAME, model, Law(k, model.presses.fits["b_hc"], r, r), options)

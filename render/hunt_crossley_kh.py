@@ -7,7 +7,7 @@ import numpy as np
 
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from render.one_d import Law, OneDRenderer, palpation_column
+from render.one_d import Law, OneDRenderer
 from render.options import RenderOptions
 
 NAME = "hunt-crossley-kh"
@@ -15,6 +15,6 @@ NAME = "hunt-crossley-kh"
 
 def create(model: Model, options: RenderOptions, progress: Progress = silent) -> OneDRenderer:
     """The registry's entry."""
-    k = palpation_column(model, "k_h")
-    r = np.full_like(k, np.nanmean(palpation_column(model, "r_c"))) if len(k) else k
+    k = model.presses.fits["k_h"]
+    r = np.full_like(k, np.nanmean(model.presses.fits["r_c"])) if len(k) else k
     return OneDRenderer(NAME, model, Law(k, np.zeros_like(k), r, np.zeros_like(k)), options)

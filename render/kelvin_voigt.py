@@ -6,7 +6,7 @@ import numpy as np
 
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from render.one_d import Law, OneDRenderer, palpation_column
+from render.one_d import Law, OneDRenderer
 from render.options import RenderOptions
 
 NAME = "kelvin-voigt"
@@ -14,6 +14,6 @@ NAME = "kelvin-voigt"
 
 def create(model: Model, options: RenderOptions, progress: Progress = silent) -> OneDRenderer:
     """The registry's entry."""
-    k = palpation_column(model, "k_kv")
+    k = model.presses.fits["k_kv"]
     r = np.ones_like(k)
-    return OneDRenderer(NAME, model, Law(k, palpation_column(model, "b_kv"), r, np.zeros_like(k)), options)
+    return OneDRenderer(NAME, model, Law(k, model.presses.fits["b_kv"], r, np.zeros_like(k)), options)

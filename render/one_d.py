@@ -24,7 +24,6 @@ from render.options import RenderOptions
 from render.snapping import touched_surface
 
 REFERENCE_DEPTH_M = 5e-3
-REPEAT_M = 4e-3
 
 
 class Law(NamedTuple):
@@ -36,11 +35,13 @@ class Law(NamedTuple):
     s: np.ndarray
 
 
-def spread_law(points: np.ndarray, law: Law, at: np.ndarray, interpolation: str = "rbf") -> Law:
-    """The law at places `at` (q, 3) m from palpations at `points` (n, 3) m; palpations with a NaN are left
-    out.
+def spread_law(
+    points: np.ndarray, site: np.ndarray, law: Law, at: np.ndarray, interpolation: str = "rbf"
+) -> Law:
+    """The law at places `at` (q, 3) m from presses at `points` (n, 3) m, of sites (n,); those with a NaN are
+    left out.
 
-    interpolation: 'rbf' (linear kernel, the biharmonic spline of space; repeats within 4 mm are averaged
+    interpolation: 'rbf' (linear kernel, the biharmonic spline of space; repeats at a site are averaged
     first) or 'nearest'. Values are kept within the range of the palpations'. Raises ModelError where none is
     usable.
     """
@@ -50,11 +51,11 @@ def spread_law(points: np.ndarray, law: Law, at: np.ndarray, interpolation: str 
     good = np.isfinite(columns).all(axis=1) & np.isfinite(points).all(axis=1)
     if not good.any():
         raise ModelError("the model's palpations hold no parameters of this 1D model: reconstruct it again")
-    points, columns = points[good], columns[good]
+    points, site, columns = points[good], site[good], columns[good]
     if interpolation == "nearest":
         values = columns[cKDTree(points).query(at)[1]]
     else:
-        places, means = _averaged(points, columns)
+        places, means = _averaged(points, columns, site=site)
         if len(places) == 1:
             values = np.tile(means, (len(at), 1))
         else:
@@ -64,20 +65,11 @@ def spread_law(points: np.ndarray, law: Law, at: np.ndarray, interpolation: str 
     return Law(force / u**r, damping / u**s, r, s)
 
 
-def _averaged(points: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points within REPEAT_M of an earlier one join it; means of each group."""
-    group = np.full(len(points), -1)
-    count = 0
-    for i, near in enumerate(cKDTree(points).query_ball_point(points, REPEAT_M)):
-        if group[i] < 0:
-            free = [j for j in near if group[j] < 0]
-            group[free] = count
-            count += 1
-    size = np.bincount(group, minlength=count)[:, None]
-    return tuple(
-        np.column_stack([np.bincount(group, weights=c, minlength=count) for c in array.T]) / size
-        for array in (points, values)
-    )
+def _averaged(*arrays: np.ndarray, site: np.ndarray) -> tuple[np.ndarray, ...]:
+    """Means (s, c) of each array (n, c) over the presses of every site."""
+    group = np.unique(site, return_inverse=True)[1]
+    size = np.bincount(group)[:, None]
+    return tuple(np.column_stack([np.bincount(group, weights=c) for c in a.T]) / size for a in arrays)
 
 
 class OneDRenderer(Renderer):
@@ -91,8 +83,10 @@ class OneDRenderer(Renderer):
         self.model = model
         self.options = options
         self.contact = touched_surface(model, options)
-        points = np.array([p.point for p in model.palpations]).reshape(-1, 3)
-        spread = spread_law(points, law, self.contact.arrays.vertices, options.interpolation)
+        presses = model.presses
+        spread = spread_law(
+            presses.point, presses.site, law, self.contact.arrays.vertices, options.interpolation
+        )
         self.parameters = OneDParameters(
             surface=self.contact.arrays,
             law=np.ascontiguousarray(np.column_stack(spread)),
@@ -122,8 +116,3 @@ class OneDRenderer(Renderer):
         for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
             draw_dent(vertices, moved, point, normal, radius, depth)
         return moved
-
-
-def palpation_column(model: Model, name: str) -> np.ndarray:
-    """(n,) one column of the model's palpations."""
-    return np.array([getattr(p, name) for p in model.palpations], dtype=float)

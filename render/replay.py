@@ -9,14 +9,12 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.files import atomic_file
-from mechanics.model import Model
+from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from render.base import Renderer
 
 _CHUNK = 4000
-_AROUND_S = 0.05  # of a contact that still counts
-_QUIET_S = 0.05  # shorter pushes are noise
 
 
 def replay(
@@ -81,52 +79,9 @@ class ReplayError:
     contact: np.ndarray
 
 
-def replay_error(
-    recording: Recording, model: Model, forces: np.ndarray, contact: np.ndarray | None = None
-) -> ReplayError:
-    """Compare forces (n, 3) N on the tool with the recording's over its contact samples.
-
-    contact: (n,) bool where the caller knows them; None takes `contact_samples`.
-    """
-    contact = contact_samples(recording, model) if contact is None else np.asarray(contact, dtype=bool)
+def replay_error(recording: Recording, presses: Presses, forces: np.ndarray) -> ReplayError:
+    """Compare forces (n, 3) N on the tool with the recording's over the contact samples of its presses."""
+    contact = presses.touching(recording.t)
     error = rms_n(forces[contact] - recording.force_on_tool[contact])
     size = rms_n(recording.force_on_tool[contact])
     return ReplayError(error, size, error / size if size > 0 else float("nan"), contact)
-
-
-def contact_samples(recording: Recording, model: Model) -> np.ndarray:
-    """(n,) bool: phase II, from first touch to its loss, and up to 50 ms before and after.
-
-    Touch shows in the force, averaged over 20 ms, less its median in the air: above five times its spread
-    there. Phase I never counts; where the recording does not state it, it ends at the model's first
-    palpation.
-    """
-    t, force = recording.t, recording.force_on_tool
-    width = max(1, round(0.02 * recording.sample_rate_hz))
-    smooth = np.apply_along_axis(lambda c: np.convolve(c, np.ones(width) / width, mode="same"), 0, force)
-    start = _phase_two(recording, model)
-    later = t > start
-    if not later.any():
-        return later
-    size = np.linalg.norm(smooth, axis=1)
-    quiet = later & (size <= np.quantile(size[later], 0.3))
-    centre = np.median(smooth[quiet], axis=0)
-    size = np.linalg.norm(smooth - centre, axis=1)
-    noise = 1.4826 * np.median(size[quiet]) + 1e-4
-    pressed = later & (size > 5 * noise)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], pressed.astype(int), [0]])))
-    contact = np.zeros(len(t), dtype=bool)
-    for first, last in zip(edges[::2], edges[1::2] - 1, strict=True):
-        if t[last] - t[first] >= _QUIET_S:
-            low, high = np.searchsorted(t, [t[first] - _AROUND_S, t[last] + _AROUND_S])
-            contact[low:high] = True
-    return contact & later
-
-
-def _phase_two(recording: Recording, model: Model) -> float:
-    own = model.provenance.get("recording_sha256") == recording.sha256
-    onsets = [p.t_onset for p in model.palpations if np.isfinite(p.t_onset)]
-    if own and onsets:
-        return min(onsets) - 2 * _AROUND_S
-    # contact may outlast the stated end of phase I by 0.1 s
-    return recording.boundary_phase[1] + 0.1 if recording.boundary_phase else float(recording.t[0])

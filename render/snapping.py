@@ -29,7 +29,7 @@ LARGEST_M = 4e-3  # a palpation further off than this is no witness of the surfa
 def touched_surface(model: Model, options: RenderOptions) -> ContactSurface:
     """The model's contact surface, through its palpations' first touches where the options ask for it."""
     surface = contact_surface(model.mesh, edge_m=options.surface_edge_m)
-    if not options.snap_to_touches or not model.palpations:
+    if not options.snap_to_touches or not len(model.presses):
         return surface
     feet, normals, gaps = touch_gaps(surface.arrays, model)
     if not len(gaps):
@@ -56,8 +56,7 @@ def touch_gaps(arrays: SurfaceArrays, model: Model) -> tuple[np.ndarray, np.ndar
     weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
     point, normal = np.zeros(3), np.zeros(3)
     radius = model.tip_radius_m
-    for palpation in model.palpations:
-        centre = np.array(palpation.point) + radius * np.array(palpation.normal)
+    for centre in model.presses.point + radius * model.presses.normal:
         if not np.isfinite(centre).all():
             continue
         triangle, distance = closest_triangle(

@@ -6,16 +6,18 @@ the 1D models fitted to them as to recorded ones.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from mechanics.errors import SceneError
 from mechanics.inclusion import balls_of
 from mechanics.model import Model
-from mechanics.palpation import Palpation
+from mechanics.presses import of_paths
 from mechanics.progress import Progress, silent
 from mechanics.sites import touch_sites
 from mechanics.touch import forces_at
-from reconstruct.one_d import Press, fit_robust
+from reconstruct.one_d import columns, fit_robust
 
 SITES = 32
 DEPTH_M = 0.005
@@ -30,7 +32,7 @@ LEAST_FLATNESS = 0.9
 def palpate_model(
     model: Model, progress: Progress = silent, *, sites: int = SITES, depth_m: float = DEPTH_M
 ) -> Model:
-    """The model with `palpations`: one press to `depth_m` at each of `sites` places."""
+    """The model with a table of presses: one to `depth_m` at each of `sites` places."""
     chosen = spread_places(model, sites)
     points, normals = model.mesh.points[chosen], model.normals[chosen]
     touched = touch_sites(
@@ -46,27 +48,29 @@ def palpate_model(
     samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))
     ramp = np.arange(1, samples) * (depth_m / samples)
     depth = np.concatenate([ramp, ramp[::-1]])
-    speed = np.concatenate([np.full(len(ramp), SPEED_M_PER_S), np.full(len(ramp), -SPEED_M_PER_S)])
-    paths = (-depth[None, :, None] * normals[:, None, :]).reshape(-1, 3)
+    paths = (-depth[None, :, None] * touched.normals[:, None, :]).reshape(-1, 3)
+    starts = np.arange(len(chosen) + 1) * len(depth)
     forces = forces_at(
         touched,
         paths,
-        np.arange(len(chosen) + 1) * len(depth),
+        starts,
         young_modulus_pa=model.young_modulus_pa,
         tip_radius_m=model.tip_radius_m,
         law="neo-hookean" if "finite_strain" in model.effects else "linear",
-    ).reshape(len(chosen), -1, 3)
-    push = np.einsum("ijk,ik->ij", forces, touched.normals)
-    fits = fit_robust([Press(depth, speed, p) for p in push])
-    rows = [
-        Palpation(
-            *(0.0, depth_m / SPEED_M_PER_S, *point, *normal, depth_m),
-            *(fit.k_kv, fit.b_kv, fit.k_hc, fit.b_hc, fit.r_hc, fit.k_v, fit.k_c, fit.r_c, fit.k_h),
-            model.young_modulus_pa,
-        )
-        for point, normal, fit in zip(points.tolist(), touched.normals.tolist(), fits, strict=True)
-    ]
-    return model.replaced(palpations=tuple(rows))
+    )
+    centres = touched.points + model.tip_radius_m * touched.normals
+    presses = of_paths(
+        starts,
+        np.repeat(centres, len(depth), axis=0) + paths,
+        forces,
+        centres,
+        touched.normals,
+        tip_radius_m=model.tip_radius_m,
+        sample_rate_hz=RATE_HZ,
+    )
+    presses = replace(presses, depth_m=np.full(len(chosen), depth_m))
+    fitted = columns(fit_robust(presses), np.full(len(chosen), model.young_modulus_pa))
+    return model.replaced(presses=presses.with_fits(**fitted))
 
 
 def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M) -> np.ndarray:

@@ -20,8 +20,9 @@ from mechanics.files import atomic_file
 from mechanics.model import Model, read_model, write_model
 from mechanics.recording import Recording, read_recording
 from reconstruct.pipeline import ReconstructOptions, reconstruct
+from reconstruct.placing import presses_on
 from render.fem import FemRenderer
-from render.replay import contact_samples, replay_recording, rms_n
+from render.replay import replay_recording, rms_n
 
 QUIET_S = 0.2
 QUIET_N = 0.05
@@ -43,7 +44,7 @@ def one(path: Path, share: float, work: Path) -> dict[str, Any]:
     plain = read_model(folder)
     result = diagnose(first, plain)
     better, applied = improved(plain, result)
-    counted = contact_samples(recording, plain)
+    counted = presses_on(recording, plain).touching(recording.t)
     before, after = counted.copy(), counted.copy()
     before[at:], after[:at] = False, False
     row: dict[str, Any] = {

@@ -17,7 +17,7 @@ import numpy as np
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import RecordingError
 from mechanics.model import Model
-from mechanics.palpation import Palpation
+from mechanics.presses import cut
 from mechanics.recording import Recording
 
 SUMMARY = "diagnosis of measured meat indentations (ramp and hold)"
@@ -58,7 +58,7 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
     tables = [_finer(np.loadtxt(p, delimiter=",", skiprows=1)) for p in pieces]
     rng = np.random.default_rng(0)
     height = float(np.median([t[0, 3] for t in tables])) * 1e-3
-    times, centres, forces, palpations = [], [], [], []
+    times, centres, forces, found = [], [], [], []
     clock = 0.0
     for k, table in enumerate(tables):
         early = round(0.3 * RATE_HZ)
@@ -78,11 +78,7 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
         pressed = np.concatenate([force, rng.normal(0, NOISE_N, len(lift))])
         sideways = rng.normal(0, NOISE_N, (len(z), 2))
         forces.append(np.column_stack([sideways, pressed]))
-        palpations.append(
-            Palpation(
-                clock + t[touched], clock + t[peak], x, 0.0, height, 0.0, 0.0, 1.0, depth[peak] - surface
-            )
-        )
+        found.append((clock + t[touched], clock + t[peak], (x, 0.0, height + RADIUS_M)))
         clock += t[-1] - t[0] + FREE_S
     recording = Recording(
         t=np.concatenate(times), position=np.concatenate(centres), force_on_tool=np.concatenate(forces),
@@ -93,7 +89,11 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
     mesh = box_mesh((round(length / 0.01), 5, 2), (length, 0.05, height)).quadratic()
     model = Model(
         mesh=mesh, young_modulus_pa=2e4, poisson_ratio=0.49, tip_radius_m=RADIUS_M, mesh_size_m=0.01,
-        support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), palpations=tuple(palpations),
+        support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]),
+        presses=cut(
+            recording, onset_s=np.array([f[0] for f in found]), peak_s=np.array([f[1] for f in found]),
+            centre=np.array([f[2] for f in found]), normal=np.tile([0.0, 0.0, 1.0], (len(found), 1)),
+        ),
     )  # fmt: skip
     return recording, model
 

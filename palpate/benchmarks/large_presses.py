@@ -22,9 +22,10 @@ from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import forces_at
 from palpate.benchmarks.timing import table
+from reconstruct.placing import presses_on
 from render.fem import FemRenderer
 from render.options import RenderOptions
-from render.replay import contact_samples, replay_recording, rms_n
+from render.replay import replay_recording, rms_n
 from scenes.laboratory.mesh import coarse_mesh
 from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.laboratory.verification import straight_press
@@ -145,7 +146,7 @@ def _recordings(models: Path, recordings: Path) -> dict[str, Any]:
         depth = _depths(model, recording)
         for law in LAWS:
             force = replay_recording(FemRenderer(model, RenderOptions(dent_law=law)), recording)
-            contact = contact_samples(recording, model)
+            contact = presses_on(recording, model).touching(recording.t)
             measured = recording.force_on_tool
             scale = (force[contact] * measured[contact]).sum() / (force[contact] ** 2).sum()
             error = scale * force - measured

@@ -22,10 +22,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Time the profiles and both estimators."""
     exploration = explore(recording_of(arguments))
-    presses = profiles(exploration, exploration.normals)
+    presses = profiles(exploration.presses)
     print(f"{len(presses)} presses")
     work = {
-        "profiles": lambda: profiles(exploration, exploration.normals),
+        "profiles": lambda: profiles(exploration.presses),
         "paper's estimators": lambda: fit_paper(presses),
         "bounded, robust": lambda: fit_robust(presses),
     }

@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = result.model
     say(
         arguments,
-        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa from {len(model.palpations)} presses",
+        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa from {len(model.presses)} presses",
         f"rendered against measured force: {result.replay_rmse_n:.3f} N rms "
         f"of {result.contact_force_rms_n:.3f} N rms",
         str(result.servo),

@@ -2,10 +2,8 @@
 the gap shrinks.
 
 REC is a recording's .csv, .csv.gz or .toml. Without --model the recording is reconstructed first. The answer
-may be one
-effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown". Forces in N
-(rms of the
-3-vector over contact samples of held-out places), lengths in m, moduli in Pa.
+may be one effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown".
+Forces in N (rms of the 3-vector over contact samples of held-out places), lengths in m, moduli in Pa.
 """
 
 from __future__ import annotations
@@ -67,9 +65,10 @@ def run(arguments: argparse.Namespace) -> int:
         chosen["most"] = 1
     with progress_bar("diagnose") as progress:
         if arguments.model:
-            from diagnose.placing import placed
+            from reconstruct.placing import presses_on
 
-            model = placed(recording, read_model(arguments.model))
+            model = read_model(arguments.model)
+            model = model.replaced(presses=presses_on(recording, model))
         else:
             from reconstruct.pipeline import ReconstructOptions, reconstruct
 

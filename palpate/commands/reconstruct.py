@@ -102,7 +102,7 @@ def _words(result: Reconstruction) -> list[str]:
     low, high = model.young_modulus_ci95_pa
     not_used = [*exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
     lines = [
-        f"{exploration.recording.name}: {len(exploration.contacts)} palpations"
+        f"{exploration.recording.name}: {len(exploration.presses)} palpations"
         + (f", {len(not_used)} contacts not used:" if not_used else ""),
         *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
         *([f"  and {len(not_used) - _NAMED} more (--json names all)"] if len(not_used) > _NAMED else []),
@@ -141,7 +141,7 @@ def _figures(result: Reconstruction) -> dict[str, Any]:
         "young_modulus_pa": model.young_modulus_pa,
         "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
         "poisson_ratio": model.poisson_ratio,
-        "palpations": len(exploration.contacts),
+        "palpations": len(exploration.presses),
         "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
         "noise_n": exploration.noise_n,
         "force_delay_s": exploration.delay_s,

@@ -33,6 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     from mechanics.recording import read_recording
     from palpate.sources import open_model
+    from reconstruct.placing import presses_on
     from render.options import RenderOptions
     from render.registry import create
     from render.replay import replay_error, replay_recording, write_forces
@@ -44,7 +45,7 @@ def run(arguments: argparse.Namespace) -> int:
         forces = replay_recording(renderer, recording, progress)
     if arguments.output:
         write_forces(arguments.output, recording.t, forces)
-    error = replay_error(recording, model, forces)
+    error = replay_error(recording, presses_on(recording, model), forces)
     result = {
         "renderer": renderer.name,
         "samples": len(forces),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -72,8 +71,8 @@ def scatter(result: Comparison) -> Figure:
     """Predicted against measured normal force."""
     presses = result.presses
     axes = Figure(figsize=(9, 3.2)).subplots(1, len(MODELS), sharex=True, sharey=True)
-    press = np.repeat(np.arange(len(presses)), np.diff(presses.starts))
-    normal = presses.normals[press]
+    press = presses.press
+    normal = presses.normal[press]
     measured = (presses.force * normal).sum(axis=1)
     top = float(measured.max())
     for ax, name in zip(axes, MODELS, strict=True):
@@ -89,17 +88,17 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     """Force at one depth along the object where `members` were left out: top by radius, side by height."""
     presses, model = result.presses, result.model
     up = model.support_normal / np.linalg.norm(model.support_normal)
-    sideways = abs(float(np.mean(presses.normals[members] @ up))) < 0.5
+    sideways = abs(float(np.mean(presses.normal[members] @ up))) < 0.5
     middle = model.mesh.points[np.unique(model.mesh.surface[:, :3])].mean(axis=0)
-    offset = presses.points - middle
+    offset = presses.point - middle
     flat = offset - (offset @ up)[:, None] * up
-    coordinate = (presses.points - model.support_point) @ up if sideways else np.linalg.norm(flat, axis=1)
-    faces_up = presses.normals @ up > 0.7
+    coordinate = (presses.point - model.support_point) @ up if sideways else np.linalg.norm(flat, axis=1)
+    faces_up = presses.normal @ up > 0.7
     family = ~faces_up if sideways else faces_up
-    places = presses.points[family]
+    places = presses.point[family]
     order = np.argsort(coordinate[family])
     forces = stiffness_along(
-        presses, np.flatnonzero(~members), places, presses.normals[family], model, DEPTH_M
+        result.prepared, np.flatnonzero(~members), places, presses.normal[family], model, DEPTH_M
     )
     ax = Figure(figsize=(7, 3.4)).subplots()
     x = coordinate[family][order] * 1e3
@@ -123,7 +122,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
 
 def _at_depth(result: Comparison) -> np.ndarray:
     """(p,) N, measured normal force on the way in at DEPTH_M; NaN where a press was shallower."""
-    presses: Any = result.presses
+    presses = result.presses
     values = np.full(len(presses), np.nan)
     for i in range(len(presses)):
         rows = slice(presses.starts[i], presses.starts[i + 1])
@@ -132,5 +131,5 @@ def _at_depth(result: Comparison) -> np.ndarray:
         if depth[peak - 1] >= DEPTH_M:
             near = np.abs(depth[:peak] - DEPTH_M) < 2e-4
             if near.any():
-                values[i] = float((presses.force[rows][:peak][near] @ presses.normals[i]).mean())
+                values[i] = float((presses.force[rows][:peak][near] @ presses.normal[i]).mean())
     return values

@@ -6,54 +6,35 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from palpate.demo import DemoResult
+from palpate.report.exploration_figures import force_over_time
 from palpate.report.object3d import draw_object
 from palpate.report.page import Page, save_figures
 from palpate.servo.histogram import lower_edge_ns
+from reconstruct.uniaxial import low_passed
 
 SHOWN_PRESSES = 4
 
 
-def force_over_time(ax: Axes, result: DemoResult) -> Axes:
-    """Force magnitude with detected contacts and peaks (the paper's Figure 2)."""
-    recording, exploration = result.recording, result.reconstruction.exploration
-    force = np.linalg.norm(exploration.force, axis=1)
-    ax.plot(recording.t, force, lw=0.7, color="#457b9d")
-    starts = np.array([c.start for c in exploration.contacts])
-    peaks = np.array([c.peak for c in exploration.contacts])
-    ax.plot(recording.t[starts], force[starts], "o", ms=4, mfc="none", color="#1d3557", label="first touch")
-    ax.plot(recording.t[peaks], force[peaks], "+", ms=7, color="#c1121f", label="peak")
-    first, last = exploration.boundary.interval
-    if last > first:
-        ax.axvspan(recording.t[first], recording.t[last - 1], color="#f1e3cf", zorder=0, label="phase I")
-    ax.set(xlabel="time [s]", ylabel="force magnitude [N]", xlim=(recording.t[0], recording.t[-1]))
-    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=3)
-    return ax
-
-
 def measured_against_rendered(axes: np.ndarray, result: DemoResult) -> np.ndarray:
     """Force along the normal over depth, measured and rendered, of presses spread over the peak force."""
-    exploration, model = result.reconstruction.exploration, result.model
-    push = [exploration.force[c.peak] @ np.array(p.normal) for c, p in _pairs(result)]
+    presses = result.model.presses
+    shown = low_passed(presses)
+    push = [shown.push[shown.rows([i])].max() for i in range(len(presses))]
     chosen = np.argsort(push)[np.linspace(0, len(push) - 1, len(axes)).round().astype(int)]
+    curves, smooth = presses.window(0.03, 0.03), shown.window(0.03, 0.03)
     for ax, i in zip(axes, chosen, strict=True):
-        contact, palpation = exploration.contacts[i], model.palpations[i]
-        n = np.array(palpation.normal)
-        rows = slice(max(contact.start - 30, 0), contact.end + 30)
-        depth = -(exploration.position[rows] - contact.centre) @ n * 1e3
-        ax.plot(depth, result.recording.force_on_tool[rows] @ n, ".", ms=1, color="#a8bccb", label="measured")
-        ax.plot(depth, result.rendered_n[rows] @ n, lw=1.5, color="#c1121f", label="rendered")
+        own = curves.rows([i])
+        depth, at = smooth.depth[own] * 1e3, np.searchsorted(result.recording.t, curves.t[own])
+        rendered = result.rendered_n[at] @ presses.normal[i]
+        ax.plot(depth, curves.push[own], ".", ms=1, color="#a8bccb", label="measured")
+        ax.plot(depth, rendered, lw=1.5, color="#c1121f", label="rendered")
         ax.set(title=f"press {i + 1}", xlabel="depth [mm]")
     axes[0].set_ylabel("force along the normal [N]")
     axes[0].legend(loc="upper left", frameon=False, markerscale=8)
     return axes
-
-
-def _pairs(result: DemoResult):
-    return zip(result.reconstruction.exploration.contacts, result.model.palpations, strict=True)
 
 
 def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
@@ -74,10 +55,10 @@ def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
 def figures(result: DemoResult) -> dict[str, Figure]:
     """The report's pictures by name."""
     force, ax = plt.subplots(figsize=(9, 3), layout="constrained")
-    force_over_time(ax, result)
+    force_over_time(ax, result.reconstruction.exploration)
     thing, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
     model = result.model
-    touches = np.array([p.point for p in model.palpations])
+    touches = model.presses.point
     draw_object(axes[0], model, touches=touches, show_base=True)
     axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
     if model.shape_uncertainty_m is not None:
@@ -95,7 +76,7 @@ def write_report(result: DemoResult, folder: Path) -> Path:
     low, high = (v / 1e3 for v in model.young_modulus_ci95_pa)
     page = Page(f"Palpate: {result.recording.object_name}, touched and felt")
     page.lead(
-        f"{len(model.palpations)} presses became a model of {model.young_modulus_pa / 1e3:.1f} kPa "
+        f"{len(model.presses)} presses became a model of {model.young_modulus_pa / 1e3:.1f} kPa "
         f"(95 % interval {low:.1f} to {high:.1f} kPa{_truth(result)}). Its rendered force differs from the "
         f"measured one by {result.replay_rmse_n:.3f} N rms, of {result.contact_force_rms_n:.2f} N rms, and "
         f"the loop held {servo.rate_hz:.0f} Hz."

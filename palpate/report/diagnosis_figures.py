@@ -31,9 +31,7 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
 def _ranked(result: Diagnosis) -> np.ndarray:
     """Presses, the one with the largest gap first."""
     t = result.forward.touches
-    each = np.bincount(
-        t.press, weights=(result.residual_before**2).sum(axis=1) * t.counted, minlength=t.presses
-    )
+    each = np.bincount(t.press, weights=(result.residual_before**2).sum(axis=1) * t.counted, minlength=len(t))
     return np.argsort(-each)
 
 

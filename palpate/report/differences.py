@@ -6,6 +6,7 @@ import numpy as np
 
 from palpate.report.modulus_figures import height_trends
 from reconstruct.pipeline import Reconstruction
+from reconstruct.uniaxial import low_passed
 
 _PAPER_THRESHOLD_N, _PAPER_INDENTATION_M = 1.0, 0.010
 
@@ -20,11 +21,12 @@ def differences(result: Reconstruction) -> list[str]:
 
 
 def _touches(result: Reconstruction) -> str:
-    contacts = result.exploration.contacts
-    depth, peak = (np.array([getattr(c, n) for c in contacts]) for n in ("depth_m", "peak_n"))
+    presses, curves = result.exploration.presses, low_passed(result.exploration.presses)
+    size = np.linalg.norm(curves.force, axis=1)
+    depth, peak = presses.depth_m, np.array([size[curves.rows([i])].max() for i in range(len(presses))])
     return (
         f"Touches. The paper counts contacts above {_PAPER_THRESHOLD_N:g} N and reads each press at "
-        f"{_PAPER_INDENTATION_M * 1e3:g} mm. Here {len(contacts)} presses reach {depth.min() * 1e3:.1f} to "
+        f"{_PAPER_INDENTATION_M * 1e3:g} mm. Here {len(presses)} presses reach {depth.min() * 1e3:.1f} to "
         f"{depth.max() * 1e3:.1f} mm and peak at {peak.min():.2f} to {peak.max():.2f} N: "
         f"{np.sum(peak > _PAPER_THRESHOLD_N)} peak above 1 N, {np.sum(depth >= _PAPER_INDENTATION_M)} "
         "reach 10 mm."
@@ -32,7 +34,7 @@ def _touches(result: Reconstruction) -> str:
 
 
 def _first_touch(result: Reconstruction) -> str:
-    error = np.median([c.onset_error_m for c in result.exploration.contacts])
+    error = np.median(result.exploration.presses.onset_error_m)
     words = (
         "First touch. The paper goes back from its threshold to where the force began to rise. Here a "
         "contact law "

@@ -20,8 +20,9 @@ def force_over_time(ax: Axes, exploration: Exploration) -> Axes:
     """Figure 2: force magnitude (N) over time (s), first touches (o), peaks (+), phase I shaded."""
     t = exploration.recording.t
     force = np.linalg.norm(exploration.force, axis=1)
-    starts = np.array([c.start for c in exploration.contacts])
-    peaks = np.array([c.peak for c in exploration.contacts])
+    starts, peaks = (
+        np.searchsorted(t, at) for at in (exploration.presses.onset_s, exploration.presses.peak_s)
+    )
     ax.plot(t, force, lw=0.7, color=FORCE_COLOUR)
     ax.plot(t[starts], force[starts], "o", ms=4, mfc="none", color=TOUCH_COLOUR, label="first touch")
     ax.plot(t[peaks], force[peaks], "+", ms=7, color=PEAK_COLOUR, label="peak")
@@ -42,7 +43,7 @@ def touched_points(ax: Axes, exploration: Exploration) -> Axes:
     def seen(points: np.ndarray) -> np.ndarray:
         return (points - boundary.support_point) @ view.T * 1e3
 
-    rim, sample, touches = seen(boundary.outline), seen(boundary.points), seen(exploration.points)
+    rim, sample, touches = seen(boundary.outline), seen(boundary.points), seen(exploration.presses.point)
     ax.plot(rim[:, 0], rim[:, 1], lw=1, color=FORCE_COLOUR, label="base outline")
     ax.plot(sample[:, 0], sample[:, 1], "o", ms=4, mfc="none", color=TOUCH_COLOUR, label="sample of the base")
     ax.plot(touches[:, 0], touches[:, 1], "+", ms=8, color=PEAK_COLOUR, label="first touches")
@@ -59,9 +60,9 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
     draw_object(ax, model, show_base=True, elevation_deg=22.0)
     view = view_axes(model.support_normal, 22.0, 35.0)
     corners = model.mesh.linear()
-    node = nearest_nodes(corners, result.exploration.points)
+    node = nearest_nodes(corners, result.exploration.presses.point)
     seen = (corners.points[node] - model.mesh.points.mean(axis=0)) @ view.T * 1e3
-    facing = np.array([p.normal for p in model.palpations]) @ view[2] > 0
+    facing = model.presses.normal @ view[2] > 0
     first = np.unique(node, return_index=True)[1]
     for i in first[facing[first]]:
         ax.plot(*seen[i, :2], "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
@@ -73,10 +74,12 @@ def force_profiles(ax: Axes, result: Reconstruction) -> Axes:
     """Figure 3(c): force on the object along -n (N) over depth (mm), coloured by height above the support."""
     exploration = result.exploration
     height = exploration.boundary.height(result.cast.points)
-    normals = np.array([p.normal for p in result.model.palpations])
+    curves = profiles(result.model.presses)
     scale = plt.Normalize(0, 1e3 * height.max())
-    for h, press in zip(height, profiles(exploration, normals), strict=True):
-        ax.plot(press.u * 1e3, press.f, lw=0.8, color=plt.cm.viridis(scale(1e3 * h)))
+    for i, h in enumerate(height):
+        rows = curves.rows([i])
+        rows = rows[curves.depth[rows] > 0]
+        ax.plot(curves.depth[rows] * 1e3, curves.push[rows], lw=0.8, color=plt.cm.viridis(scale(1e3 * h)))
     bar = ax.figure.colorbar(plt.cm.ScalarMappable(scale, "viridis"), ax=ax, label="height [mm]")
     bar.outline.set_visible(False)
     ax.set(xlabel="depth [mm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
@@ -93,7 +96,7 @@ def damped_parameters(axes: np.ndarray, result: Reconstruction) -> np.ndarray:
         ("r_hc", "$r$"),
     ]
     for ax, (name, label) in zip(axes, columns, strict=True):
-        spread(ax, [np.array([getattr(p, name) for p in result.model.palpations])], [""])
+        spread(ax, [result.model.presses.fits[name]], [""])
         ax.set_title(label, fontsize=10)
     return axes
 

@@ -36,20 +36,18 @@ class Trend:
 
 
 def column(model: Model, name: str) -> np.ndarray:
-    """(k,) one column of the palpations."""
-    return np.array([getattr(p, name) for p in model.palpations], dtype=float)
+    """(k,) one fitted column of the presses."""
+    return model.presses.fits[name]
 
 
 def heights(model: Model) -> np.ndarray:
     """(k,) m, heights of the contacts above the support."""
-    points = np.array([p.point for p in model.palpations])
-    return (points - model.support_point) @ model.support_normal
+    return (model.presses.point - model.support_point) @ model.support_normal
 
 
 def on_side(model: Model) -> np.ndarray:
     """(k,) bool, presses whose normal is within 17 degrees of the support plane."""
-    normals = np.array([p.normal for p in model.palpations])
-    return np.abs(normals @ model.support_normal) < SIDE
+    return np.abs(model.presses.normal @ model.support_normal) < SIDE
 
 
 def height_trends(model: Model) -> list[Trend]:
@@ -73,7 +71,7 @@ def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
 
     Repeats at one place are averaged by the smoothing; the result is kept within the range of the values.
     """
-    points = np.array([p.point for p in model.palpations])
+    points = model.presses.point
     used = np.isfinite(values)
     scale = np.linalg.norm(np.ptp(points, axis=0))
     centre, size = np.median(values[used]), max(float(np.std(values[used])), 1e-12)
@@ -140,7 +138,7 @@ def _coloured(
     limits = None if share is None else tuple(np.nanmedian(values) * np.array([1 - share, 1 + share]))
     draw_object(
         ax, model, over_surface(model, values), label=label, limits=limits, elevation_deg=elevation_deg,
-        touches=np.array([p.point for p in model.palpations])[used],
+        touches=model.presses.point[used],
     )  # fmt: skip
 
 

@@ -107,7 +107,7 @@ def _summary(page: Page, result: Reconstruction) -> None:
     low, high = model.young_modulus_ci95_pa
     page.lead(
         f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
-        f"{high / 1e3:.2f} kPa, from {len(model.palpations)} palpations (method "
+        f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations (method "
         f"{model.provenance['method']})."
     )
     page.paragraph(

@@ -58,10 +58,10 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
 def one_d_comparison(result: Reconstruction) -> tuple[list[str], list[list[Any]]]:
     """Header and rows: the paper's estimators beside the bounded, robust ones; medians over the
     palpations."""
-    normals = np.array([p.normal for p in result.model.palpations])
-    presses = profiles(result.exploration, normals)
+    presses, least = profiles(result.model.presses), result.exploration.noise_n
     rows = []
-    for name, fits in (("paper, (3) to (6)", fit_paper(presses)), ("bounded, robust", fit_robust(presses))):
+    for name, fit in (("paper, (3) to (6)", fit_paper), ("bounded, robust", fit_robust)):
+        fits = fit(presses, least)
         median = _medians(fits)
         negative = 100 * float(np.mean([f.b_hc < 0 for f in fits]))
         slow = 100 * float(np.mean([f.valid for f in fits]))
@@ -87,8 +87,8 @@ def point_load_rows(result: Reconstruction) -> list[list[Any]]:
     throughout.
     """
     model = result.model
-    palpation = max(model.palpations, key=lambda p: np.dot(p.point, model.support_normal))
-    point, normal = np.array(palpation.point), np.array(palpation.normal)
+    highest = int(np.argmax(model.presses.point @ model.support_normal))
+    point, normal = model.presses.point[highest], model.presses.normal[highest]
     rows = []
     width = patch_width(result.meshing.mesh)
     scale = 1e3 / model.young_modulus_pa

@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.presses import sites_of
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,8 @@ class Evidence:
     the base on the support, tip radius taken off, ordered along the path (which may overlap itself).
     outline_centres: (k, 3) the tip's centre there, one tip radius above the support. centres: (m, 3) tip's
     centre at first touch. normals: (m, 3) outward unit normals from the first force, a few degrees wrong.
-    centre_error_m: (m,) standard deviation of a centre along the normal.
+    centre_error_m: (m,) standard deviation of a centre along the normal. site: (m,) number of the place of
+    each touch, repeats share one; None: by distance.
     Raises SurfaceError where arrays disagree, are not finite or hold too few points.
     """
 
@@ -35,6 +37,7 @@ class Evidence:
     normals: np.ndarray
     centre_error_m: np.ndarray
     tip_radius_m: float
+    site: np.ndarray | None = None
 
     def __post_init__(self) -> None:
         for name in ("support_point", "support_normal", "outline", "outline_centres", "centres", "normals"):
@@ -58,6 +61,8 @@ class Evidence:
             raise SurfaceError("normals need one row a touch, outline_centres one row an outline point")
         if not self.tip_radius_m >= 0:
             raise SurfaceError(f"tip_radius_m is {self.tip_radius_m}; it must not be negative")
+        if self.site is None:
+            object.__setattr__(self, "site", sites_of(self.centres, self.normals))
 
     @property
     def points(self) -> np.ndarray:

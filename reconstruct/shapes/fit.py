@@ -38,7 +38,7 @@ class Seen:
 
     @classmethod
     def of(cls, evidence: Evidence) -> Seen:
-        """Thin the outline evenly by angle, medians of what overlaps; number the places."""
+        """Thin the outline evenly by angle, medians of what overlaps."""
         rim = evidence.to_support(evidence.outline_centres)
         angle = np.arctan2(rim[:, 1], rim[:, 0])
         sector = np.floor((angle + np.pi) / (2 * np.pi) * _OUTLINE_POINTS).astype(int) % _OUTLINE_POINTS
@@ -53,17 +53,9 @@ class Seen:
             outline=np.array(outline),
             normals=evidence.normals @ evidence.axes.T,
             error_m=np.asarray(evidence.centre_error_m),
-            sites=sites(centres, 1.2 * evidence.tip_radius_m),
+            sites=np.asarray(evidence.site),
             tip_radius_m=evidence.tip_radius_m,
         )
-
-
-def sites(centres: np.ndarray, reach_m: float) -> np.ndarray:
-    """(m,) number of the place that each touch belongs to: touches closer than `reach_m` share a place."""
-    from scipy.sparse.csgraph import connected_components
-    from scipy.spatial.distance import cdist
-
-    return connected_components(cdist(centres, centres) < reach_m, directed=False)[1]
 
 
 def residuals(shape: Shape, seen: Seen, lean_m: float) -> tuple[np.ndarray, np.ndarray]:

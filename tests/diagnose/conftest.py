@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import hashlib
 import itertools
 
 import numpy as np
 import pytest
 
 from mechanics.model import Model
-from mechanics.palpation import Palpation
+from mechanics.presses import cut
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh
@@ -56,7 +57,7 @@ class Bench:
         rng = np.random.default_rng(seed)
         clock = 0.0
         rate = 500.0
-        times, centres, forces, palpations = [], [], [], []
+        times, centres, forces, onsets, peaks = [], [], [], [], []
         presses = [(i, k) for k in range(2) for i in range(len(self.points))]
         for number, (i, _) in enumerate(presses):
             depth = (0.0025, 0.0035, 0.0042)[(number * 7) % 3]
@@ -89,18 +90,26 @@ class Bench:
             centres.append(self.points[i] + RADIUS * n + d)
             forces.append(f)
             onset = clock + before
-            palpations.append(Palpation(onset, onset + ramp, *self.points[i], *n, depth=depth))
+            onsets.append(onset)
+            peaks.append(onset + ramp)
             clock += local[-1] + 1 / rate
         t, x, f = np.concatenate(times), np.concatenate(centres), np.concatenate(forces)
         if alter is not None:
             x, f = alter(t, x, f)
         f = f + rng.normal(0, NOISE, f.shape)
         recording = Recording(
-            t=t, position=x, force_on_tool=f, sample_rate_hz=rate, tip_radius_m=RADIUS, poisson_ratio=NU
-        )
+            t=t, position=x, force_on_tool=f, sample_rate_hz=rate, tip_radius_m=RADIUS, poisson_ratio=NU,
+            sha256=f"the bench {hashlib.sha256(f.tobytes()).hexdigest()}",
+        )  # fmt: skip
+        place = [i for i, _ in presses]
+        known = self.points[place], self.normals[place]
+        table = cut(
+            recording, onset_s=np.array(onsets), peak_s=np.array(peaks),
+            centre=known[0] + RADIUS * known[1], normal=known[1],
+        )  # fmt: skip
         model = Model(
             mesh=self.mesh, young_modulus_pa=MODULUS, poisson_ratio=NU, tip_radius_m=RADIUS, mesh_size_m=0.02,
-            support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), palpations=tuple(palpations),
+            support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), presses=table,
         )  # fmt: skip
         return recording, model
 

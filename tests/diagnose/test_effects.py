@@ -40,7 +40,7 @@ CONTRACT = {
 @pytest.fixture(scope="module")
 def forward(bench):  # type: ignore[no-untyped-def]
     recording, model = bench.record()
-    return build_forward(touches_of(recording, model), model)
+    return build_forward(touches_of(model.presses), model)
 
 
 def test_all_22_names():
@@ -82,9 +82,9 @@ def test_delay_is_a_shift_in_time(forward):
     settings = forward.ideal(20e3)
     settings.delay = 0.02
     late = forward.predict(settings)
-    step = np.median(np.diff(t.t[: t.start[1]]))
-    rows = slice(t.start[1] + 2, t.start[2])
-    before = slice(t.start[1], t.start[2] - 2)
+    step = np.median(np.diff(t.t[: t.starts[1]]))
+    rows = slice(t.starts[1] + 2, t.starts[2])
+    before = slice(t.starts[1], t.starts[2] - 2)
     assert step == pytest.approx(0.01, rel=1e-6)
     np.testing.assert_allclose(late[rows], plain[before], atol=1e-12)
 
@@ -95,7 +95,7 @@ def test_relaxation_decays_by_its_time_constant(forward):
     plain, slow = forward.predict(forward.ideal(20e3)), forward.predict(settings)
     t = forward.touches
     press = int(
-        np.argmax([(t.phase[a:b] == 1).sum() for a, b in zip(t.start[:-1], t.start[1:], strict=True)])
+        np.argmax([(t.phase[a:b] == 1).sum() for a, b in zip(t.starts[:-1], t.starts[1:], strict=True)])
     )
     hold = np.flatnonzero((t.press == press) & (np.abs(t.speed) < 1e-4) & (t.y[:, 0] > 1e-3))[4:-4]
     extra = slow[hold, 0] - plain[hold, 0]

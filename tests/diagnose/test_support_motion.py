@@ -18,7 +18,7 @@ from mechanics.support import Support
 @pytest.fixture(scope="module")
 def forward(bench):  # type: ignore[no-untyped-def]
     recording, model = bench.record()
-    return build_forward(touches_of(recording, model), model)
+    return build_forward(touches_of(model.presses), model)
 
 
 def _give(forward, support):  # type: ignore[no-untyped-def]

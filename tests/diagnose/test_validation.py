@@ -27,7 +27,7 @@ def late(bench):  # type: ignore[no-untyped-def]
         return x, np.stack([np.interp(t - 0.01, t, c) for c in f.T], axis=1)
 
     recording, model = bench.record(alter)
-    forward = build_forward(touches_of(recording, model), model)
+    forward = build_forward(touches_of(model.presses), model)
     search = Search(
         forward, MODULUS, nuisance=NuisanceOptions(), options=AttributionOptions(), site_sd=None,
         finite_strain=effect("finite_strain"),
@@ -64,7 +64,7 @@ def test_what_no_noise_tells_is_added(late):
 def test_places_not_fitted_are_predicted_by_the_right_effect(late):
     search, plain, found = late
     t = search.forward.touches
-    added = 3 * (t.raw_noise_n**2 - t.noise_n**2)
+    added = 3 * (t.noise.raw_n**2 - t.noise_n**2)
     before, after = (held_out_by_refit(search, f, None, added) for f in (plain, found))
     noise = 3 * t.noise_n**2 * search.whitener.counts()
     assert after.plain.sum() < 1.3 * noise.sum() < before.plain.sum()
@@ -85,7 +85,7 @@ def test_folds_hold_every_site_once_and_neighbours_together(late):
     place = np.array([t.point[t.site == s].mean(axis=0) for s in range(t.sites)])
     inside = [np.ptp(place[f], axis=0).max() for f in folds]
     assert np.mean(inside) < 0.6 * np.ptp(place, axis=0).max()
-    assert t.depth[np.isin(t.site, deepest(t))].max() == t.depth.max()
+    assert t.deepest[np.isin(t.site, deepest(t))].max() == t.deepest.max()
 
 
 def test_a_first_touch_left_aside_is_found_again_press_by_press(late):

@@ -12,10 +12,10 @@ from diagnose.apply import corrected, improved
 from diagnose.forward import Forward
 from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.placing import placed
 from diagnose.whiten import NuisanceOptions
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
+from reconstruct.placing import presses_on
 
 
 def _late(t, x, f):  # type: ignore[no-untyped-def]
@@ -93,16 +93,10 @@ def test_a_play_whose_reading_follows_the_tip_is_no_delay(bench):
 
 def test_a_model_meets_a_recording_that_it_was_not_made_from(bench):
     recording, model = bench.record()
-    stranger = dataclasses.replace(
-        model, palpations=model.palpations[:3], provenance={"recording_sha256": "x"}
-    )
-    found = placed(recording, stranger)
-    assert len(found.palpations) == len(model.palpations)
-    off = [
-        np.linalg.norm(np.subtract(a.point, b.point))
-        for a, b in zip(found.palpations, model.palpations, strict=True)
-    ]
-    assert np.median(off) < 1e-3
+    stranger = dataclasses.replace(model, presses=model.presses.of(np.arange(3)))
+    found = presses_on(dataclasses.replace(recording, sha256="of another file"), stranger)
+    assert len(found) == len(model.presses)
+    assert np.median(np.linalg.norm(found.point - model.presses.point, axis=1)) < 1e-3
 
 
 def test_the_next_touch_parts_the_two_that_stand_closest(delayed):
@@ -110,7 +104,7 @@ def test_the_next_touch_parts_the_two_that_stand_closest(delayed):
     assert "time_delay" in touch.separates and touch.sigmas > 3 and touch.difference_n > 0
     assert 0 < touch.depth_m <= 9e-3
     assert np.linalg.norm(touch.direction) == pytest.approx(1.0)
-    places = np.array([p.point for p in delayed[1].palpations])
+    places = delayed[1].presses.point
     assert np.linalg.norm(places - [touch.x, touch.y, touch.z], axis=1).min() < 1e-6
 
 

@@ -7,7 +7,7 @@ import pytest
 
 from mechanics.errors import MeshError, ModelError
 from mechanics.model import Model, read_model, write_model
-from mechanics.palpation import Palpation
+from mechanics.presses import of_places
 from mechanics.tetmesh import TetMesh
 
 
@@ -24,7 +24,7 @@ def model(order: int) -> Model:
         mesh, 16e3, 0.49, 0.005, 0.01, np.zeros(3), np.array([0, 0, 1.0]), (15e3, 17e3),
         modulus_ratio=np.linspace(1, 2, len(mesh.tetrahedra)),
         shape_uncertainty_m=np.linspace(0, 1e-3, len(mesh.points)),
-        palpations=(Palpation(1.0, 1.2, 0.5, 0.5, 1.0, 0, 0, 1.0, 0.004, e_pa=15.5e3),),
+        presses=of_places([0.5, 0.5, 1.0], [0, 0, 1.0], 0.005, depth_m=0.004, fits={"e_pa": 15.5e3}),
         effects={"viscoelasticity": {"g": [0.3], "tau_s": [0.3]}},
         provenance={"method": "finite-tip"},
     )  # fmt: skip
@@ -41,7 +41,7 @@ def test_round_trip(tmp_path, order):
     assert np.array_equal(again.shape_uncertainty_m, first.shape_uncertainty_m)
     assert again.young_modulus_ci95_pa == (15e3, 17e3)
     assert again.effects["viscoelasticity"]["tau_s"] == [0.3]
-    assert again.palpations[0].e_pa == 15.5e3 and np.isnan(again.palpations[0].k_kv)
+    assert again.presses.fits["e_pa"] == [15.5e3] and np.isnan(again.presses.fits["k_kv"][0])
 
 
 def test_an_interrupted_write_leaves_the_old_model(tmp_path, monkeypatch):
@@ -50,7 +50,7 @@ def test_an_interrupted_write_leaves_the_old_model(tmp_path, monkeypatch):
     def broken(*_):
         raise OSError("disk full")
 
-    monkeypatch.setattr("mechanics.model.write_palpations", broken)
+    monkeypatch.setattr("mechanics.model.write_csv", broken)
     with pytest.raises(OSError, match="disk full"):
         write_model(tmp_path / "m", model(2))
     assert read_model(tmp_path / "m").mesh.order == 1

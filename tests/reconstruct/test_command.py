@@ -127,7 +127,7 @@ def test_a_recording_becomes_a_model_with_a_report(files, tmp_path, capsys):
     assert cli.main(["reconstruct", str(files[0]), "-o", str(output), *words]) == 0
     model = read_model(output)
     result = json.loads(figures.read_text())
-    assert len(model.palpations) == result["palpations"] == 12
+    assert len(model.presses) == result["palpations"] == 12
     assert result["young_modulus_pa"] == pytest.approx(model.young_modulus_pa)
     assert model.young_modulus_ci95_pa[0] < model.young_modulus_pa < model.young_modulus_ci95_pa[1]
     assert model.provenance["recording_sha256"]

@@ -7,7 +7,7 @@ import pytest
 from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 from mechanics.errors import ContactError, OptionError
-from reconstruct import presses
+from reconstruct import finding
 from reconstruct.contacts import ContactOptions, explore
 
 
@@ -19,18 +19,18 @@ def distance_to_cylinder(points: np.ndarray) -> np.ndarray:
 
 
 def onset_errors(exploration) -> np.ndarray:
-    centres = TILTED.object(np.array([c.centre for c in exploration.contacts]))
+    centres = TILTED.object(exploration.presses.centre)
     return distance_to_cylinder(centres) - TIP
 
 
 def test_every_press_is_found_with_its_first_touch(cylinder):
     recording, onsets = cylinder
     exploration = explore(recording)
-    assert len(exploration.contacts) == len(onsets)
+    assert len(exploration.presses) == len(onsets)
     errors = onset_errors(exploration)
     assert np.median(np.abs(errors)) < 1e-4
     assert np.abs(errors).max() < 3e-4
-    times = np.array([c.t_onset for c in exploration.contacts])
+    times = exploration.presses.onset_s
     assert np.abs(times - onsets).max() < 0.02
 
 
@@ -44,17 +44,17 @@ def test_stated_errors_of_first_touch_are_of_the_size_of_the_true_ones():
     ratios = []
     for seed in range(3):
         exploration = explore(explore_cylinder(seed=seed)[0])
-        ratios += list(onset_errors(exploration) / [c.onset_error_m for c in exploration.contacts])
+        ratios += list(onset_errors(exploration) / exploration.presses.onset_error_m)
     assert 0.2 < np.sqrt(np.median(np.square(ratios))) < 2.5
 
 
 def test_normals_come_from_the_force(cylinder):
     exploration = explore(cylinder[0])
-    radial = TILTED.object(exploration.points) * [1, 1, 0]
-    top = TILTED.object(exploration.points)[:, 2] > HEIGHT - 0.004
+    radial = TILTED.object(exploration.presses.point) * [1, 1, 0]
+    top = TILTED.object(exploration.presses.point)[:, 2] > HEIGHT - 0.004
     radial[top] = [0, 0, 1]
     radial /= np.linalg.norm(radial, axis=1, keepdims=True)
-    cosine = np.einsum("ij,ij->i", exploration.normals @ TILTED.rotation, radial)
+    cosine = np.einsum("ij,ij->i", exploration.presses.contact_normal @ TILTED.rotation, radial)
     assert np.degrees(np.arccos(cosine.clip(-1, 1))).max() < 3
 
 
@@ -78,21 +78,21 @@ def test_what_the_low_pass_leaves_of_a_rendered_force_is_no_contact():
 def test_bias_and_drift_of_the_sensor_are_followed():
     recording, onsets = explore_cylinder(bias=(0.05, -0.03, 0.04), drift_n_per_s=0.002)
     exploration = explore(recording)
-    assert len(exploration.contacts) == len(onsets)
+    assert len(exploration.presses) == len(onsets)
     assert np.median(np.abs(onset_errors(exploration))) < 2e-4
     expected = np.array([0.05, -0.03, 0.04]) + np.outer(recording.t, [0, 0.002, 0])
-    after = recording.t > 7
-    assert np.abs(exploration.free_air - expected)[after].max() < 0.01
+    read = exploration.presses
+    assert np.abs(read.free_air - expected[np.searchsorted(recording.t, read.t)])[read.t > 7].max() < 0.01
 
 
 def test_the_tools_weight_and_inertia_are_taken_off():
     recording, onsets = explore_cylinder(tool_mass_kg=0.05)
     exploration = explore(recording)
-    assert len(exploration.contacts) == len(onsets)
+    assert len(exploration.presses) == len(onsets)
     assert np.median(np.abs(onset_errors(exploration))) < 2e-4
     blind = dataclasses.replace(recording, quaternion=None)
     try:
-        found = len(explore(blind).contacts)
+        found = len(explore(blind).presses)
     except ContactError:
         found = 0
     assert found < len(onsets)
@@ -101,7 +101,7 @@ def test_the_tools_weight_and_inertia_are_taken_off():
 def test_a_rise_that_would_begin_beyond_the_deepest_travel_is_no_press(monkeypatch):
     """As where a heavy tool's weight, read late, swings while nothing is touched."""
     recording, onsets = explore_cylinder()
-    fit = presses.fit_rise
+    fit = finding.fit_rise
     calls = []
 
     def misled(travel, force, noise_n, **options):
@@ -109,27 +109,29 @@ def test_a_rise_that_would_begin_beyond_the_deepest_travel_is_no_press(monkeypat
         calls.append(rise)
         return dataclasses.replace(rise, u0_m=travel.max() + 1e-4) if len(calls) == 4 else rise
 
-    monkeypatch.setattr(presses, "fit_rise", misled)
+    monkeypatch.setattr(finding, "fit_rise", misled)
     exploration = explore(recording, contact_options=ContactOptions(correct_delay=False))
-    assert len(exploration.contacts) == len(onsets) - 1
+    assert len(exploration.presses) == len(onsets) - 1
     assert [reason for _, reason in exploration.rejected if "no rise" in reason]
 
 
 def test_a_surface_that_holds_on_to_the_leaving_tip_is_no_press():
     recording, onsets = explore_cylinder()
     force = recording.force_on_tool.copy()
-    for contact in explore(recording).contacts[2:6]:
-        pull = 0.4 * np.sin(np.linspace(0, np.pi, 120))[:, None] * contact.normal
-        force[contact.end : contact.end + 120] -= pull
+    first = explore(recording).presses
+    for i in range(2, 6):
+        end = int(np.searchsorted(recording.t, first.end_s[i]))
+        pull = 0.4 * np.sin(np.linspace(0, np.pi, 120))[:, None] * first.contact_normal[i]
+        force[end : end + 120] -= pull
     exploration = explore(dataclasses.replace(recording, force_on_tool=force))
-    assert len(exploration.contacts) == len(onsets)
+    assert len(exploration.presses) == len(onsets)
     assert sum("adhesion" in reason for _, reason in exploration.rejected) == 4
 
 
 def test_a_press_on_the_support_is_rejected_and_named():
     recording, onsets = explore_cylinder(support_press=True)
     exploration = explore(recording)
-    assert len(exploration.contacts) == len(onsets) - 1
+    assert len(exploration.presses) == len(onsets) - 1
     assert any("support" in reason for _, reason in exploration.rejected)
 
 
@@ -138,8 +140,8 @@ def test_the_papers_mode_names_presses_below_its_threshold():
     exploration = explore(recording, method="paper", contact_options=ContactOptions(least_palpations=1))
     weak = [reason for _, reason in exploration.rejected if "below 1 N" in reason]
     assert weak
-    assert len(weak) + len(exploration.contacts) == len(onsets)
-    assert len(explore(recording).contacts) == len(onsets)
+    assert len(weak) + len(exploration.presses) == len(onsets)
+    assert len(explore(recording).presses) == len(onsets)
 
 
 def test_no_contact_is_an_error():

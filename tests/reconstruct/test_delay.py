@@ -14,7 +14,7 @@ def on_time():
 
 def shift_of_first_touch(exploration) -> float:
     """Median distance (m) by which the tip's centres lie nearer than its radius: first touch found late."""
-    q = TILTED.object(np.array([c.centre for c in exploration.contacts]))
+    q = TILTED.object(exploration.presses.centre)
     q = np.column_stack([np.hypot(q[:, 0], q[:, 1]) - RADIUS, q[:, 2] - HEIGHT])
     return float(np.median(TIP - q.max(axis=1)))
 

@@ -6,17 +6,16 @@ import numpy as np
 import pytest
 from boxes import box
 
-from mechanics.recording import Recording
+from mechanics.presses import Presses, of_paths, sites_of
 from mechanics.sites import TouchSites, touch_sites
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import touch_forces
-from reconstruct.contacts import Exploration
-from reconstruct.modulus import ModulusOptions, combine, fit_modulus, site_labels
-from reconstruct.presses import Contact
+from reconstruct.modulus import ModulusOptions, combine, fit_modulus
 from reconstruct.shape_error import compliance_covariance
 
 E, NU, TIP = 20e3, 0.45, 0.005
+NOISE = 0.012
 PLACES = [(x, y) for x in (-0.025, 0.0, 0.025) for y in (-0.025, 0.0, 0.025)]
 FAST = ModulusOptions(bootstraps=200)
 
@@ -30,30 +29,20 @@ def block() -> tuple[Solver, TouchSites]:
     return solver, touch_sites(mesh, points, normals, NU, solver=solver, curvature=0.0)
 
 
-def exploration(
+def pressed(
     sites: TouchSites, *, law="neo-hookean", deep=0.006, noise=0.012, onset=5e-5, scale=None, seed=0
-) -> Exploration:
+) -> Presses:
     """Presses simulated by the touch law; each onset is wrong by about `onset`; scale: a factor a press."""
     random = np.random.default_rng(seed)
     travel = np.concatenate([np.linspace(-0.3, 1, 400), np.ones(100), np.linspace(1, -0.3, 300)]) * deep
-    paths, starts, contacts = [], [0], []
-    for i, (p, n) in enumerate(zip(sites.points, sites.normals, strict=True)):
-        wrong = onset * random.standard_normal()
-        path = -travel[:, None] * n + 0.1 * np.maximum(travel, 0)[:, None] * np.array([1.0, 0, 0])
-        paths.append(path)
-        first = i * len(travel)
-        touched, left = np.flatnonzero(travel > 0)[[0, -1]]
-        centre = p + (TIP + wrong) * n
-        contacts.append(
-            Contact(
-                start=first + touched, peak=first + 400, end=first + left, t_onset=0.0,
-                t_peak=0.0, centre=centre,
-                point=centre - TIP * n, normal=n, depth_m=deep, peak_n=1.0, onset_error_m=onset,
-            )
-        )  # fmt: skip
-        starts.append(starts[-1] + len(travel))
+    slide = 0.1 * np.maximum(travel, 0)[:, None] * np.array([1.0, 0, 0])
+    paths, centres = [], []
+    for p, n in zip(sites.points, sites.normals, strict=True):
+        paths.append(-travel[:, None] * n + slide)
+        centres.append(p + (TIP + onset * random.standard_normal()) * n)
+    starts = np.arange(len(sites) + 1) * len(travel)
     force = touch_forces(
-        np.vstack(paths), np.array(starts), sites.normals, sites.far, young_modulus_pa=E, poisson_ratio=NU,
+        np.vstack(paths), starts, sites.normals, sites.far, young_modulus_pa=E, poisson_ratio=NU,
         tip_radius_m=TIP, curvature=sites.curvature, law=law,
     )  # fmt: skip
     each = np.repeat(np.ones(len(sites)) if scale is None else scale, len(travel))
@@ -61,17 +50,16 @@ def exploration(
     position = np.vstack(
         [path + p + TIP * n for path, p, n in zip(paths, sites.points, sites.normals, strict=True)]
     )
-    recording = Recording(np.arange(len(force)) / 1000, position, force, 1000.0, TIP, poisson_ratio=NU)
-    zero = np.zeros_like(force)
-    return Exploration(
-        recording, position, force, force, zero, noise, None, tuple(contacts), (), 0.1, "noise"
-    )
+    return of_paths(
+        starts, position, force, np.array(centres), sites.normals, tip_radius_m=TIP, sample_rate_hz=1000.0,
+        onset_error_m=onset, noise_n=noise,
+    )  # fmt: skip
 
 
 def test_modulus_law_and_onset_are_recovered(block):
     _, sites = block
     for law in ("linear", "neo-hookean"):
-        fit = fit_modulus(exploration(sites, law=law), sites, FAST)
+        fit = fit_modulus(pressed(sites, law=law), sites, NOISE, FAST)
         assert fit.modulus_pa == pytest.approx(E, rel=0.01)
         assert fit.press.law == law
         assert fit.ci95_pa[0] < E < fit.ci95_pa[1]
@@ -80,19 +68,19 @@ def test_modulus_law_and_onset_are_recovered(block):
 
 def test_a_wrong_first_touch_costs_little_because_it_is_fitted(block):
     _, sites = block
-    good = fit_modulus(exploration(sites, onset=1e-6), sites)
-    shifted = exploration(sites, onset=1.5e-4, seed=2)
-    fit = fit_modulus(shifted, sites)
+    good = fit_modulus(pressed(sites, onset=1e-6), sites, NOISE)
+    shifted = pressed(sites, onset=1.5e-4, seed=2)
+    fit = fit_modulus(shifted, sites, NOISE)
     assert fit.modulus_pa == pytest.approx(good.modulus_pa, rel=0.01)
-    true_shift = [(sites.points[i, 2] + TIP - c.centre[2]) for i, c in enumerate(shifted.contacts)]
-    assert -fit.press.onset_shift_m == pytest.approx(np.array(true_shift), abs=6e-5)
+    true_shift = sites.points[:, 2] + TIP - shifted.centre[:, 2]
+    assert -fit.press.onset_shift_m == pytest.approx(true_shift, abs=6e-5)
 
 
 def test_bad_presses_are_left_out(block):
     _, sites = block
     scale = np.ones(len(sites))
     scale[[2, 5]] = 2.5, 0.3
-    fit = fit_modulus(exploration(sites, scale=scale), sites)
+    fit = fit_modulus(pressed(sites, scale=scale), sites, NOISE)
     assert fit.modulus_pa == pytest.approx(E, rel=0.02)
     assert fit.weights[[2, 5]].max() < 1e-6
     plain = np.exp(np.mean(np.log(fit.press.modulus_pa)))
@@ -101,23 +89,23 @@ def test_bad_presses_are_left_out(block):
 
 def test_depths_at_which_the_law_fails_are_left_out(block):
     _, sites = block
-    plain = exploration(sites, deep=0.008)
-    depth = -(plain.recording.position - (sites.points[0] + [0, 0, TIP]))[:, 2]
+    plain = pressed(sites, deep=0.008)
+    depth = -(plain.position - (sites.points[0] + [0, 0, TIP]))[:, 2]
     factor = 1 + 0.5 * np.clip((depth - 0.004) / 0.004, 0, None)
-    stiffening = dataclasses.replace(plain, raw_force=plain.raw_force * factor[:, None])
+    stiffening = dataclasses.replace(plain, force=plain.force * factor[:, None])
     options = ModulusOptions(law="neo-hookean")
-    fit = fit_modulus(stiffening, sites, options)
+    fit = fit_modulus(stiffening, sites, NOISE, options)
     assert fit.press.depth_m <= 0.005
     assert fit.modulus_pa == pytest.approx(E, rel=0.015)
     assert not fit.by_depth[-1][2]
-    whole = fit_modulus(stiffening, sites, ModulusOptions(law="neo-hookean", greatest_depth_m=0.01))
+    whole = fit_modulus(stiffening, sites, NOISE, ModulusOptions(law="neo-hookean", greatest_depth_m=0.01))
     assert abs(whole.modulus_pa - E) > 2 * abs(fit.modulus_pa - E)
 
 
 def test_depths_that_agree_are_all_used(block):
     _, sites = block
     for seed in range(3):
-        fit = fit_modulus(exploration(sites, deep=0.008, seed=seed), sites, FAST)
+        fit = fit_modulus(pressed(sites, deep=0.008, seed=seed), sites, NOISE, FAST)
         assert fit.press.depth_m > 0.008
         assert all(agrees for _, _, agrees in fit.by_depth)
 
@@ -130,8 +118,9 @@ def test_the_interval_covers_when_sites_scatter(block):
     for seed in range(runs):
         scale = np.exp(0.05 * random.standard_normal(len(sites)))
         fit = fit_modulus(
-            exploration(sites, scale=scale, seed=seed),
+            pressed(sites, scale=scale, seed=seed),
             sites,
+            NOISE,
             ModulusOptions(law="neo-hookean", greatest_depth_m=0.01, bootstraps=200),
         )
         covered += fit.ci95_pa[0] < E < fit.ci95_pa[1]
@@ -140,7 +129,8 @@ def test_the_interval_covers_when_sites_scatter(block):
 
 def test_repeats_at_one_site_do_not_outvote_the_others():
     moduli = np.array([10e3, 10e3, 10e3, 12e3] + [12e3] * 20)
-    site = site_labels(np.array([[0, 0, 0], [0.03, 0, 0], [0.06, 0, 0]] + [[0.09, 0, 0]] * 21), 0.008)
+    places = np.array([[0, 0, 0], [0.03, 0, 0], [0.06, 0, 0]] + [[0.09, 0, 0]] * 21)
+    site = sites_of(places, np.tile([0, 0, 1.0], (24, 1)))
     assert site.max() == 3
     modulus, weights, _ = combine(moduli, np.full(24, 1e-4), site)
     assert weights[3:].sum() < 0.5

@@ -5,44 +5,37 @@ import pytest
 from boxes import box
 
 from mechanics.errors import ContactError
-from mechanics.recording import Recording
+from mechanics.presses import Presses, of_paths
 from mechanics.solver import Solver
-from reconstruct.contacts import Exploration
 from reconstruct.modulus_paper import (
     PaperOptions,
     base_reactions,
     fit_paper_modulus,
     least_squares_modulus,
 )
-from reconstruct.presses import Contact
 
 E, NU = 16e3, 0.49
 MESH = box((0.06, 0.06, 0.04), (5, 5, 4))
 
 
-def pressed(deep: float = 0.011) -> Exploration:
+def pressed(deep: float = 0.011) -> Presses:
     """Presses whose force is that of the point-loaded mesh itself, straight down to `deep`."""
     solver = Solver(MESH, NU)
     nodes = np.flatnonzero(MESH.touchable & np.isclose(MESH.points[:, 2], 0.04))[::7]
-    contacts, positions, forces = [], [], []
+    positions, forces = [], []
     travel = np.linspace(0, deep, 200)
-    for k, node in enumerate(nodes):
+    centres = MESH.points[nodes] + [0.0005, 0, 0.005]
+    for node, start in zip(nodes, centres, strict=True):
         load = np.zeros((len(MESH.points), 3))
         load[node, 2] = -1.0
         give = -solver.solve(load)[node, 2]
-        start = MESH.points[node] + [0.0005, 0, 0.005]
         positions.append(start - travel[:, None] * np.array([0, 0, 1.0]))
         forces.append(np.outer(travel * E / give, [0, 0, 1.0]))
-        rows = slice(k * 200, (k + 1) * 200)
-        contacts.append(
-            Contact(rows.start, rows.stop - 1, rows.stop, float(k), 0.0, start, start - [0, 0, 0.005],
-                    np.array([0, 0, 1.0]), deep, 1.0)
-        )  # fmt: skip
-    position, force = np.vstack(positions), np.vstack(forces)
-    recording = Recording(np.arange(len(force)) / 1000, position, force, 1000.0, 0.005)
-    return Exploration(
-        recording, position, force, force, 0 * force, 0.012, None, tuple(contacts), (), 1.0, "paper"
-    )
+    up = np.tile([0.0, 0.0, 1.0], (len(nodes), 1))
+    return of_paths(
+        200 * np.arange(len(nodes) + 1), np.vstack(positions), np.vstack(forces), centres, up,
+        tip_radius_m=0.005, sample_rate_hz=1000.0,
+    )  # fmt: skip
 
 
 def test_the_global_and_every_single_modulus_are_recovered():

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.palpation import Palpation
+from mechanics.presses import of_places
 
 from . import shapes
 
@@ -34,13 +34,11 @@ def thin_renderer():
 @pytest.fixture(scope="session")
 def one_d_model():
     """A block with four palpations on its top whose 1D parameters differ from left to right."""
-    rows = [
-        Palpation(
-            t_onset=float(i), t_peak=i + 0.5, x=x, y=y, z=0.05, nx=0.0, ny=0.0, nz=1.0, depth=0.005,
-            k_kv=k, b_kv=5.0, k_hc=10 * k, b_hc=20.0, r_hc=1.4, k_v=k, k_c=10 * k, r_c=1.4, k_h=10 * k,
-        )
-        for i, (x, y, k) in enumerate(
-            [(-0.03, -0.03, 200.0), (-0.03, 0.03, 200.0), (0.03, -0.03, 400.0), (0.03, 0.03, 400.0)]
-        )
-    ]  # fmt: skip
-    return shapes.model(shapes.block((0.1, 0.1, 0.05), (6, 6, 3)), palpations=tuple(rows))
+    places = np.array([[-0.03, -0.03, 0.05], [-0.03, 0.03, 0.05], [0.03, -0.03, 0.05], [0.03, 0.03, 0.05]])
+    k = np.array([200.0, 200.0, 400.0, 400.0])
+    fits = {"k_kv": k, "b_kv": 5.0, "k_hc": 10 * k, "b_hc": 20.0, "r_hc": 1.4, "k_v": k, "k_c": 10 * k}
+    rows = of_places(
+        places, np.tile([0.0, 0.0, 1.0], (4, 1)), 0.005, depth_m=0.005,
+        fits={**fits, "r_c": 1.4, "k_h": 10 * k},
+    )  # fmt: skip
+    return shapes.model(shapes.block((0.1, 0.1, 0.05), (6, 6, 3)), presses=rows)

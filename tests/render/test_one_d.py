@@ -7,6 +7,7 @@ import pytest
 
 import render
 from mechanics.errors import ModelError, OptionError
+from mechanics.presses import no_presses
 from render.one_d import Law, spread_law
 
 TIP = 0.005
@@ -57,7 +58,7 @@ def test_a_1d_model_pushes_along_the_normal_alone_and_never_pulls(one_d_model):
 
 def test_a_1d_model_without_parameters_says_so(one_d_model):
     with pytest.raises(ModelError, match="reconstruct"):
-        render.create("kelvin-voigt", one_d_model.replaced(palpations=()))
+        render.create("kelvin-voigt", one_d_model.replaced(presses=no_presses(0.005)))
     with pytest.raises(OptionError, match="hunt-crossley"):
         render.create("spring", one_d_model)
 
@@ -65,6 +66,8 @@ def test_a_1d_model_without_parameters_says_so(one_d_model):
 def test_spreading_averages_repeats_and_stays_in_range():
     points = np.array([[0.0, 0, 0], [0.0005, 0, 0], [0.05, 0, 0], [0.1, 0, 0]])
     law = Law(np.array([100.0, 300.0, 400.0, np.nan]), np.zeros(4), np.ones(4), np.zeros(4))
-    at = spread_law(points, law, np.array([[0.00025, 0, 0], [0.05, 0, 0], [1.0, 0, 0]]))
+    at = spread_law(
+        points, np.array([0, 0, 1, 2]), law, np.array([[0.00025, 0, 0], [0.05, 0, 0], [1.0, 0, 0]])
+    )
     assert at.k[:2] == pytest.approx([200, 400], rel=1e-6)
     assert at.k[2] <= 400

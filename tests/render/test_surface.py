@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.palpation import Palpation
+from mechanics.presses import of_places
 from render.bvh import STACK, closest_triangle
 from render.options import RenderOptions
 from render.snapping import touch_gaps, touched_surface
@@ -54,12 +54,9 @@ def test_the_search_finds_the_closest_triangle():
 
 def test_the_surface_is_drawn_to_the_touched_points():
     shift = 4e-4
-    rows = tuple(
-        Palpation(1.0, 2.0, x, y, 0.05 + shift, 0.0, 0.0, 1.0, 0.004)
-        for x in (-0.02, 0.02)
-        for y in (-0.02, 0.02)
-    )
-    made = shapes.model(shapes.block((0.1, 0.1, 0.05), (6, 6, 3)), palpations=rows)
+    places = np.array([[x, y, 0.05 + shift] for x in (-0.02, 0.02) for y in (-0.02, 0.02)])
+    rows = of_places(places, np.tile([0.0, 0.0, 1.0], (4, 1)), 0.005)
+    made = shapes.model(shapes.block((0.1, 0.1, 0.05), (6, 6, 3)), presses=rows)
     before = touch_gaps(contact_surface(made.mesh).arrays, made)[2]
     surface = touched_surface(made, RenderOptions())
     after = touch_gaps(surface.arrays, made)[2]

@@ -103,8 +103,9 @@ def test_virtual_presses_spread_and_stay_off_rims(block: Model) -> None:
     assert gaps.min() > 0.01
     on_faces = (np.abs(places[:, :2]) > 0.0399).sum(axis=1) + (places[:, 2] > 0.0399)
     assert (on_faces == 1).all()
-    for row in block.palpations:
-        assert row.k_kv > 0 and row.k_hc > 0 and 1.0 < row.r_hc < 1.6 and row.depth == 0.005
+    fits, r = block.presses.fits, block.presses.fits["r_hc"]
+    assert (fits["k_kv"] > 0).all() and (fits["k_hc"] > 0).all() and ((r > 1.0) & (r < 1.6)).all()
+    assert (block.presses.depth_m == 0.005).all()
 
 
 def test_exploration_traces_the_foot_and_presses_outside_in(block: Model) -> None:

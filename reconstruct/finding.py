@@ -3,41 +3,31 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.onset import Rise, fit_rise
+from reconstruct.onset import fit_rise
 
 _LEAD_S = 0.15
 _FIT_SAMPLES = 250
 
 
-@dataclass(frozen=True)
-class Contact:
-    """One press; device frame, SI.
+class Found(NamedTuple):
+    """One press where it was found; device frame, SI.
 
-    start, peak, end: sample indices of first touch, greatest force, loss of touch (end exclusive).
-    centre: (3,)
-    tip's centre at first touch. point: (3,) surface point there. normal: (3,) outward, from the force.
-    depth_m:
-    greatest travel of the centre along -normal. peak_n: greatest force. onset_error_m: standard error of
-    the first
-    touch along the normal. law: the fitted rise, None in the paper's mode.
+    start, peak, end: samples of first touch, greatest force, loss of the last force above the noise (end
+    exclusive). centre: (3,) tip's centre at first touch. normal: (3,) outward, from the force. onset_error_m:
+    standard error of the first touch along it.
     """
 
     start: int
     peak: int
     end: int
-    t_onset: float
-    t_peak: float
     centre: np.ndarray
-    point: np.ndarray
     normal: np.ndarray
-    depth_m: float
-    peak_n: float
     onset_error_m: float = 0.0
-    law: Rise | None = None
 
 
 @dataclass(frozen=True)
@@ -53,7 +43,7 @@ class Signals:
     noise_n: float
 
 
-def paper_contact(signals: Signals, a: int, b: int) -> Contact | None:
+def paper_contact(signals: Signals, a: int, b: int) -> Found | None:
     """First touch where the force started to rise: back from the threshold while each sample is above
     the last.
 
@@ -65,10 +55,10 @@ def paper_contact(signals: Signals, a: int, b: int) -> Contact | None:
     while start > 0 and magnitude[start - 1] < magnitude[start]:
         start -= 1
     peak = a + int(np.argmax(magnitude[a:b]))
-    return _contact(signals, start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
+    return Found(start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
 
 
-def fitted_contact(signals: Signals, a: int, b: int) -> Contact | None:
+def fitted_contact(signals: Signals, a: int, b: int) -> Found | None:
     """First touch by fitting the contact law to the approach and rise; None where the force has no direction.
 
     a, b: samples between which the force is above its lower threshold.
@@ -98,8 +88,8 @@ def fitted_contact(signals: Signals, a: int, b: int) -> Contact | None:
     start = first + int(touched[0])
     here = -(signals.position[start] - signals.position[a]) @ normal
     centre = signals.position[start] - (rise.u0_m - here) * normal
-    contact = _contact(signals, start, peak, b, centre, normal, rise)
-    return contact if contact.depth_m > 0 else None
+    deepest = float((-(signals.position[start:b] - centre) @ normal).max())
+    return Found(start, peak, b, centre, normal, rise.u0_error_m) if deepest > 0 else None
 
 
 def initial_normal(signals: Signals, a: int, peak: int) -> np.ndarray | None:
@@ -111,30 +101,3 @@ def initial_normal(signals: Signals, a: int, peak: int) -> np.ndarray | None:
     direction = signals.force[a : peak + 1][chosen].sum(axis=0)
     length = np.linalg.norm(direction)
     return direction / length if length > 0 else None
-
-
-def _contact(
-    signals: Signals,
-    start: int,
-    peak: int,
-    end: int,
-    centre: np.ndarray,
-    normal: np.ndarray,
-    law: Rise | None = None,
-) -> Contact:
-    t, radius = signals.recording.t, signals.recording.tip_radius_m
-    depth = -(signals.position[start:end] - centre) @ normal
-    return Contact(
-        start=start,
-        peak=peak,
-        end=end,
-        t_onset=float(t[start]),
-        t_peak=float(t[peak]),
-        centre=centre,
-        point=centre - radius * normal,
-        normal=normal,
-        depth_m=float(depth.max()),
-        peak_n=float(signals.magnitude[peak]),
-        onset_error_m=law.u0_error_m if law else 0.0,
-        law=law,
-    )

@@ -1,0 +1,28 @@
+"""The presses of a recording on the surface of a model, whether or not the model was made from it."""
+
+from __future__ import annotations
+
+from mechanics.errors import NoBaseError
+from mechanics.model import Model
+from mechanics.presses import Presses
+from mechanics.recording import Recording
+from reconstruct.casting import cast
+from reconstruct.contacts import explore
+from reconstruct.known_base import base_of_model
+
+
+def presses_on(recording: Recording, model: Model) -> Presses:
+    """The model's own table where it was made from this recording; else its presses, found and cast onto the
+    model's surface. A recording that does not trace a base stands on the model's.
+
+    Raises ContactError where the recording holds too few presses.
+    """
+    own = model.presses
+    if own.sampled and own.recording_sha256 and own.recording_sha256 == recording.sha256:
+        return own
+    try:
+        found = explore(recording).presses
+    except NoBaseError:
+        found = explore(recording, boundary=base_of_model(model, recording.tip_radius_m)).presses
+    where = cast(model.mesh.points, model.mesh.touchable_surface, found.point, found.contact_normal)
+    return found.on_surface(where.points, where.normals)
