@@ -202,7 +202,7 @@ def gather(exploration: Exploration, model: Model, site_m: float, progress: Prog
     recording = exploration.recording
     mesh = model.mesh
     where = cast(mesh.points, mesh.touchable_surface, exploration.points, exploration.normals)
-    solved = touch_sites(mesh, where.points, where.normals, model.poisson_ratio, progress=progress)
+    solved = touch_sites(mesh, where.points, where.normals, model.material.poisson_ratio, progress=progress)
     normals = solved.normals
     around = round(_AROUND_S * recording.sample_rate_hz)
     paths, rates, forces, starts = [], [], [], [0]
@@ -286,7 +286,7 @@ def stiffness_along(
     presses: Presses, train: np.ndarray, places: np.ndarray, normals: np.ndarray, model: Model, depth_m: float
 ) -> dict[str, np.ndarray]:
     """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
-    solved = touch_sites(model.mesh, places, normals, model.poisson_ratio)
+    solved = touch_sites(model.mesh, places, normals, model.material.poisson_ratio)
     _, modulus = _predict(presses, train, train[:1], "rbf")
     seen = presses.rows(train)
     law = min(LAWS, key=lambda name: _rms(_scaled(presses.unit[name][seen], presses.force[seen])))
@@ -297,7 +297,7 @@ def stiffness_along(
         path,
         np.arange(len(places) + 1) * len(steps),
         young_modulus_pa=modulus,
-        tip_radius_m=model.tip_radius_m,
+        tip_radius_m=model.tool.tip_radius_m,
         law=law,
     )
     deepest = force.reshape(len(places), len(steps), 3)[:, -1]

@@ -9,7 +9,6 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.errors import SceneError
-from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.palpation import Palpation
 from mechanics.progress import Progress, silent
@@ -37,10 +36,10 @@ def palpate_model(
         model.mesh,
         points,
         normals,
-        model.poisson_ratio,
-        model.modulus_ratio,
-        balls=balls_of(model),
-        tip_radius_m=model.tip_radius_m,
+        model.material.poisson_ratio,
+        model.ratio_without_balls,
+        balls=tuple(model.material.inclusions.values()),
+        tip_radius_m=model.tool.tip_radius_m,
         progress=progress,
     )
     samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))
@@ -52,9 +51,9 @@ def palpate_model(
         touched,
         paths,
         np.arange(len(chosen) + 1) * len(depth),
-        young_modulus_pa=model.young_modulus_pa,
-        tip_radius_m=model.tip_radius_m,
-        law="neo-hookean" if "finite_strain" in model.effects else "linear",
+        young_modulus_pa=model.material.young_modulus_pa,
+        tip_radius_m=model.tool.tip_radius_m,
+        law=model.material.dent_law,
     ).reshape(len(chosen), -1, 3)
     push = np.einsum("ijk,ik->ij", forces, touched.normals)
     fits = fit_robust([Press(depth, speed, p) for p in push])
@@ -62,7 +61,7 @@ def palpate_model(
         Palpation(
             *(0.0, depth_m / SPEED_M_PER_S, *point, *normal, depth_m),
             *(fit.k_kv, fit.b_kv, fit.k_hc, fit.b_hc, fit.r_hc, fit.k_v, fit.k_c, fit.r_c, fit.k_h),
-            model.young_modulus_pa,
+            model.material.young_modulus_pa,
         )
         for point, normal, fit in zip(points.tolist(), touched.normals.tolist(), fits, strict=True)
     ]
@@ -75,7 +74,7 @@ def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M)
     Rims, and places near the support where a tip would not fit, are left out.
     """
     mesh = model.mesh
-    height = (mesh.points - model.support_point) @ model.support_normal
+    height = model.support.height(mesh.points)
     triangles = mesh.touchable_surface[:, :3]
     corners = np.unique(triangles)
     flatness = np.ones(len(mesh.points))

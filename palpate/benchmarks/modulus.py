@@ -27,7 +27,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     options = PaperOptions(indentation_m=arguments.indentation)
     papers = reconstruct_fully(recording, ReconstructOptions(method="paper", paper=options))
     own = reconstruct_fully(recording)
-    mesh, nu, where = own.meshing.mesh, own.model.poisson_ratio, own.cast
+    mesh, nu, where = own.meshing.mesh, own.model.material.poisson_ratio, own.cast
     solver = touch_solver(mesh, nu)
     work = {
         "paper: K_G, factorisation, (12), (13)": lambda: fit_paper_modulus(

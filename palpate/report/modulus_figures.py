@@ -43,13 +43,13 @@ def column(model: Model, name: str) -> np.ndarray:
 def heights(model: Model) -> np.ndarray:
     """(k,) m, heights of the contacts above the support."""
     points = np.array([p.point for p in model.palpations])
-    return (points - model.support_point) @ model.support_normal
+    return model.support.height(points)
 
 
 def on_side(model: Model) -> np.ndarray:
     """(k,) bool, presses whose normal is within 17 degrees of the support plane."""
     normals = np.array([p.normal for p in model.palpations])
-    return np.abs(normals @ model.support_normal) < SIDE
+    return np.abs(normals @ model.support.normal) < SIDE
 
 
 def height_trends(model: Model) -> list[Trend]:
@@ -121,7 +121,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
             ax.set_ylim(0, 1.3 * np.nanmax(value[side]))
         if name in trends:
             ax.set_title(f"r = {trends[name].pearson:+.2f} (p = {trends[name].pearson_p:.2g})", fontsize=10)
-    axes[1, 2].axhline(model.young_modulus_pa / 1e3, color=PEAK_COLOUR, lw=1)
+    axes[1, 2].axhline(model.material.young_modulus_pa / 1e3, color=PEAK_COLOUR, lw=1)
     return figure
 
 

@@ -7,7 +7,8 @@ import itertools
 import numpy as np
 import pytest
 
-from mechanics.model import Model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.palpation import Palpation
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
@@ -99,8 +100,9 @@ class Bench:
             t=t, position=x, force_on_tool=f, sample_rate_hz=rate, tip_radius_m=RADIUS, poisson_ratio=NU
         )
         model = Model(
-            mesh=self.mesh, young_modulus_pa=MODULUS, poisson_ratio=NU, tip_radius_m=RADIUS, mesh_size_m=0.02,
-            support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), palpations=tuple(palpations),
+            mesh=self.mesh, material=Material(MODULUS, NU),
+            support=Support(np.zeros(3), np.array([0, 0, 1.0])), tool=Tool(RADIUS), mesh_size_m=0.02,
+            palpations=tuple(palpations),
         )  # fmt: skip
         return recording, model
 
