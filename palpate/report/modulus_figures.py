@@ -148,7 +148,7 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
     """Figure 6: (a) moduli of single presses, * the global one; (b) where they hold, on two samples."""
     shown = list(models.items())[:2]
     figure, axes = plt.subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4), layout="constrained")
-    stars = [m.young_modulus_pa / 1e3 for m in models.values()]
+    stars = [m.material.young_modulus_pa / 1e3 for m in models.values()]
     spread(axes[0], [column(m, "e_pa") / 1e3 for m in models.values()], list(models), stars)
     axes[0].set(ylabel="Young's modulus [kPa]", ylim=(0, None))
     axes[0].tick_params(axis="x", labelrotation=15)

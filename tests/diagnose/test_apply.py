@@ -129,7 +129,7 @@ def test_a_skin_is_stiffer_at_first_touch_than_deep(model, folder):
     skin = {"skin_layer": {"thickness_m": 0.003, "modulus_ratio": 3.0}}
     ratio = felt(model, folder, skin)[0, :, 2] / np.maximum(felt(model, folder, {})[0, :, 2], 1e-9)
     assert ratio[60] > ratio[199] > 1.1
-    ratios = with_effects(model, skin).modulus_ratio
+    ratios = with_effects(model, skin).element_ratio
     assert 1.1 < ratios.max() <= 3.0 and ratios.min() >= 1.0
 
 
