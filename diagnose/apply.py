@@ -12,12 +12,10 @@ import numpy as np
 from diagnose.freeair import matrices
 from diagnose.library import effect
 from diagnose.result import Diagnosis
-from mechanics.effects.skin_layer import skin_ratio
-from mechanics.inclusion import inclusion_ratio
+from mechanics.material import Ball, Gradient, Skin
 from mechanics.model import Model
 from mechanics.recording import Recording
 
-MODULUS_LIMITS = (0.05, 50.0)
 NOT_RENDERED = ("surface_shape", "surface_offset")
 """They say that the model's surface is wrong, not what it should be."""
 FOUND_INCLUSION = "diagnosed"
@@ -37,16 +35,12 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
     provenance = {**model.provenance, "diagnosed_effects": list(diagnosis.effects)}
     if diagnosis.attribution is not None:
         fitted = diagnosis.attribution.final.found
-        deep = "finite_strain" in (*fitted.names, *diagnosis.effects)
-        provenance["dent_law"] = "neo-hookean" if deep else "linear"
+        deep = "finite_strain" in (*fitted.names, *diagnosis.effects, *model.effects)
+        model = model.with_material(dent_law="neo-hookean" if deep else "linear")
         if "adhesion" in asserted and "adhesion" in fitted.names:
             asserted["adhesion"].setdefault("inside", float(fitted.of("adhesion")[2]))
-    better = with_effects(model, asserted)
-    better = better.replaced(
-        young_modulus_pa=diagnosis.young_modulus_pa,
-        young_modulus_ci95_pa=(float("nan"), float("nan")),
-        provenance=provenance,
-    )
+    better = with_effects(model.with_modulus(diagnosis.young_modulus_pa), asserted)
+    better = better.replaced(provenance=provenance)
     return better, [name for name in asserted if rendered(name)]
 
 
@@ -65,7 +59,7 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
     if not len(begins):
         return model
     measured = recording.force_on_tool
-    renderer, modulus = FemRenderer(model), model.young_modulus_pa
+    renderer, modulus = FemRenderer(model), model.material.young_modulus_pa
     for _ in range(REPLAYS):
         forces = np.where(counted[:, None], replay_recording(renderer, recording), 0.0)
         meets = np.add.reduceat((forces * measured).sum(axis=1), begins)
@@ -75,7 +69,7 @@ def with_replayed_modulus(model: Model, recording: Recording) -> Model:
             return model
         modulus *= float(np.median(meets[felt] / power[felt]))
         renderer = renderer.with_modulus(modulus)
-    return model.replaced(young_modulus_pa=modulus)
+    return model.with_modulus(modulus)
 
 
 def rendered(name: str) -> bool:
@@ -87,40 +81,29 @@ def rendered(name: str) -> bool:
 def with_effects(model: Model, effects: Mapping[str, Mapping[str, Any]]) -> Model:
     """The model with these effects, by the contract's keys (SI, device frame), over those that it has.
 
-    Laws of material and contact go to [effects.NAME]; an inclusion, a gradient and a skin into the elements'
-    moduli as well, Poisson's ratio into the material; a loose or springy base to [effects.NAME], where the
-    compliance reads it. Effects of the instrument are left out.
+    All go to [effects.NAME]; what of one is material goes into the material, where it counts: an inclusion
+    beside those that are known, a gradient times the one that is there, the rest in place of what is there.
+    Effects of the instrument are left out.
     """
     kept = {name: dict(keys) for name, keys in effects.items() if rendered(name)}
-    ratio, nu, extra = model.modulus_ratio, model.poisson_ratio, dict(model.extra)
     for name, keys in kept.items():
+        material = model.material
         if name == "inclusion":
-            centre, radius, times = np.array(keys["centre_m"]), float(keys["radius_m"]), keys["modulus_ratio"]
-            ratio = ratio * inclusion_ratio(model.mesh, centre, radius, float(times))
-            known = extra.get("inclusions", {})
-            extra["inclusions"] = {**known, f"{FOUND_INCLUSION}-{len(known) + 1}": dict(keys)}
+            known = material.inclusions
+            found = {f"{FOUND_INCLUSION}-{len(known) + 1}": Ball(**keys)}
+            model = model.with_material(inclusions={**known, **found})
         elif name == "modulus_gradient":
-            ratio = ratio * _along_the_normal(model, float(keys["ratio_base"]), float(keys["ratio_top"]))
+            there = material.gradient or Gradient(1.0, 1.0)
+            base, top = float(keys["ratio_base"]), float(keys["ratio_top"])
+            both = Gradient(base * there.ratio_base, top * there.ratio_top)
+            model = model.with_material(gradient=both)
         elif name == "skin_layer":
-            ratio = ratio * skin_ratio(model.mesh, float(keys["thickness_m"]), float(keys["modulus_ratio"]))
+            model = model.with_material(skin=Skin(**keys))
         elif name == "poisson_ratio":
-            nu = float(keys["poisson_ratio"])
-    return model.replaced(
-        poisson_ratio=nu,
-        modulus_ratio=np.clip(ratio, *MODULUS_LIMITS),
-        effects={**{k: dict(v) for k, v in model.effects.items()}, **kept},
-        extra=extra,
-        path=None,
-    )
-
-
-def _along_the_normal(model: Model, base: float, top: float) -> np.ndarray:
-    """(m,) modulus of each element where it runs linearly from the support to the object's top."""
-    mesh = model.mesh
-    normal = model.support_normal / np.linalg.norm(model.support_normal)
-    highest = ((mesh.points - model.support_point) @ normal).max()
-    centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
-    return base + (top - base) * ((centroid - model.support_point) @ normal) / highest
+            model = model.with_material(poisson_ratio=keys["poisson_ratio"])
+        elif name == "finite_strain":
+            model = model.with_material(dent_law="neo-hookean")
+    return model.replaced(effects={**{k: dict(v) for k, v in model.effects.items()}, **kept}, path=None)
 
 
 def corrected(recording: Recording, diagnosis: Diagnosis) -> Recording:

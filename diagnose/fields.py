@@ -52,7 +52,7 @@ def energy_fields(forward: Forward) -> EnergyFields:
     t, model = forward.touches, forward.model
     mesh = model.mesh.quadratic()
     unique, first, inverse = places_of(t)
-    solver = Solver(mesh, model.poisson_ratio)
+    solver = Solver(mesh, model.material.poisson_ratio)
     sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
     q = len(first)
     forces = np.zeros((len(mesh.points), 3, 3 * q))
@@ -65,7 +65,7 @@ def energy_fields(forward: Forward) -> EnergyFields:
     energy = np.empty((q, m, 3, 3), dtype=np.float32)
     for a in range(0, m, _CHUNK):
         nodes = mesh.tetrahedra[a : a + _CHUNK]
-        stiff = element_stiffness(mesh.points[nodes[:, :4]], 2, model.poisson_ratio).reshape(
+        stiff = element_stiffness(mesh.points[nodes[:, :4]], 2, model.material.poisson_ratio).reshape(
             len(nodes), 30, 30
         )
         local = u[nodes].reshape(len(nodes), 30, 3 * q)
@@ -74,13 +74,16 @@ def energy_fields(forward: Forward) -> EnergyFields:
             "mxqi,mxqj->qmij", local.reshape(len(nodes), 30, q, 3), product, optimize=True
         )
     centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
-    height = (centroid - model.support_point) @ model.support_normal
+    height = model.support.height(centroid)
     from scipy.spatial import cKDTree
 
     surface = sampler._positions.reshape(-1, 3)
     depth = cKDTree(surface).query(centroid)[0]
     half = np.array(
-        [half_space_compliance(np.array([1.0, 0, 0]), model.poisson_ratio, sampler.width_m) for _ in first]
+        [
+            half_space_compliance(np.array([1.0, 0, 0]), model.material.poisson_ratio, sampler.width_m)
+            for _ in first
+        ]
     )
     fields = EnergyFields(energy, inverse.ravel(), centroid, mesh.volumes, height, depth, half, solver, u)
     forward.stages["fields"] = fields

@@ -90,9 +90,7 @@ class Forward:
         self.dents = grid()
         self.onset = np.zeros(len(t))
         self.centre = t.point.mean(axis=0)
-        self.height = float(
-            ((self.model.mesh.points - self.model.support_point) @ self.model.support_normal).max()
-        )
+        self.height = float((self.model.support.height(self.model.mesh.points)).max())
 
     def ideal(self, modulus: float) -> Settings:
         """Settings of the ideal model."""
@@ -143,7 +141,7 @@ class Forward:
         if s.table_factor is not None:
             table = table.copy()
             table[:, [0, 2]] *= s.table_factor
-        usual = self.model.young_modulus_pa
+        usual = self.model.material.young_modulus_pa
         give = s.tool_give * s.modulus / usual
         arrays = (y, s.far, s.stiffness, s.dent_ratio, table)
         key = hash((s.tip_radius, s.nu, give, s.mu, *(a.tobytes() for a in arrays)))
@@ -171,7 +169,7 @@ class Forward:
         turns.
         """
         t = self.touches
-        down = -self.model.support_normal / np.linalg.norm(self.model.support_normal)
+        down = -self.model.support.normal
         weight = mass_kg * STANDARD_GRAVITY * down
         if t.quaternion is None:
             return np.broadcast_to(share * weight, t.f.shape)
@@ -216,9 +214,11 @@ def build_forward(touches: Presses, model: Model, *, solver: Any = None) -> Forw
     unique, first, inverse = places_of(touches)
 
     def solve() -> dict[str, np.ndarray]:
-        ratio = model.modulus_ratio if np.ptp(model.modulus_ratio) > 0 else None
+        ratio = model.element_ratio if np.ptp(model.element_ratio) > 0 else None
         where = (touches.point[first], touches.normal[first])
-        sites = touch_sites(model.mesh.quadratic(), *where, model.poisson_ratio, ratio, solver=solver)
+        sites = touch_sites(
+            model.mesh.quadratic(), *where, model.material.poisson_ratio, ratio, solver=solver
+        )
         return {"far": sites.far, "curvature": sites.curvature}
 
     sites = stored("sites", model, touches, solve)
@@ -229,7 +229,7 @@ def build_forward(touches: Presses, model: Model, *, solver: Any = None) -> Forw
         model,
         np.ascontiguousarray(far),
         sites["curvature"][inverse],
-        model.poisson_ratio,
+        model.material.poisson_ratio,
         touches.tip_radius_m,
     )
 

@@ -86,7 +86,7 @@ def diagnose(
     settled = settle(forward, free, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
     search = Search(
-        forward, model.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
+        forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
         finite_strain=effect("finite_strain"),
     )  # fmt: skip
     left_out = set(FAST_LEAVES_OUT) if options.fast else set()

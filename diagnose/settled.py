@@ -99,9 +99,7 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
         reasons.append(f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared")
     heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
     if heavy and not turns and "tool_gravity_inertia" not in excluded:
-        weight = (
-            -forward.model.support_normal / np.linalg.norm(forward.model.support_normal) * STANDARD_GRAVITY
-        )
+        weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
         part = -free.mass_kg * forward.acceleration
         if untared:

@@ -21,7 +21,7 @@ def site_stiffness_sd(touches: Presses, model: Model, options: NuisanceOptions) 
     if model.shape_uncertainty_m is None:
         return np.full(len(touches), options.site_stiffness)
     surface = np.flatnonzero(model.mesh.touchable)
-    height = np.ptp((model.mesh.points - model.support_point) @ model.support_normal)
+    height = np.ptp(model.support.height(model.mesh.points))
     tree = cKDTree(model.mesh.points[surface])
     near = tree.query_ball_point(touches.point, 0.35 * height)
     spread = np.array(

@@ -12,7 +12,7 @@ import numpy as np
 from diagnose.effects.inclusion import first_order
 from diagnose.fields import PATCH_WIDTH_IN_MESH_SIZES, energy_fields
 from diagnose.forward import Forward
-from mechanics.inclusion import inclusion_ratio
+from mechanics.moduli import inclusion_ratio
 from mechanics.patch import PatchSampler
 from mechanics.refine import typical_edge
 from mechanics.solver import Solver

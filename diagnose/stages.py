@@ -23,7 +23,7 @@ def stored(
     path = None if model.path is None else model.path / f"diagnosis-{name}.cache"
     mesh = model.mesh
     key = content_key(
-        name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.modulus_ratio, model.poisson_ratio,
-        touches.point, touches.normal,
+        name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
+        model.material.poisson_ratio, touches.point, touches.normal,
     )  # fmt: skip
     return load_or_build(path, key, build)

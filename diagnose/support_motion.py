@@ -55,7 +55,7 @@ def _condensed(forward: Forward) -> dict[str, np.ndarray]:
     fields = energy_fields(forward)
     solver = fields.solver
     mesh, free = solver.mesh, solver.free
-    axes = np.stack([unit_normal(forward.model), *support_axes(forward.model)])
+    axes = np.stack([forward.model.support.normal, *support_axes(forward.model)])
     corners, interpolation = _corner_motion(mesh)
     fixed = np.setdiff1d(np.arange(3 * len(mesh.points)), free)
     full = stiffness(mesh, solver.poisson_ratio)
@@ -69,21 +69,16 @@ def _condensed(forward: Forward) -> dict[str, np.ndarray]:
     loads = fields.solution.reshape(3 * len(mesh.points), -1)[free]
     reaction = (coupling.T @ loads).reshape(len(own), -1, 3).transpose(1, 0, 2)
     return {
-        "plane": (mesh.points[corners] - forward.model.support_point) @ axes[1:].T,
+        "plane": (mesh.points[corners] - forward.model.support.point) @ axes[1:].T,
         "stiffness": own - 0.5 * (give + give.T),
         "mass": _mass(mesh, corners),
         "reaction": np.ascontiguousarray(reaction),
     }
 
 
-def unit_normal(model: Model) -> np.ndarray:
-    """(3,) out of the support, into the object."""
-    return model.support_normal / np.linalg.norm(model.support_normal)
-
-
 def support_axes(model: Model) -> tuple[np.ndarray, np.ndarray]:
     """Two unit vectors in the support plane."""
-    normal = unit_normal(model)
+    normal = model.support.normal
     across = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
     across /= np.linalg.norm(across)
     return across, np.cross(normal, across)

@@ -19,13 +19,12 @@ import scipy.sparse as sp
 from mechanics import pardiso
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError, OptionError
-from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver, free_dofs
 from mechanics.store import content_key, load_or_build
-from mechanics.support import support_of
+from mechanics.support import base_hold
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 
@@ -191,9 +190,10 @@ def load_or_condense(
     (mechanics.support). A model that was never written, or a folder that cannot be written, is computed in
     memory. A large surface is compressed (ComplianceOptions).
     """
-    support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
-    held = () if support is None else dataclasses.astuple(support)
-    balls = balls_of(model)
+    material = model.material
+    hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)
+    held = () if hold is None else dataclasses.astuple(hold)
+    balls = tuple(material.inclusions.values())
     error = (options or ComplianceOptions()).error_of(model.mesh)
     form = () if error is None else ("low-rank", error)
     key = content_key(
@@ -202,23 +202,23 @@ def load_or_condense(
         model.mesh.tetrahedra,
         model.mesh.fixed,
         model.mesh.touchable,
-        model.poisson_ratio,
-        model.modulus_ratio,
+        material.poisson_ratio,
+        model.ratio_without_balls,
         *held,
         *form,
-        *([model.tip_radius_m] if balls else []),
+        *([model.tool.tip_radius_m] if balls else []),
         *(value for ball in balls for value in dataclasses.astuple(ball)),
     )
 
     def build() -> dict[str, np.ndarray]:
         made = surface_compliance(
             model.mesh,
-            model.poisson_ratio,
-            model.modulus_ratio,
+            material.poisson_ratio,
+            model.ratio_without_balls,
             balls=balls,
-            support=support,
+            hold=hold,
             low_rank_error=error,
-            tip_radius_m=model.tip_radius_m,
+            tip_radius_m=model.tool.tip_radius_m,
             progress=progress,
         )
         return made.arrays()

@@ -26,14 +26,14 @@ def carried_by_floor(
 ) -> np.ndarray:
     """(k, 3, 3) 1/m that the floor takes off the give of patches at points (k, 3) m, unit modulus.
 
-    solver: its support bonded in part. normals: (k, 3) outward at the points.
+    solver: its base bonded in part. normals: (k, 3) outward at the points.
     """
     mesh = solver.mesh
     nodes = _loose_corners(solver)
     result = np.zeros((len(points), 3, 3))
     if not len(nodes):
         return result
-    up = solver.support.normal / np.linalg.norm(solver.support.normal)
+    up = solver.hold.normal
     average = PatchSampler(mesh, patch_width_m).matrix(points)
     give = np.empty((len(nodes), len(nodes)))
     reach = np.empty((len(points), 3, len(nodes)))
@@ -80,8 +80,8 @@ def resting(give: np.ndarray, motion: np.ndarray, guess: np.ndarray | None = Non
 
 def _loose_corners(solver: Solver) -> np.ndarray:
     """Corner nodes of the base that no held triangle has."""
-    support = solver.support
-    if support is None or support.bonded_fraction >= 1:
+    hold = solver.hold
+    if hold is None or hold.bonded_fraction >= 1:
         return np.zeros(0, dtype=np.int64)
     corners = np.unique(base_triangles(solver.mesh)[:, :3])
-    return np.setdiff1d(corners, np.unique(support.held_triangles(solver.mesh)))
+    return np.setdiff1d(corners, np.unique(hold.held_triangles(solver.mesh)))

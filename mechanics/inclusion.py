@@ -10,92 +10,19 @@ inside costs dense algebra of the size of what changed. Exact to about 1e-7 of t
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
-
 import numpy as np
 import scipy.linalg as la
 import scipy.sparse as sp
 
 from mechanics.elasticity import element_stiffness
 from mechanics.errors import MeshError
-from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
-from mechanics.tetmesh import TetMesh
 
 _COLUMNS = 96
 _NEGLIGIBLE = 1e-6  # singular values of X over the greatest one
 _PROBES = 240  # directions in which a change of a few centimetres is sought, before all are
 _MISSED = 1e-7
-
-# points that share a tetrahedron evenly: centres of the 20 tetrahedra and holes of a cut in three
-_GRID = np.array(
-    [[i, j, k, 3 - i - j - k] for i in range(4) for j in range(4 - i) for k in range(4 - i - j)], dtype=float
-)
-_SAMPLES = (_GRID + 0.25) / 4
-
-
-def share_inside(
-    mesh: TetMesh, centre_m: np.ndarray, radius_m: float, elements: np.ndarray | slice = slice(None)
-) -> np.ndarray:
-    """(m,) share of each tetrahedron (or of `elements` alone) in a sphere, from 20 points in each."""
-    points = points_inside(mesh, elements)
-    return (np.linalg.norm(points - centre_m, axis=2) < radius_m).mean(axis=1)
-
-
-def points_inside(mesh: TetMesh, elements: np.ndarray | slice = slice(None)) -> np.ndarray:
-    """(m, 20, 3) m, points that share each tetrahedron (or each of `elements`) evenly."""
-    return np.einsum("qc,mcx->mqx", _SAMPLES, mesh.points[mesh.tetrahedra[elements, :4]])
-
-
-def inclusion_ratio(mesh: TetMesh, centre_m: np.ndarray, radius_m: float, modulus_ratio: float) -> np.ndarray:
-    """(m,) modulus over the global one of a sphere `modulus_ratio` times as stiff.
-
-    A tetrahedron that the sphere cuts takes `mixed_ratio` of its share.
-    """
-    return mixed_ratio(share_inside(mesh, centre_m, radius_m), modulus_ratio)
-
-
-def mixed_ratio(share: np.ndarray, modulus_ratio: float) -> np.ndarray:
-    """Modulus of a matrix (1) that holds a share of balls `modulus_ratio` times as stiff, incompressible.
-
-    After Mori and Tanaka (1973), for stiff balls the lower bound of Hashin and Shtrikman: it keeps the far
-    effect of what a tetrahedron holds; the geometric mean has 10 % more of it.
-    """
-    return 1 + share * (modulus_ratio - 1) / (1 + 0.4 * (1 - share) * (modulus_ratio - 1))
-
-
-@dataclass(frozen=True)
-class Ball:
-    """A sphere in an object: centre (3,) m in the mesh's frame, radius m, modulus over the object's."""
-
-    centre_m: tuple[float, float, float]
-    radius_m: float
-    modulus_ratio: float
-
-
-def balls_of(model: Model) -> tuple[Ball, ...]:
-    """Those that a model states beside its elements' moduli, under [inclusions.NAME]."""
-    stated = model.extra.get("inclusions", {})
-    return tuple(
-        Ball(tuple(map(float, ball["centre_m"])), float(ball["radius_m"]), float(ball["modulus_ratio"]))
-        for ball in stated.values()
-    )
-
-
-def drawn_anew(
-    mesh: TetMesh, modulus_ratio: np.ndarray, fine: TetMesh, parent: np.ndarray, balls: Sequence[Ball]
-) -> np.ndarray:
-    """Moduli (of `fine`) of a mesh whose tetrahedra were cut, `parent` naming the one that each lies in.
-
-    modulus_ratio (m,) holds the balls as inclusion_ratio draws them on `mesh`; they are drawn on `fine`.
-    """
-    ratio = modulus_ratio[parent]
-    for ball in balls:
-        known = np.array(ball.centre_m), ball.radius_m, ball.modulus_ratio
-        ratio *= inclusion_ratio(fine, *known) / inclusion_ratio(mesh, *known)[parent]
-    return ratio
 
 
 class Region:

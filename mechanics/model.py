@@ -1,7 +1,9 @@
 """A reconstructed model and its folder, which ParaView and a text editor open.
 
-MODEL/model.toml       material, tool, mesh, frame, effects, provenance
-MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, young_modulus_pa, shape uncertainty
+MODEL/model.toml       format, material, tool, mesh, frame, effects, provenance, what else is known: this
+                       counts, an edited value changes the model
+MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, shape uncertainty; modulus_field
+                       where the material has one; young_modulus_pa, for people who look: never read back
 MODEL/presses.bin      the table of presses, samples and all (mechanics.presses) MODEL/palpations.csv   one
 row a palpation MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content"""
 
@@ -19,62 +21,126 @@ import numpy as np
 
 from mechanics.errors import MeshError, ModelError
 from mechanics.files import atomic_folder
+from mechanics.material import UNKNOWN, Ball, Gradient, Material, Skin, finite, positive
+from mechanics.moduli import balls_ratio, gradient_ratio, skin_ratio, with_balls, within_limits
 from mechanics.presses import Presses, no_presses, read_csv, read_presses, write_csv, write_presses
 from mechanics.recording import dump_toml
 from mechanics.tetmesh import TetMesh, vertex_normals
+
+FORMAT = 2
+"""Of model.toml. 1, which states none: moduli of elements in mesh.vtu, [inclusions], the dent law in
+[provenance]."""
+
+
+@dataclass(frozen=True, eq=False)
+class Support:
+    """The plane that an object stands on: point (3,) m; normal (3,), made a unit vector, into the object.
+
+    Raises ModelError where one is not finite, or the normal has no direction.
+    """
+
+    point: np.ndarray
+    normal: np.ndarray
+
+    def __post_init__(self) -> None:
+        point, normal = finite("support_point", self.point, (3,)), finite("support_normal", self.normal, (3,))
+        length = np.linalg.norm(normal)
+        if not length > 0:
+            raise ModelError("support_normal is [0, 0, 0]; it must point out of the support")
+        if abs(length - 1) > 1e-15:  # a unit vector keeps its bits
+            normal = normal / length
+        for name, value in (("point", point), ("normal", normal)):
+            value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    def height(self, points: np.ndarray) -> np.ndarray:
+        """(k,) m over the plane, of points (k, 3)."""
+        return (np.asarray(points) - self.point) @ self.normal
+
+
+@dataclass(frozen=True)
+class Tool:
+    """tip_radius_m: of the rigid sphere that touches; greater than 0."""
+
+    tip_radius_m: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "tip_radius_m", positive("tip_radius_m", self.tip_radius_m))
 
 
 @dataclass(frozen=True)
 class Model:
     """Everything that a renderer needs; SI units, device frame.
 
-    young_modulus_pa: the global modulus e of eq. (13); young_modulus_ci95_pa: its 95 % interval.
-    modulus_ratio: (m,) modulus of each tetrahedron over the global one (1 where homogeneous).
-    support_point, support_normal: (3,), the support plane; the normal points into the object.
     shape_uncertainty_m: (n,) standard deviation of the surface along its normal at each node, or None.
     presses: the table of what was pressed. effects: parameters of every effect that a diagnosis added, by
-    name. provenance: where it came from.
+    name; what of one is material stands in the material, and only that counts. provenance: where it came
+    from. about: tables that inform, by name;
+    nothing reads physics from these two.
     """
 
     mesh: TetMesh
-    young_modulus_pa: float
-    poisson_ratio: float
-    tip_radius_m: float
+    material: Material
+    support: Support
+    tool: Tool
     mesh_size_m: float
-    support_point: np.ndarray
-    support_normal: np.ndarray
-    young_modulus_ci95_pa: tuple[float, float] = (float("nan"), float("nan"))
-    modulus_ratio: np.ndarray | None = None
     shape_uncertainty_m: np.ndarray | None = None
     presses: Presses = field(default_factory=lambda: no_presses(0.005))
     effects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
-    extra: Mapping[str, Any] = field(default_factory=dict)
+    about: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     path: Path | None = None
 
     def __post_init__(self) -> None:
-        ratio = self.modulus_ratio
-        ratio = np.ones(len(self.mesh.tetrahedra)) if ratio is None else np.asarray(ratio, dtype=float)
-        if ratio.shape != (len(self.mesh.tetrahedra),) or not (ratio > 0).all():
-            raise ModelError("modulus_ratio needs one positive value a tetrahedron")
-        object.__setattr__(self, "modulus_ratio", ratio)
-        for name in ("support_point", "support_normal"):
-            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
-        if not self.young_modulus_pa > 0:
-            raise ModelError(f"young_modulus_pa is {self.young_modulus_pa}; it must be greater than 0")
-        if not -1 < self.poisson_ratio < 0.5:
-            raise ModelError(f"poisson_ratio is {self.poisson_ratio}; it must lie between -1 and 0.5")
-        if not self.tip_radius_m > 0:
-            raise ModelError(f"tip_radius_m is {self.tip_radius_m}; it must be greater than 0")
+        given, needed = self.material.field, len(self.mesh.tetrahedra)
+        if given is not None and len(given) != needed:
+            raise ModelError(f"field has {len(given)} values; the mesh needs {needed}, one a tetrahedron")
 
     @cached_property
     def normals(self) -> np.ndarray:
         """(n, 3) outward unit normals at the nodes of the touchable surface, zero elsewhere."""
         return vertex_normals(self.mesh.points, self.mesh.touchable_surface)
 
+    @cached_property
+    def element_ratio(self) -> np.ndarray:
+        """(m,) modulus of each tetrahedron over the global one, of all parts of the material."""
+        return with_balls(self.mesh, self.ratio_without_balls, self.material.inclusions.values())
+
+    @cached_property
+    def ratio_without_balls(self) -> np.ndarray:
+        """(m,) of what the balls lie in, for meshes on which they are drawn by themselves."""
+        skin = self.material.skin
+        if skin is None:
+            return self.surface_ratio
+        return within_limits(self._bulk_ratio * skin_ratio(self.mesh, skin))
+
+    @cached_property
+    def surface_ratio(self) -> np.ndarray:
+        """(m,) of what a dent meets beside its law: without balls, which lie inside, and without the skin."""
+        return within_limits(self._bulk_ratio)
+
+    @cached_property
+    def _bulk_ratio(self) -> np.ndarray:
+        material, ratio = self.material, np.ones(len(self.mesh.tetrahedra))
+        if material.field is not None:
+            ratio = ratio * material.field
+        if material.gradient is not None:
+            ratio = ratio * gradient_ratio(
+                self.mesh, material.gradient, self.support.point, self.support.normal
+            )
+        return ratio
+
     def replaced(self, **changes: Any) -> Model:
         """A copy with some fields changed."""
         return dataclasses.replace(self, **changes)
+
+    def with_material(self, **changes: Any) -> Model:
+        """A copy with some fields of the material changed. The path stays: caches are keyed by content."""
+        return self.replaced(material=dataclasses.replace(self.material, **changes))
+
+    def with_modulus(self, young_modulus_pa: float) -> Model:
+        """A copy of another global modulus, whose interval nobody estimated."""
+        return self.with_material(young_modulus_pa=young_modulus_pa, young_modulus_ci95_pa=UNKNOWN)
 
 
 def write_model(path: Path | str, model: Model) -> Path:
@@ -84,15 +150,11 @@ def write_model(path: Path | str, model: Model) -> Path:
     path = Path(path)
     if path.exists() and not (path / "model.toml").exists() and (path.is_file() or any(path.iterdir())):
         raise ModelError(f"'{path}' exists and is no MODEL folder: name another output")
-    mesh = model.mesh
-    low, high = model.young_modulus_ci95_pa
+    mesh, material = model.mesh, model.material
     table = {
-        "material": {
-            "young_modulus_pa": model.young_modulus_pa,
-            "young_modulus_ci95_pa": [low, high],
-            "poisson_ratio": model.poisson_ratio,
-        },
-        "tool": {"tip_radius_m": model.tip_radius_m},
+        "format": FORMAT,
+        "material": _material_table(material),
+        "tool": {"tip_radius_m": model.tool.tip_radius_m},
         "mesh": {
             "nodes": len(mesh.points),
             "tetrahedra": len(mesh.tetrahedra),
@@ -100,10 +162,10 @@ def write_model(path: Path | str, model: Model) -> Path:
             "mesh_size_m": model.mesh_size_m,
             "element_order": mesh.order,
         },
-        "frame": {"support_point": model.support_point, "support_normal": model.support_normal},
+        "frame": {"support_point": model.support.point, "support_normal": model.support.normal},
         "effects": {name: dict(keys) for name, keys in model.effects.items()},
         "provenance": dict(model.provenance),
-        **{name: dict(keys) for name, keys in model.extra.items()},
+        **{name: dict(keys) for name, keys in model.about.items()},
     }
     kind = pyvista.CellType.TETRA if mesh.order == 1 else pyvista.CellType.QUADRATIC_TETRA
     grid = pyvista.UnstructuredGrid({kind: mesh.tetrahedra}, mesh.points)
@@ -111,7 +173,9 @@ def write_model(path: Path | str, model: Model) -> Path:
     grid.point_data["touchable"] = mesh.touchable.astype(np.uint8)
     if model.shape_uncertainty_m is not None:
         grid.point_data["shape_uncertainty_m"] = np.asarray(model.shape_uncertainty_m, dtype=float)
-    grid.cell_data["young_modulus_pa"] = model.young_modulus_pa * model.modulus_ratio
+    grid.cell_data["young_modulus_pa"] = material.young_modulus_pa * model.element_ratio
+    if material.field is not None:
+        grid.cell_data["modulus_field"] = material.field
     with atomic_folder(path) as folder:
         (folder / "model.toml").write_text(dump_toml(table), encoding="utf-8")
         grid.save(folder / "mesh.vtu")
@@ -120,11 +184,28 @@ def write_model(path: Path | str, model: Model) -> Path:
     return path
 
 
-_KNOWN_TABLES = ("material", "tool", "mesh", "frame", "effects", "provenance")
+def _material_table(material: Material) -> dict[str, Any]:
+    """[material] and its tables; parts that are not there are left out."""
+    parts = {name: getattr(material, name) for name in ("gradient", "skin")}
+    return {
+        "young_modulus_pa": material.young_modulus_pa,
+        "young_modulus_ci95_pa": list(material.young_modulus_ci95_pa),
+        "poisson_ratio": material.poisson_ratio,
+        "dent_law": material.dent_law,
+        **{name: dataclasses.asdict(part) for name, part in parts.items() if part is not None},
+        "inclusions": {name: dataclasses.asdict(ball) for name, ball in material.inclusions.items()} or None,
+    }
+
+
+_KNOWN_TABLES = ("format", "material", "tool", "mesh", "frame", "effects", "provenance")
 
 
 def read_model(path: Path | str) -> Model:
-    """Read a MODEL folder; raises ModelError where a file or key is missing or the files contradict."""
+    """Read a MODEL folder; one of an older format is converted.
+
+    Raises ModelError where a file or key is missing, a value is impossible, the files contradict, or the
+    format is newer than this program.
+    """
     import pyvista
 
     path = Path(path)
@@ -138,49 +219,106 @@ def read_model(path: Path | str) -> Model:
         table = tomllib.loads((path / "model.toml").read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ModelError(f"'{path / 'model.toml'}' is no valid TOML: {error}") from error
-    try:
-        material, frame = table["material"], table["frame"]
-        grid = pyvista.read(path / "mesh.vtu")
-        cells = grid.cells_dict
-        tetrahedra = cells.get(int(pyvista.CellType.QUADRATIC_TETRA), cells.get(int(pyvista.CellType.TETRA)))
-        if tetrahedra is None:
-            raise ModelError(f"'{path / 'mesh.vtu'}' holds no tetrahedra")
-        mesh = TetMesh(
-            np.asarray(grid.points, dtype=float),
-            tetrahedra,
-            np.asarray(grid.point_data["fixed"]) > 0,
-            np.asarray(grid.point_data["touchable"]) > 0,
+    version = table.get("format", 1)
+    if version not in (1, FORMAT):
+        raise ModelError(
+            f"'{path}' has format {version}; this program reads 1 to {FORMAT}: "
+            "install the version that wrote it, or make it anew with 'palpate reconstruct REC -o MODEL'"
         )
-        modulus = float(material["young_modulus_pa"])
-        uncertainty = grid.point_data.get("shape_uncertainty_m")
+    try:
+        grid = pyvista.read(path / "mesh.vtu")
+        mesh = _mesh_of(grid)
         if int(table["mesh"]["nodes"]) != len(mesh.points):
             raise ModelError(
-                f"'{path}': model.toml says {table['mesh']['nodes']} nodes, "
-                f"mesh.vtu holds {len(mesh.points)}: "
+                f"model.toml says {table['mesh']['nodes']} nodes, mesh.vtu holds {len(mesh.points)}: "
                 "the files are of different models; reconstruct again"
             )
-        ci = material.get("young_modulus_ci95_pa", [float("nan")] * 2)
+        support = Support(table["frame"]["support_point"], table["frame"]["support_normal"])
+        uncertainty = grid.point_data.get("shape_uncertainty_m")
+        if version == 1:
+            drawn = np.asarray(grid.cell_data["young_modulus_pa"], dtype=float)
+            table["material"] = _material_of_format_1(table, mesh, support, drawn)
+        else:
+            table["material"] = _material_of(table["material"], grid.cell_data.get("modulus_field"))
         return Model(
             mesh=mesh,
-            young_modulus_pa=modulus,
-            young_modulus_ci95_pa=(float(ci[0]), float(ci[1])),
-            poisson_ratio=float(material["poisson_ratio"]),
-            tip_radius_m=float(table["tool"]["tip_radius_m"]),
+            material=table["material"],
+            support=support,
+            tool=Tool(table["tool"]["tip_radius_m"]),
             mesh_size_m=float(table["mesh"]["mesh_size_m"]),
-            support_point=np.array(frame["support_point"], dtype=float),
-            support_normal=np.array(frame["support_normal"], dtype=float),
-            modulus_ratio=np.asarray(grid.cell_data["young_modulus_pa"], dtype=float) / modulus,
             shape_uncertainty_m=None if uncertainty is None else np.asarray(uncertainty, dtype=float),
             presses=_presses(path, float(table["tool"]["tip_radius_m"])),
             effects=table.get("effects", {}),
             provenance=table.get("provenance", {}),
-            extra={k: v for k, v in table.items() if k not in _KNOWN_TABLES},
+            about={k: v for k, v in table.items() if k not in _KNOWN_TABLES},
             path=path,
         )
+    except ModelError as error:
+        raise ModelError(f"'{path}': {error}") from error
     except KeyError as error:
         raise ModelError(f"'{path}' lacks {error}: reconstruct it again") from error
-    except (MeshError, TypeError, ValueError) as error:
+    except (MeshError, TypeError, ValueError, AttributeError) as error:
         raise ModelError(f"'{path}' is damaged: {error}") from error
+
+
+def _mesh_of(grid: Any) -> TetMesh:
+    """The mesh in a VTK grid; raises ModelError where it has no tetrahedra."""
+    import pyvista
+
+    cells = grid.cells_dict
+    tetrahedra = cells.get(int(pyvista.CellType.QUADRATIC_TETRA), cells.get(int(pyvista.CellType.TETRA)))
+    if tetrahedra is None:
+        raise ModelError("mesh.vtu holds no tetrahedra")
+    return TetMesh(
+        np.asarray(grid.points, dtype=float),
+        tetrahedra,
+        np.asarray(grid.point_data["fixed"]) > 0,
+        np.asarray(grid.point_data["touchable"]) > 0,
+    )
+
+
+def _material_of(keys: Mapping[str, Any], ratios: np.ndarray | None = None) -> Material:
+    """From [material] and the field of mesh.vtu; raises ModelError for a key that it does not know."""
+    known = [each.name for each in dataclasses.fields(Material) if each.name != "field"]
+    strange = sorted(set(keys) - set(known))
+    if strange:
+        raise ModelError(f"[material] has {', '.join(strange)}; allowed are {', '.join(known)}")
+    parts: dict[str, Any] = dict(keys)
+    if "gradient" in keys:
+        parts["gradient"] = Gradient(**keys["gradient"])
+    if "skin" in keys:
+        parts["skin"] = Skin(**keys["skin"])
+    if "inclusions" in keys:
+        parts["inclusions"] = {name: Ball(**ball) for name, ball in keys["inclusions"].items()}
+    return Material(**parts, field=ratios)
+
+
+def _material_of_format_1(
+    table: dict[str, Any], mesh: TetMesh, support: Support, element_modulus_pa: np.ndarray
+) -> Material:
+    """What format 1 spread over tables, typed; takes out of `table` what it typed.
+
+    It multiplied gradient, skin and balls into the moduli of the elements (m,) Pa: what these parts do not
+    draw becomes the field.
+    """
+    effects, provenance = table.get("effects", {}), table.get("provenance", {})
+    keys = {**table["material"], "dent_law": provenance.pop("dent_law", "linear")}
+    if "finite_strain" in effects:
+        keys["dent_law"] = "neo-hookean"
+    keys["inclusions"] = table.pop("inclusions", {})
+    for part, effect in (("gradient", "modulus_gradient"), ("skin", "skin_layer")):
+        if effect in effects:
+            keys[part] = effects[effect]
+    material = _material_of(keys)
+    ratio = balls_ratio(mesh, material.inclusions.values())
+    if material.gradient is not None:
+        ratio = ratio * gradient_ratio(mesh, material.gradient, support.point, support.normal)
+    if material.skin is not None:
+        ratio = ratio * skin_ratio(mesh, material.skin)
+    rest = element_modulus_pa / (material.young_modulus_pa * within_limits(ratio))
+    if np.abs(rest - 1).max() < 1e-6:
+        return material
+    return dataclasses.replace(material, field=rest)
 
 
 def _presses(path: Path, tip_radius_m: float) -> Presses:

@@ -9,12 +9,9 @@ without the nodule and drops out of the difference.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
 from mechanics.compression import own_compliance
-from mechanics.inclusion import Ball, inclusion_ratio
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
@@ -35,20 +32,14 @@ def contact_width(tip_radius_m: float) -> float:
 
 
 def surface_softness(
-    mesh: TetMesh,
-    modulus_ratio: np.ndarray,
-    points: np.ndarray,
-    tip_radius_m: float,
-    balls: Sequence[Ball] = (),
+    mesh: TetMesh, surface_ratio: np.ndarray, points: np.ndarray, tip_radius_m: float
 ) -> np.ndarray:
     """(k,) global modulus over that of the surface under a tip at points (k, 3) m; 1 where it is uniform.
 
-    Balls that modulus_ratio (m,) holds lie inside: what they add to elements at the surface does not count.
+    surface_ratio: (m,) of what lies at the surface (Model.surface_ratio): balls lie inside, a skin is in the
+    dent's law.
     """
-    ratio = np.asarray(modulus_ratio, dtype=float)
-    for ball in balls:
-        ratio = ratio / inclusion_ratio(mesh, np.array(ball.centre_m), ball.radius_m, ball.modulus_ratio)
-    softness = 1 / ratio[mesh.touchable_elements]
+    softness = 1 / surface_ratio[mesh.touchable_elements]
     if np.abs(softness - 1).max() < 1e-9:
         return np.ones(len(points))
     sampler = PatchSampler(mesh, contact_width(tip_radius_m))
@@ -79,7 +70,7 @@ def sharpening(
     felt = np.flatnonzero(_estimate(solver, points, soft, narrow, patch_width_m) > _NEGLIGIBLE)
     if not len(felt):
         return result
-    plain = Solver(solver.mesh, solver.poisson_ratio, support=solver.support)
+    plain = Solver(solver.mesh, solver.poisson_ratio, hold=solver.hold)
     for start in range(0, len(felt), _BATCH):
         some = felt[start : start + _BATCH]
         near, far = narrow_patch.matrix(points[some]), wide_patch.matrix(points[some])

@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import MeshError
-from mechanics.inclusion import Ball, drawn_anew
+from mechanics.material import Ball
+from mechanics.moduli import with_balls
 from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.refine import refined_around, refined_near_surface, typical_edge
 from mechanics.solver import Solver
-from mechanics.support import Support
+from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
@@ -60,22 +61,22 @@ def touch_solver(
     *,
     balls: Sequence[Ball] = (),
     surface_edge_m: float = SURFACE_EDGE_M,
-    support: Support | None = None,
+    hold: BaseHold | None = None,
 ) -> Solver:
     """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
 
     A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
     to 5 % too soft (docs/mechanics.md). Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
-    `mesh`. balls: those that modulus_ratio holds; their elements are halved too and the balls drawn anew.
+    `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
     """
     fine, parent = refined_near_surface(mesh, surface_edge_m)
     for ball in balls:
         fine, step = refined_around(fine, np.array(ball.centre_m), ball.radius_m, surface_edge_m)
         parent = parent[step]
-    ratio = None
-    if modulus_ratio is not None:
-        ratio = drawn_anew(mesh, np.asarray(modulus_ratio, dtype=float), fine, parent, balls)
-    return Solver(fine.quadratic(), poisson_ratio, ratio, support=support)
+    ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)[parent]
+    if balls:
+        ratio = with_balls(fine, ratio, balls)
+    return Solver(fine.quadratic(), poisson_ratio, ratio, hold=hold)
 
 
 def patch_width(mesh: TetMesh) -> float:
@@ -99,7 +100,8 @@ def touch_sites(
 ) -> TouchSites:
     """Far-field compliance at surface points (k, 3) m with outward normals (k, 3).
 
-    mesh: linear or quadratic; modulus_ratio: (m,). patch_width_m: None takes `patch_width`.
+    mesh: linear or quadratic; modulus_ratio: (m,), without the balls. patch_width_m: None takes
+    `patch_width`.
     curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh.
     solver: a factorisation to reuse, whose own mesh then counts; None makes `touch_solver(mesh, ...)`, for
     which the balls are.

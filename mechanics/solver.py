@@ -8,7 +8,7 @@ import scipy.sparse.linalg as spla
 from mechanics import pardiso
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError, OptionError
-from mechanics.support import Support
+from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh
 
 BACKENDS = ("pardiso", "superlu")
@@ -18,7 +18,7 @@ class Solver:
     """Displacements for nodal forces on a mesh with a fixed base, for unit Young's modulus.
 
     modulus_ratio: (m,) or None. backend: 'pardiso', 'superlu' or None for the best that is there.
-    support: how the base is held; None: bonded. The factorisation is done in the constructor. Raises
+    hold: how the base is held; None: bonded. The factorisation is done in the constructor. Raises
     MeshError where nothing is fixed (rigid motion).
     """
 
@@ -30,18 +30,18 @@ class Solver:
         *,
         backend: str | None = None,
         mean_dilatation: bool | None = None,
-        support: Support | None = None,
+        hold: BaseHold | None = None,
     ) -> None:
         self.mesh = mesh
         self.poisson_ratio = poisson_ratio
-        self.support = support
+        self.hold = hold
         self.modulus_ratio = None if modulus_ratio is None else np.asarray(modulus_ratio, dtype=float)
         self.backend = backend or ("pardiso" if pardiso.available() else "superlu")
         if self.backend not in BACKENDS:
             raise OptionError(f"backend is '{backend}'; allowed are {', '.join(BACKENDS)}")
-        self.free = free_dofs(mesh, support)
+        self.free = free_dofs(mesh, hold)
         full = stiffness(mesh, poisson_ratio, modulus_ratio, mean_dilatation=mean_dilatation)
-        springs = None if support is None else support.stiffness(mesh)
+        springs = None if hold is None else hold.stiffness(mesh)
         if springs is not None:
             full = (full + springs).tocsr()
         self.matrix = full[self.free][:, self.free].tocsr()
@@ -86,12 +86,12 @@ class Solver:
         return self._factor.solve(np.asfortranarray(right, dtype=float))
 
 
-def free_dofs(mesh: TetMesh, support: Support | None = None) -> np.ndarray:
+def free_dofs(mesh: TetMesh, hold: BaseHold | None = None) -> np.ndarray:
     """Indices of the degrees of freedom that are not fixed and belong to some element."""
     used = np.zeros(len(mesh.points), dtype=bool)
     used[mesh.tetrahedra.ravel()] = True
     if mesh.fixed[used].sum() < 3:
         raise MeshError("fewer than 3 nodes are fixed: the object would move as a rigid body")
-    held = mesh.fixed if support is None else support.held_nodes(mesh)
+    held = mesh.fixed if hold is None else hold.held_nodes(mesh)
     nodes = np.flatnonzero(used & ~held)
     return (3 * nodes[:, None] + np.arange(3)).ravel()

@@ -20,7 +20,7 @@ FLOOR = 1e5  # 1/m, stiffness a unit of area over the modulus: far stiffer than 
 
 
 @dataclass(frozen=True)
-class Support:
+class BaseHold:
     """normal: (3,) unit, out of the support into the object.
 
     springs: (normal, tangential) stiffness a unit of area over Young's modulus, 1/m; None: rigid.
@@ -92,10 +92,10 @@ def base_triangles(mesh: TetMesh) -> np.ndarray:
     return mesh.surface[mesh.fixed[mesh.surface[:, :3]].all(axis=1)]
 
 
-def support_of(
+def base_hold(
     effects: Mapping[str, Mapping[str, Any]], normal: np.ndarray, young_modulus_pa: float
-) -> Support | None:
-    """The support that compliant_base and unbonded_base describe; None where the base is bonded."""
+) -> BaseHold | None:
+    """The base as compliant_base and unbonded_base say; None where it is bonded. normal: (3,) unit."""
     springs, fraction, direction = None, 1.0, None
     if "compliant_base" in effects:
         keys = effects["compliant_base"]
@@ -108,4 +108,4 @@ def support_of(
         direction = np.asarray(keys["direction"], dtype=float)
     if springs is None and fraction >= 1:
         return None
-    return Support(np.asarray(normal, dtype=float), springs, fraction, direction)
+    return BaseHold(np.asarray(normal, dtype=float), springs, fraction, direction)

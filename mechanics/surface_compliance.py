@@ -17,7 +17,8 @@ import scipy.sparse as sp
 
 from mechanics.compression import compress, own_compliance
 from mechanics.floor import carried_by_floor
-from mechanics.inclusion import Ball
+from mechanics.material import Ball
+from mechanics.moduli import with_balls
 from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
 from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler, half_space_compliance, triangle_shapes
@@ -26,7 +27,7 @@ from mechanics.recovery import edge_middles
 from mechanics.refine import typical_edge
 from mechanics.sites import SURFACE_EDGE_M, patch_width, touch_solver
 from mechanics.solver import Solver
-from mechanics.support import Support
+from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 WIDE_PATCH_M = 0.008  # of the mutual give of a large surface, whatever its elements
@@ -105,22 +106,23 @@ def surface_compliance(
     modulus_ratio: np.ndarray | None = None,
     *,
     balls: Sequence[Ball] = (),
-    support: Support | None = None,
+    hold: BaseHold | None = None,
     low_rank_error: float | None = None,
     tip_radius_m: float = USUAL_TIP_RADIUS_M,
     progress: Progress = silent,
 ) -> SurfaceCompliance:
-    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None, with the balls in it;
-    support: None, bonded.
+    """Compute both tables. mesh: linear or quadratic; modulus_ratio: (m,) or None, without the balls;
+    hold: None, bonded.
 
     low_rank_error: None for dense blocks; else the relative error to which a factor stands in for them, under
     a patch of at least WIDE_PATCH_M. tip_radius_m: only matters where a ball lies close below the surface
     (mechanics.near_field).
     """
     # between places a loose base rests on the floor: never softer than what each place has of its own
-    resting = None if support is None else replace(support, resting=True)
-    loose = support is not None and support.bonded_fraction < 1
-    coarse = Solver(mesh.quadratic(), poisson_ratio, modulus_ratio, support=resting)
+    resting = None if hold is None else replace(hold, resting=True)
+    loose = hold is not None and hold.bonded_fraction < 1
+    drawn = with_balls(mesh, modulus_ratio, balls) if balls else modulus_ratio
+    coarse = Solver(mesh.quadratic(), poisson_ratio, drawn, hold=resting)
     nodes, triangles = _corners(coarse.mesh)
     points = coarse.mesh.points[nodes]
     normals = _normals(coarse.mesh, nodes)
@@ -134,7 +136,7 @@ def surface_compliance(
         tables["factor"] = compress(coarse, points, width, tolerance=low_rank_error, progress=progress).factor
     if typical_edge(mesh) > SURFACE_EDGE_M or balls or loose:
         del coarse
-        fine = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, support=support)
+        fine = touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls, hold=hold)
     else:  # what touch_solver would factorise once more
         fine = coarse
     own_nodes, own_triangles = _corners(fine.mesh)

@@ -193,7 +193,9 @@ def prepare(
     table = presses_on(recording, model)
     if site_m is not None:
         table = replace(table, site=sites_of(table.point, table.normal, site_m))
-    solved = touch_sites(model.mesh, table.point, table.normal, model.poisson_ratio, progress=progress)
+    solved = touch_sites(
+        model.mesh, table.point, table.normal, model.material.poisson_ratio, progress=progress
+    )
     smooth = low_passed(table)
     presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
     unit = {
@@ -258,7 +260,7 @@ def stiffness_along(
     depth_m: float,
 ) -> dict[str, np.ndarray]:
     """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
-    solved = touch_sites(model.mesh, places, normals, model.poisson_ratio)
+    solved = touch_sites(model.mesh, places, normals, model.material.poisson_ratio)
     presses = prepared.presses
     _, modulus = _predict(prepared, train, train[:1], "rbf")
     seen = presses.rows(train)
@@ -270,7 +272,7 @@ def stiffness_along(
         path,
         np.arange(len(places) + 1) * len(steps),
         young_modulus_pa=modulus,
-        tip_radius_m=model.tip_radius_m,
+        tip_radius_m=model.tool.tip_radius_m,
         law=law,
     )
     deepest = force.reshape(len(places), len(steps), 3)[:, -1]

@@ -27,16 +27,16 @@ def regions(model: Model, points: np.ndarray, normals: np.ndarray) -> list[Regio
     left lie towards the rim. base-band: the side's lowest 35 %. corners: where the outline reaches out by
     more than 10 % beyond the largest circle in it.
     """
-    up = model.support_normal / np.linalg.norm(model.support_normal)
+    up = model.support.normal
     nodes = model.mesh.points[np.unique(model.mesh.surface[:, :3])]
-    height = (nodes - model.support_point) @ up
+    height = model.support.height(nodes)
     middle = nodes.mean(axis=0)
 
     def across(x: np.ndarray) -> np.ndarray:
         offset = x - middle
         return offset - (offset @ up)[:, None] * up
 
-    h = ((points - model.support_point) @ up) / height.max()
+    h = model.support.height(points) / height.max()
     out = np.linalg.norm(across(points), axis=1)
     inscribed = _inscribed_radius(across(nodes), up)
     faces_up = normals @ up > np.cos(np.radians(40))

@@ -41,21 +41,22 @@ def warm_up() -> None:
     import render
     from mechanics.box_mesh import box_mesh
     from mechanics.compliance import load_or_condense
-    from mechanics.model import Model, write_model
+    from mechanics.material import Material
+    from mechanics.model import Model, Support, Tool, write_model
     from palpate.servo.headless import run_headless
     from render.replay import replay
 
     mesh = box_mesh((3, 3, 3), (0.04, 0.04, 0.04)).quadratic()
     up = np.array([0.0, 0.0, 1.0])
     with tempfile.TemporaryDirectory() as folder:
-        block = Model(mesh, 20e3, 0.49, 0.005, 0.0133, np.zeros(3), up)
+        block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(0.005), 0.0133)
         block = block.replaced(path=write_model(Path(folder) / "block", block))
         load_or_condense(block)  # from now on it is mapped from disk, read-only: another type to the compiler
         renderer = render.create("fem", block)
         path = np.outer(np.linspace(0.05, 0.043, 50), up)
         t = np.arange(50) * 1e-3
         t.setflags(write=False)  # as a recording's
-        replay(renderer, t, path, tip_radius_m=block.tip_radius_m)
+        replay(renderer, t, path, tip_radius_m=block.tool.tip_radius_m)
         run_headless(block, "fem", seconds=0.2)
 
 

@@ -21,13 +21,13 @@ def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
             f"the base of the model '{model.path}' has only {len(rim)} rim nodes; at least 8 are needed: "
             "reconstruct that model with a finer --mesh-size"
         )
-    n = model.support_normal
+    n = model.support.normal
     after, before = np.roll(rim, -1, axis=0), np.roll(rim, 1, axis=0)
     outward = np.cross(after - before, n)
     outward /= np.linalg.norm(outward, axis=1, keepdims=True)
     outward *= np.sign(np.sum(outward * (rim - rim.mean(axis=0))))
     return Boundary(
-        support_point=model.support_point,
+        support_point=model.support.point,
         support_normal=n,
         outline=rim,
         outward=outward,
@@ -45,6 +45,6 @@ def _ordered_rim(model: Model) -> np.ndarray:
     rim = mesh.points[corners[mesh.fixed[corners]]]
     if not len(rim):
         return rim
-    u, v = tangents(model.support_normal)
+    u, v = tangents(model.support.normal)
     offset = rim - rim.mean(axis=0)
     return rim[np.argsort(np.arctan2(offset @ v, offset @ u))]

@@ -12,7 +12,8 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.linear_range import linear_range
-from mechanics.model import Model, read_model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
@@ -145,17 +146,14 @@ def reconstruct_fully(
         tables["linear_range"] = linear_range(sites, recording.tip_radius_m).table()
     model = Model(
         mesh=mesh,
-        young_modulus_pa=modulus,
-        young_modulus_ci95_pa=interval,
-        poisson_ratio=nu,
-        tip_radius_m=recording.tip_radius_m,
+        material=Material(modulus, nu, interval, dent_law="linear" if fit is None else fit.press.law),
+        support=Support(exploration.boundary.support_point, exploration.boundary.support_normal),
+        tool=Tool(recording.tip_radius_m),
         mesh_size_m=options.meshing.mesh_size_m,
-        support_point=exploration.boundary.support_point,
-        support_normal=exploration.boundary.support_normal,
         shape_uncertainty_m=meshing.shape_uncertainty_m if paper else uncertainty_at(mesh, surface),
         presses=presses.with_fits(**columns(one_d, each)),
         provenance=_provenance(exploration, options, surface, fit),
-        extra=tables,
+        about=tables,
     )
     progress("done", 1.0)
     return Reconstruction(
@@ -217,7 +215,7 @@ def _provenance(
     if exploration.delay_s:
         about |= {"force_delay_s": exploration.delay_s, "force_delay_sd_s": exploration.delay_error_s}
     if fit is not None:
-        about |= {"dent_law": fit.press.law, "modulus_reason": fit.reason}
+        about["modulus_reason"] = fit.reason
     return about
 
 

@@ -150,7 +150,7 @@ def new_grip(tips: int) -> Grip:
 
 def check_radii(radii_m: Sequence[float] | None, model: Model) -> np.ndarray:
     """Radii as an array; raises OptionError where one is not positive and finite."""
-    radii = np.atleast_1d(np.asarray([model.tip_radius_m] if radii_m is None else radii_m, dtype=float))
+    radii = np.atleast_1d(np.asarray([model.tool.tip_radius_m] if radii_m is None else radii_m, dtype=float))
     if radii.ndim != 1 or not len(radii) or not (np.isfinite(radii) & (radii > 0)).all():
         raise OptionError(f"tip radii are {radii.tolist()}; each must be a finite number greater than 0 m")
     return radii

@@ -63,7 +63,7 @@ def effect_arrays(model: Model, options: RenderOptions) -> EffectArrays:
         if "mullins_softening" in effects:
             keys = effects["mullins_softening"]
             known = model.presses.depth_m[np.isfinite(model.presses.depth_m)]
-            deepest = float(known.max(initial=0.0)) or model.tip_radius_m
+            deepest = float(known.max(initial=0.0)) or model.tool.tip_radius_m
             mullins = np.array([float(keys["r"]), float(keys["m_rel"]) * dent_energy(deepest)])
             _check(
                 mullins[0] >= 1 and mullins[1] > 0, "mullins_softening", "r at least 1, m_rel greater than 0"
@@ -79,7 +79,7 @@ def effect_arrays(model: Model, options: RenderOptions) -> EffectArrays:
                 "pull_off_n at least 0, range_m above 0, inside from 0 to 1",
             )
         if "tip_radius" in effects:
-            dent_radius = np.array([float(effects["tip_radius"]["tip_radius_m"]) / model.tip_radius_m])
+            dent_radius = np.array([float(effects["tip_radius"]["tip_radius_m"]) / model.tool.tip_radius_m])
             _check(dent_radius[0] > 0, "tip_radius", "tip_radius_m greater than 0")
     except KeyError as error:
         raise ModelError(
@@ -91,21 +91,14 @@ def effect_arrays(model: Model, options: RenderOptions) -> EffectArrays:
 
 
 def rendered_dent_law(model: Model, options: RenderOptions) -> DentLaw:
-    """The options' law, or neo-Hookean where finite strain is an effect of the model, or the law it was
-    fitted with."""
-    name = options.dent_law or str(model.provenance.get("dent_law", "linear"))
-    if not options.effects:
-        return dent_law(name)
-    if options.dent_law is None and "finite_strain" in model.effects:
-        name = "neo-hookean"
-    law = dent_law(name)
-    if "strain_stiffening" in model.effects:
+    """The options' law or else the material's, with what stiffens it: strain, and a skin (which is material,
+    so that it stays where the options leave effects out)."""
+    law, skin = dent_law(options.dent_law or model.material.dent_law), model.material.skin
+    if options.effects and "strain_stiffening" in model.effects:
         law = stiffened(law, float(model.effects["strain_stiffening"]["c20_over_c10"]))
-    if "skin_layer" in model.effects:
-        keys = model.effects["skin_layer"]
-        thickness, ratio = float(keys["thickness_m"]), float(keys["modulus_ratio"])
-        _check(thickness > 0 and ratio > 0, "skin_layer", "thickness_m and modulus_ratio above 0")
-        law = skinned(law, thickness, ratio, model.tip_radius_m, model.poisson_ratio)
+    if skin is not None:
+        tip, nu = model.tool.tip_radius_m, model.material.poisson_ratio
+        law = skinned(law, skin.thickness_m, skin.modulus_ratio, tip, nu)
     return law
 
 

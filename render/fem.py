@@ -60,8 +60,8 @@ class FemRenderer(Renderer):
             blocks=np.array(self.compliance.blocks),
             factor=np.array(self.compliance.factor),
             table=np.array(self.dent_law.table),
-            young_modulus_pa=np.array([model.young_modulus_pa]),
-            poisson_ratio=np.array([model.poisson_ratio]),
+            young_modulus_pa=np.array([model.material.young_modulus_pa]),
+            poisson_ratio=np.array([model.material.poisson_ratio]),
             friction=np.array([rendered_friction(model, self.options)]),
             series_compliance=np.zeros(1),
             edition=np.zeros(1, dtype=np.int64),
@@ -75,7 +75,7 @@ class FemRenderer(Renderer):
         if not young_modulus_pa > 0:
             raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
         changed = self._with(young_modulus_pa=np.array([float(young_modulus_pa)]))
-        changed.model = self.model.replaced(young_modulus_pa=float(young_modulus_pa))
+        changed.model = self.model.with_modulus(float(young_modulus_pa))
         return changed
 
     def with_field(self, far: np.ndarray, blocks: np.ndarray | None = None) -> FemRenderer:

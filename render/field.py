@@ -6,8 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.effects.skin_layer import skin_ratio
-from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.near_field import surface_softness
 from mechanics.patch import half_space_compliance
@@ -44,14 +42,12 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
     far = np.zeros((len(arrays.vertices), 3, 3))
     far[touched] = compliance.far_at(points, normals)
     softness = np.ones(len(arrays.vertices))
-    ratio = model.modulus_ratio
-    if "skin_layer" in model.effects:  # the dent's law knows it
-        keys = model.effects["skin_layer"]
-        ratio = ratio / skin_ratio(mesh, float(keys["thickness_m"]), float(keys["modulus_ratio"]))
-    softness[touched] = surface_softness(mesh, ratio, points, model.tip_radius_m, balls_of(model))
+    softness[touched] = surface_softness(mesh, model.surface_ratio, points, model.tool.tip_radius_m)
     width = float(compliance.own_width_m[0])
     for v in touched[softness[touched] != 1]:
-        far[v] += (1 - softness[v]) * half_space_compliance(arrays.normals[v], model.poisson_ratio, width)
+        far[v] += (1 - softness[v]) * half_space_compliance(
+            arrays.normals[v], model.material.poisson_ratio, width
+        )
     curvature = np.zeros(len(arrays.vertices))
     curvature[touched] = mean_curvature(mesh, points, normals)
     return Field(far, curvature, softness, parents)

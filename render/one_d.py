@@ -101,7 +101,7 @@ class OneDRenderer(Renderer):
     def with_modulus(self, young_modulus_pa: float) -> Renderer:
         if not young_modulus_pa > 0:
             raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
-        return self._with(scale=np.array([young_modulus_pa / self.model.young_modulus_pa]))
+        return self._with(scale=np.array([young_modulus_pa / self.model.material.young_modulus_pa]))
 
     def displacement_of(
         self,

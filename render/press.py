@@ -80,7 +80,7 @@ def press(
     if hold_s < 0 or approach_m <= 0:
         raise OptionError(f"hold is {hold_s} s and approach {approach_m} m: at least 0 s and more than 0 m")
     direction = direction / length
-    radius = renderer.model.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
+    radius = renderer.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     touch, normal = first_touch(renderer.parameters.surface, at, direction, radius)
     steepness = -float(normal @ direction)
     if steepness < np.cos(np.radians(80)):

@@ -55,7 +55,7 @@ def touch_gaps(arrays: SurfaceArrays, model: Model) -> tuple[np.ndarray, np.ndar
     feet, normals, gaps = [], [], []
     weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
     point, normal = np.zeros(3), np.zeros(3)
-    radius = model.tip_radius_m
+    radius = model.tool.tip_radius_m
     for centre in model.presses.point + radius * model.presses.normal:
         if not np.isfinite(centre).all():
             continue

@@ -11,23 +11,23 @@ import json
 import os
 import shutil
 import sys
-from collections.abc import Iterable
+from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from mechanics.errors import ModelError, SceneError
 from mechanics.files import atomic_folder
-from mechanics.model import Model, read_model, write_model
+from mechanics.material import Ball, Material
+from mechanics.model import Model, Support, Tool, read_model, write_model
 from mechanics.progress import Progress, silent
 from mechanics.recording import read_recording, recording_files
 from reconstruct.meshing import MeshingOptions, mesh_surface
 from reconstruct.pipeline import reconstruct
 from reconstruct.surface import Surface
 from scenes.embedded import embedded_names, embedded_recording
-from scenes.inclusions import modulus_ratio
+from scenes.inclusions import ball_of
 from scenes.phantoms import Region, phantom
 from scenes.scene import Scene
 from scenes.virtual_presses import palpate_model
@@ -129,32 +129,30 @@ def _from_phantom(scene: Scene, progress: Progress) -> Model:
         surface, MeshingOptions(mesh_size_m=scene.mesh_size_m), lambda s, f: progress(s, 0.4 * f)
     )
     regions = shape.regions if scene.inclusions is None else scene.inclusions
-    mesh = meshing.mesh.quadratic()
     model = Model(
-        mesh=mesh,
-        young_modulus_pa=scene.young_modulus_pa or shape.young_modulus_pa,
-        poisson_ratio=shape.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
-        tip_radius_m=scene.tip_radius_m or DEFAULT_TIP_RADIUS_M,
+        mesh=meshing.mesh.quadratic(),
+        material=Material(
+            young_modulus_pa=scene.young_modulus_pa or shape.young_modulus_pa,
+            poisson_ratio=shape.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
+            dent_law="neo-hookean" if scene.finite_strain else "linear",
+            inclusions=_balls(regions),
+        ),
+        support=Support(surface.support_point, surface.support_normal),
+        tool=Tool(scene.tip_radius_m or DEFAULT_TIP_RADIUS_M),
         mesh_size_m=scene.mesh_size_m,
-        support_point=np.zeros(3),
-        support_normal=np.array([0.0, 0.0, 1.0]),
-        modulus_ratio=modulus_ratio(mesh, regions),
         effects={"finite_strain": {}} if scene.finite_strain else {},
         provenance={"method": "scene", "phantom": shape.name, "shape": shape.shape},
-        extra={"inclusions": _stated(regions)},
     )
     return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
 
 
-def _stated(regions: Iterable[Region]) -> dict[str, dict[str, Any]]:
-    return {
-        r.name: {
-            "centre_m": list(r.centre_m),
-            "radius_m": r.radius_m,
-            "modulus_ratio": r.modulus_ratio,
-        }
-        for r in regions
-    }
+def _balls(regions: Collection[Region]) -> dict[str, Ball]:
+    balls = {region.name: ball_of(region) for region in regions}
+    if len(balls) < len(regions):
+        raise SceneError(
+            f"inclusions need names of their own; these came: {', '.join(r.name for r in regions)}"
+        )
+    return balls
 
 
 def _from_recording(scene: Scene, progress: Progress) -> Model:
@@ -167,18 +165,14 @@ def _from_model(scene: Scene, progress: Progress) -> Model:
 
 def _changed(scene: Scene, model: Model) -> Model:
     """What the scene says over what the model holds."""
-    changes: dict[str, object] = {"path": None}
     if scene.young_modulus_pa is not None:
-        changes["young_modulus_pa"] = scene.young_modulus_pa
-        changes["young_modulus_ci95_pa"] = (float("nan"), float("nan"))
+        model = model.with_modulus(scene.young_modulus_pa)
     if scene.poisson_ratio is not None:
-        changes["poisson_ratio"] = scene.poisson_ratio
-    if scene.tip_radius_m is not None:
-        changes["tip_radius_m"] = scene.tip_radius_m
+        model = model.with_material(poisson_ratio=scene.poisson_ratio)
     if scene.inclusions is not None:
-        changes["modulus_ratio"] = modulus_ratio(model.mesh, scene.inclusions)
-        changes["extra"] = {**model.extra, "inclusions": _stated(scene.inclusions)}
-    return model.replaced(**changes)
+        model = model.with_material(inclusions=_balls(scene.inclusions))
+    tool = model.tool if scene.tip_radius_m is None else Tool(scene.tip_radius_m)
+    return model.replaced(tool=tool, path=None)
 
 
 _MAKERS = {"phantom": _from_phantom, "recording": _from_recording, "model": _from_model}

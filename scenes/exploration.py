@@ -51,7 +51,7 @@ def explore(
     options = options or ExplorationOptions()
     random = np.random.default_rng(seed)
     trace = base_tracing(model, options)
-    times, points = [0.0], [trace[0] + 0.03 * model.support_normal]
+    times, points = [0.0], [trace[0] + 0.03 * model.support.normal]
     _go(times, points, trace[0], options.travel_speed_m_per_s)
     for point in trace[1:]:
         _go(times, points, point, options.tracing_speed_m_per_s)
@@ -59,7 +59,10 @@ def explore(
     high = _top(model) + 0.02
     _go(times, points, _raised(model, points[-1], high), options.travel_speed_m_per_s)
     for place in _sites(model, options):
-        n, centre = model.normals[place], model.mesh.points[place] + model.tip_radius_m * model.normals[place]
+        n, centre = (
+            model.normals[place],
+            model.mesh.points[place] + model.tool.tip_radius_m * model.normals[place],
+        )
         before = centre + options.clearance_m * n
         _go(times, points, _raised(model, before, high), options.travel_speed_m_per_s)
         _go(times, points, before, options.travel_speed_m_per_s)
@@ -82,18 +85,18 @@ def base_tracing(model: Model, options: ExplorationOptions) -> np.ndarray:
     radius less the lean; raises SceneError where the object cannot be gone around.
     """
     mesh = model.mesh
-    up = model.support_normal
+    up = model.support.normal
     e1 = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
     e1 /= np.linalg.norm(e1)
     e2 = np.cross(up, e1)
     triangles = mesh.surface[:, :3]
     base = mesh.points[mesh.fixed]
     middle = base.mean(axis=0)
-    middle += (model.tip_radius_m - options.bear_down_m - (middle - model.support_point) @ up) * up
+    middle += (model.tool.tip_radius_m - options.bear_down_m - model.support.height(middle)) * up
     turn = np.linspace(0.0, 2 * np.pi, ANGLES, endpoint=False)
     rays = np.cos(turn)[:, None] * e1 + np.sin(turn)[:, None] * e2
-    wanted = model.tip_radius_m - options.lean_m
-    far = np.linalg.norm(mesh.points - middle, axis=1).max() + 2 * model.tip_radius_m
+    wanted = model.tool.tip_radius_m - options.lean_m
+    far = np.linalg.norm(mesh.points - middle, axis=1).max() + 2 * model.tool.tip_radius_m
     reach = np.full(ANGLES, far)
     for _ in range(60):  # sphere tracing inwards: a step of the distance itself never passes the surface
         centres = middle + reach[:, None] * rays
@@ -109,16 +112,16 @@ def base_tracing(model: Model, options: ExplorationOptions) -> np.ndarray:
 
 
 def _top(model: Model) -> float:
-    return float(((model.mesh.points - model.support_point) @ model.support_normal).max())
+    return float(model.support.height(model.mesh.points).max())
 
 
 def _raised(model: Model, point: np.ndarray, height_m: float) -> np.ndarray:
-    up = model.support_normal
-    return point + (height_m - (point - model.support_point) @ up) * up
+    up = model.support.normal
+    return point + (height_m - model.support.height(point)) * up
 
 
 def _sites(model: Model, options: ExplorationOptions) -> np.ndarray:
-    clearance = 2.0 * model.tip_radius_m + options.clearance_m
+    clearance = 2.0 * model.tool.tip_radius_m + options.clearance_m
     return spread_places(model, options.sites, clearance_m=clearance)
 
 

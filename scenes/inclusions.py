@@ -1,22 +1,11 @@
-"""Stiff balls inside an object, as a modulus ratio a tetrahedron."""
+"""Stiff balls inside an object, as a material states them."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable
-
-import numpy as np
-
-from mechanics.inclusion import inclusion_ratio
-from mechanics.tetmesh import TetMesh
+from mechanics.material import Ball
 from scenes.phantoms import Region
 
 
-def modulus_ratio(mesh: TetMesh, regions: Iterable[Region]) -> np.ndarray:
-    """(m,) modulus of each tetrahedron over the object's: 1 outside; balls that overlap multiply.
-
-    Region centres: the mesh's frame.
-    """
-    ratio = np.ones(len(mesh.tetrahedra))
-    for region in regions:
-        ratio *= inclusion_ratio(mesh, np.array(region.centre_m), region.radius_m, region.modulus_ratio)
-    return ratio
+def ball_of(region: Region) -> Ball:
+    """The region as a part of a material; its centre in the mesh's frame."""
+    return Ball(region.centre_m, region.radius_m, region.modulus_ratio)

@@ -11,7 +11,6 @@ from dataclasses import replace
 import numpy as np
 
 from mechanics.errors import SceneError
-from mechanics.inclusion import balls_of
 from mechanics.model import Model
 from mechanics.presses import of_paths
 from mechanics.progress import Progress, silent
@@ -39,10 +38,10 @@ def palpate_model(
         model.mesh,
         points,
         normals,
-        model.poisson_ratio,
-        model.modulus_ratio,
-        balls=balls_of(model),
-        tip_radius_m=model.tip_radius_m,
+        model.material.poisson_ratio,
+        model.ratio_without_balls,
+        balls=tuple(model.material.inclusions.values()),
+        tip_radius_m=model.tool.tip_radius_m,
         progress=progress,
     )
     samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))
@@ -54,22 +53,22 @@ def palpate_model(
         touched,
         paths,
         starts,
-        young_modulus_pa=model.young_modulus_pa,
-        tip_radius_m=model.tip_radius_m,
-        law="neo-hookean" if "finite_strain" in model.effects else "linear",
+        young_modulus_pa=model.material.young_modulus_pa,
+        tip_radius_m=model.tool.tip_radius_m,
+        law=model.material.dent_law,
     )
-    centres = touched.points + model.tip_radius_m * touched.normals
+    centres = touched.points + model.tool.tip_radius_m * touched.normals
     presses = of_paths(
         starts,
         np.repeat(centres, len(depth), axis=0) + paths,
         forces,
         centres,
         touched.normals,
-        tip_radius_m=model.tip_radius_m,
+        tip_radius_m=model.tool.tip_radius_m,
         sample_rate_hz=RATE_HZ,
     )
     presses = replace(presses, depth_m=np.full(len(chosen), depth_m))
-    fitted = columns(fit_robust(presses), np.full(len(chosen), model.young_modulus_pa))
+    fitted = columns(fit_robust(presses), np.full(len(chosen), model.material.young_modulus_pa))
     return model.replaced(presses=presses.with_fits(**fitted))
 
 
@@ -79,7 +78,7 @@ def spread_places(model: Model, count: int, *, clearance_m: float = CLEARANCE_M)
     Rims, and places near the support where a tip would not fit, are left out.
     """
     mesh = model.mesh
-    height = (mesh.points - model.support_point) @ model.support_normal
+    height = model.support.height(mesh.points)
     triangles = mesh.touchable_surface[:, :3]
     corners = np.unique(triangles)
     flatness = np.ones(len(mesh.points))

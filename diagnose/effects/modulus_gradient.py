@@ -18,7 +18,7 @@ def _change(settings, values, forward):  # type: ignore[no-untyped-def]
     height = fields.height.max() * 1.02
     modulus = base + (top - base) * fields.height / height
     settings.far = settings.far - forward.far + far_with_weights(forward, 1 / modulus)
-    at = (forward.touches.point - forward.model.support_point) @ forward.model.support_normal
+    at = forward.model.support.height(forward.touches.point)
     local = np.clip(base + (top - base) * at / height, 0.05, None)
     half = fields.half_space[fields.place]
     settings.far = settings.far - (1 / local - 1)[:, None, None] * half

@@ -2,7 +2,7 @@
 
 The modulus under a contact of radius a is E ratio^w(thickness / a), w Gao's weight of a film (Gao, Chiu & Lee
 1992), 0 for a thin and 1 for a thick one: stiff at first touch, less so deeper. How the skin holds the whole
-object together is in the far field: each element takes the mean modulus of what it holds.
+object together is in the far field, by mechanics.moduli.skin_ratio.
 """
 
 from __future__ import annotations
@@ -10,9 +10,6 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.dent import DentLaw, grid
-from mechanics.inclusion import points_inside
-from mechanics.nearest import closest_on_triangles
-from mechanics.tetmesh import TetMesh
 
 
 def film_weight(thickness_over_contact: np.ndarray, poisson_ratio: float) -> np.ndarray:
@@ -38,17 +35,3 @@ def skinned(
     contact = tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
     factor = film_factor(contact, thickness_m, modulus_ratio, poisson_ratio)
     return law.scaled(factor, factor, name=f"{law.name}, skin")
-
-
-def skin_ratio(mesh: TetMesh, thickness_m: float, modulus_ratio: float) -> np.ndarray:
-    """(m,) modulus over that of the object within: 1 + (modulus_ratio - 1) of each element's share of skin.
-
-    The arithmetic mean, since a skin is stretched along with what it covers.
-    """
-    points = points_inside(mesh)
-    triangles = mesh.touchable_surface[:, :3]
-    flat = points.reshape(-1, 3)
-    triangle, weights = closest_on_triangles(flat, mesh.points, triangles)
-    nearest = np.einsum("kc,kcx->kx", weights, mesh.points[triangles[triangle]])
-    depth = np.linalg.norm(flat - nearest, axis=1).reshape(points.shape[:2])
-    return 1 + (modulus_ratio - 1) * (depth < thickness_m).mean(axis=1)

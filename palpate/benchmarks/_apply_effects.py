@@ -33,11 +33,11 @@ class Case:
 
 def cases(model: Model) -> list[Case]:
     """One for every effect of object, boundary and contact at strength 1, and one of three together."""
-    normal = model.support_normal / np.linalg.norm(model.support_normal)
-    height = float(((model.mesh.points - model.support_point) @ normal).max())
+    normal = model.support.normal
+    height = float(model.support.height(model.mesh.points).max())
     top, _ = places(model)
     radius = height / 5
-    stiffness = model.young_modulus_pa / height
+    stiffness, tip = model.material.young_modulus_pa / height, model.tool.tip_radius_m
     side = _side(model)
     lump = {"centre_m": list(top[0] - 2 * radius * normal), "radius_m": radius, "modulus_ratio": 6.0}
     memory = {"g": [0.3], "tau_s": [0.3]}
@@ -95,7 +95,7 @@ def cases(model: Model) -> list[Case]:
             over("held"),
             softer,
         ),
-        Case("tip_radius", {"tip_radius": {"tip_radius_m": 1.3 * model.tip_radius_m}}, held, over("held"),
+        Case("tip_radius", {"tip_radius": {"tip_radius_m": 1.3 * tip}}, held, over("held"),
              stiffer),
         Case(
             "friction_slip",
@@ -123,7 +123,7 @@ def cases(model: Model) -> list[Case]:
 
 def _side(model: Model) -> np.ndarray:
     """(3,) unit, in the support's plane."""
-    return tangents(model.support_normal / np.linalg.norm(model.support_normal))[0]
+    return tangents(model.support.normal)[0]
 
 
 def places(model: Model) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
@@ -131,11 +131,11 @@ def places(model: Model) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarra
     import pyvista
 
     mesh = model.mesh
-    up = model.support_normal / np.linalg.norm(model.support_normal)
+    up = model.support.normal
     surface = pyvista.PolyData.from_regular_faces(mesh.points, mesh.surface[:, :3])
     middle = mesh.points[mesh.fixed].mean(axis=0)
-    middle = middle - ((middle - model.support_point) @ up) * up
-    height = ((mesh.points - model.support_point) @ up).max()
+    middle = middle - model.support.height(middle) * up
+    height = model.support.height(mesh.points).max()
 
     def met(start: np.ndarray, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         hit, face = surface.ray_trace(start, start + direction, first_point=False)
@@ -152,7 +152,7 @@ def path_of(model: Model) -> Recording:
     """A tip path (its forces zero): on top a press that is held and dragged, the same again, and one from the
     side. About 6 s."""
     (top, n), (edge, m) = places(model)
-    radius = model.tip_radius_m
+    radius = model.tool.tip_radius_m
     sideways = tangents(n)[0]
     ramp = (DEPTH_M + ABOVE_M) / SPEED_M_PER_S
     above, below = top + (radius + ABOVE_M) * n, top + (radius - DEPTH_M) * n
@@ -172,7 +172,7 @@ def path_of(model: Model) -> Recording:
     )
     return Recording(
         t=t, position=position, force_on_tool=np.zeros_like(position), sample_rate_hz=RATE_HZ,
-        tip_radius_m=radius, poisson_ratio=model.poisson_ratio,
+        tip_radius_m=radius, poisson_ratio=model.material.poisson_ratio,
     )  # fmt: skip
 
 
@@ -184,7 +184,7 @@ def felt_on(model: Model, position: np.ndarray, force: np.ndarray) -> dict[str, 
     N, pressed from the side.
     """
     (top, n), (edge, m) = places(model)
-    radius = model.tip_radius_m
+    radius = model.tool.tip_radius_m
     depth = radius - (position - top) @ n
     aside = np.linalg.norm((position - top) - ((position - top) @ n)[:, None] * n, axis=1)
     push = force @ n

@@ -56,15 +56,15 @@ def one(path: Path, share: float, work: Path) -> dict[str, Any]:
         "noise_n": result.noise_n,
         "held_out_samples": int(after.sum()),
     }
-    ideal = plain.replaced(effects={}, provenance={**plain.provenance, "dent_law": "linear"})
+    ideal = plain.with_material(dent_law="linear").replaced(effects={})
     row["ideal_n"] = replayed(ideal, recording, after, fit=before)
     better = with_replayed_modulus(better.replaced(path=folder), corrected(first, result))
     row["improved_n"] = replayed(better, recording, after)
     true = {n: k for n, k in truth_effects(recording).items() if rendered(n)}
     if true:
-        stated = plain.replaced(effects={}, young_modulus_pa=recording.truth["young_modulus_pa"])
         law = "neo-hookean" if "finite_strain" in true else "linear"
-        stated = stated.replaced(provenance={**plain.provenance, "dent_law": law})
+        stated = plain.with_modulus(recording.truth["young_modulus_pa"]).with_material(dent_law=law)
+        stated = stated.replaced(effects={})
         model = with_effects(stated, true).replaced(path=folder)
         row["truth_n"] = replayed(model, recording, after, fit=before)
         alone = {n: k for n, k in true.items() if n != "finite_strain"}
@@ -112,7 +112,7 @@ def replayed(
     for _ in range(0 if fit is None else 3):
         forces = replay_recording(renderer, recording)[fit]
         scale = (forces * recording.force_on_tool[fit]).sum() / (forces**2).sum()
-        renderer = renderer.with_modulus(renderer.model.young_modulus_pa * scale)
+        renderer = renderer.with_modulus(renderer.model.material.young_modulus_pa * scale)
     return rms_n((replay_recording(renderer, recording) - recording.force_on_tool)[counted])
 
 

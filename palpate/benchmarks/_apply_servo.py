@@ -24,7 +24,7 @@ POLL_S = 0.5
 
 def run_all(model: Model, work: Path, only: list[str]) -> list[dict[str, Any]]:
     """The plain model and every case, one after the other; a row each. work: where models are kept."""
-    plain = model.replaced(effects={}, provenance={**model.provenance, "dent_law": "linear"}, path=None)
+    plain = model.with_material(dent_law="linear").replaced(effects={}, path=None)
     path = write_recording(work / "path.csv.gz", path_of(plain))
     base = _one("plain", plain, path, work)
     rows = [base]

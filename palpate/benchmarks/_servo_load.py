@@ -11,7 +11,8 @@ from numba import njit
 
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
-from mechanics.model import Model, read_model, write_model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool, read_model, write_model
 from palpate.benchmarks.compliance import block
 from palpate.servo.clock import compiled_now_ns, compiled_sleep_until, compiled_thread_cpu_ns
 from palpate.servo.histogram import BINS, Histogram, count
@@ -62,12 +63,10 @@ def block_model(touchable: int) -> Model:
     low = mesh.points.min(axis=0)
     return Model(
         mesh=mesh,
-        young_modulus_pa=30e3,
-        poisson_ratio=0.49,
-        tip_radius_m=TIP_RADIUS_M,
+        material=Material(30e3, 0.49),
+        support=Support(low, np.array([0.0, 0.0, 1.0])),
+        tool=Tool(TIP_RADIUS_M),
         mesh_size_m=float(np.cbrt(mesh.volumes.mean() * 8.5)),
-        support_point=low,
-        support_normal=np.array([0.0, 0.0, 1.0]),
     )
 
 

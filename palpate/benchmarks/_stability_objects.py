@@ -14,7 +14,8 @@ import numpy as np
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
 from mechanics.box_mesh import box_mesh
-from mechanics.model import Model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.tetmesh import TetMesh
 from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from render.fem import FemRenderer
@@ -44,12 +45,10 @@ def dome() -> Model:
     bent = np.stack([x, y, z], axis=1)
     return Model(
         mesh=TetMesh(bent, mesh.tetrahedra, mesh.fixed, mesh.touchable),
-        young_modulus_pa=MODULI_PA[0],
-        poisson_ratio=0.49,
-        tip_radius_m=TIP_RADIUS_M,
+        material=Material(MODULI_PA[0], 0.49),
+        support=Support(np.array([0.0, 0.0, -SIZE_M[2]]), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(TIP_RADIUS_M),
         mesh_size_m=0.01,
-        support_point=np.array([0.0, 0.0, -SIZE_M[2]]),
-        support_normal=np.array([0.0, 0.0, 1.0]),
     )
 
 

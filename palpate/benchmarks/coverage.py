@@ -70,7 +70,7 @@ def _explored(name: str, presses: int, hand: int, protocol: str, effects: dict[s
         phantom(name), effects, options, hand=cohort_hand(hand), seed=seed, sizes=False, workers=1
     )
     result = reconstruct_fully(simulated.recording)
-    low, high = result.model.young_modulus_ci95_pa
+    low, high = result.model.material.young_modulus_ci95_pa
     turned = np.array(simulated.truth["device_from_object_rotation"])
     shift = np.array(simulated.truth["device_from_object_shift_mm"]) / 1e3
     vertices = (result.surface.vertices - shift) @ turned
@@ -78,9 +78,9 @@ def _explored(name: str, presses: int, hand: int, protocol: str, effects: dict[s
         "phantom": f"{name} {presses}",
         "hand": hand,
         "true_pa": modulus,
-        "found_pa": result.model.young_modulus_pa,
+        "found_pa": result.model.material.young_modulus_pa,
         "ci95_pa": [low, high],
-        "error": result.model.young_modulus_pa / modulus - 1,
+        "error": result.model.material.young_modulus_pa / modulus - 1,
         "covers": bool(low <= modulus <= high),
         "law": result.modulus.press.law,
         "surface": result.surface.method,

@@ -16,7 +16,8 @@ import numpy as np
 
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import RecordingError
-from mechanics.model import Model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.presses import cut
 from mechanics.recording import Recording
 
@@ -88,8 +89,8 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
     length = SPACING_M * (len(tables) + 1)
     mesh = box_mesh((round(length / 0.01), 5, 2), (length, 0.05, height)).quadratic()
     model = Model(
-        mesh=mesh, young_modulus_pa=2e4, poisson_ratio=0.49, tip_radius_m=RADIUS_M, mesh_size_m=0.01,
-        support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]),
+        mesh=mesh, material=Material(2e4, 0.49), support=Support(np.zeros(3), np.array([0, 0, 1.0])),
+        tool=Tool(RADIUS_M), mesh_size_m=0.01,
         presses=cut(
             recording, onset_s=np.array([f[0] for f in found]), peak_s=np.array([f[1] for f in found]),
             centre=np.array([f[2] for f in found]), normal=np.tile([0.0, 0.0, 1.0], (len(found), 1)),

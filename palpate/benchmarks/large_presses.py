@@ -156,14 +156,20 @@ def _recordings(models: Path, recordings: Path) -> dict[str, Any]:
                 for b in bands
             ]
             found[law] = {
-                "young_modulus_pa": float(scale * model.young_modulus_pa),
+                "young_modulus_pa": float(scale * model.material.young_modulus_pa),
                 "rmse_n": rms_n(error[contact]),
                 "bias_by_depth": bias,
                 "rmse_by_depth_n": [rms_n(error[b]) if b.any() else None for b in bands],
             }
             shares = ["-" if b is None else f"{100 * b:+.1f}" for b in bias]
             rows.append(
-                [folder.name, law, scale * model.young_modulus_pa / 1e3, rms_n(error[contact]), *shares]
+                [
+                    folder.name,
+                    law,
+                    scale * model.material.young_modulus_pa / 1e3,
+                    rms_n(error[contact]),
+                    *shares,
+                ]
             )
     header = ["recording", "dent law", "best modulus kPa", "rms error N"]
     header += [f"bias at {low}-{high} mm %" for low, high in BANDS_MM]

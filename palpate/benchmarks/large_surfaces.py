@@ -18,7 +18,8 @@ import numpy as np
 
 from mechanics.box_mesh import box_mesh
 from mechanics.compliance import ComplianceOptions
-from mechanics.model import Model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler
 from mechanics.refine import refined_near_surface
@@ -98,12 +99,10 @@ def tick_us(mesh: TetMesh, made: SurfaceCompliance, tips: int) -> float:
     """Microseconds of a step with so many tips pressed into the top and sliding."""
     model = Model(
         mesh=mesh,
-        young_modulus_pa=MODULUS,
-        poisson_ratio=NU,
-        tip_radius_m=RADIUS,
+        material=Material(MODULUS, NU),
+        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(RADIUS),
         mesh_size_m=0.01,
-        support_point=np.zeros(3),
-        support_normal=np.array([0.0, 0.0, 1.0]),
     )
     renderer = FemRenderer(model, compliance=made)
     t = np.arange(600)

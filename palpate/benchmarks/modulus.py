@@ -10,6 +10,7 @@ from palpate.benchmarks._recording import add_indentation, add_recording, record
 from reconstruct.modulus import fit_modulus
 from reconstruct.modulus_paper import PaperOptions, fit_paper_modulus
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+from reconstruct.uniaxial import profiles
 
 SUMMARY = "the modulus, K_G and its factorisation included"
 PAPER_S = 3.0
@@ -27,15 +28,17 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     options = PaperOptions(indentation_m=arguments.indentation)
     papers = reconstruct_fully(recording, ReconstructOptions(method="paper", paper=options))
     own = reconstruct_fully(recording)
-    mesh, nu, where = own.meshing.mesh, own.model.poisson_ratio, own.cast
+    mesh, nu, where = own.meshing.mesh, own.model.material.poisson_ratio, own.cast
     solver = touch_solver(mesh, nu)
     work = {
         "paper: K_G, factorisation, (12), (13)": lambda: fit_paper_modulus(
-            papers.exploration, papers.meshing.mesh, nu, options
+            profiles(papers.model.presses), papers.meshing.mesh, nu, options
         ),
         "finite tip: refined mesh, factorisation": lambda: touch_solver(mesh, nu),
         "finite tip: sites": lambda: touch_sites(mesh, where.points, where.normals, nu, solver=solver),
-        "finite tip: fit and interval": lambda: fit_modulus(own.exploration, own.sites),
+        "finite tip: fit and interval": lambda: fit_modulus(
+            own.model.presses, own.sites, own.exploration.noise_n
+        ),
     }
     nodes = {
         "paper": len(papers.meshing.mesh.points), "linear": len(mesh.points), "fine": len(solver.mesh.points)

@@ -49,8 +49,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 except ContactError as error:
                     print(f"{recording.name}, {method}: {error}")
                     break
-                low, high = model.young_modulus_ci95_pa
-                found.append(model.young_modulus_pa)
+                low, high = model.material.young_modulus_ci95_pa
+                found.append(model.material.young_modulus_pa)
                 rows.append([recording.name, method, f"{1e3 * size:g}", len(model.mesh.points)]
                             + [f"{e / 1e3:.2f}" for e in (found[-1], low, high)])  # fmt: skip
                 print(*rows[-1], flush=True)

@@ -117,7 +117,7 @@ def _window_and_recording(stop: threading.Event, current: list[Load], renderer: 
         rows, _ = ring_rows(shared, max(0, int(shared.ring_head[0]) - 40))
         kept_rows.append(rows)
         if seen is not None and seen.touching.any():
-            radii = np.full(len(seen.depths), renderer.model.tip_radius_m)
+            radii = np.full(len(seen.depths), renderer.model.tool.tip_radius_m)
             renderer.displacement_of(seen.points, seen.normals, seen.forces_n, radii, seen.depths)
         time.sleep(1.0 / 30.0)
 

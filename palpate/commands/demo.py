@@ -60,7 +60,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = result.model
     say(
         arguments,
-        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa from {len(model.presses)} presses",
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa from {len(model.presses)} presses",
         f"rendered against measured force: {result.replay_rmse_n:.3f} N rms "
         f"of {result.contact_force_rms_n:.3f} N rms",
         str(result.servo),
@@ -69,8 +69,8 @@ def run(arguments: argparse.Namespace) -> int:
     )
     emit_json(
         {
-            "young_modulus_pa": model.young_modulus_pa,
-            "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
+            "young_modulus_pa": model.material.young_modulus_pa,
+            "young_modulus_ci95_pa": model.material.young_modulus_ci95_pa,
             "replay_rmse_n": result.replay_rmse_n,
             "servo": result.servo.as_dict(),
             "seconds": result.seconds,

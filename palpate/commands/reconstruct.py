@@ -99,14 +99,14 @@ def run(arguments: argparse.Namespace) -> int:
 def _words(result: Reconstruction) -> list[str]:
     model, exploration, surface = result.model, result.exploration, result.surface
     quality = result.meshing.report
-    low, high = model.young_modulus_ci95_pa
+    low, high = model.material.young_modulus_ci95_pa
     not_used = [*exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
     lines = [
         f"{exploration.recording.name}: {len(exploration.presses)} palpations"
         + (f", {len(not_used)} contacts not used:" if not_used else ""),
         *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
         *([f"  and {len(not_used) - _NAMED} more (--json names all)"] if len(not_used) > _NAMED else []),
-        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, "
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
         f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
     ]
     if result.modulus:
@@ -138,9 +138,9 @@ def _figures(result: Reconstruction) -> dict[str, Any]:
     model, exploration, fit = result.model, result.exploration, result.modulus
     figures = {
         "method": model.provenance["method"],
-        "young_modulus_pa": model.young_modulus_pa,
-        "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
-        "poisson_ratio": model.poisson_ratio,
+        "young_modulus_pa": model.material.young_modulus_pa,
+        "young_modulus_ci95_pa": model.material.young_modulus_ci95_pa,
+        "poisson_ratio": model.material.poisson_ratio,
         "palpations": len(exploration.presses),
         "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
         "noise_n": exploration.noise_n,

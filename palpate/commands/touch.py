@@ -193,8 +193,8 @@ def _mapping(arguments: argparse.Namespace, name: str, scene: Scene, model: Mode
 
 def _above(model: Model) -> np.ndarray:
     """(3,) m, two finger's widths over the middle of the object: where a device's middle lies."""
-    top = ((model.mesh.points - model.support_point) @ model.support_normal).max()
-    return model.mesh.points[model.mesh.fixed].mean(axis=0) + (top + 0.03) * model.support_normal
+    top = model.support.height(model.mesh.points).max()
+    return model.mesh.points[model.mesh.fixed].mean(axis=0) + (top + 0.03) * model.support.normal
 
 
 def _wait(session: TouchSession, seconds: float | None) -> None:

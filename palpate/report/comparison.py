@@ -87,12 +87,12 @@ def scatter(result: Comparison) -> Figure:
 def across_region(result: Comparison, members: np.ndarray) -> Figure:
     """Force at one depth along the object where `members` were left out: top by radius, side by height."""
     presses, model = result.presses, result.model
-    up = model.support_normal / np.linalg.norm(model.support_normal)
+    up = model.support.normal
     sideways = abs(float(np.mean(presses.normal[members] @ up))) < 0.5
     middle = model.mesh.points[np.unique(model.mesh.surface[:, :3])].mean(axis=0)
     offset = presses.point - middle
     flat = offset - (offset @ up)[:, None] * up
-    coordinate = (presses.point - model.support_point) @ up if sideways else np.linalg.norm(flat, axis=1)
+    coordinate = (presses.point - model.support.point) @ up if sideways else np.linalg.norm(flat, axis=1)
     faces_up = presses.normal @ up > 0.7
     family = ~faces_up if sideways else faces_up
     places = presses.point[family]

@@ -73,10 +73,10 @@ def figures(result: DemoResult) -> dict[str, Figure]:
 def write_report(result: DemoResult, folder: Path) -> Path:
     """Write `folder/report.html` and its pictures as PNGs; returns the report's path."""
     model, servo = result.model, result.servo
-    low, high = (v / 1e3 for v in model.young_modulus_ci95_pa)
+    low, high = (v / 1e3 for v in model.material.young_modulus_ci95_pa)
     page = Page(f"Palpate: {result.recording.object_name}, touched and felt")
     page.lead(
-        f"{len(model.presses)} presses became a model of {model.young_modulus_pa / 1e3:.1f} kPa "
+        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
         f"(95 % interval {low:.1f} to {high:.1f} kPa{_truth(result)}). Its rendered force differs from the "
         f"measured one by {result.replay_rmse_n:.3f} N rms, of {result.contact_force_rms_n:.2f} N rms, and "
         f"the loop held {servo.rate_hz:.0f} Hz."

@@ -43,7 +43,7 @@ def _object(ax: Any, model: Model, result: Diagnosis) -> None:
     weight = np.exp(-((distance / SPREAD_M) ** 2)) + 1e-9
     values = (weight @ (result.where.site_rmse * 1e3)) / weight.sum(axis=1)
     draw_object(ax, model, values, label="difference (mN)", colour_map="magma", touches=places)
-    view = view_axes(model.support_normal, 25.0, 35.0)
+    view = view_axes(model.support.normal, 25.0, 35.0)
     worst = (np.array(result.where.worst[0][:3]) - nodes.mean(axis=0)) @ view.T * 1e3
     ax.scatter(
         [worst[0]], [worst[1]], s=190, facecolors="none", edgecolors=IMPROVED, linewidths=2.2, zorder=4

@@ -58,7 +58,7 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
     the number of its first press."""
     model = result.model
     draw_object(ax, model, show_base=True, elevation_deg=22.0)
-    view = view_axes(model.support_normal, 22.0, 35.0)
+    view = view_axes(model.support.normal, 22.0, 35.0)
     corners = model.mesh.linear()
     node = nearest_nodes(corners, result.exploration.presses.point)
     seen = (corners.points[node] - model.mesh.points.mean(axis=0)) @ view.T * 1e3

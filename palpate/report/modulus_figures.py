@@ -42,12 +42,12 @@ def column(model: Model, name: str) -> np.ndarray:
 
 def heights(model: Model) -> np.ndarray:
     """(k,) m, heights of the contacts above the support."""
-    return (model.presses.point - model.support_point) @ model.support_normal
+    return model.support.height(model.presses.point)
 
 
 def on_side(model: Model) -> np.ndarray:
     """(k,) bool, presses whose normal is within 17 degrees of the support plane."""
-    return np.abs(model.presses.normal @ model.support_normal) < SIDE
+    return np.abs(model.presses.normal @ model.support.normal) < SIDE
 
 
 def height_trends(model: Model) -> list[Trend]:
@@ -119,7 +119,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
             ax.set_ylim(0, 1.3 * np.nanmax(value[side]))
         if name in trends:
             ax.set_title(f"r = {trends[name].pearson:+.2f} (p = {trends[name].pearson_p:.2g})", fontsize=10)
-    axes[1, 2].axhline(model.young_modulus_pa / 1e3, color=PEAK_COLOUR, lw=1)
+    axes[1, 2].axhline(model.material.young_modulus_pa / 1e3, color=PEAK_COLOUR, lw=1)
     return figure
 
 
@@ -146,7 +146,7 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
     """Figure 6: (a) moduli of single presses, * the global one; (b) where they hold, on two samples."""
     shown = list(models.items())[:2]
     figure, axes = plt.subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4), layout="constrained")
-    stars = [m.young_modulus_pa / 1e3 for m in models.values()]
+    stars = [m.material.young_modulus_pa / 1e3 for m in models.values()]
     spread(axes[0], [column(m, "e_pa") / 1e3 for m in models.values()], list(models), stars)
     axes[0].set(ylabel="Young's modulus [kPa]", ylim=(0, None))
     axes[0].tick_params(axis="x", labelrotation=15)

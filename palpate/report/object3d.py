@@ -53,7 +53,7 @@ def draw_object(
     touches: (k, 3) m, points as dots, pale where hidden; show_base: the fixed corner nodes as dots.
     """
     mesh = model.mesh
-    view = view_axes(model.support_normal, elevation_deg, azimuth_deg)
+    view = view_axes(model.support.normal, elevation_deg, azimuth_deg)
     seen = (mesh.points - mesh.points.mean(axis=0)) @ view.T * 1e3
     triangles = mesh.touchable_surface[:, :3]
     p = seen[triangles]

@@ -104,9 +104,9 @@ def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figu
 
 def _summary(page: Page, result: Reconstruction) -> None:
     model, surface = result.model, result.surface
-    low, high = model.young_modulus_ci95_pa
+    low, high = model.material.young_modulus_ci95_pa
     page.lead(
-        f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
         f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations (method "
         f"{model.provenance['method']})."
     )

@@ -46,10 +46,10 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
         mine = model is result.model
         known = truth.get("young_modulus_pa", float("nan")) / 1e3 if mine else float("nan")
         each = column(model, "e_pa") / 1e3
-        low, high = np.array(model.young_modulus_ci95_pa) / 1e3
-        shape = truth.get("shape", "") if mine else model.extra.get("shape", {}).get("surface", "")
+        low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
+        shape = truth.get("shape", "") if mine else model.about.get("shape", {}).get("surface", "")
         rows.append([
-            name, str(shape), known, model.young_modulus_pa / 1e3,
+            name, str(shape), known, model.material.young_modulus_pa / 1e3,
             f"{low:.2f} to {high:.2f}", f"{np.nanmin(each):.1f} to {np.nanmax(each):.1f}",
         ])  # fmt: skip
     return header, rows
@@ -87,20 +87,20 @@ def point_load_rows(result: Reconstruction) -> list[list[Any]]:
     throughout.
     """
     model = result.model
-    highest = int(np.argmax(model.presses.point @ model.support_normal))
+    highest = int(np.argmax(model.presses.point @ model.support.normal))
     point, normal = model.presses.point[highest], model.presses.normal[highest]
     rows = []
     width = patch_width(result.meshing.mesh)
-    scale = 1e3 / model.young_modulus_pa
+    scale = 1e3 / model.material.young_modulus_pa
     for edge, with_patch in ((1.0, True), (0.6 * model.mesh_size_m, True), (0.3 * model.mesh_size_m, False)):
         mesh, _ = refined_near_surface(result.meshing.mesh.linear(), edge)
         node = nearest_nodes(mesh, point[None])[0]
         load = np.zeros((len(mesh.points), 3))
         load[node] = normal
-        linear = Solver(mesh, model.poisson_ratio).solve(load)[node] @ normal
+        linear = Solver(mesh, model.material.poisson_ratio).solve(load)[node] @ normal
         patch = float("nan")
         if with_patch:
-            quadratic = Solver(mesh.quadratic(), model.poisson_ratio)
+            quadratic = Solver(mesh.quadratic(), model.material.poisson_ratio)
             weights = PatchSampler(quadratic.mesh, width).weights(point)
             patch = normal @ patch_compliance(quadratic, [weights])[0] @ normal
         rows.append([typical_edge(mesh) * 1e3, len(mesh.points), linear * scale, patch * scale])

@@ -26,11 +26,11 @@ def exploring_hand(model: Model, *, seed: int = 0, target_force_n: float = 1.0) 
     """The simulated hand, pressing a model from all free sides until it feels `target_force_n`."""
     points = model.mesh.points[np.unique(model.mesh.touchable_surface)]
     centre = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    radius = float(np.linalg.norm(points - centre, axis=1).max()) + 2.0 * model.tip_radius_m
+    radius = float(np.linalg.norm(points - centre, axis=1).max()) + 2.0 * model.tool.tip_radius_m
     intention = FreeExploration(
         centre,
         radius,
-        up=model.support_normal,
+        up=model.support.normal,
         target_force_n=target_force_n,
         speed_m_per_s=0.05,
         seed=seed,

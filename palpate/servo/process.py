@@ -121,8 +121,8 @@ class ServoProcess:
         if self._device.spec.has_force:
             stiffness = min(stiffness, self._device.spec.max_stiffness_n_per_m)
         return SupportParameters(
-            model.support_point,
-            model.support_normal,
+            model.support.point,
+            model.support.normal,
             stiffness,
             options.support_damping_n_s_per_m,
             options.support_friction,

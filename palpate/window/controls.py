@@ -214,7 +214,7 @@ class Controls:
             return
         pointer = self._window.pointer
         target = pointer.target
-        normal = self._session.model.support_normal if target is None else target.normal
+        normal = self._session.model.support.normal if target is None else target.normal
         point = pointer.tip_m if target is None else target.point
         centre = point - 2.0 * INCLUSION_RADIUS_M * normal
         region = Region("inclusion", tuple(map(float, centre)), INCLUSION_RADIUS_M, INCLUSION_RATIO)

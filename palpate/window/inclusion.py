@@ -16,16 +16,17 @@ import scipy.sparse as sp
 
 from mechanics import inclusion
 from mechanics.model import Model
+from mechanics.moduli import balls_ratio
 from mechanics.near_field import contact_width
 from mechanics.nearest import closest_on_triangles
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
-from mechanics.support import support_of
+from mechanics.support import base_hold
 from palpate.servo import Servo
 from render.base import Renderer
 from render.fem import FemRenderer
-from scenes.inclusions import modulus_ratio
+from scenes.inclusions import ball_of
 from scenes.phantoms import Region
 
 
@@ -49,10 +50,11 @@ class MovingInclusion:
     def __init__(self, model: Model, renderer: FemRenderer) -> None:
         compliance = renderer.compliance
         self._mesh = model.mesh.quadratic()
-        support = support_of(model.effects, model.support_normal, model.young_modulus_pa)
-        self._solver = Solver(self._mesh, model.poisson_ratio, model.modulus_ratio, support=support)
+        material = model.material
+        hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)
+        self._solver = Solver(self._mesh, material.poisson_ratio, model.element_ratio, hold=hold)
         wide = PatchSampler(self._mesh, float(compliance.patch_width_m[0])).matrix(compliance.points)
-        width = min(contact_width(model.tip_radius_m), float(compliance.own_width_m[0]))
+        width = min(contact_width(model.tool.tip_radius_m), float(compliance.own_width_m[0]))
         narrow = PatchSampler(self._mesh, width).matrix(compliance.own_points)
         self._outputs = sp.vstack([wide, narrow], format="csr")
         self._mutual = 3 * len(compliance.points)  # rows of the wide patches
@@ -69,7 +71,7 @@ class MovingInclusion:
         """The change that a ball makes, None: the plain object. Solves only for elements not met before."""
         far, blocks = self._plain_far, self._blocks
         if region is not None:
-            far, blocks = self._changed(modulus_ratio(self._mesh, [region]), progress)
+            far, blocks = self._changed(balls_ratio(self._mesh, [ball_of(region)]), progress)
         with open(path, "wb") as file:
             np.savez(file, far=far, blocks=blocks)
         return FieldChange(path)

@@ -145,5 +145,5 @@ def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> ob
 def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> None:
     size = 2.2 * np.linalg.norm(np.ptp(points, axis=0))
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
-    plane = pyvista.Plane(center=middle, direction=model.support_normal, i_size=size, j_size=size)
+    plane = pyvista.Plane(center=middle, direction=model.support.normal, i_size=size, j_size=size)
     plotter.add_mesh(plane, color="#d9dee5", lighting=False)

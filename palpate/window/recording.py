@@ -65,7 +65,7 @@ class SessionRecording:
             base, phase = None, (round(max(0.0, start - MARGIN_S), 3), round(end + MARGIN_S, 3))
         recording = replace(
             recording,
-            poisson_ratio=self._model.poisson_ratio,
+            poisson_ratio=self._model.material.poisson_ratio,
             base_model=None if base is None else base.resolve(),
             boundary_phase=phase,
         )

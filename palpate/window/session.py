@@ -57,7 +57,7 @@ class TouchSession:
         self.model = model
         self.title = title
         self.trace = Trace()
-        self.young_modulus_pa = model.young_modulus_pa
+        self.young_modulus_pa = model.material.young_modulus_pa
         self.friction = friction
         self.worker = Worker()
         self.recording: SessionRecording | None = None
@@ -92,7 +92,7 @@ class TouchSession:
 
     def _apply(self) -> None:
         """What the user changed, to a renderer that is new."""
-        if self.young_modulus_pa != self.model.young_modulus_pa:
+        if self.young_modulus_pa != self.model.material.young_modulus_pa:
             self._servo.set_modulus(self.young_modulus_pa)
         if self.friction is not None:
             self._servo.set_friction(self.friction)

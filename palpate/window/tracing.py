@@ -24,7 +24,7 @@ class BaseTracing:
         self._model = model
         base = model.mesh.points[model.mesh.fixed]
         self._middle = base.mean(axis=0)
-        up = model.support_normal
+        up = model.support.normal
         e1 = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
         e1 /= np.linalg.norm(e1)
         self._axes = np.column_stack([e1, np.cross(up, e1)])
@@ -38,10 +38,10 @@ class BaseTracing:
         if self.done or not len(tips_m):
             return
         model = self._model
-        height = (tips_m - model.support_point) @ model.support_normal
-        low = np.flatnonzero(height < model.tip_radius_m)
+        height = model.support.height(tips_m)
+        low = np.flatnonzero(height < model.tool.tip_radius_m)
         away = (tips_m[low] - self._middle) @ self._axes
-        near = self._foot.query(away)[0] < model.tip_radius_m + NEAR_M if len(low) else low
+        near = self._foot.query(away)[0] < model.tool.tip_radius_m + NEAR_M if len(low) else low
         at_foot, away = low[near], away[near]
         if not len(at_foot):
             return

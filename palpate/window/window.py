@@ -79,7 +79,7 @@ class TouchWindow:
         points, triangles = self.pictures[0].rest_surface
         model = session.model
         radius = session.servo.tip_radius_m
-        self.pointer = Pointer(points, triangles, radius, model.support_point, model.support_normal)
+        self.pointer = Pointer(points, triangles, radius, model.support.point, model.support.normal)
         self._look()
         self.controls = Controls(self)
 
@@ -132,7 +132,7 @@ class TouchWindow:
     def _look(self) -> None:
         """From the person's side, a little above; both pictures share the camera."""
         model = self.session.model
-        up = model.support_normal
+        up = model.support.normal
         away = np.cross(up, [1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.cross(up, [0.0, 1.0, 0.0])
         away /= np.linalg.norm(away)
         middle = 0.5 * (model.mesh.points.min(axis=0) + model.mesh.points.max(axis=0))

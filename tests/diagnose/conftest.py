@@ -8,7 +8,8 @@ import itertools
 import numpy as np
 import pytest
 
-from mechanics.model import Model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.presses import cut
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
@@ -108,8 +109,9 @@ class Bench:
             centre=known[0] + RADIUS * known[1], normal=known[1],
         )  # fmt: skip
         model = Model(
-            mesh=self.mesh, young_modulus_pa=MODULUS, poisson_ratio=NU, tip_radius_m=RADIUS, mesh_size_m=0.02,
-            support_point=np.zeros(3), support_normal=np.array([0, 0, 1.0]), presses=table,
+            mesh=self.mesh, material=Material(MODULUS, NU),
+            support=Support(np.zeros(3), np.array([0, 0, 1.0])), tool=Tool(RADIUS), mesh_size_m=0.02,
+            presses=table,
         )  # fmt: skip
         return recording, model
 

@@ -12,7 +12,7 @@ from diagnose.touches import touches_of
 from mechanics.patch import PatchSampler
 from mechanics.refine import typical_edge
 from mechanics.solver import Solver
-from mechanics.support import Support
+from mechanics.support import BaseHold
 
 
 @pytest.fixture(scope="module")
@@ -21,7 +21,7 @@ def forward(bench):  # type: ignore[no-untyped-def]
     return build_forward(touches_of(model.presses), model)
 
 
-def _give(forward, support):  # type: ignore[no-untyped-def]
+def _give(forward, hold):  # type: ignore[no-untyped-def]
     """(q, 3, 3) added by a support, by factorising it."""
     fields = energy_fields(forward)
     mesh, t = fields.solver.mesh, forward.touches
@@ -32,7 +32,7 @@ def _give(forward, support):  # type: ignore[no-untyped-def]
         nodes, weights = sampler.weights(t.point[press])
         for axis in range(3):
             forces[nodes, :, 3 * k + axis] = weights[:, None] * t.frame[press][axis]
-    other = Solver(mesh, forward.nu, support=support)
+    other = Solver(mesh, forward.nu, hold=hold)
     both = [Solver(mesh, forward.nu).solve(forces), other.solve(forces)]
     flat = forces.reshape(-1, len(presses), 3)
     work = [np.einsum("fqi,fqj->qij", flat, u.reshape(flat.shape)) for u in both]
@@ -41,7 +41,7 @@ def _give(forward, support):  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize(("normal", "tangential"), [(25.0, 25.0), (60.0, 20.0)])
 def test_springs(forward, normal, tangential):
-    expected = _give(forward, Support(np.array([0, 0, 1.0]), springs=(normal, tangential)))
+    expected = _give(forward, BaseHold(np.array([0, 0, 1.0]), springs=(normal, tangential)))
     got = far_on_springs(forward, normal, tangential) - forward.far
     place = energy_fields(forward).place
     # the base moves linearly between nodes 10 mm apart here, quadratically in the factorised solution
@@ -52,7 +52,7 @@ def test_springs(forward, normal, tangential):
 def test_partly_loose(forward):
     across, _ = support_axes(forward.model)
     # the same rows of nodes let go: here nodes are freed, there triangles
-    expected = _give(forward, Support(np.array([0, 0, 1.0]), bonded_fraction=0.26, direction=across))
+    expected = _give(forward, BaseHold(np.array([0, 0, 1.0]), bonded_fraction=0.26, direction=across))
     got = loosened(support_motion(forward), 0.6, 0.0)[0]
     np.testing.assert_allclose(got[:, 0, 0], expected[:, 0, 0], rtol=0.2, atol=1.0)
 

@@ -13,9 +13,9 @@ from diagnose.forward import Forward
 from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.whiten import NuisanceOptions
+from reconstruct.placing import presses_on
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
-from reconstruct.placing import presses_on
 
 
 def _late(t, x, f):  # type: ignore[no-untyped-def]

@@ -10,7 +10,8 @@ import scipy.sparse as sp
 
 from mechanics.compliance import condense
 from mechanics.errors import MeshError
-from mechanics.inclusion import Region, inclusion_ratio, share_inside
+from mechanics.inclusion import Region
+from mechanics.moduli import inclusion_ratio, share_inside
 from mechanics.pardiso import available
 from mechanics.solver import Solver
 from palpate.benchmarks.nodule import felt

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 from mechanics.errors import MeshError, ModelError
-from mechanics.model import Model, read_model, write_model
+from mechanics.material import Ball, Gradient, Material, Skin
+from mechanics.model import Model, Support, Tool, read_model, write_model
+from mechanics.moduli import MODULUS_LIMITS, gradient_ratio, inclusion_ratio, skin_ratio
 from mechanics.presses import of_places
 from mechanics.tetmesh import TetMesh
 
@@ -20,14 +22,28 @@ def cube() -> TetMesh:
 
 def model(order: int) -> Model:
     mesh = cube() if order == 1 else cube().quadratic()
+    material = Material(
+        16e3, 0.49, (15e3, 17e3), "neo-hookean", {"a ball": Ball((0.5, 0.5, 0.6), 0.3, 6.0)},
+        Gradient(1.5, 0.7), Skin(0.1, 3.0), np.linspace(1, 2, len(mesh.tetrahedra)),
+    )  # fmt: skip
     return Model(
-        mesh, 16e3, 0.49, 0.005, 0.01, np.zeros(3), np.array([0, 0, 1.0]), (15e3, 17e3),
-        modulus_ratio=np.linspace(1, 2, len(mesh.tetrahedra)),
+        mesh, material, Support(np.zeros(3), np.array([0, 0, 1.0])), Tool(0.005), 0.01,
         shape_uncertainty_m=np.linspace(0, 1e-3, len(mesh.points)),
         presses=of_places([0.5, 0.5, 1.0], [0, 0, 1.0], 0.005, depth_m=0.004, fits={"e_pa": 15.5e3}),
         effects={"viscoelasticity": {"g": [0.3], "tau_s": [0.3]}},
         provenance={"method": "finite-tip"},
+        about={"shape": {"surface": "block", "held_out_m": {"block+": 1e-4}}},
     )  # fmt: skip
+
+
+def edited(path, *changes):
+    """The folder with texts of its model.toml replaced."""
+    text = (path / "model.toml").read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    (path / "model.toml").write_text(text)
+    return path
 
 
 @pytest.mark.parametrize("order", [1, 2])
@@ -37,9 +53,15 @@ def test_round_trip(tmp_path, order):
     assert np.array_equal(again.mesh.points, first.mesh.points)
     assert np.array_equal(again.mesh.tetrahedra, first.mesh.tetrahedra)
     assert np.array_equal(again.mesh.touchable, first.mesh.touchable)
-    assert np.allclose(again.modulus_ratio, first.modulus_ratio, rtol=1e-14)
+    for name in ("young_modulus_pa", "young_modulus_ci95_pa", "poisson_ratio", "dent_law"):
+        assert getattr(again.material, name) == getattr(first.material, name)
+    for name in ("inclusions", "gradient", "skin"):
+        assert getattr(again.material, name) == getattr(first.material, name)
+    assert np.array_equal(again.material.field, first.material.field)
+    assert np.array_equal(again.element_ratio, first.element_ratio)
+    assert np.array_equal(again.support.normal, first.support.normal) and again.tool == first.tool
+    assert again.about == first.about and again.provenance == first.provenance
     assert np.array_equal(again.shape_uncertainty_m, first.shape_uncertainty_m)
-    assert again.young_modulus_ci95_pa == (15e3, 17e3)
     assert again.effects["viscoelasticity"]["tau_s"] == [0.3]
     assert again.presses.fits["e_pa"] == [15.5e3] and np.isnan(again.presses.fits["k_kv"][0])
 
@@ -69,8 +91,7 @@ def test_contradicting_and_missing_files_are_named(tmp_path):
     with pytest.raises(ModelError, match="model.toml"):
         read_model(tmp_path / "none")
     path = write_model(tmp_path / "m", model(1))
-    text = (path / "model.toml").read_text().replace("nodes = 8", "nodes = 9", 1)
-    (path / "model.toml").write_text(text)
+    edited(path, ("nodes = 8", "nodes = 9"))
     with pytest.raises(ModelError, match="says 9 nodes, mesh.vtu holds 8"):
         read_model(path)
 
@@ -93,3 +114,166 @@ def test_an_inverted_tetrahedron_is_refused():
     mesh = cube()
     with pytest.raises(MeshError, match="flat or inverted"):
         TetMesh(mesh.points, mesh.tetrahedra[:, [1, 0, 2, 3]], mesh.fixed, mesh.touchable)
+
+
+def test_a_plain_object_has_one_modulus():
+    plain = model(1).replaced(material=Material(16e3, 0.49))
+    assert (plain.element_ratio == 1).all()
+    assert plain.material.dent_law == "linear" and np.isnan(plain.material.young_modulus_ci95_pa).all()
+
+
+def test_moduli_of_elements_are_the_product_of_the_parts(box):
+    mesh = box((4, 4, 3), (0.08, 0.08, 0.06))
+    ball, skin = Ball((0.01, 0.0, 0.03), 0.02, 6.0), Skin(0.008, 3.0)
+    gradient, field = Gradient(1.5, 0.7), np.linspace(0.8, 1.2, len(mesh.tetrahedra))
+    support = Support(np.array([0.0, 0.0, 0.01]), np.array([0.0, 0.0, 2.0]))
+    material = Material(16e3, 0.49, inclusions={"a": ball}, gradient=gradient, skin=skin, field=field)
+    made = Model(mesh, material, support, Tool(0.005), 0.02)
+    # linear in height from the support, 1 cm up, to the highest node, 6 cm up
+    height = (mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)[:, 2] - 0.01) / 0.05
+    bulk = field * (1.5 - 0.8 * height)
+    lump, hide = inclusion_ratio(mesh, np.array(ball.centre_m), 0.02, 6.0), skin_ratio(mesh, skin)
+    assert lump.max() > 2 and hide.max() > 1.5 and (lump * hide).min() == 1.0
+    assert made.surface_ratio == pytest.approx(bulk)
+    assert made.ratio_without_balls == pytest.approx(bulk * hide)
+    assert made.element_ratio == pytest.approx(bulk * hide * lump)
+    hard = made.with_material(inclusions={"a": Ball(ball.centre_m, 0.02, 500.0)}).element_ratio
+    assert hard.max() == MODULUS_LIMITS[1] and hard.min() > 0
+
+
+def test_an_edited_value_in_the_text_changes_the_model(tmp_path):
+    first = model(1)
+    path = write_model(tmp_path / "m", first)
+    edited(
+        path,
+        ("young_modulus_pa = 16000.0", "young_modulus_pa = 24e3"),
+        ("ratio_top = 0.7", "ratio_top = 0.9"),
+    )
+    again = read_model(path)
+    assert again.material.young_modulus_pa == 24e3
+    assert np.array_equal(again.material.field, first.material.field)
+    stiffer = first.with_material(gradient=Gradient(1.5, 0.9))
+    assert np.array_equal(again.element_ratio, stiffer.element_ratio)
+    assert not np.allclose(again.element_ratio, first.element_ratio)
+
+
+def test_effects_that_are_material_do_not_count_twice(tmp_path):
+    effects = {
+        "inclusion": {"centre_m": [0.5, 0.5, 0.6], "radius_m": 0.3, "modulus_ratio": 6.0},
+        "modulus_gradient": {"ratio_base": 1.5, "ratio_top": 0.7},
+        "skin_layer": {"thickness_m": 0.1, "modulus_ratio": 3.0},
+        "finite_strain": {},
+    }
+    first = model(1)
+    again = read_model(write_model(tmp_path / "m", first.replaced(effects=effects)))
+    assert again.effects == effects
+    assert np.array_equal(again.element_ratio, first.element_ratio)
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_a_folder_of_format_1_is_read_as_it_was_meant(tmp_path, order):
+    """Parts that it multiplied into the elements are typed again; what they do not draw is the field."""
+    import pyvista
+
+    new = model(order)
+    path = write_model(tmp_path / "m", new)
+    ball, skin, gradient = next(iter(new.material.inclusions.values())), new.material.skin, Gradient(1.5, 0.7)
+    text = """
+        [material]
+        young_modulus_pa = 16e3
+        young_modulus_ci95_pa = [15e3, 17e3]
+        poisson_ratio = 0.49
+        [tool]
+        tip_radius_m = 0.005
+        [mesh]
+        nodes = NODES
+        tetrahedra = 6
+        touchable_nodes = 4
+        mesh_size_m = 0.01
+        element_order = 1
+        [frame]
+        support_point = [0.0, 0.0, 0.0]
+        support_normal = [0.0, 0.0, 2.0]
+        [effects.inclusion]
+        centre_m = [0.5, 0.5, 0.6]
+        radius_m = 0.3
+        modulus_ratio = 6.0
+        [effects.modulus_gradient]
+        ratio_base = 1.5
+        ratio_top = 0.7
+        [effects.skin_layer]
+        thickness_m = 0.1
+        modulus_ratio = 3.0
+        [provenance]
+        method = "finite-tip"
+        dent_law = "neo-hookean"
+        [inclusions.diagnosed-1]
+        centre_m = [0.5, 0.5, 0.6]
+        radius_m = 0.3
+        modulus_ratio = 6.0
+        [shape]
+        surface = "block"
+    """
+    (path / "model.toml").write_text(text.replace("NODES", str(len(new.mesh.points))))
+    parts = inclusion_ratio(new.mesh, np.array(ball.centre_m), ball.radius_m, ball.modulus_ratio)
+    parts = parts * skin_ratio(new.mesh, skin)
+    parts = parts * gradient_ratio(new.mesh, gradient, np.zeros(3), np.array([0, 0, 1.0]))
+    grid = pyvista.read(path / "mesh.vtu")
+    for field in (None, new.material.field):
+        grid.cell_data.clear()
+        grid.cell_data["young_modulus_pa"] = 16e3 * parts * (1.0 if field is None else field)
+        grid.save(path / "mesh.vtu")
+        old = read_model(path)
+        assert old.material.inclusions == {"diagnosed-1": ball}
+        assert (old.material.gradient, old.material.skin) == (gradient, skin)
+        assert old.material.dent_law == "neo-hookean" and "dent_law" not in old.provenance
+        assert old.about == {"shape": {"surface": "block"}} and old.support.normal.tolist() == [0, 0, 1]
+        assert old.element_ratio * 16e3 == pytest.approx(grid.cell_data["young_modulus_pa"], rel=1e-12)
+        assert (old.material.field is None) == (field is None)
+        again = read_model(write_model(tmp_path / "again", old))
+        assert np.array_equal(again.element_ratio, old.element_ratio)
+    (path / "model.toml").write_text((path / "model.toml").read_text().replace("neo-hookean", "linear"))
+    assert read_model(path).material.dent_law == "linear"
+    edited(path, ("[effects.inclusion]", "[effects.finite_strain]\n[effects.inclusion]"))
+    assert read_model(path).material.dent_law == "neo-hookean"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("format = 2", "format = 99", "has format 99; this program reads 1 to 2"),
+        ("format = 2", 'format = "x"', "has format x"),
+        (
+            "support_normal = [0.0, 0.0, 1.0]",
+            "support_normal = [0.0, 0.0, 0.0]",
+            "support_normal is .0, 0, 0",
+        ),
+        (
+            "support_normal = [0.0, 0.0, 1.0]",
+            "support_normal = [nan, 0.0, 1.0]",
+            "support_normal is .nan.*finite",
+        ),
+        ("young_modulus_pa = 16000.0", "young_modulus_pa = -1", "young_modulus_pa is -1.*greater than 0"),
+        ("young_modulus_pa = 16000.0", "young_modulus_pa = 'soft'", "young_modulus_pa is 'soft'.*a number"),
+        ("poisson_ratio = 0.49", "poisson_ratio = 0.5", "between -1 and 0.5"),
+        ("poisson_ratio = 0.49", "poison_ratio = 0.49", "has poison_ratio; allowed are .*poisson_ratio"),
+        ('"neo-hookean"', '"rubber"', "dent_law is 'rubber'; allowed are .*linear"),
+        ("ratio_top = 0.7", "ratio_top = inf", "ratio_top is inf.*finite"),
+        ("thickness_m = 0.1", "thickness_m = 0", "thickness_m is 0.*greater than 0"),
+        ("radius_m = 0.3", "", "damaged.*radius_m"),
+        ("[material.skin]", "[material.hide]", r"\[material\] has hide"),
+        ("[15000.0, 17000.0]", "[17e3, 15e3]", "0 <= low <= high"),
+    ],
+)
+def test_what_is_impossible_is_refused_in_one_line(tmp_path, old, new, words):
+    path = edited(write_model(tmp_path / "m", model(1)), (old, new))
+    with pytest.raises(ModelError, match=words) as error:
+        read_model(path)
+    assert str(path) in str(error.value) and "\n" not in str(error.value)
+
+
+def test_a_field_needs_a_value_a_tetrahedron():
+    with pytest.raises(ModelError, match="field has 5 values; the mesh needs 6"):
+        model(1).with_material(field=np.ones(5))
+    with pytest.raises(ModelError, match="positive finite"):
+        model(1).with_material(field=np.array([1, 1, 1, 1, 1, np.nan]))

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.inclusion import Ball, drawn_anew, inclusion_ratio, mixed_ratio
+from mechanics.material import Ball
+from mechanics.moduli import balls_ratio, inclusion_ratio, mixed_ratio
 from mechanics.near_field import contact_width, sharpening
-from mechanics.refine import refined_around
-from mechanics.sites import patch_width, touch_sites
+from mechanics.refine import refined_around, refined_near_surface
+from mechanics.sites import patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 
 NU = 0.49
@@ -23,7 +24,7 @@ def mesh(box):
 
 
 def stiff(mesh, times=1.0):
-    return times * inclusion_ratio(mesh, np.array(BALL.centre_m), BALL.radius_m, BALL.modulus_ratio)
+    return times * balls_ratio(mesh, [BALL])
 
 
 def test_a_uniform_object_keeps_its_far_field(mesh):
@@ -72,6 +73,9 @@ def test_a_ball_is_drawn_anew_on_finer_elements(mesh):
             for p in (m.points[m.surface] for m in (fine, linear))]  # fmt: skip
     assert area[0] == pytest.approx(area[1]), "a face that only one side halved would count twice"
     base = np.random.default_rng(0).uniform(0.5, 2.0, len(mesh.tetrahedra))
-    ratio = drawn_anew(mesh, base * stiff(mesh), fine, parent, [BALL])
+    solver = touch_solver(mesh, NU, base, balls=[BALL], surface_edge_m=0.006)
+    fine, parent = refined_near_surface(mesh, 0.006)
+    fine, step = refined_around(fine, centre, BALL.radius_m, 0.006)
+    parent = parent[step]
     want = base[parent] * inclusion_ratio(fine, centre, BALL.radius_m, BALL.modulus_ratio)
-    assert np.allclose(ratio, want)
+    assert np.allclose(solver.modulus_ratio, want)

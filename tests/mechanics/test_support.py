@@ -9,7 +9,7 @@ from mechanics.elasticity import triangle_mass
 from mechanics.errors import OptionError
 from mechanics.sites import touch_sites
 from mechanics.solver import Solver
-from mechanics.support import Support, base_triangles, support_of
+from mechanics.support import BaseHold, base_hold, base_triangles
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -27,7 +27,7 @@ def test_triangle_mass_integrates_to_the_area(box):
 def test_springs_under_a_rigidly_pushed_block(box):
     """A block far stiffer than its springs sinks by F / (k A), and shifts by F / (k_t A)."""
     mesh = box((3, 3, 2), (0.1, 0.1, 0.05)).quadratic()
-    solver = Solver(mesh, 0.3, support=Support(UP, springs=(1e-3, 4e-4)))
+    solver = Solver(mesh, 0.3, hold=BaseHold(UP, springs=(1e-3, 4e-4)))
     force = np.zeros((len(mesh.points), 3, 2))
     top = np.argmin(np.linalg.norm(mesh.points - [0, 0, 0.0], axis=1))
     force[top, 2, 0] = force[top, 0, 1] = 1.0
@@ -41,26 +41,26 @@ def test_hard_springs_are_a_bond_and_a_free_part_gives_more(box):
     points = np.array([[0.05, 0.0, 0.03], [-0.05, 0.0, 0.03]])
     normals = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
 
-    def give(support):
-        solver = Solver(mesh, 0.49, support=support)
+    def give(hold):
+        solver = Solver(mesh, 0.49, hold=hold)
         return touch_sites(mesh, points, normals, 0.49, solver=solver, curvature=0.0).far[:, 0, 0]
 
     bonded = give(None)
-    assert give(Support(UP, springs=(1e7, 1e7))) == pytest.approx(bonded, rel=1e-3)
-    assert (give(Support(UP, springs=(20.0, 20.0))) > bonded).all()
-    half = give(Support(UP, bonded_fraction=0.5, direction=np.array([1.0, 0, 0])))
+    assert give(BaseHold(UP, springs=(1e7, 1e7))) == pytest.approx(bonded, rel=1e-3)
+    assert (give(BaseHold(UP, springs=(20.0, 20.0))) > bonded).all()
+    half = give(BaseHold(UP, bonded_fraction=0.5, direction=np.array([1.0, 0, 0])))
     assert half[0] - bonded[0] > 2 * (half[1] - bonded[1]) > 0
 
 
 def test_effects_describe_the_support():
-    assert support_of({}, UP, 30e3) is None
-    springs = support_of(
+    assert base_hold({}, UP, 30e3) is None
+    springs = base_hold(
         {"compliant_base": {"k_normal_pa_per_m": 6e5, "k_tangential_pa_per_m": 3e5}}, UP, 30e3
     )
     assert springs.springs == pytest.approx((20.0, 10.0))
-    part = support_of({"unbonded_base": {"bonded_fraction": 0.5, "direction": [1, 0, 0]}}, UP, 30e3)
+    part = base_hold({"unbonded_base": {"bonded_fraction": 0.5, "direction": [1, 0, 0]}}, UP, 30e3)
     assert part.bonded_fraction == 0.5
     with pytest.raises(OptionError, match="bonded_fraction"):
-        Support(UP, bonded_fraction=0.0)
+        BaseHold(UP, bonded_fraction=0.0)
     with pytest.raises(OptionError, match="direction"):
-        Support(UP, bonded_fraction=0.4)
+        BaseHold(UP, bonded_fraction=0.4)

@@ -128,10 +128,14 @@ def test_a_recording_becomes_a_model_with_a_report(files, tmp_path, capsys):
     model = read_model(output)
     result = json.loads(figures.read_text())
     assert len(model.presses) == result["palpations"] == 12
-    assert result["young_modulus_pa"] == pytest.approx(model.young_modulus_pa)
-    assert model.young_modulus_ci95_pa[0] < model.young_modulus_pa < model.young_modulus_ci95_pa[1]
+    assert result["young_modulus_pa"] == pytest.approx(model.material.young_modulus_pa)
+    assert (
+        model.material.young_modulus_ci95_pa[0]
+        < model.material.young_modulus_pa
+        < model.material.young_modulus_ci95_pa[1]
+    )
     assert model.provenance["recording_sha256"]
-    shape = model.extra["shape"]
+    shape = model.about["shape"]
     assert shape["surface"] == "hull" and shape["reason"]
     assert shape["volume_m3"] == pytest.approx(shape["hull_volume_m3"])
     assert 0 < shape["sd_median_m"] <= shape["sd_p95_m"] <= shape["sd_greatest_m"]
@@ -151,5 +155,5 @@ def test_a_models_base_stands_in_for_a_missing_phase(files, tmp_path, capsys):
     samples.with_suffix(".toml").write_text(toml.replace("[object]", '[object]\nmodel = "FIRST"'))
     assert cli.main(["reconstruct", str(samples), "-o", str(second), *coarse]) == 0
     a, b = read_model(first), read_model(second)
-    assert np.allclose(a.support_normal, b.support_normal, atol=1e-6)
-    assert b.young_modulus_pa == pytest.approx(a.young_modulus_pa, rel=0.1)
+    assert np.allclose(a.support.normal, b.support.normal, atol=1e-6)
+    assert b.material.young_modulus_pa == pytest.approx(a.material.young_modulus_pa, rel=0.1)

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.model import Model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.sites import patch_width
 from mechanics.solver import Solver
 from mechanics.surface_compliance import SurfaceCompliance, patch_blocks
@@ -62,12 +63,10 @@ def model(mesh: TetMesh, modulus: float = 30e3, poisson: float = 0.49, tip: floa
     """A homogeneous model of a mesh on the plane z = 0."""
     return Model(
         mesh=mesh,
-        young_modulus_pa=modulus,
-        poisson_ratio=poisson,
-        tip_radius_m=tip,
+        material=Material(modulus, poisson),
+        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(tip),
         mesh_size_m=0.01,
-        support_point=np.zeros(3),
-        support_normal=np.array([0.0, 0.0, 1.0]),
         **more,
     )
 
@@ -80,7 +79,7 @@ def quick_compliance(made: Model) -> SurfaceCompliance:
     points = mesh.points[nodes]
     normals = vertex_normals(mesh.points, mesh.touchable_surface[:, :3])[nodes]
     width = patch_width(mesh)
-    blocks = patch_blocks(Solver(mesh, made.poisson_ratio), points, width)
+    blocks = patch_blocks(Solver(mesh, made.material.poisson_ratio), points, width)
     every = np.arange(len(nodes))
     return SurfaceCompliance(
         nodes=nodes,
@@ -94,7 +93,7 @@ def quick_compliance(made: Model) -> SurfaceCompliance:
         own_triangles=local.reshape(-1, 3).copy(),
         own=blocks[every, every].astype(float),
         own_width_m=np.array([width]),
-        poisson_ratio=np.array([made.poisson_ratio]),
+        poisson_ratio=np.array([made.material.poisson_ratio]),
     )
 
 

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.model import Model, read_model, write_model
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool, read_model, write_model
 from mechanics.tetmesh import TetMesh
 from scenes.virtual_presses import palpate_model
 
@@ -41,12 +42,10 @@ def block_model(folder: Path, young_modulus_pa: float = 20e3) -> Model:
     """A MODEL folder of the block, with presses for the 1D renderers."""
     model = Model(
         mesh=block_mesh().quadratic(),
-        young_modulus_pa=young_modulus_pa,
-        poisson_ratio=0.49,
-        tip_radius_m=0.005,
+        material=Material(young_modulus_pa, 0.49, dent_law="neo-hookean"),
+        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(0.005),
         mesh_size_m=0.013,
-        support_point=np.zeros(3),
-        support_normal=np.array([0.0, 0.0, 1.0]),
         effects={"finite_strain": {}},
     )
     return read_model(write_model(folder / "block", palpate_model(model, sites=16)))

@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 
 from mechanics.model import Model
+from mechanics.moduli import balls_ratio
 from palpate.window.inclusion import MovingInclusion
 from render.base import Renderer
 from render.registry import create
-from scenes.inclusions import modulus_ratio
+from scenes.inclusions import ball_of
 from scenes.phantoms import Region
 
 
@@ -31,8 +32,8 @@ def test_a_ball_that_came_by_dragging_is_felt_as_one_from_the_start(block: Model
     balls = [Region("ball", (x, -0.002, 0.022), 0.008, 8.0) for x in (-0.02, -0.012, 0.003)]
     for number, ball in enumerate(balls):
         felt = moving.write(ball, tmp_path / f"{number}.npz").changed(plain)
-    ratio = modulus_ratio(block.mesh, [balls[-1]])
-    anew = create("fem", block.replaced(modulus_ratio=ratio, path=None))
+    stated = block.with_material(field=balls_ratio(block.mesh, [ball_of(balls[-1])]))
+    anew = create("fem", stated.replaced(path=None))
     for x, y in ((0.003, -0.002), (0.01, 0.01)):
         stiffer = force(felt, x, y) / force(plain, x, y) - 1.0
         wanted = force(anew, x, y) / force(plain, x, y) - 1.0

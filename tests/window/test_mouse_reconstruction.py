@@ -83,4 +83,4 @@ def test_what_a_mouse_touched_is_reconstructed(block: Model, tmp_path: Path) -> 
     recording = read_recording(path)
     assert recording.base_model is None and recording.boundary_phase is not None
     model = reconstruct(recording)
-    assert model.young_modulus_pa == pytest.approx(block.young_modulus_pa, rel=0.05)
+    assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.05)

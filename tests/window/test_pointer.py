@@ -15,7 +15,7 @@ FRAME_S = 1 / 60
 @pytest.fixture
 def pointer(block: Model) -> Pointer:
     surface = block.mesh.touchable_surface[:, :3]
-    return Pointer(block.mesh.points, surface, R, block.support_point, block.support_normal)
+    return Pointer(block.mesh.points, surface, R, block.support.point, block.support.normal)
 
 
 def down_at(pointer: Pointer, x: float, y: float) -> None:

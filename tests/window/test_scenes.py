@@ -9,9 +9,10 @@ import pytest
 
 from mechanics.errors import SceneError
 from mechanics.model import Model
+from mechanics.moduli import balls_ratio
 from scenes.build import keep, model_of
 from scenes.exploration import ExplorationOptions, base_tracing, explore
-from scenes.inclusions import modulus_ratio
+from scenes.inclusions import ball_of
 from scenes.phantoms import Region
 from scenes.scene import load_scene, read_scene, scene_names
 from scenes.virtual_presses import spread_places
@@ -73,8 +74,8 @@ def test_paths_are_from_the_scenes_own_folder(block: Model, tmp_path: Path, own_
     (tmp_path / "here").symlink_to(block.path)
     path.write_text("[object]\nmodel = 'here'\nyoung_modulus_pa = 5e3\n[tool]\ntip_radius_m = 0.004\n")
     model = model_of(load_scene(path))
-    assert (model.young_modulus_pa, model.tip_radius_m) == (5e3, 0.004)
-    assert model.path.is_relative_to(own_cache) and block.young_modulus_pa == 20e3
+    assert (model.material.young_modulus_pa, model.tool.tip_radius_m) == (5e3, 0.004)
+    assert model.path.is_relative_to(own_cache) and block.material.young_modulus_pa == 20e3
     again = model_of(load_scene(path))
     assert again.path == model.path
     path.write_text(path.read_text().replace("5e3", "6e3"))
@@ -89,12 +90,12 @@ def test_inclusions_are_stiff_where_they_are() -> None:
     mesh = block_mesh()
     ball = Region("ball", (0.01, 0.0, 0.02), 0.014, 5.0)
     other = Region("other", (-0.03, 0.0, 0.02), 0.006, 3.0)
-    ratio = modulus_ratio(mesh, [ball, other])
+    ratio = balls_ratio(mesh, [ball_of(ball), ball_of(other)])
     middle = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
     assert ratio.max() > 4.0 and np.linalg.norm(middle[ratio.argmax()] - ball.centre_m) < ball.radius_m
     assert (ratio[np.linalg.norm(middle - other.centre_m, axis=1) > 0.05] >= 1.0).all()
-    assert ratio == pytest.approx(modulus_ratio(mesh, [ball]) * modulus_ratio(mesh, [other]))
-    assert (modulus_ratio(mesh, []) == 1.0).all()
+    assert ratio == pytest.approx(balls_ratio(mesh, [ball_of(ball)]) * balls_ratio(mesh, [ball_of(other)]))
+    assert (balls_ratio(mesh, []) == 1.0).all()
 
 
 def test_virtual_presses_spread_and_stay_off_rims(block: Model) -> None:
@@ -112,13 +113,15 @@ def test_exploration_traces_the_foot_and_presses_outside_in(block: Model) -> Non
     options = ExplorationOptions(sites=5, repeats=2)
     trace = base_tracing(block, options)
     outside = np.maximum(np.abs(trace[:, :2]) - 0.04, 0.0)
-    assert np.linalg.norm(outside, axis=1) == pytest.approx(block.tip_radius_m - options.lean_m, abs=2e-4)
-    assert trace[:, 2] == pytest.approx(block.tip_radius_m - options.bear_down_m)
+    assert np.linalg.norm(outside, axis=1) == pytest.approx(
+        block.tool.tip_radius_m - options.lean_m, abs=2e-4
+    )
+    assert trace[:, 2] == pytest.approx(block.tool.tip_radius_m - options.bear_down_m)
     angle = np.unwrap(np.arctan2(trace[:, 1], trace[:, 0]))
     assert angle[-1] - angle[0] > 2 * np.pi
     path, traced_s = explore(block, options)
-    inside = (np.abs(path.waypoints_m[:, :2]) < 0.04 + block.tip_radius_m).all(axis=1)
-    inside &= path.waypoints_m[:, 2] < 0.04 + block.tip_radius_m
+    inside = (np.abs(path.waypoints_m[:, :2]) < 0.04 + block.tool.tip_radius_m).all(axis=1)
+    inside &= path.waypoints_m[:, 2] < 0.04 + block.tool.tip_radius_m
     presses = path.times_s[inside & (path.times_s > traced_s)]
     assert len(presses) == 5 * 2 * 2  # reached, then held
     again, _ = explore(block, options)

@@ -148,4 +148,4 @@ def test_what_was_rendered_is_reconstructed(block: Model, tmp_path: Path) -> Non
     recording = read_recording(path)
     assert recording.base_model is None, "the base was traced, so nothing stands in for it"
     model = reconstruct(recording)
-    assert model.young_modulus_pa == pytest.approx(block.young_modulus_pa, rel=0.05)
+    assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.05)
