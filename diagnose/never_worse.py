@@ -10,7 +10,7 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Kept:
-    """names: what may be named, strongest first. dropped: weakest first. after: (g,) N^2, held out with names.
+    """names: what may be named, strongest first. dropped: weakest first. after: (g,) N^2, held out so.
 
     unexplained: what was dropped had stood for a gap that is there all the same.
     """
