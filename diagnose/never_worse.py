@@ -7,6 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.gaps import resampled
+
 
 @dataclass(frozen=True)
 class Kept:
@@ -55,8 +57,8 @@ def _grows(before: np.ndarray, after: np.ndarray, beyond_chance: bool, resamples
     growth = after - before
     if not beyond_chance or growth.sum() <= 0:
         return bool(growth.sum() > 0)
-    drawn = np.random.default_rng(seed).integers(0, len(growth), (resamples, len(growth)))
-    return bool(np.quantile(growth[drawn].sum(axis=1), 0.025) > 0)
+    drawn = resampled((growth,), np.sum, resamples, np.random.default_rng(seed))
+    return bool(np.quantile(drawn, 0.025) > 0)
 
 
 def verdict_kind(names: Sequence[str], candidates: Sequence[str], remainder: bool) -> str:
