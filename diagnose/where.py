@@ -65,7 +65,9 @@ def locate(
         rows = (t.site[t.press] == site) & t.counted
         rmse[site] = np.sqrt((residual[rows] ** 2).sum(axis=1).mean() + t.thinned_away)
     order = np.argsort(-rmse)[:5]
-    worst = tuple((*map(float, t.site_point[s]), float(rmse[s])) for s in order)
+    worst = tuple(
+        (float(x), float(y), float(z), float(rmse[s])) for s in order for x, y, z in [t.site_point[s]]
+    )
     return Where(axes, worst, rmse, _curves(t, residual))
 
 
@@ -102,9 +104,9 @@ def _contrasts(t: Touches, residual: np.ndarray) -> dict[str, np.ndarray]:
     good = ~np.isnan(level)
     clock = (t.onset_s - t.onset_s[good].mean()) / max(t.onset_s.std(), 1e-9)
     out["order"] = level * clock
-    for p in np.flatnonzero(t.repeat > 0):
-        earlier = [q for q in range(p) if t.site[q] == t.site[p]]
-        out["repeat"][p] = level[p] - np.nanmean(level[earlier])
+    for again in np.flatnonzero(t.repeat > 0):
+        earlier = [q for q in range(again) if t.site[q] == t.site[again]]
+        out["repeat"][again] = level[again] - np.nanmean(level[earlier])
     return out
 
 
