@@ -1,1 +1,3 @@
 """Devices: protocols, codecs, drivers, the simulated hand and the one safety filter."""
+
+import mechanics as mechanics  # it says where compiled kernels are kept, before the first is decorated

@@ -29,7 +29,8 @@ class Axis:
 class Where:
     """axes: in the contract's order. worst: (x, y, z, rmse_n) of the sites, worst first. site_rmse: (s,) N.
 
-    curves: name -> (x, mean, standard error) of the normal residual along depth, rate and time, for pictures.
+    curves: name -> (x, mean over sites, its error) of the normal residual along depth, rate and time, for
+    pictures.
     """
 
     axes: tuple[Axis, ...]
@@ -53,7 +54,7 @@ def locate(
     """residual: (n, 3) N, measured less the ideal model's force, local frames. site_sd: (p,) shape prior."""
     t = forward.touches
     contrasts = _contrasts(t, residual)
-    p_values = _max_t(contrasts, t.sites, seed)
+    p_values = family_wise(contrasts, t.site, seed)
     p_values["space"] = _space(t, residual, site_sd)
     p_values["free_air"] = _free_p(free)
     shares = _shares(t, residual)
@@ -64,7 +65,9 @@ def locate(
         rows = (t.site[t.press] == site) & t.counted
         rmse[site] = np.sqrt((residual[rows] ** 2).sum(axis=1).mean() + t.thinned_away)
     order = np.argsort(-rmse)[:5]
-    worst = tuple((*map(float, t.site_point[s]), float(rmse[s])) for s in order)
+    worst = tuple(
+        (float(x), float(y), float(z), float(rmse[s])) for s in order for x, y, z in [t.site_point[s]]
+    )
     return Where(axes, worst, rmse, _curves(t, residual))
 
 
@@ -100,9 +103,9 @@ def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:
     good = ~np.isnan(level)
     clock = (t.onset_s - t.onset_s[good].mean()) / max(t.onset_s.std(), 1e-9)
     out["order"] = level * clock
-    for p in np.flatnonzero(t.repeat > 0):
-        earlier = [q for q in range(p) if t.site[q] == t.site[p]]
-        out["repeat"][p] = level[p] - np.nanmean(level[earlier])
+    for again in np.flatnonzero(t.repeat > 0):
+        earlier = [q for q in range(again) if t.site[q] == t.site[again]]
+        out["repeat"][again] = level[again] - np.nanmean(level[earlier])
     return out
 
 
@@ -115,34 +118,35 @@ def _at_depth(shape: np.ndarray, r: np.ndarray, rows: np.ndarray) -> float:
     return float(r[middle].mean()) if middle.any() else float(r[rows].mean())
 
 
-def _max_t(contrasts: dict[str, np.ndarray], sites_count: int, seed: int) -> dict[str, float]:
-    """Family-wise p of each contrast's mean: whole sites change sign together, the largest |t| counts."""
-    rng = np.random.default_rng(seed)
+def family_wise(contrasts: dict[str, np.ndarray], site: np.ndarray, seed: int) -> dict[str, float]:
+    """Family-wise p of each contrast's mean: whole sites change sign together, the largest |t| counts.
+
+    contrasts: name -> (p,) a signed number a press, nan where it has none; site: (p,) its site. Presses of
+    one site share that place's errors, so a site is one draw. A contrast that fewer than 5 sites have is 1.
+    """
     names = list(contrasts)
     values = np.stack([contrasts[n] for n in names], axis=1)
     fine = ~np.isnan(values)
-    filled = np.where(fine, values, 0.0)
-    count = np.maximum(fine.sum(axis=0), 1)
+    sums, told = np.zeros((2, site.max() + 1, len(names)))
+    np.add.at(sums, site, np.where(fine, values, 0.0))
+    np.add.at(told, site, fine)
+    told = told > 0
+    count = np.maximum(told.sum(axis=0), 1)
+    square = (sums**2).sum(axis=0)
 
-    def t_of(v: np.ndarray) -> np.ndarray:
-        mean = v.sum(axis=0) / count
-        spread = np.sqrt(np.maximum((v**2).sum(axis=0) / count - mean**2, 1e-18) / count)
-        return np.abs(mean) / spread
+    def t_of(total: np.ndarray) -> np.ndarray:
+        """|t| of sites' sums; signs do not change their squares."""
+        return np.abs(total) / np.sqrt(np.maximum(square - total**2 / count, 1e-18))
 
-    observed = t_of(filled)
-    larger = np.zeros(len(names))
-    for _ in range(FLIPS):
-        signs = rng.choice([-1.0, 1.0], size=len(filled))
-        larger += t_of(filled * signs[:, None]).max() >= observed - 1e-12
-    result = dict(zip(names, (larger + 1) / (FLIPS + 1), strict=True))
-    for i, name in enumerate(names):
-        if fine[:, i].sum() < 5:
-            result[name] = 1.0
-    return result
+    signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(FLIPS, len(sums)))
+    largest = t_of(signs @ sums).max(axis=1)
+    larger = (largest[:, None] >= t_of(sums.sum(axis=0)) - 1e-12).sum(axis=0)
+    p = np.where(told.sum(axis=0) < 5, 1.0, (larger + 1) / (FLIPS + 1))
+    return dict(zip(names, map(float, p), strict=True))
 
 
 def _levels(t: Presses, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(s,) relative residual of each site and its standard error from repeats and noise."""
+    """(s,) relative residual of each site and its standard error from noise."""
     level, se = np.zeros(t.sites), np.zeros(t.sites)
     for site in range(t.sites):
         rows = (t.site[t.press] == site) & t.counted
@@ -215,7 +219,7 @@ def _shares(t: Presses, residual: np.ndarray) -> dict[str, float]:
 
 def _curves(t: Presses, residual: np.ndarray) -> dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]:
     rows = np.flatnonzero(t.counted)
-    normal = residual[rows, 0]
+    normal, site = residual[rows, 0], t.site[t.press[rows]]
     result = {}
     axes = {
         "depth (mm)": t.y[rows, 0] * 1e3,
@@ -229,12 +233,12 @@ def _curves(t: Presses, residual: np.ndarray) -> dict[str, tuple[np.ndarray, np.
         centres, means, errors = [], [], []
         for b in range(1, len(edges)):
             inside = bins == b
-            presses = np.unique(t.press[rows][inside])
-            if len(presses) < 2:
+            sites = np.unique(site[inside])
+            if len(sites) < 2:
                 continue
-            each = np.array([normal[inside & (t.press[rows] == p)].mean() for p in presses])
+            each = np.array([normal[inside & (site == s)].mean() for s in sites])
             centres.append(x[inside].mean())
             means.append(each.mean())
-            errors.append(each.std() / np.sqrt(len(each)))
+            errors.append(each.std(ddof=1) / np.sqrt(len(each)))
         result[name] = (np.array(centres), np.array(means), np.array(errors))
     return result

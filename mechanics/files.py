@@ -1,4 +1,5 @@
-"""Files that are either whole or not there: write to a temporary name beside the target, then rename."""
+"""Files that are either whole or not there (written to a temporary name beside the target, then renamed), and
+the user's folder for what can be made again."""
 
 from __future__ import annotations
 
@@ -9,6 +10,16 @@ import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
+
+
+def cache_folder() -> Path:
+    """Where what can be made again is kept: $PALPATE_CACHE, or the system's folder for caches."""
+    named = os.environ.get("PALPATE_CACHE")
+    if named:
+        return Path(named)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("palpate", appauthor=False)
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from mechanics.material import Ball, Gradient, Skin
-from mechanics.nearest import closest_on_triangles
+from mechanics.nearest import distance
 from mechanics.tetmesh import TetMesh
 
 MODULUS_LIMITS = (0.05, 50.0)
@@ -83,10 +83,7 @@ def skin_ratio(mesh: TetMesh, skin: Skin) -> np.ndarray:
     """
     points = points_inside(mesh)
     triangles = mesh.touchable_surface[:, :3]
-    flat = points.reshape(-1, 3)
-    triangle, weights = closest_on_triangles(flat, mesh.points, triangles)
-    nearest = np.einsum("kc,kcx->kx", weights, mesh.points[triangles[triangle]])
-    depth = np.linalg.norm(flat - nearest, axis=1).reshape(points.shape[:2])
+    depth = distance(mesh.points, triangles, points.reshape(-1, 3)).reshape(points.shape[:2])
     return 1 + (skin.modulus_ratio - 1) * (depth < skin.thickness_m).mean(axis=1)
 
 

@@ -1,50 +1,39 @@
-"""The nearest place of a triangulated surface to a point."""
+"""The nearest places of a triangulated surface, by VTK's cell locator, and points spread over one."""
 
 from __future__ import annotations
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 
-def closest_on_triangles(
-    points: np.ndarray, corners: np.ndarray, triangles: np.ndarray, *, candidates: int = 24
-) -> tuple[np.ndarray, np.ndarray]:
-    """Nearest triangle (k,) and barycentric weights (k, 3) of the nearest point on it, for points (k, 3).
+def closest(
+    vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """For points (k, 3): closest points (k, 3), their triangle (k,), and barycentric weights (k, 3) in it."""
+    import pyvista
 
-    Among the triangles with the nearest centres; weights are not negative and sum to 1.
-    """
-    p = corners[triangles]
-    count = min(candidates, len(triangles))
-    _, near = cKDTree(p.mean(axis=1)).query(points, k=count)
-    near = np.asarray(near).reshape(len(points), count)
-    best = np.full(len(points), np.inf)
-    chosen = np.zeros(len(points), dtype=np.int64)
-    weights = np.zeros((len(points), 3))
-    for k in range(count):
-        w = _closest_weights(points, p[near[:, k]])
-        distance = np.linalg.norm(np.einsum("kc,kcx->kx", w, p[near[:, k]]) - points, axis=1)
-        better = distance < best - 1e-12
-        best[better], chosen[better], weights[better] = distance[better], near[better, k], w[better]
-    return chosen, weights
+    shell = pyvista.PolyData.from_regular_faces(np.asarray(vertices, dtype=float), np.asarray(triangles))
+    index, found = shell.find_closest_cell(np.asarray(points, dtype=float), return_closest_point=True)
+    index, found = np.atleast_1d(index), np.atleast_2d(found)
+    a, b, c = (np.asarray(vertices)[np.asarray(triangles)[index, k]] for k in range(3))
+    u, v, w = b - a, c - a, found - a
+    uu, vv, uv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (v, v), (u, v)))
+    wu, wv = np.einsum("ij,ij->i", w, u), np.einsum("ij,ij->i", w, v)
+    area = np.maximum(uu * vv - uv * uv, 1e-300)
+    s, t = (vv * wu - uv * wv) / area, (uu * wv - uv * wu) / area
+    weights = np.clip(np.column_stack([1 - s - t, s, t]), 0, 1)
+    return found, index, weights / weights.sum(axis=1, keepdims=True)
 
 
-def _closest_weights(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(k, 3) barycentric weights of the point of each triangle (k, 3, 3) nearest to its point (k, 3)."""
-    a, b, c = triangles[:, 0], triangles[:, 1], triangles[:, 2]
-    u, v, w = b - a, c - a, points - a
-    uu, uv, vv = (u * u).sum(1), (u * v).sum(1), (v * v).sum(1)
-    wu, wv = (w * u).sum(1), (w * v).sum(1)
-    det = uu * vv - uv * uv
-    s, t = (vv * wu - uv * wv) / det, (uu * wv - uv * wu) / det
-    weights = np.stack([1 - s - t, s, t], axis=1)
-    outside = (weights < 0).any(axis=1)
-    best = np.full(len(points), np.inf)
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        side = triangles[:, j] - triangles[:, i]
-        f = np.clip(((points - triangles[:, i]) * side).sum(1) / (side * side).sum(1), 0, 1)
-        distance = np.linalg.norm(points - triangles[:, i] - f[:, None] * side, axis=1)
-        use = outside & (distance < best)
-        best[use] = distance[use]
-        weights[use] = 0
-        weights[use, i], weights[use, j] = 1 - f[use], f[use]
-    return weights
+def distance(vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """(k,) m, unsigned distance of points (k, 3) from the surface."""
+    return np.linalg.norm(closest(vertices, triangles, points)[0] - points, axis=1)
+
+
+def sample(vertices: np.ndarray, triangles: np.ndarray, count: int, seed: int = 0) -> np.ndarray:
+    """(count, 3) points spread evenly by area over the surface; the same for the same seed."""
+    generator = np.random.default_rng(seed)
+    corner = np.asarray(vertices)[np.asarray(triangles)]
+    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    chosen = corner[generator.choice(len(area), count, p=area / area.sum())]
+    r, s = np.sqrt(generator.random(count)), generator.random(count)
+    return np.einsum("ik,ikj->ij", np.column_stack([1 - r, r * (1 - s), r * s]), chosen)

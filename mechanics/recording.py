@@ -7,6 +7,7 @@ described in docs/recording-format.md. SI units; device frame; forces are kept a
 from __future__ import annotations
 
 import gzip
+import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -15,6 +16,7 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
+import tomli_w
 
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file, sha256_of_file
@@ -284,38 +286,28 @@ def write_recording(
 
 
 def dump_toml(table: Mapping[str, Any]) -> str:
-    """A mapping of scalars, lists and nested mappings as TOML text (the standard library only reads TOML).
+    """A mapping of scalars, lists, arrays and nested mappings as TOML text.
 
-    Values that are None are left out, since TOML has no such value.
+    Values that are None are left out, since TOML has no such value. A list of scalars stays on one line.
     """
-    return "\n\n".join(_toml_blocks(table, "")) + "\n"
+    return _SPREAD.sub(_on_one_line, tomli_w.dumps(_plain(table)))
 
 
-def _toml_blocks(table: Mapping[str, Any], name: str) -> list[str]:
-    lines = [f"[{name}]"] if name else []
-    blocks: list[str] = []
-    for key, value in table.items():
-        if isinstance(value, Mapping):
-            blocks += _toml_blocks(value, f"{name}.{_toml_key(key)}" if name else _toml_key(key))
-        elif value is not None:
-            lines.append(f"{_toml_key(key)} = {_toml_value(value)}")
-    bare = not name or (blocks and len(lines) == 1)
-    return blocks if bare and len(lines) <= bool(name) else ["\n".join(lines), *blocks]
+# tomli_w gives each item a line; a line break cannot be part of a string, so this is always a list's
+_SPREAD = re.compile(r"\[\n((?: +[^ \[\]{].*,\n)+) *\]")
 
 
-def _toml_key(key: str) -> str:
-    return key if key.replace("_", "").replace("-", "").isalnum() else '"' + key.replace('"', '\\"') + '"'
+def _on_one_line(spread: re.Match[str]) -> str:
+    items = spread[1].splitlines()
+    return "[" + ", ".join(item.strip().removesuffix(",") for item in items) + "]"
 
 
-def _toml_value(value: Any) -> str:
-    if isinstance(value, bool | np.bool_):
-        return "true" if value else "false"
-    if isinstance(value, int | np.integer):
-        return str(int(value))
-    if isinstance(value, float | np.floating):
-        text = repr(float(value))
-        return text if any(c in text for c in ".einf") else text + ".0"
+def _plain(value: Any) -> Any:
+    """The value in Python's own types, without None; other objects by their text."""
+    if isinstance(value, Mapping):
+        return {str(key): _plain(v) for key, v in value.items() if v is not None}
     if isinstance(value, list | tuple | np.ndarray):
-        return "[" + ", ".join(_toml_value(v) for v in value) + "]"
-    text = str(value).replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n")
-    return f'"{text}"'
+        return [_plain(v) for v in value]
+    if isinstance(value, np.generic):
+        return value.item()
+    return value if isinstance(value, bool | int | float) else str(value)

@@ -20,7 +20,7 @@ from mechanics.floor import carried_by_floor
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
 from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
-from mechanics.nearest import closest_on_triangles
+from mechanics.nearest import closest
 from mechanics.patch import PatchSampler, half_space_compliance, triangle_shapes
 from mechanics.progress import Progress, silent
 from mechanics.recovery import edge_middles
@@ -86,7 +86,7 @@ class SurfaceCompliance:
         Interpolated quadratically in the nearest fine triangle; what TouchSites.far holds for a site there.
         """
         points, normals = np.atleast_2d(points), np.atleast_2d(normals)
-        triangle, weights = closest_on_triangles(points, self.own_points, self.own_triangles)
+        _, triangle, weights = closest(self.own_points, self.own_triangles, points)
         six = np.concatenate([self.own[self.own_triangles[triangle]], self.own_middles[triangle]], axis=1)
         own = np.einsum("kc,kcab->kab", triangle_shapes(2, weights), six)
         nu, width = float(self.poisson_ratio[0]), float(self.own_width_m[0])

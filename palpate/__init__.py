@@ -2,6 +2,8 @@
 
 from importlib.metadata import PackageNotFoundError, version
 
+import mechanics as mechanics  # it says where compiled kernels are kept, before the first is decorated
+
 try:
     __version__ = version("palpate")
 except PackageNotFoundError:  # a source tree that was never installed

@@ -12,6 +12,7 @@ from scipy.ndimage import gaussian_filter1d
 
 from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.options import option
+from mechanics.robust import biweight
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
 _GAP_S = 1.0
@@ -65,15 +66,15 @@ def runs(mask: np.ndarray) -> list[tuple[int, int]]:
 def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
     """(centre, unit normal, rms) of the plane through points (n, 3), robust (Tukey's biweight on
     distances)."""
-    weight = np.ones(len(points))
-    for _ in range(12):
+
+    def plane(weight: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
         centre = np.average(points, axis=0, weights=weight)
         offset = points - centre
         normal = np.linalg.eigh((offset * weight[:, None]).T @ offset)[1][:, 0]
-        distance = offset @ normal
-        scale = max(1.4826 * np.median(np.abs(distance)), 1e-7)
-        weight = np.clip(1 - (distance / (6 * scale)) ** 2, 0, None) ** 2
-    return centre, normal, float(np.sqrt(np.average(distance**2, weights=weight)))
+        return (centre, normal), offset @ normal
+
+    found = biweight(plane, len(points), least=1e-7, reach=6.0, rounds=12)
+    return *found.fitted, float(np.sqrt(np.average(found.residual**2, weights=found.weight)))
 
 
 def farthest_points(points: np.ndarray, spacing_m: float, start: int = 0) -> np.ndarray:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.robust import biweight
 from reconstruct.finding import Found, Signals
 from reconstruct.onset import fit_rise
 
@@ -50,16 +51,16 @@ def force_delay(signals: Signals, contacts: Sequence[Found]) -> Delay:
     gap, error, speed = np.array(rows).T
     system = np.column_stack([np.ones_like(speed), speed])
     least = max(float(np.median(error)), 1e-5)
-    weight = np.ones_like(gap)
-    for _ in range(20):
-        right = weight / np.maximum(error, least) ** 2
-        normal = (system * right[:, None]).T @ system
-        constant, seconds = np.linalg.solve(normal, (system * right[:, None]).T @ gap)
-        rest = gap - constant - seconds * speed
-        scatter = max(1.4826 * float(np.median(np.abs(rest))), least)
-        weight = np.clip(1 - (rest / (4.7 * scatter)) ** 2, 0, None) ** 2
-    spread = np.linalg.inv((system * weight[:, None]).T @ system)[1, 1]
-    return Delay(float(seconds), float(scatter * np.sqrt(spread)), len(rows))
+    known = 1 / np.maximum(error, least)
+
+    def line(weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        root = np.sqrt(weight) * known
+        found = np.linalg.lstsq(system * root[:, None], gap * root, rcond=None)[0]
+        return found, gap - system @ found
+
+    fit = biweight(line, len(gap), least=least)
+    variance = np.linalg.inv((system * fit.weight[:, None]).T @ system)[1, 1]
+    return Delay(float(fit.fitted[1]), float(fit.scale * np.sqrt(variance)), len(rows))
 
 
 def _gap_and_speed(signals: Signals, contact: Found) -> tuple[float, float, float] | None:

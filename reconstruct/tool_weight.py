@@ -11,8 +11,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from mechanics.kinematics import acceleration
 from mechanics.recording import Recording
-from reconstruct.filtering import low_pass
 
 _SUBSAMPLE = 1500
 _TRIALS = 400
@@ -30,13 +30,10 @@ def tool_weight(recording: Recording, filtered: np.ndarray, cutoff_hz: float, sp
         return none
     q = recording.quaternion
     turned = Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
-    rate = recording.sample_rate_hz
-    smooth = low_pass(recording.position, rate, 0.6 * cutoff_hz)
-    acceleration = np.gradient(np.gradient(smooth, recording.t, axis=0), recording.t, axis=0)
+    # fits as wide as the period of the cut-off pass what the filtered force has passed
+    hand = acceleration(recording.t, recording.position, width_s=1 / cutoff_hz)
     # rows of the model: constant (3), tool frame (3), minus the acceleration (1)
-    model = np.concatenate(
-        [np.broadcast_to(np.eye(3), turned.shape), turned, -acceleration[:, :, None]], axis=2
-    )
+    model = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned, -hand[:, :, None]], axis=2)
     start = 0
     if recording.boundary_phase is not None:
         start = int(np.searchsorted(recording.t, recording.boundary_phase[1] + 0.2))

@@ -1,1 +1,3 @@
 """Scenes: what can be touched: phantoms, embedded recordings, scene files, the virtual laboratory."""
+
+import mechanics as mechanics  # it says where compiled kernels are kept, before the first is decorated

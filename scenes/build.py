@@ -8,9 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-import os
 import shutil
-import sys
 from collections.abc import Collection
 from dataclasses import asdict
 from pathlib import Path
@@ -18,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import ModelError, SceneError
-from mechanics.files import atomic_folder
+from mechanics.files import atomic_folder, cache_folder
 from mechanics.material import Ball, Material
 from mechanics.model import Model, Support, Tool, read_model, write_model
 from mechanics.progress import Progress, silent
@@ -34,18 +32,6 @@ from scenes.virtual_presses import palpate_model
 
 VERSION = 5
 DEFAULT_TIP_RADIUS_M = 0.005
-
-
-def cache_folder() -> Path:
-    """Where models of scenes are kept: $PALPATE_CACHE, or the system's folder for caches."""
-    named = os.environ.get("PALPATE_CACHE")
-    if named:
-        return Path(named)
-    if sys.platform == "darwin":
-        return Path.home() / "Library" / "Caches" / "palpate"
-    if sys.platform == "win32":
-        return Path(os.environ.get("LOCALAPPDATA", Path.home())) / "palpate"
-    return Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "palpate"
 
 
 def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = None) -> Model:

@@ -13,8 +13,8 @@ import numpy as np
 from devices.intention import Path
 from mechanics.errors import SceneError
 from mechanics.model import Model
+from mechanics.nearest import closest
 from mechanics.options import option
-from reconstruct.proximity import closest
 from scenes.virtual_presses import spread_places
 
 ANGLES = 180

@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+import mechanics  # noqa: F401  where compiled kernels are kept, before a test decorates one
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 

@@ -11,6 +11,7 @@ from numba import njit
 
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
+from mechanics.files import cache_folder
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model, write_model
 from palpate.benchmarks.compliance import block
@@ -46,7 +47,6 @@ from palpate.servo.tick import (
     tick_arrays,
 )
 from render.passivity import PassivityOptions, passivity_parameters
-from scenes.build import cache_folder
 
 PERIOD_NS = 1_000_000
 LATE_NS = 200_000

@@ -20,7 +20,7 @@ from mechanics.box_mesh import box_mesh
 from mechanics.compliance import ComplianceOptions
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.nearest import closest_on_triangles
+from mechanics.nearest import closest
 from mechanics.patch import PatchSampler
 from mechanics.refine import refined_near_surface
 from mechanics.sites import patch_solutions, touch_sites
@@ -73,7 +73,7 @@ def errors(made: SurfaceCompliance, solver: Solver, places: int, seed: int) -> d
     sampler = PatchSampler(solver.mesh, float(made.patch_width_m[0]))
     patches = [sampler.weights(p) for p in points[:8]]
     moved = patch_solutions(solver, patches)
-    triangle, weights = closest_on_triangles(points[:8], made.points, made.triangles)
+    _, triangle, weights = closest(made.points, made.triangles, points[:8])
     worst = 0.0
     for j in range(8):
         under = moved[:, :, 3 * j : 3 * j + 3]

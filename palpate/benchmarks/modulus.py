@@ -30,9 +30,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     own = reconstruct_fully(recording)
     mesh, nu, where = own.meshing.mesh, own.model.material.poisson_ratio, own.cast
     solver = touch_solver(mesh, nu)
+    curves = profiles(papers.model.presses)
     work = {
         "paper: K_G, factorisation, (12), (13)": lambda: fit_paper_modulus(
-            profiles(papers.model.presses), papers.meshing.mesh, nu, options
+            curves, papers.meshing.mesh, nu, options
         ),
         "finite tip: refined mesh, factorisation": lambda: touch_solver(mesh, nu),
         "finite tip: sites": lambda: touch_sites(mesh, where.points, where.normals, nu, solver=solver),

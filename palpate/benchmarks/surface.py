@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.nearest import distance, sample
 from palpate.arguments import progress_bar
 from palpate.benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
 from palpate.benchmarks.timing import table
-from reconstruct.proximity import distance, sample
 from reconstruct.surface import SURFACES, SurfaceOptions, reconstruct_surface
 
 SUMMARY = "distance of reconstructed surfaces from known shapes, against the hull"

@@ -18,7 +18,7 @@ from mechanics import inclusion
 from mechanics.model import Model
 from mechanics.moduli import balls_ratio
 from mechanics.near_field import contact_width
-from mechanics.nearest import closest_on_triangles
+from mechanics.nearest import closest
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
@@ -63,7 +63,7 @@ class MovingInclusion:
         self._touched = np.flatnonzero(np.abs(self._plain_far).any(axis=(1, 2)))
         vertices = renderer.surface[0][self._touched]
         points, triangles = compliance.own_points, compliance.own_triangles
-        triangle, self._weights = closest_on_triangles(vertices, points, triangles)
+        _, triangle, self._weights = closest(points, triangles, vertices)
         self._corners = triangles[triangle]
         self._region: inclusion.Region | None = None
 

@@ -10,6 +10,7 @@ from scipy.optimize import brentq
 
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError, RecordingError
+from mechanics.robust import spread_about_zero
 
 
 @dataclass(frozen=True)
@@ -88,7 +89,7 @@ def fit_approach(indentation: Indentation, *, poisson_ratio: float = 0.5, law: s
     travel, force = indentation.travel[start : top + 1], indentation.force[start : top + 1]
     baseline = np.median(force[: max(10, len(force) // 5)])
     force = force - baseline
-    noise = 1.4826 * np.median(np.abs(force[: max(10, len(force) // 5)]))
+    noise = spread_about_zero(force[: max(10, len(force) // 5)])
     if not force.max() > 8 * noise:
         raise ContactError("the force of the approach never rises above its noise: no contact")
     dent = dent_law(law)

@@ -8,7 +8,7 @@ from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from mechanics.errors import SurfaceError
-from reconstruct.proximity import distance
+from mechanics.nearest import distance
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import LEAN_M, Seen
 

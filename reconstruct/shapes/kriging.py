@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from mechanics.robust import spread_about_zero
 from reconstruct.shapes.base import Shape, gradient, parameter_slopes
 from reconstruct.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
 
@@ -175,7 +176,7 @@ def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained
     found = _explain(shape, lean_m, seen, free=free)
     touches = len(seen.centres)
     miss = found.misses if free else found.gap[:touches]
-    typical = 1.4826 * float(np.median(np.abs(miss)))
+    typical = spread_about_zero(miss)
     bad = np.abs(miss) > max(_FAR * typical, _FAR_M)
     if not 0 < bad.sum() <= _BAD_AT_MOST * touches:
         return found

@@ -17,7 +17,7 @@ import numpy as np
 from mechanics.files import atomic_file
 from mechanics.progress import Progress, silent
 from scenes.laboratory.linear import LinearProblem
-from scenes.laboratory.mesh import cache_folder, coarse_mesh
+from scenes.laboratory.mesh import coarse_mesh, laboratory_cache
 from scenes.laboratory.solver import LabError
 from scenes.laboratory.specimen import Fineness, Specimen, build, phantom_key
 from scenes.phantoms import Phantom
@@ -164,7 +164,7 @@ def curves(
     workers: processes, by default one a core. Raises LabError naming the touches that found no equilibrium.
     """
     fineness = fineness or Fineness()
-    cache = cache or cache_folder()
+    cache = cache or laboratory_cache()
     shape = phantom_key(phantom)
     paths = [cache / "curves" / shape / f"{job.key(shape, specimen, fineness)}.npz" for job in jobs]
     found = [_load(path) for path in paths]

@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import os
 import tempfile
 from dataclasses import dataclass
 from pathlib import Path
@@ -14,7 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import MeshError
-from mechanics.files import atomic_file
+from mechanics.files import atomic_file, cache_folder
 from scenes.laboratory.refine import boundary_faces, refine
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
@@ -27,10 +26,9 @@ COARSE_MM = 18.0
 """Edge length of the coarse mesh."""
 
 
-def cache_folder() -> Path:
-    """Where solved curves and meshes are kept: PALPATE_CACHE, or the user's cache folder."""
-    root = os.environ.get("PALPATE_CACHE") or Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache"))
-    return Path(root) / "palpate" / "laboratory"
+def laboratory_cache() -> Path:
+    """Where solved curves and meshes are kept."""
+    return cache_folder() / "laboratory"
 
 
 def surface_key(phantom: Phantom) -> str:
@@ -46,7 +44,7 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
 
     The mesher is not deterministic: whoever wants the same numbers again keeps the cache.
     """
-    folder = (cache or cache_folder()) / "meshes"
+    folder = (cache or laboratory_cache()) / "meshes"
     path = folder / f"{surface_key(phantom)}-{COARSE_MM:g}.npz"
     if path.is_file():
         with np.load(path) as stored:

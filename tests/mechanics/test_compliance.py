@@ -8,7 +8,7 @@ import pytest
 from mechanics.compliance import ComplianceOptions, condense
 from mechanics.errors import MeshError, OptionError
 from mechanics.mutual import between_block
-from mechanics.nearest import closest_on_triangles
+from mechanics.nearest import closest
 from mechanics.pardiso import available
 from mechanics.sites import touch_sites
 from mechanics.solver import Solver
@@ -153,7 +153,8 @@ def test_closest_point_on_triangles():
     corners = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0], [1, 1, 0]])
     triangles = np.array([[0, 1, 2], [1, 3, 2]])
     points = np.array([[0.2, 0.2, 0.5], [0.9, 0.8, -0.1], [2.0, 0.5, 0.0], [-1.0, -1.0, 0.0]])
-    triangle, weights = closest_on_triangles(points, corners, triangles)
+    found, triangle, weights = closest(corners, triangles, points)
     nearest = np.einsum("kc,kcx->kx", weights, corners[triangles[triangle]])
+    assert found == pytest.approx(nearest)
     assert nearest == pytest.approx(np.array([[0.2, 0.2, 0], [0.9, 0.8, 0], [1, 0.5, 0], [0, 0, 0]]))
     assert (weights >= 0).all()

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gzip
 import pickle
+import tomllib
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from mechanics.errors import RecordingError
-from mechanics.recording import Recording, read_recording, write_recording
+from mechanics.recording import Recording, dump_toml, read_recording, write_recording
 
 TOML = """[recording]
 sample_rate_hz = 1000.0
@@ -101,3 +103,32 @@ def test_a_pickled_recording_comes_back_whole_and_read_only():
     assert again.truth == first.truth and again.boundary_phase == first.boundary_phase
     with pytest.raises(TypeError):
         again.truth["sizes"] = {}
+
+
+def test_toml_text_comes_back_as_it_was() -> None:
+    table = {
+        "plain": {"a": 1, "b": 0.1, "c": True, "d": 'quoted "\\" tab\t line\n and [', "e": 1e-9, "f": np.inf},
+        "numpy": {
+            "v": np.array([0.0, 1e-3, -2.5]),
+            "n": np.int64(3),
+            "y": np.bool_(False),
+        },
+        "nested": {
+            "m": np.eye(2),
+            "words": ["a, b", "[", "]"],
+            "none": None,
+            "empty": [],
+            "p": Path("x/y"),
+        },
+        "deep": {"er": {"key with space": (1, 2)}, "tables": [{"at": [1.0, 2.0]}, {"at": [3.0, 4.0]}]},
+    }
+    text = dump_toml(table)
+    read = tomllib.loads(text)
+    assert read["plain"] == table["plain"]
+    assert read["numpy"] == {"v": [0.0, 1e-3, -2.5], "n": 3, "y": False}
+    assert read["nested"] == {
+        "m": [[1, 0], [0, 1]], "words": ["a, b", "[", "]"], "empty": [], "p": "x/y"
+    }  # fmt: skip
+    assert read["deep"] == {"er": {"key with space": [1, 2]}, "tables": [{"at": [1, 2]}, {"at": [3, 4]}]}
+    assert "m = [\n    [1.0, 0.0],\n    [0.0, 1.0],\n]\n" in text
+    assert "v = [0.0, 0.001, -2.5]\n" in text  # a vector is one line to those who read it or cut it out

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.nearest import closest_on_triangles
+from mechanics.nearest import closest
 from mechanics.patch import triangle_shapes
 from mechanics.recovery import edge_middles
 
@@ -51,7 +51,7 @@ def test_it_is_nearer_to_a_field_that_falls_off_beside_an_edge(box):
     rng = np.random.default_rng(0)
     across, along = rng.uniform(0.02, 0.028, 60), rng.uniform(-0.015, 0.015, 60)
     somewhere = np.column_stack([across, along, np.full(60, 0.03)])
-    triangle, weights = closest_on_triangles(somewhere, points, triangles)
+    _, triangle, weights = closest(points, triangles, somewhere)
     middles = edge_middles(points, triangles, field(points))[triangle]
     six = np.concatenate([field(points)[triangles[triangle]], middles], axis=1)
     linear = (weights * six[:, :3]).sum(axis=1)

@@ -9,6 +9,8 @@ from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinde
 from mechanics.errors import ContactError, OptionError
 from reconstruct import finding
 from reconstruct.contacts import ContactOptions, explore
+from reconstruct.filtering import low_pass
+from reconstruct.tool_weight import tool_weight
 
 
 def distance_to_cylinder(points: np.ndarray) -> np.ndarray:
@@ -169,3 +171,12 @@ def test_too_few_presses_is_an_error_that_says_how_many():
 def test_a_threshold_that_is_not_positive_is_refused(cylinder):
     with pytest.raises(OptionError, match="--contact-threshold"):
         explore(cylinder[0], contact_options=ContactOptions(contact_threshold_n=-1.0))
+
+
+def test_weight_and_inertia_of_the_tool_are_found_to_a_fiftieth():
+    heavy, plain = (explore_cylinder(tool_mass_kg=mass)[0] for mass in (0.05, 0.0))
+    rate, cutoff_hz = heavy.sample_rate_hz, 25.0
+    true = low_pass(heavy.force_on_tool - plain.force_on_tool, rate, cutoff_hz)
+    found = tool_weight(heavy, low_pass(heavy.force_on_tool, rate, cutoff_hz), cutoff_hz, 0.003)
+    rms = np.sqrt(np.mean(true**2))
+    assert np.sqrt(np.mean((found - true) ** 2)) < 0.02 * rms  # 1.1 %; two gradients in turn missed by 3.3 %

@@ -144,7 +144,7 @@ def test_uncertainty_covers_the_error_of_a_free_form():
     truth = OWN["blob"]()
     evidence, back = touch(truth, 2)
     found = reconstruct_surface(evidence)
-    from reconstruct.proximity import distance
+    from mechanics.nearest import distance
 
     local = back(found.vertices)
     off = local[:, 2] > 0.012

@@ -1,0 +1,69 @@
+"""Robust statistics: the scaled median deviation, and regression that lets outliers go (Tukey's biweight).
+
+Source: Huber and Ronchetti, Robust Statistics, chapters 5 and 7; 4.7 scales is 95 % efficient on Gaussian
+errors.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+from scipy.stats import median_abs_deviation, norm
+
+EFFICIENT = 4.7
+GAUSSIAN = 1 / float(norm.ppf(0.75))
+Fitted = TypeVar("Fitted")
+
+
+@dataclass(frozen=True)
+class Robust(Generic[Fitted]):
+    """fitted: as the last round gave it. residual, weight: (n,), weights 0 (left out) to 1. scale: of the
+    residuals."""
+
+    fitted: Fitted
+    residual: np.ndarray
+    weight: np.ndarray
+    scale: float
+
+
+def spread(values: np.ndarray, axis: int | None = None) -> np.ndarray | float:
+    """Standard deviation of Gaussian values (n, ...) from their median deviation from their median."""
+    return median_abs_deviation(values, axis=axis, scale="normal")
+
+
+def spread_about_zero(values: np.ndarray) -> float:
+    """Standard deviation of Gaussian values (n,) about zero from their median size."""
+    # not scipy's: it centres on the median, and takes 0.6 ms where this takes 0.04, in every round of a fit
+    return GAUSSIAN * float(np.median(np.abs(values)))
+
+
+def biweight(
+    fit: Callable[[np.ndarray], tuple[Fitted, np.ndarray]],
+    count: int,
+    *,
+    least: float,
+    reach: float = EFFICIENT,
+    rounds: int = 20,
+) -> Robust[Fitted]:
+    """Regression by iteratively reweighted least squares with Tukey's biweight.
+
+    fit(weight (n,)) -> (parameters, residual (n,)); least: the smallest scale that is believed, in the
+    residual's unit; reach: scales beyond which a row loses its weight. The first round weighs all rows alike;
+    it ends early where the weights stand still.
+    """
+    weight = np.ones(count)
+    for _ in range(rounds):
+        fitted, residual = fit(weight)
+        scale = max(spread_about_zero(residual), least)
+        before, weight = weight, tukey(residual / (reach * scale))
+        if np.abs(weight - before).max() < 1e-12:
+            break
+    return Robust(fitted, residual, weight, scale)
+
+
+def tukey(share: np.ndarray) -> np.ndarray:
+    """Weights (n,) of residuals as a share of the distance beyond which they count nothing."""
+    return np.clip(1 - share**2, 0, None) ** 2
