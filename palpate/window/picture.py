@@ -8,6 +8,8 @@ import pyvista
 from mechanics.model import Model
 from palpate.window.frames import Frame, View
 from render.base import Renderer
+from render.press import BESIDE
+from render.support import support_plane
 from scenes.phantoms import Region
 
 ARROW_M_PER_N = 0.03
@@ -143,7 +145,9 @@ def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> ob
 
 
 def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> None:
-    size = 2.2 * np.linalg.norm(np.ptp(points, axis=0))
+    size = 2 * BESIDE * np.linalg.norm(np.ptp(points, axis=0))
+    support = support_plane(model)
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
-    plane = pyvista.Plane(center=middle, direction=model.support.normal, i_size=size, j_size=size)
+    middle = middle - ((middle - support.point) @ support.normal) * support.normal
+    plane = pyvista.Plane(center=middle, direction=support.normal, i_size=size, j_size=size)
     plotter.add_mesh(plane, color="#d9dee5", lighting=False)
