@@ -38,6 +38,7 @@ def open_scene(
 
     Raises what `open_model` does, and OptionError for a renderer that is not there.
     """
+    from render.felt import with_own_stiffness
     from render.options import RenderOptions
     from render.registry import create
     from render.scene import scene_of
@@ -45,7 +46,9 @@ def open_scene(
 
     model = open_model(source, progress)
     options = with_friction(options or RenderOptions(), load_scene(source))
-    return scene_of(create(renderer, model, options, progress), support)
+    made = create(renderer, model, options, progress)
+    with_own_stiffness(made)
+    return scene_of(made, support)
 
 
 def with_friction(options: RenderOptions, scene: Scene) -> RenderOptions:

@@ -57,8 +57,8 @@ def touched_points(ax: Axes, exploration: Exploration) -> Axes:
 
 
 def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
-    """Figure 3(b): the felt surface with the mesh's edges laid onto it, fixed base nodes, and the node nearest
-    to each contact, with the number of its first press."""
+    """Figure 3(b): the felt surface with the mesh's edges laid onto it, fixed base nodes, and the node
+    nearest to each contact, with the number of its first press."""
     model = result.model
     draw_object(ax, model, show_base=True, elevation_deg=22.0)
     view = view_axes(model.support.normal, 22.0, 35.0)

@@ -70,7 +70,8 @@ def height_trends(model: Model) -> list[Trend]:
 
 
 def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
-    """(v,) values of single presses spread over the felt surface by radial basis functions (thin plate, smoothed).
+    """(v,) values of single presses spread over the felt surface by radial basis functions (thin plate,
+    smoothed).
 
     Repeats at one place are averaged by the smoothing; the result is kept within the range of the values.
     """

@@ -6,6 +6,7 @@ import numpy as np
 import pyvista
 
 from mechanics.model import Model
+from mechanics.tetmesh import vertex_normals
 from palpate.window.frames import Frame, View
 from render.base import Renderer
 from render.press import BESIDE
@@ -39,6 +40,10 @@ class ObjectPicture:
         self._rest = np.array(points, dtype=float)
         self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
         self._surface["displacement (mm)"] = np.zeros(len(points))
+        self._bent = False
+        self._flat = vertex_normals(self._rest, np.asarray(triangles))
+        self._smooth = renderer.contact.arrays.normals
+        self._shade()
         self._actor: pyvista.Actor | None = None
         self._title = f"{label}  " if label else ""
         _add_support(plotter, model, self._rest)
@@ -105,6 +110,13 @@ class ObjectPicture:
             },
             render=False,
         )
+        self._actor.prop.interpolation = "Gouraud"
+
+    def _shade(self) -> None:
+        """As the tip feels it: by the contact normals, turned as the surface has turned since."""
+        now = vertex_normals(np.asarray(self._surface.points), self._surface.regular_faces)
+        self._surface.point_data["normals"] = self._smooth + now - self._flat
+        self._surface.point_data.active_normals_name = "normals"
 
     def see_through(self, on: bool) -> None:
         """Show what is inside."""
@@ -121,8 +133,10 @@ class ObjectPicture:
     def update(self, frame: Frame, view: View) -> None:
         """Move surface, tip and arrow to a frame."""
         moved = view.displacement_m
-        if len(moved) == len(self._rest):
+        if len(moved) == len(self._rest) and (self._bent or moved.any()):
+            self._bent = bool(moved.any())
             self._surface.points = self._rest + moved
+            self._shade()
             self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)
         self._tip.SetPosition(*frame.tip_m)
         force = view.force_n

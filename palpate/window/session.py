@@ -28,6 +28,7 @@ from palpate.window.trace import Trace
 from palpate.window.worker import Worker
 from render.base import Renderer
 from render.effects import rendered_friction
+from render.felt import with_own_stiffness
 from render.options import RenderOptions
 from render.registry import create, names
 from render.scene import scene_of
@@ -94,6 +95,8 @@ class TouchSession:
             loading = {name: pool.submit(self._create, name) for name in sorted(drawn)}
             self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share))
             self._renderers = {name: job.result() for name, job in loading.items()}
+        for renderer in self._renderers.values():
+            with_own_stiffness(renderer)
         self._restart_beside()
         self._apply()
         self._next = int(self._servo.arrays.ring_head[0])
