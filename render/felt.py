@@ -1,24 +1,29 @@
 """The surface that a tip meets, as a file beside the mesh: what is felt is what is seen.
 
 MODEL/surface.vtp: the contact surface (rounded, drawn through the first touches) as triangles in the device
-frame, metres. Point data: `uncertainty_m`, `touchable`, and `own_stiffness_n_per_m` once the model's
-compliance has been condensed (the first press, replay or touch does it), NaN before and where nothing can be
-touched. Field data say which mesh, touches and material it was made from: a file of others is made anew.
+frame, metres. Point data: `uncertainty_m`, `touchable`, `own_stiffness_n_per_m` (NaN where nothing can be
+touched). A reconstruction knows the far field at its touches only and spreads that; the first renderer whose
+compliance is condensed presses every place instead (field data `stiffness_from` says which). Field data also
+say which mesh, touches and material it was made from: a file of others is made anew.
 """
 
 from __future__ import annotations
 
 import json
+import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.interpolate import RBFInterpolator
 from scipy.spatial import cKDTree
 
 from mechanics.files import atomic_file
 from mechanics.model import Model
+from mechanics.sites import TouchSites
 from mechanics.store import content_key
+from mechanics.touch import touch_forces
 from render.base import Renderer
 from render.effects import rendered_dent_law, rendered_friction
 from render.fem import FemRenderer
@@ -28,6 +33,7 @@ from render.snapping import surface_uncertainty, touched_surface
 FILE = "surface.vtp"
 OWN_DEPTH_M = 1e-3
 """Depth of the press by which a place's own stiffness is told."""
+PRESSES, TOUCHES = "presses", "touch sites"
 _STEPS = 7
 _PLACES = 2500
 
@@ -38,6 +44,7 @@ class FeltSurface:
 
     touchable: (v,) bool. uncertainty_m: (v,) standard deviation along the normal. own_stiffness_n_per_m: (v,)
     force over depth of a straight press to OWN_DEPTH_M with the model's tip, NaN where it is not known.
+    stiffness_from: PRESSES, TOUCHES or ''.
     """
 
     points: np.ndarray
@@ -46,11 +53,50 @@ class FeltSurface:
     touchable: np.ndarray
     uncertainty_m: np.ndarray
     own_stiffness_n_per_m: np.ndarray
+    stiffness_from: str = ""
 
 
-def felt_surface(model: Model) -> FeltSurface:
-    """What a tip meets of a model, as its renderers have it: from its folder, or made and kept there."""
-    return _load(model) or _keep(model, _made(model))
+def felt_surface(model: Model, sites: TouchSites | None = None) -> FeltSurface:
+    """What a tip meets of a model, as its renderers have it: from its folder, or made and kept there.
+
+    sites: touch sites of a reconstruction, which tell the own stiffness where nothing better is known yet.
+    """
+    surface = _load(model)
+    if surface is not None and (surface.stiffness_from or sites is None):
+        return surface
+    surface = surface or _made(model)
+    if sites is not None and len(sites):
+        stiffness = np.where(surface.touchable, _from_touches(model, surface, sites), np.nan)
+        surface = replace(surface, own_stiffness_n_per_m=stiffness, stiffness_from=TOUCHES)
+    return _keep(model, surface)
+
+
+def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.ndarray:
+    """(v,) N/m, by the dent law and the far field and curvature of the touch sites, spread over the surface.
+
+    Radial basis functions as for the 1D renderers' parameters (linear kernel), within the sites' range.
+    """
+    far = np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)
+    told = np.column_stack([far, sites.curvature])
+    scale = np.linalg.norm(np.ptp(surface.points, axis=0))
+    spread = told[[0] * len(surface.points)]
+    if len(sites) > 1:
+        smooth = RBFInterpolator(sites.points / scale, told, kernel="linear", degree=0, smoothing=1e-3)
+        spread = np.clip(smooth(surface.points / scale), told.min(axis=0), told.max(axis=0))
+    depths = np.linspace(0.0, OWN_DEPTH_M, _STEPS)
+    up = np.array([0.0, 0.0, 1.0])
+    forces = touch_forces(
+        np.tile(-depths[:, None] * up, (len(spread), 1)),
+        _STEPS * np.arange(len(spread) + 1),
+        np.tile(up, (len(spread), 1)),
+        spread[:, 0, None, None] * np.eye(3),
+        young_modulus_pa=model.young_modulus_pa,
+        poisson_ratio=model.poisson_ratio,
+        tip_radius_m=model.tip_radius_m,
+        curvature=spread[:, 1],
+        law=rendered_dent_law(model, RenderOptions()),
+    )
+    return forces[_STEPS - 1 :: _STEPS, 2] / OWN_DEPTH_M
 
 
 def with_own_stiffness(renderer: Renderer) -> FeltSurface:
@@ -59,14 +105,15 @@ def with_own_stiffness(renderer: Renderer) -> FeltSurface:
     Only a finite-element renderer tells a place's own stiffness; others leave the surface as it is.
     """
     surface = felt_surface(renderer.model)
-    if not isinstance(renderer, FemRenderer) or np.isfinite(surface.own_stiffness_n_per_m).any():
+    if not isinstance(renderer, FemRenderer) or surface.stiffness_from == PRESSES:
         return surface
     plain = RenderOptions()
     if replace(renderer.options, friction=plain.friction) != plain:
         return surface  # not the surface or the law that the model has by itself
     ideal = renderer.with_friction(rendered_friction(renderer.model, plain))
     stiffness = local_stiffness(ideal, renderer.model.tip_radius_m, OWN_DEPTH_M)
-    return _keep(renderer.model, replace(surface, own_stiffness_n_per_m=stiffness))
+    made = replace(surface, own_stiffness_n_per_m=stiffness, stiffness_from=PRESSES)
+    return _keep(renderer.model, made)
 
 
 def local_stiffness(renderer: Renderer, tip_radius_m: float, depth_m: float) -> np.ndarray:
@@ -76,7 +123,9 @@ def local_stiffness(renderer: Renderer, tip_radius_m: float, depth_m: float) -> 
     """
     arrays = renderer.contact.arrays
     touchable = np.unique(arrays.triangles[arrays.free > 0])
-    chosen = touchable[:: max(1, len(touchable) // _PLACES)]
+    # a tip cannot press the rim of the base from outside the support
+    pressed = np.setdiff1d(touchable, arrays.triangles[arrays.free == 0])
+    chosen = pressed[:: max(1, len(pressed) // _PLACES)]
     depths = np.concatenate([[-0.002], np.linspace(0.0, depth_m, _STEPS)])
     values = np.empty(len(chosen))
     for i, k in enumerate(chosen):
@@ -150,6 +199,7 @@ def _keep(model: Model, surface: FeltSurface) -> FeltSurface:
     shape.point_data["own_stiffness_n_per_m"] = surface.own_stiffness_n_per_m
     shape.field_data["shape_key"] = [_shape_key(model)]
     shape.field_data["material_key"] = [_material_key(model)]
+    shape.field_data["stiffness_from"] = [surface.stiffness_from]
     try:
         with atomic_file(Path(model.path) / FILE) as temporary:
             shape.save(temporary)
@@ -166,14 +216,17 @@ def _load(model: Model) -> FeltSurface | None:
     if path is None or not path.is_file():
         return None
     try:
-        with pyvista.VtkErrorCatcher(raise_errors=True):
+        # what a damaged file makes the reader say is an answer here, not a warning
+        with pyvista.VtkErrorCatcher(raise_errors=True), warnings.catch_warnings():
+            warnings.simplefilter("ignore")
             shape = pyvista.read(path)
         if str(shape.field_data["shape_key"][0]) != _shape_key(model):
             return None
         data = {name: np.asarray(shape.point_data[name]) for name in shape.point_data}
         stiffness = data["own_stiffness_n_per_m"].astype(float)
+        source = str(shape.field_data["stiffness_from"][0])
         if str(shape.field_data["material_key"][0]) != _material_key(model):
-            stiffness = np.full(len(stiffness), np.nan)
+            stiffness, source = np.full(len(stiffness), np.nan), ""
         return FeltSurface(
             np.asarray(shape.points, dtype=float),
             data["normals"].astype(float),
@@ -181,6 +234,7 @@ def _load(model: Model) -> FeltSurface | None:
             data["touchable"] > 0,
             data["uncertainty_m"].astype(float),
             stiffness,
+            source,
         )
     except (AttributeError, KeyError, IndexError, RuntimeError, ValueError, OSError):
         return None

@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> int:
     with progress_bar("reconstruct") as progress:
         result = reconstruct_fully(recording, options, progress)
     result = replace(result, model=result.model.replaced(path=write_model(output, result.model)))
-    felt_surface(result.model)
+    felt_surface(result.model, result.sites)
     if arguments.report:
         from palpate.report.reconstruction import write_report
 
