@@ -90,9 +90,9 @@ def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.n
         _STEPS * np.arange(len(spread) + 1),
         np.tile(up, (len(spread), 1)),
         spread[:, 0, None, None] * np.eye(3),
-        young_modulus_pa=model.young_modulus_pa,
-        poisson_ratio=model.poisson_ratio,
-        tip_radius_m=model.tip_radius_m,
+        young_modulus_pa=model.material.young_modulus_pa,
+        poisson_ratio=model.material.poisson_ratio,
+        tip_radius_m=model.tool.tip_radius_m,
         curvature=spread[:, 1],
         law=rendered_dent_law(model, RenderOptions()),
     )
@@ -111,7 +111,7 @@ def with_own_stiffness(renderer: Renderer) -> FeltSurface:
     if replace(renderer.options, friction=plain.friction) != plain:
         return surface  # not the surface or the law that the model has by itself
     ideal = renderer.with_friction(rendered_friction(renderer.model, plain))
-    stiffness = local_stiffness(ideal, renderer.model.tip_radius_m, OWN_DEPTH_M)
+    stiffness = local_stiffness(ideal, renderer.model.tool.tip_radius_m, OWN_DEPTH_M)
     made = replace(surface, own_stiffness_n_per_m=stiffness, stiffness_from=PRESSES)
     return _keep(renderer.model, made)
 
@@ -166,7 +166,7 @@ def _shape_key(model: Model) -> str:
         mesh.fixed,
         np.zeros(0) if sd is None else sd,
         np.array([[*p.point, *p.normal] for p in model.palpations]),
-        float(model.tip_radius_m),
+        float(model.tool.tip_radius_m),
     )
 
 
@@ -174,9 +174,9 @@ def _material_key(model: Model) -> str:
     return content_key(
         "own stiffness 1",
         OWN_DEPTH_M,
-        float(model.young_modulus_pa),
-        float(model.poisson_ratio),
-        model.modulus_ratio,
+        float(model.material.young_modulus_pa),
+        float(model.material.poisson_ratio),
+        model.element_ratio,
         json.dumps(model.effects, sort_keys=True, default=_plain),
         rendered_dent_law(model, RenderOptions()).table,
     )

@@ -102,7 +102,7 @@ def test_a_place_is_as_stiff_as_a_press_there(folder):
     # it stays in the folder, whatever friction or renderer comes next, but not for another material
     kept = felt_surface(read_model(folder.path))
     assert np.array_equal(kept.own_stiffness_n_per_m, surface.own_stiffness_n_per_m, equal_nan=True)
-    stiffer = felt_surface(folder.replaced(young_modulus_pa=60e3))
+    stiffer = felt_surface(folder.replaced(material=replace(folder.material, young_modulus_pa=60e3)))
     assert stiffer.stiffness_from == "" and np.isnan(stiffer.own_stiffness_n_per_m).all()
 
 

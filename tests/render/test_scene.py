@@ -87,9 +87,7 @@ def test_each_tip_meets_the_plane_by_itself_and_one_that_is_lost_meets_nothing(b
     assert forces[:, 2] == pytest.approx([1.5, 1.5])
 
 
-def test_a_device_makes_the_plane_softer_and_a_normal_of_any_length_serves(block_renderer):
-    made = block_renderer.model.replaced(support_normal=np.array([0, 0, 2.0]))
-    assert support_plane(made).normal == pytest.approx([0, 0, 1])
+def test_a_device_makes_the_plane_softer(block_renderer):
     soft = scene_of(block_renderer).no_stiffer_than(300.0)
     curve = press(soft, BESIDE, [0, 0, -1], 1e-3, 0.01, hold_s=0.1)
     assert curve.force[len(curve.force) // 2, 2] == pytest.approx(0.3, abs=1e-9)
