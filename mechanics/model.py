@@ -5,6 +5,7 @@ MODEL/model.toml       format, material, tool, mesh, frame, effects, provenance,
 MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, shape uncertainty; modulus_field
                        where the material has one; young_modulus_pa, for people who look: never read back
 MODEL/palpations.csv   one row a palpation
+MODEL/surface.vtp      what a tip meets, written by the shell (render.felt), keyed by content
 MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content
 """
 
