@@ -4,8 +4,11 @@ MODEL/model.toml       format, material, tool, mesh, frame, effects, provenance,
                        counts, an edited value changes the model
 MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, shape uncertainty; modulus_field
                        where the material has one; young_modulus_pa, for people who look: never read back
-MODEL/presses.bin      the table of presses, samples and all (mechanics.presses) MODEL/palpations.csv   one
-row a palpation MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content"""
+MODEL/presses.bin      the table of presses, samples and all (mechanics.presses)
+MODEL/palpations.csv   one row a palpation
+MODEL/surface.vtp      what a tip meets, written by the shell (render.felt), keyed by content
+MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content
+"""
 
 from __future__ import annotations
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -63,6 +63,7 @@ def run_demo(
     from mechanics.compliance import load_or_condense
     from palpate.servo.headless import run_headless
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+    from render.felt import with_own_stiffness
     from render.replay import replay_recording, rms_n
 
     seconds: dict[str, float] = {}
@@ -79,12 +80,14 @@ def run_demo(
     with warming_up() as compiling, stage("reconstruct") as progress:
         done = reconstruct_fully(recording, ReconstructOptions(seed=seed), progress)
         path = write_model(folder / "model", done.model)
-        model = done.model.replaced(path=path)
+        done = replace(done, model=done.model.replaced(path=path))
+        model = done.model
         progress("compiling", 0.99)
         compiling.wait()
     with stage("precompute") as progress:
         load_or_condense(model, progress=progress)
         renderer = render.create(options.renderer, model, progress=progress)
+        with_own_stiffness(renderer)
     with stage("replay") as progress:
         rendered = replay_recording(renderer, recording, progress)
         touching = model.presses.touching(recording.t)

@@ -16,11 +16,11 @@ from typing import Any
 
 import pytest
 
-from palpate.sources import open_model
-from render.base import Renderer
+from palpate.sources import open_scene
 from render.options import RenderOptions
 from render.press import Curve, press
-from render.registry import create
+from render.scene import TouchScene
+from render.support import SupportOptions
 
 
 @pytest.fixture(scope="session")
@@ -28,13 +28,15 @@ def press_model() -> Callable[..., Curve]:
     """A function `press_model(model_or_scene, at, direction, depth_m, speed_m_per_s=0.01, renderer="fem",
     ...)`.
 
-    It returns the render.press.Curve; other keywords go to render.press.press, `options` is a RenderOptions.
-    Models and renderers are read and made once a session.
+    It returns the render.press.Curve; other keywords go to render.press.press, `options` is a RenderOptions,
+    `support` a SupportOptions. Models and renderers are read and made once a session.
     """
 
     @cache
-    def renderer_of(source: str, name: str, options: RenderOptions) -> Renderer:
-        return create(name, open_model(source), options)
+    def scene_of(
+        source: str, name: str, options: RenderOptions | None, support: SupportOptions | None
+    ) -> TouchScene:
+        return open_scene(source, name, options, support)
 
     def pressed(
         model_or_scene: str | Path,
@@ -45,9 +47,10 @@ def press_model() -> Callable[..., Curve]:
         *,
         renderer: str = "fem",
         options: RenderOptions | None = None,
+        support: SupportOptions | None = None,
         **more: Any,
     ) -> Curve:
-        made = renderer_of(str(model_or_scene), renderer, options or RenderOptions())
-        return press(made, at, direction, depth_m, speed_m_per_s, **more)
+        scene = scene_of(str(model_or_scene), renderer, options, support)
+        return press(scene, at, direction, depth_m, speed_m_per_s, **more)
 
     return pressed

@@ -16,11 +16,15 @@ from mechanics.errors import OptionError, RecordingError
 from mechanics.files import atomic_file
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
+from render.scene import TouchScene, scene_of
 from render.surface import SurfaceArrays
 from render.walking import foot
 
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 _MARCH = 400
+_GRAZING = float(np.cos(np.radians(80)))
+BESIDE = 1.1
+"""Of the object's diagonal: from its middle so far the support is aimed at on purpose (and drawn)."""
 
 
 @dataclass(frozen=True)
@@ -54,7 +58,7 @@ class Curve:
 
 
 def press(
-    renderer: Renderer,
+    touched: Renderer | TouchScene,
     at: np.ndarray,
     direction: np.ndarray,
     depth_m: float,
@@ -67,9 +71,11 @@ def press(
 ) -> Curve:
     """Press along `direction` (3,) with the tip's centre aimed at the point `at` (3,) m, device frame.
 
-    depth_m: of the tip's centre along -n after first touch. Raises OptionError where the line misses the
-    object, enters it through its base, or grazes it (more than 80 degrees off the normal).
+    touched: a scene, or a renderer, which stands on its model's support. depth_m: of the tip's centre along
+    -n after first touch, of the object or of the support beside it. Raises OptionError where the line misses
+    both, enters the object through its base, or grazes what it meets (more than 80 degrees off the normal).
     """
+    scene = scene_of(touched)
     at, direction = np.asarray(at, dtype=float), np.asarray(direction, dtype=float)
     length = float(np.linalg.norm(direction))
     if not length > 0 or not np.isfinite(at).all() or not np.isfinite(length):
@@ -80,10 +86,10 @@ def press(
     if hold_s < 0 or approach_m <= 0:
         raise OptionError(f"hold is {hold_s} s and approach {approach_m} m: at least 0 s and more than 0 m")
     direction = direction / length
-    radius = renderer.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
-    touch, normal = first_touch(renderer.parameters.surface, at, direction, radius)
+    radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
+    touch, normal = first_touch(scene, at, direction, radius)
     steepness = -float(normal @ direction)
-    if steepness < np.cos(np.radians(80)):
+    if steepness < _GRAZING:
         raise OptionError(
             f"the press runs along the surface, normal {np.round(normal, 3).tolist()}: turn it into the "
             "surface"
@@ -93,16 +99,53 @@ def press(
     t = np.arange(0.0, times[-1] + 0.5 / rate_hz, 1.0 / rate_hz)
     along = np.interp(t, times, [-approach_m, travel - approach_m, travel - approach_m, -approach_m])
     position = touch + along[:, None] * direction
-    state = renderer.start([radius], dt_s=1.0 / rate_hz)
-    force = renderer.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), 1.0 / rate_hz))
+    state = scene.start([radius], dt_s=1.0 / rate_hz)
+    force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), 1.0 / rate_hz))
     return Curve(t, position, np.maximum(along * steepness, 0.0), force[:, 0], normal)
 
 
 def first_touch(
-    surface: SurfaceArrays, at: np.ndarray, direction: np.ndarray, radius: float
+    scene: TouchScene, at: np.ndarray, direction: np.ndarray, radius: float
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Centre (3,) m of a sphere that comes along `direction` (3, unit) through `at` when it first touches,
-    and the outward normal (3,) there. Raises OptionError where the line misses or first meets the base."""
+    """Centre (3,) m of a sphere that comes along `direction` (3, unit) through `at` when it first touches the
+    object or the support beside it, and the outward normal (3,) there.
+
+    Raises OptionError where the line misses both or first meets the base.
+    """
+    surface = scene.renderer.contact.arrays
+    beside = _on_support(scene, surface, at, direction, radius)
+    on_object = _on_object(surface, at, direction, radius)
+    if on_object is None and beside is None:
+        low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+        raise OptionError(
+            f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does "
+            f"not meet the touchable surface (object within {np.round(low, 4).tolist()} to "
+            f"{np.round(high, 4).tolist()} m), nor a support close beside it"
+        )
+    return min((found for found in (on_object, beside) if found is not None), key=lambda f: f[0] @ direction)
+
+
+def _on_support(
+    scene: TouchScene, surface: SurfaceArrays, at: np.ndarray, direction: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where it comes down onto the support, not farther from the object than BESIDE; None where it does not,
+    or would only graze it."""
+    plane = scene.support
+    down = float(direction @ plane.normal)
+    if plane.stiffness_n_per_m <= 0 or down > -_GRAZING:
+        return None
+    centre = at + (radius - float((at - plane.point) @ plane.normal)) / down * direction
+    low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
+    across = centre - (low + high) / 2
+    across -= (across @ plane.normal) * plane.normal
+    near = np.linalg.norm(across) <= BESIDE * np.linalg.norm(high - low)
+    return (centre, plane.normal) if near else None
+
+
+def _on_object(
+    surface: SurfaceArrays, at: np.ndarray, direction: np.ndarray, radius: float
+) -> tuple[np.ndarray, np.ndarray] | None:
+    """Where it meets the touchable surface; None where it misses that or meets the base before."""
     low, high = surface.vertices.min(axis=0), surface.vertices.max(axis=0)
     reach = float(np.linalg.norm(high - low)) + radius + float(np.linalg.norm(at - (low + high) / 2))
     weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
@@ -116,19 +159,15 @@ def first_touch(
         gap = distance - radius
         if gap <= 1e-9:
             if surface.free[triangle] == 0:
-                break
+                return None
             triangle, height = foot(surface, triangle, weights, centre, point, normal, move)
             gap = height - radius
             if gap <= 1e-9:
                 return centre, normal
         along += max(gap, 1e-9)
         if along > reach:
-            break
-    raise OptionError(
-        f"a tip of radius {radius} m aimed at {at.tolist()} along {np.round(direction, 4).tolist()} does not "
-        f"meet the touchable surface (object within {np.round(low, 4).tolist()} to "
-        f"{np.round(high, 4).tolist()} m)"
-    )
+            return None
+    return None
 
 
 def write_curve(path: Path | str, curve: Curve) -> None:

@@ -13,12 +13,13 @@ from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from render.base import Renderer
+from render.scene import TouchScene, scene_of
 
 _CHUNK = 4000
 
 
 def replay(
-    renderer: Renderer,
+    touched: Renderer | TouchScene,
     t: np.ndarray,
     positions: np.ndarray,
     *,
@@ -28,28 +29,31 @@ def replay(
     """Force on the tool (n, 3) N for a path of one tip: t (n,) s increasing, positions (n, 3) m of its
     centre.
 
-    The tip starts in air: one that begins inside the object is not touched until it has come out.
-    tip_radius_m: None takes the model's. Bit-identical from run to run. Raises OptionError where the shapes
-    disagree.
+    touched: a scene, or a renderer, which stands on its model's support. The tip starts in air: one that
+    begins inside the object is not touched until it has come out. tip_radius_m: None takes the model's.
+    Bit-identical from run to run. Raises OptionError where the shapes disagree.
     """
+    scene = scene_of(touched)
     t = np.ascontiguousarray(t, dtype=float)
     positions = np.array(positions, dtype=float)
     if t.ndim != 1 or positions.shape != (len(t), 3):
         raise OptionError(f"a path needs t (n,) and positions (n, 3); got {t.shape} and {positions.shape}")
     forces = np.zeros_like(positions)
-    state = renderer.start(None if tip_radius_m is None else [tip_radius_m])
+    state = scene.start(None if tip_radius_m is None else [tip_radius_m])
     steps = np.diff(t, prepend=t[0] - 1e-3) if len(t) else t
     for first in range(0, len(t), _CHUNK):
         part = slice(first, first + _CHUNK)
-        forces[part] = renderer.follow(state, positions[part, None], steps[part])[:, 0]
+        forces[part] = scene.follow(state, positions[part, None], steps[part])[:, 0]
         progress("replay", min(first + _CHUNK, len(t)) / len(t))
     return forces
 
 
-def replay_recording(renderer: Renderer, recording: Recording, progress: Progress = silent) -> np.ndarray:
+def replay_recording(
+    touched: Renderer | TouchScene, recording: Recording, progress: Progress = silent
+) -> np.ndarray:
     """`replay` of a recording's path with the recording's tip."""
     return replay(
-        renderer, recording.t, recording.position, tip_radius_m=recording.tip_radius_m, progress=progress
+        touched, recording.t, recording.position, tip_radius_m=recording.tip_radius_m, progress=progress
     )
 
 

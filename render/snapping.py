@@ -12,6 +12,7 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mechanics.model import Model
 from render.bvh import STACK, closest_triangle
@@ -43,6 +44,31 @@ def touched_surface(model: Model, options: RenderOptions) -> ContactSurface:
     vertices[touched] += lift[:, None] * arrays.normals[touched]
     moved = with_vertices(vertices, arrays.triangles, arrays.neighbours, arrays.free)
     return dataclasses.replace(surface, arrays=moved)
+
+
+def surface_uncertainty(model: Model, surface: ContactSurface) -> np.ndarray:
+    """(v,) m, standard deviation of the fine vertices along their normals: the model's, less near touches.
+
+    The model's shape uncertainty takes the place of the process's size DOUBT_M (which stands in where the
+    model has none); a first touch is known to ONSET_NOISE_M.
+    """
+    arrays = surface.arrays
+    own = model.shape_uncertainty_m
+    if own is None:
+        sd = np.full(len(arrays.vertices), DOUBT_M)
+    else:
+        sd = np.einsum("vc,vc->v", surface.node_weights, np.asarray(own, dtype=float)[surface.nodes])
+    feet, normals, gaps = touch_gaps(arrays, model)
+    if not len(gaps):
+        return sd
+    at_feet = sd[cKDTree(arrays.vertices).query(feet)[1]]
+    covariance = np.outer(at_feet, at_feet) * _kernel(feet, normals, feet, normals)
+    covariance += ONSET_NOISE_M**2 * np.eye(len(gaps))
+    touched = np.unique(arrays.triangles[arrays.free > 0])
+    shared = at_feet * _kernel(arrays.vertices[touched], arrays.normals[touched], feet, normals)
+    told = np.einsum("vk,kv->v", shared, np.linalg.solve(covariance, shared.T))
+    sd[touched] *= np.sqrt(np.clip(1 - told, 0.0, 1.0))
+    return sd
 
 
 def touch_gaps(arrays: SurfaceArrays, model: Model) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -6,23 +6,64 @@ f_n = max(0, k d - b d'), d = R - n . (tip - p);    |f_t| <= mu f_n, against the
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from numba import njit
 
+from mechanics.errors import OptionError
+from mechanics.model import Model
+from mechanics.options import option
+
 CREEP_M_PER_S = 0.005
 """Below this speed friction falls off linearly, so that it does not chatter at rest."""
 
 
+@dataclass(frozen=True)
+class SupportOptions:
+    """What the plane beside the object feels like, in every command that renders a model."""
+
+    support: bool = option(True, "the support is felt as a rigid plane beside the object")
+    support_stiffness_n_per_m: float = option(1500.0, "the support's stiffness, or the device's", unit="N/m")
+    support_damping_n_s_per_m: float = option(2.0, "the support's damping", unit="N s/m")
+    support_friction: float = option(0.2, "friction on the support")
+
+    def __post_init__(self) -> None:
+        for name in ("support_stiffness_n_per_m", "support_damping_n_s_per_m", "support_friction"):
+            value = getattr(self, name)
+            if not (math.isfinite(value) and value >= 0):
+                raise OptionError(f"{name} is {value}; it must be a finite number, 0 or greater")
+
+
 class SupportParameters(NamedTuple):
-    """point, normal: (3,), the normal points into the object. N/m, N s/m; stiffness 0: no support."""
+    """point, normal: (3,), the unit normal points into the object. N/m, N s/m; stiffness 0: no support."""
 
     point: np.ndarray
     normal: np.ndarray
     stiffness_n_per_m: float
     damping_n_s_per_m: float
     friction: float
+
+
+def no_support() -> SupportParameters:
+    """A support plane that is not there."""
+    return SupportParameters(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0)
+
+
+def support_plane(model: Model, options: SupportOptions | None = None) -> SupportParameters:
+    """The model's support as the options want it felt."""
+    options = options or SupportOptions()
+    if not options.support:
+        return no_support()
+    # copies: the compiled loop knows only arrays that may be written to
+    return SupportParameters(
+        np.array(model.support.point),
+        np.array(model.support.normal),
+        float(options.support_stiffness_n_per_m),
+        float(options.support_damping_n_s_per_m),
+        float(options.support_friction),
+    )
 
 
 @njit(cache=True, nogil=True)
@@ -49,3 +90,21 @@ def add_support_force(parameters, tip, velocity, radius_m, force):
         force[i] += normal_force * parameters.normal[i]
         force[i] -= drag * (velocity[i] - rate * parameters.normal[i])
     return True
+
+
+@njit(cache=True, nogil=True)
+def add_support_path(parameters, radii_m, previous, velocity, steps_s, path, forces):
+    """`add_support_force` along a path (n, m, 3) m of m tips, steps_s (n,) apart, to forces (n, m, 3) N.
+
+    A tip's velocity is that of its last step; previous: (m, 3) m, where it was before, NaN where that is not
+    known (then it is at rest). previous and velocity (m, 3) m/s are left as the path ends.
+    """
+    for i in range(path.shape[0]):
+        for t in range(path.shape[1]):
+            known = steps_s[i] > 0.0
+            for k in range(3):
+                known = known and math.isfinite(previous[t, k])
+            for k in range(3):
+                velocity[t, k] = (path[i, t, k] - previous[t, k]) / steps_s[i] if known else 0.0
+                previous[t, k] = path[i, t, k]
+            add_support_force(parameters, path[i, t], velocity[t], radii_m[t], forces[i, t])

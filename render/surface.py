@@ -15,6 +15,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 from mechanics.errors import MeshError
 from mechanics.tetmesh import TetMesh
@@ -23,6 +24,8 @@ from render.bvh import Bvh, build_bvh
 CREASE_DEGREES = 35.0
 NORMAL_SMOOTHING_M = 2.5e-3
 EDGE_ROUNDING_M = 2.2e-3
+EASED_AGREEMENT = (0.99, 0.93)
+"""Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
 
 
 class SurfaceArrays(NamedTuple):
@@ -94,7 +97,7 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     neighbours = _neighbours(triangles)
     if (neighbours < 0).any():
         raise MeshError("the mesh's boundary is not closed: mesh the surface again")
-    vertices = _rounded_edges(vertices, triangles, neighbours, free)
+    vertices = _rounded_edges(vertices, triangles, free)
     return ContactSurface(
         with_vertices(vertices, triangles, neighbours, free), nodes, node_weights, parents, parent_weights
     )
@@ -129,34 +132,42 @@ def with_vertices(
     )
 
 
-def _rounded_edges(
-    vertices: np.ndarray, triangles: np.ndarray, neighbours: np.ndarray, free: np.ndarray
-) -> np.ndarray:
-    """Vertices with the creases between touchable triangles filleted over about a fine edge.
+def _rounded_edges(vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray) -> np.ndarray:
+    """Vertices with the creases between touchable triangles eased over some EDGE_ROUNDING_M.
 
-    Over a sharp edge a tip that is held by friction would snap from one face to the other.
+    Over a sharp edge a tip that is held by friction would snap from one face to the other. Near a crease a
+    vertex moves to the mean of the surface around it, an integral, so that an irregular mesh makes an even
+    rim. A fine mesh too coarse for that stays as it is.
     """
-    p = vertices[triangles]
-    face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    face /= np.maximum(np.linalg.norm(face, axis=1, keepdims=True), 1e-300)
-    sharp = np.einsum("kx,kex->ke", face, face[neighbours]) < np.cos(np.radians(CREASE_DEGREES))
-    sharp &= (free[:, None] > 0) & (free[neighbours] > 0)
-    near = np.zeros(len(vertices), dtype=bool)
-    for edge in range(3):
-        near[triangles[sharp[:, edge], edge]] = True
-        near[triangles[sharp[:, edge], (edge + 1) % 3]] = True
-    near[triangles[near[triangles].any(axis=1)]] = True  # and the ring around it
-    near[triangles[free == 0]] = False
-    pairs = np.vstack([triangles[:, [0, 1]], triangles[:, [1, 2]], triangles[:, [2, 0]]])
-    n = len(vertices)
-    links = sp.coo_matrix((np.ones(len(pairs)), (pairs[:, 0], pairs[:, 1])), shape=(n, n)).tocsr()
-    degree = np.asarray(links.sum(axis=1)).ravel()
+    touch = triangles[free > 0]
+    p = vertices[touch]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]) / 2
+    if np.median(np.linalg.norm(p[:, 1] - p[:, 0], axis=1)) > 2 * EDGE_ROUNDING_M:
+        return vertices
+    # the middles of its edges integrate a triangle to second order
+    places = ((p + np.roll(p, -1, axis=1)) / 2).reshape(-1, 3)
+    parts = np.repeat(area / 3, 3, axis=0)
+    size = np.linalg.norm(parts, axis=1)
+    own = np.setdiff1d(touch, triangles[free == 0])
+    normals = np.zeros_like(vertices)
+    for corner in range(3):
+        np.add.at(normals, touch[:, corner], area)
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    pairs = cKDTree(vertices[own]).sparse_distance_matrix(
+        cKDTree(places), 2.5 * EDGE_ROUNDING_M, output_type="ndarray"
+    )
+    row, column = pairs["i"], pairs["j"]
+    weight = size[column] * np.exp(-((pairs["v"] / EDGE_ROUNDING_M) ** 2) / 2)
+    # the far side of a thin wall is no neighbour
+    weight *= np.einsum("ij,ij->i", normals[own][row], parts[column]) > -0.3 * size[column]
+    around = sp.csr_matrix((weight, (row, column)), shape=(len(own), len(places)))
+    total = np.maximum(np.asarray(around.sum(axis=1)), 1e-300)
+    agreement = np.linalg.norm(around @ (parts / np.maximum(size, 1e-300)[:, None]), axis=1) / total[:, 0]
+    flat, crease = EASED_AGREEMENT
+    share = np.clip((flat - agreement) / (flat - crease), 0.0, 1.0)
+    share = (share * share * (3 - 2 * share))[:, None]
     rounded = vertices.copy()
-    # as in _smooth_normals, a sweep spreads by a quarter of the squared edge
-    fine = float(np.median(np.linalg.norm(p[:, 1] - p[:, 0], axis=1)))
-    for _ in range(round(EDGE_ROUNDING_M**2 / (0.25 * fine**2))):
-        mean = links @ rounded / np.maximum(degree, 1)[:, None]
-        rounded[near] = (rounded[near] + mean[near]) / 2
+    rounded[own] += share * ((around @ places) / total - vertices[own])
     return rounded
 
 

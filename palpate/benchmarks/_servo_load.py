@@ -28,7 +28,6 @@ from palpate.servo.layout import (
 )
 from palpate.servo.loop import Program, kept, make_program, one_tick
 from palpate.servo.realtime import real_time_thread
-from palpate.servo.source import no_support
 from palpate.servo.tick import (
     IN_CALIBRATED,
     IN_CONNECTED,
@@ -47,6 +46,7 @@ from palpate.servo.tick import (
     tick_arrays,
 )
 from render.passivity import PassivityOptions, passivity_parameters
+from render.scene import in_the_air
 
 PERIOD_NS = 1_000_000
 LATE_NS = 200_000
@@ -97,7 +97,9 @@ def sliding_path(model: Model, ticks: int) -> np.ndarray:
 
 
 @njit(cache=True, nogil=True)
-def _timed(kernel, model, state, arrays, parameters, path, ticks, start, wait, cpu_bins, cpu_extremes):
+def _timed(
+    kernel, model, state, support, arrays, parameters, path, ticks, start, wait, cpu_bins, cpu_extremes
+):
     """The servo's loop, its poses taken from `path`; wait: sleep to each deadline, else free-running."""
     pose = np.zeros(IN_WIDTH)
     pose[IN_CONNECTED] = 1.0
@@ -119,7 +121,7 @@ def _timed(kernel, model, state, arrays, parameters, path, ticks, start, wait, c
             compiled_sleep_until(arrays.timespec, deadline)
         began = compiled_now_ns(arrays.timespec)
         cpu = compiled_thread_cpu_ns(arrays.timespec)
-        one_tick(kernel, model, state, arrays, parameters, max(began, deadline), deadline)
+        one_tick(kernel, model, state, support, arrays, parameters, max(began, deadline), deadline)
         count(cpu_bins, cpu_extremes, compiled_thread_cpu_ns(arrays.timespec) - cpu)
         ended = compiled_now_ns(arrays.timespec)
         account(arrays, parameters, deadline, began, ended)
@@ -165,9 +167,8 @@ class Load:
             passivity_parameters(
                 PassivityOptions(), max_damping_n_s_per_m=SPEC.max_damping_n_s_per_m, delay_ticks=0.4
             ),
-            no_support(),
         )
-        self.program: Program = make_program(renderer, self.arrays, parameters)
+        self.program: Program = make_program(in_the_air(renderer), self.arrays, parameters)
         self.arrays.shared.control[ENABLE] = 1
         self._path = path
         self._done = 0
@@ -176,11 +177,12 @@ class Load:
         self._call(0, False)
 
     def _call(self, ticks: int, wait: bool) -> None:
-        renderer, kernel, _, state, parameters = self.program
-        kept(_timed, renderer)(
+        scene, kernel, _, state, parameters = self.program
+        kept(_timed, scene.renderer)(
             kernel,
-            renderer.parameters,
+            scene.renderer.parameters,
             state,
+            scene.support,
             self.arrays,
             parameters,
             self._path,

@@ -1,7 +1,8 @@
 """One scripted press on a model, headless: t,x,y,z,depth,fx,fy,fz in s, m and N (force on the tool).
 
 The tip comes straight along --direction with its centre aimed at --at (m, device frame), goes in by --depth
-along the surface's normal after first touch, and comes out again. With --expect the curve is compared with a
+along the surface's normal after first touch, and comes out again. Beside the object it meets the support, as
+in 'palpate touch' (--no-support leaves that out). With --expect the curve is compared with a
 stored one: exit 1 where the forces differ by more than --tolerance anywhere.
 """
 
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """MODEL_OR_SCENE, where and how to press, what to expect."""
     from render.options import RenderOptions
     from render.registry import names
+    from render.support import SupportOptions
 
     parser.add_argument("model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
     parser.add_argument("--at", type=vector, required=True, metavar="X,Y,Z", help="point aimed at [m]")
@@ -44,22 +46,28 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--tolerance", type=finite, default=0.02, metavar="N", help="of --expect (default: 0.02) [N]"
     )
     add_options(parser, RenderOptions)
+    add_options(parser, SupportOptions)
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Press, write, compare."""
-    from palpate.sources import open_model
+    from palpate.sources import open_scene
     from render.options import RenderOptions
     from render.press import greatest_difference, press, read_curve, write_curve
-    from render.registry import create
+    from render.support import SupportOptions
 
     expected = read_curve(arguments.expect) if arguments.expect else None
     with progress_bar("press") as progress:
-        model = open_model(arguments.model, progress)
-        renderer = create(arguments.renderer, model, options_from(arguments, RenderOptions), progress)
+        scene = open_scene(
+            arguments.model,
+            arguments.renderer,
+            options_from(arguments, RenderOptions),
+            options_from(arguments, SupportOptions),
+            progress,
+        )
     curve = press(
-        renderer,
+        scene,
         arguments.at,
         arguments.direction,
         arguments.depth,
@@ -71,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
         write_curve(arguments.output, curve)
     deepest = curve.force_at(curve.depth.max())
     result = {
-        "renderer": renderer.name,
+        "renderer": arguments.renderer,
         "normal": curve.normal,
         "depth_m": curve.depth.max(),
         "force_at_depth_n": deepest,
@@ -79,8 +87,8 @@ def run(arguments: argparse.Namespace) -> int:
     }
     say(
         arguments,
-        f"{renderer.name}: {curve.peak_force_n:.4g} N at most; at {curve.depth.max() * 1e3:.3g} mm the force "
-        f"on the tool is {', '.join(f'{f:.4g}' for f in deepest)} N",
+        f"{arguments.renderer}: {curve.peak_force_n:.4g} N at most; at {curve.depth.max() * 1e3:.3g} mm the "
+        f"force on the tool is {', '.join(f'{f:.4g}' for f in deepest)} N",
     )
     code = 0
     if expected is not None:

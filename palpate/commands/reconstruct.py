@@ -1,12 +1,13 @@
 """A recording becomes a model: contacts, base, surface, tetrahedra, modulus, 1D models of every press.
 
-REC is a recording's .csv, .csv.gz or .toml. MODEL is a folder: model.toml, mesh.vtu (ParaView opens it),
-palpations.csv. Lengths in m, forces in N, moduli in Pa.
+REC is a recording's .csv, .csv.gz or .toml. MODEL is a folder: model.toml, mesh.vtu and surface.vtp
+(ParaView opens them), palpations.csv. Lengths in m, forces in N, moduli in Pa.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +17,7 @@ from mechanics.errors import ModelError
 from mechanics.model import read_model, write_model
 from mechanics.recording import read_recording
 from palpate.arguments import add_json, add_options, add_seed, emit_json, options_from, progress_bar, say
+from render.felt import felt_surface
 
 if TYPE_CHECKING:
     from reconstruct.pipeline import Reconstruction
@@ -86,7 +88,8 @@ def run(arguments: argparse.Namespace) -> int:
     recording = read_recording(arguments.recording)
     with progress_bar("reconstruct") as progress:
         result = reconstruct_fully(recording, options, progress)
-    write_model(output, result.model)
+    result = replace(result, model=result.model.replaced(path=write_model(output, result.model)))
+    felt_surface(result.model, result.sites)
     if arguments.report:
         from palpate.report.reconstruction import write_report
 

@@ -33,8 +33,11 @@ from palpate.arguments import (
     say,
 )
 from palpate.servo import SafetyOptions, ServoOptions
+from palpate.sources import with_friction
 from palpate.window.session import TouchSession
+from render.options import RenderOptions
 from render.registry import names
+from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene, load_scene
@@ -74,7 +77,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--screenshot", metavar="PNG", type=Path, help="save a picture of the window at its end"
     )
     add_options(parser, MapperOptions)
-    add_options(parser, ServoOptions, skip=("safety", "passivity", "tip_offsets_m"))
+    add_options(parser, RenderOptions)
+    add_options(parser, ServoOptions, skip=("safety", "passivity", "support_plane", "tip_offsets_m"))
+    add_options(parser, SupportOptions)
     add_options(parser, SafetyOptions)
     for name in DEVICES:
         add_options(parser, options_of(name))
@@ -104,9 +109,14 @@ def run(arguments: argparse.Namespace) -> int:
                 device=device,
                 renderer=arguments.renderer or scene.renderer,
                 beside=_beside(arguments, scene),
-                friction=scene.friction,
+                render_options=with_friction(options_from(arguments, RenderOptions), scene),
                 mapping=_mapping(arguments, name, scene, model),
-                options=options_from(arguments, ServoOptions, safety=options_from(arguments, SafetyOptions)),
+                options=options_from(
+                    arguments,
+                    ServoOptions,
+                    safety=options_from(arguments, SafetyOptions),
+                    support_plane=options_from(arguments, SupportOptions),
+                ),
                 recording=arguments.record,
                 pictures=not arguments.headless,
             )

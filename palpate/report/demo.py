@@ -14,6 +14,7 @@ from palpate.report.object3d import draw_object
 from palpate.report.page import Page, save_figures
 from palpate.servo.histogram import lower_edge_ns
 from reconstruct.uniaxial import low_passed
+from render.felt import felt_surface
 
 SHOWN_PRESSES = 4
 
@@ -61,8 +62,8 @@ def figures(result: DemoResult) -> dict[str, Figure]:
     touches = model.presses.point
     draw_object(axes[0], model, touches=touches, show_base=True)
     axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
-    if model.shape_uncertainty_m is not None:
-        draw_object(axes[1], model, values=model.shape_uncertainty_m * 1e3, label="shape uncertainty [mm]")
+    doubt = felt_surface(model).uncertainty_m
+    draw_object(axes[1], model, values=doubt * 1e3, label="shape uncertainty [mm]")
     presses, axes = plt.subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True, layout="constrained")
     measured_against_rendered(axes, result)
     loop, axes = plt.subplots(1, 2, figsize=(9, 2.6), layout="constrained")

@@ -5,10 +5,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from diagnose.result import Diagnosis
 from mechanics.model import Model
 from palpate.report.object3d import draw_object, view_axes
+from render.felt import felt_surface
 
 MEASURED, IDEAL, IMPROVED, PALE = "#1d3557", "#e76f51", "#2a9d8f", "#c9c9c9"
 SPREAD_M = 0.015
@@ -38,13 +40,12 @@ def _ranked(result: Diagnosis) -> np.ndarray:
 def _object(ax: Any, model: Model, result: Diagnosis) -> None:
     t = result.forward.touches
     places = t.site_point
-    nodes = model.mesh.points
-    distance = np.linalg.norm(nodes[:, None] - places[None], axis=2)
+    distance = cdist(felt_surface(model).points, places)
     weight = np.exp(-((distance / SPREAD_M) ** 2)) + 1e-9
     values = (weight @ (result.where.site_rmse * 1e3)) / weight.sum(axis=1)
     draw_object(ax, model, values, label="difference (mN)", colour_map="magma", touches=places)
     view = view_axes(model.support.normal, 25.0, 35.0)
-    worst = (np.array(result.where.worst[0][:3]) - nodes.mean(axis=0)) @ view.T * 1e3
+    worst = (np.array(result.where.worst[0][:3]) - model.mesh.points.mean(axis=0)) @ view.T * 1e3
     ax.scatter(
         [worst[0]], [worst[1]], s=190, facecolors="none", edgecolors=IMPROVED, linewidths=2.2, zorder=4
     )

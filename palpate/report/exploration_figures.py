@@ -5,13 +5,17 @@ from __future__ import annotations
 import numpy as np
 from matplotlib import pyplot as plt
 from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
 from matplotlib.figure import Figure
+from scipy.spatial import cKDTree
 
+from mechanics.model import Model
 from palpate.report.object3d import draw_object, view_axes
 from reconstruct.contacts import Exploration
 from reconstruct.modulus_paper import nearest_nodes
 from reconstruct.pipeline import Reconstruction
 from reconstruct.uniaxial import profiles
+from render.felt import felt_surface
 
 FORCE_COLOUR, TOUCH_COLOUR, PEAK_COLOUR, PHASE_COLOUR = "#457b9d", "#1d3557", "#c1121f", "#f1e3cf"
 
@@ -54,11 +58,12 @@ def touched_points(ax: Axes, exploration: Exploration) -> Axes:
 
 
 def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
-    """Figure 3(b): surface of the mesh, fixed base nodes, and the node nearest to each contact, with
-    the number of its first press."""
+    """Figure 3(b): the felt surface with the mesh's edges laid onto it, fixed base nodes, and the node
+    nearest to each contact, with the number of its first press."""
     model = result.model
     draw_object(ax, model, show_base=True, elevation_deg=22.0)
     view = view_axes(model.support.normal, 22.0, 35.0)
+    _mesh_edges(ax, model, view)
     corners = model.mesh.linear()
     node = nearest_nodes(corners, result.exploration.presses.point)
     seen = (corners.points[node] - model.mesh.points.mean(axis=0)) @ view.T * 1e3
@@ -68,6 +73,20 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
         ax.plot(*seen[i, :2], "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
         ax.text(*seen[i, :2], str(i + 1), ha="center", va="center", fontsize=5.5)
     return ax
+
+
+def _mesh_edges(ax: Axes, model: Model, view: np.ndarray, pieces: int = 5) -> None:
+    """The edges of the mesh's touchable surface, where the felt surface has them and faces the eye."""
+    surface = felt_surface(model)
+    triangles = model.mesh.touchable_surface[:, :3]
+    edges = np.unique(np.sort(np.vstack([np.roll(triangles, k, axis=1)[:, :2] for k in range(3)])), axis=0)
+    share = np.linspace(0.0, 1.0, pieces)[:, None]
+    ends = model.mesh.points[edges][:, :, None]
+    own = np.flatnonzero(surface.touchable)
+    near = own[cKDTree(surface.points[own]).query(ends[:, 0] * (1 - share) + ends[:, 1] * share)[1]]
+    facing = (surface.normals[near] @ view[2] > 0.02).all(axis=1)
+    seen = (surface.points[near[facing]] - model.mesh.points.mean(axis=0)) @ view[:2].T * 1e3
+    ax.add_collection(LineCollection(seen, colors="#b9a88f", linewidths=0.4))
 
 
 def force_profiles(ax: Axes, result: Reconstruction) -> Axes:

@@ -15,6 +15,7 @@ from mechanics.model import Model
 from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, spread
 from palpate.report.object3d import draw_object
 from reconstruct.modulus import ModulusFit
+from render.felt import felt_surface
 
 SIDE = 0.3  # |n . support normal| below this: a press on the side
 
@@ -67,7 +68,8 @@ def height_trends(model: Model) -> list[Trend]:
 
 
 def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
-    """(n,) values of single presses spread over the nodes by radial basis functions (thin plate, smoothed).
+    """(v,) values of single presses spread over the felt surface by radial basis functions (thin plate,
+    smoothed).
 
     Repeats at one place are averaged by the smoothing; the result is kept within the range of the values.
     """
@@ -76,7 +78,7 @@ def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
     scale = np.linalg.norm(np.ptp(points, axis=0))
     centre, size = np.median(values[used]), max(float(np.std(values[used])), 1e-12)
     smooth = RBFInterpolator(points[used] / scale, (values[used] - centre) / size, smoothing=1e-2)
-    field = centre + size * smooth(model.mesh.points / scale)
+    field = centre + size * smooth(felt_surface(model).points / scale)
     return np.clip(field, values[used].min(), values[used].max())
 
 

@@ -1,4 +1,4 @@
-"""Pictures of an object: its surface coloured by a value, contact points, base.
+"""Pictures of an object: the surface that is felt, coloured by a value, contact points, base.
 
 Drawn with matplotlib, in parallel projection with hidden triangles left out, so that reports need no OpenGL,
 which a bare machine may lack.
@@ -13,8 +13,10 @@ from matplotlib import colormaps
 from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
+from scipy.spatial import cKDTree
 
 from mechanics.model import Model
+from render.felt import felt_surface
 
 PLAIN_COLOUR = "#ead7bf"
 TOUCH_COLOUR = "#c1121f"
@@ -47,19 +49,19 @@ def draw_object(
     elevation_deg: float = 25.0,
     azimuth_deg: float = 35.0,
 ) -> Axes:
-    """Draw the touchable surface and return `ax`.
+    """Draw what a tip meets of the object (render.felt) and return `ax`.
 
-    values: (n,) one a mesh node, colours the surface, with a bar named `label`; limits: of the colours.
-    touches: (k, 3) m, points as dots, pale where hidden; show_base: the fixed corner nodes as dots.
+    values: (v,) one a point of the felt surface, colours it, with a bar named `label`; limits: of the
+    colours. touches: (k, 3) m, points as dots, pale where hidden; show_base: the fixed corner nodes as dots.
     """
-    mesh = model.mesh
+    mesh, surface = model.mesh, felt_surface(model)
     view = view_axes(model.support.normal, elevation_deg, azimuth_deg)
-    seen = (mesh.points - mesh.points.mean(axis=0)) @ view.T * 1e3
-    triangles = mesh.touchable_surface[:, :3]
+    seen = (surface.points - mesh.points.mean(axis=0)) @ view.T * 1e3
+    triangles = surface.triangles[surface.touchable[surface.triangles].all(axis=1)]
     p = seen[triangles]
-    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    front = normal[:, 2] > 0
+    front = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])[:, 2] > 0
+    normal = (surface.normals[triangles].mean(axis=1)) @ view.T
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
     order = np.flatnonzero(front)[np.argsort(p[front][:, :, 2].mean(axis=1))]
     shade = 0.55 + 0.45 * np.clip(normal @ np.array([-0.35, 0.55, 0.76]), 0, 1)
     if values is None:
@@ -73,17 +75,16 @@ def draw_object(
         )
         bar.outline.set_visible(False)
     colour = colour * shade[:, None]
-    edges = colour * 0.86 if values is None else colour
     ax.add_collection(
-        PolyCollection(p[order][:, :, :2], facecolors=colour[order], edgecolors=edges[order], linewidths=0.5)
+        PolyCollection(p[order][:, :, :2], facecolors=colour[order], edgecolors=colour[order], linewidths=0.5)
     )
     if show_base:
-        base = seen[: len(mesh.linear().points)][mesh.linear().fixed]
+        corners = mesh.linear()
+        base = (corners.points[corners.fixed] - mesh.points.mean(axis=0)) @ view.T * 1e3
         ax.scatter(base[:, 0], base[:, 1], s=16, color=BASE_COLOUR, label="fixed base", zorder=0.4)
     if touches is not None and len(touches):
         dots = (np.asarray(touches) - mesh.points.mean(axis=0)) @ view.T * 1e3
-        nearest = np.argmin(((dots[:, None] - p.mean(axis=1)[None]) ** 2).sum(axis=2), axis=1)
-        visible = normal[nearest, 2] > 0
+        visible = front[cKDTree(p.mean(axis=1)).query(dots)[1]]
         ax.scatter(dots[~visible, 0], dots[~visible, 1], s=14, color=TOUCH_COLOUR, alpha=0.25, zorder=0.5)
         ax.scatter(
             dots[visible, 0], dots[visible, 1], s=26, color=TOUCH_COLOUR, label="contact points",

@@ -140,10 +140,12 @@ class Servo:
         self.set_source(self._source.named(name), progress)
 
     def set_model(self, model: Model | Path | str, progress: Progress = silent) -> None:
-        """Go on with another model through the same renderer."""
+        """Go on with another model through the same renderer, with the same options."""
         folder = ModelFolder(model)
         try:
-            self.set_source(ModelSource(folder.path, self._source.name), progress)
+            now = self._source
+            options = now.render_options if isinstance(now, ModelSource) else None
+            self.set_source(ModelSource(folder.path, now.name, options), progress)
         except PalpateError:
             folder.close()
             raise

@@ -20,7 +20,6 @@ from devices.impedance import HandImpedance
 from devices.safety import SafetyOptions, safety_parameters
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
 from palpate.servo.loop import kept, make_program, one_tick
-from palpate.servo.source import no_support
 from palpate.servo.tick import (
     IN_CALIBRATED,
     IN_CONNECTED,
@@ -46,6 +45,7 @@ from render.coupling import (
     stiffness_distortion,
 )
 from render.passivity import DISSIPATED, PassivityOptions, passivity_parameters
+from render.scene import in_the_air
 
 SUBSTEPS = 20
 START_NS = 1_000_000_000
@@ -98,7 +98,20 @@ class ClosedLoopResult:
 
 @njit(cache=True, nogil=True)
 def _run(
-    kernel, model, state, arrays, parameters, intended, hand, start, throw, quantum, delay_steps, noise, out
+    kernel,
+    model,
+    state,
+    support,
+    arrays,
+    parameters,
+    intended,
+    hand,
+    start,
+    throw,
+    quantum,
+    delay_steps,
+    noise,
+    out,
 ):
     """out: (n, 10) position, command, rendered, work. hand: (2, 3) transition over a substep."""
     position, velocity = start.copy(), throw.copy()
@@ -128,7 +141,7 @@ def _run(
         pose[IN_TIME] = now * 1e-9
         pose[IN_SEQUENCE] = tick
         put_pose(arrays, pose)
-        one_tick(kernel, model, state, arrays, parameters, now, now)
+        one_tick(kernel, model, state, support, arrays, parameters, now, now)
         arrays.shared.counts[TICKS] += 1
         for i in range(3):
             out[tick, i] = position[i]
@@ -197,9 +210,8 @@ def closed_loop(
             delay_ticks=known,
             rate_hz=loop.rate_hz,
         ),
-        no_support(),
     )
-    program = make_program(renderer, arrays, parameters)
+    program = make_program(in_the_air(renderer), arrays, parameters)
     arrays.shared.control[ENABLE] = 1
     n = len(intended) - 1
     out = np.zeros((n, 10))
@@ -211,6 +223,7 @@ def closed_loop(
         program.kernel,
         renderer.parameters,
         program.state,
+        program.scene.support,
         arrays,
         parameters,
         intended,

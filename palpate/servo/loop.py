@@ -18,6 +18,7 @@ from numba import cfunc, njit, typeof, types
 from palpate.servo.clock import COMPILED, compiled_now_ns, compiled_sleep_until, sleep_until
 from palpate.servo.layout import DEADLINE, STATUS, STOP
 from palpate.servo.tick import TickArrays, TickParameters, account, after, before
+from render.scene import TouchScene
 
 _write = types.ExternalFunction("write", types.intp(types.int32, types.voidptr, types.uintp))
 
@@ -26,13 +27,14 @@ SWAP = 7
 
 
 @njit(inline="always", nogil=True)
-def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
-    """A whole tick with the renderer's kernel in its middle."""
+def one_tick(kernel, model, state, support, arrays, parameters, now_ns, deadline_ns):
+    """A whole tick with the renderer's kernel in its middle, and the support beside it."""
     before(arrays)
     kernel(model, state, arrays.tips)
     after(
         arrays,
         parameters,
+        support,
         state.forces,
         state.points,
         state.normals,
@@ -46,7 +48,7 @@ def one_tick(kernel, model, state, arrays, parameters, now_ns, deadline_ns):
 
 
 @njit(cache=True, nogil=True)
-def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
+def compiled_loop(kernel, model, state, support, arrays, parameters, wake, most_ticks):
     """Tick until told to stop or swap; `wake` is a file descriptor told after each tick, -1 for none."""
     for _ in range(most_ticks):
         if arrays.shared.control[STOP] != 0 or arrays.shared.control[SWAP] != 0:
@@ -54,7 +56,7 @@ def compiled_loop(kernel, model, state, arrays, parameters, wake, most_ticks):
         deadline = arrays.shared.counts[DEADLINE]
         compiled_sleep_until(arrays.timespec, deadline)
         started = compiled_now_ns(arrays.timespec)
-        one_tick(kernel, model, state, arrays, parameters, started, deadline)
+        one_tick(kernel, model, state, support, arrays, parameters, started, deadline)
         ended = compiled_now_ns(arrays.timespec)
         account(arrays, parameters, deadline, started, ended)
         if wake >= 0:
@@ -74,33 +76,28 @@ def kernel_pointer(renderer: Any, state: Any) -> Any:
 
 
 class Program(NamedTuple):
-    """A renderer made ready: its kernel's pointer, the loop compiled for it, and its state."""
+    """A scene made ready: its renderer's kernel as a pointer, the loop compiled for it, and its state."""
 
-    renderer: Any
+    scene: TouchScene
     kernel: Any
     loop: Any
     state: Any
     parameters: TickParameters
 
 
-def make_program(
-    renderer: Any, arrays: TickArrays, parameters: TickParameters, state: Any | None = None
-) -> Program:
-    """Compile the loop for this renderer and touch its memory; nothing of a running loop is changed.
-
-    state: kept where the renderer is only retuned (same kernel), else a fresh one.
-    """
-    if state is None:
-        radius = float(renderer.start().radii_m[0])
-        state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
-        warm_up(renderer, state)
-        state = renderer.start(radii_m=np.full(len(arrays.offsets), radius), dt_s=parameters.period_ns * 1e-9)
+def make_program(scene: TouchScene, arrays: TickArrays, parameters: TickParameters) -> Program:
+    """Compile the loop for this scene and touch its memory; nothing of a running loop is changed."""
+    renderer = scene.renderer
+    radii = np.full(len(arrays.offsets), float(renderer.start().radii_m[0]))
+    state = renderer.start(radii_m=radii, dt_s=parameters.period_ns * 1e-9)
+    warm_up(renderer, state)
+    state = renderer.start(radii_m=radii, dt_s=parameters.period_ns * 1e-9)
     kernel = kernel_pointer(renderer, state)
     loop = None
     if COMPILED:
         loop = kept(compiled_loop, renderer)
-        loop(kernel, renderer.parameters, state, arrays, parameters, -1, 0)
-    return Program(renderer, kernel, loop, state, parameters)
+        loop(kernel, renderer.parameters, state, scene.support, arrays, parameters, -1, 0)
+    return Program(scene, kernel, loop, state, parameters)
 
 
 def _is_ours(renderer: Any) -> bool:
@@ -187,11 +184,12 @@ class ServoLoop:
                     self.arrays.shared.control[SWAP] = 0
                     self._swapped.set()
                 if COMPILED:
-                    renderer, kernel, loop, state, parameters = self._program
+                    scene, kernel, loop, state, parameters = self._program
                     loop(
                         kernel,
-                        renderer.parameters,
+                        scene.renderer.parameters,
                         state,
+                        scene.support,
                         self.arrays,
                         parameters,
                         self._wake,
@@ -215,7 +213,8 @@ def portable_tick(program: Program, arrays: TickArrays) -> None:
 
 def run_tick(program: Program, arrays: TickArrays, now_ns: int, deadline_ns: int) -> None:
     """One tick at a time that is handed in: what the compiled loop does between two deadlines."""
-    renderer = program.renderer
+    renderer, support = program.scene.renderer, program.scene.support
+    state, parameters = program.state, program.parameters
     one_tick.py_func(
-        renderer.kernel, renderer.parameters, program.state, arrays, program.parameters, now_ns, deadline_ns
+        renderer.kernel, renderer.parameters, state, support, arrays, parameters, now_ns, deadline_ns
     )

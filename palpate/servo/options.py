@@ -11,6 +11,7 @@ from devices.safety import SafetyOptions
 from mechanics.errors import OptionError
 from mechanics.options import option
 from render.passivity import PassivityOptions
+from render.support import SupportOptions
 
 
 @dataclass(frozen=True)
@@ -25,14 +26,11 @@ class ServoOptions:
         "stop", "when the window dies: stop with zero force, or go on", choices=("stop", "continue")
     )
     coupling: bool = option(True, "soften stiffness beyond what the device renders stably")
-    support: bool = option(True, "the support is felt as a rigid plane beside the object")
-    support_stiffness_n_per_m: float = option(1500.0, "the support's stiffness, or the device's", unit="N/m")
-    support_damping_n_s_per_m: float = option(2.0, "the support's damping", unit="N s/m")
-    support_friction: float = option(0.2, "friction on the support")
     read_ahead_s: float = option(250e-6, "how long before a tick the device is read", unit="s")
     late_s: float = option(200e-6, "a tick that starts later than this counts as late", unit="s")
     priority: int = option(60, "real-time priority where permitted, 0 for none")
     tip_offsets_m: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
+    support_plane: SupportOptions = field(default_factory=SupportOptions)
     safety: SafetyOptions = field(default_factory=SafetyOptions)
     passivity: PassivityOptions = field(default_factory=PassivityOptions)
 

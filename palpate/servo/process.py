@@ -29,11 +29,11 @@ from palpate.servo.layout import ENABLE, MOST_TIPS, STOP, SharedBlock
 from palpate.servo.loop import Program, ServoLoop, make_program
 from palpate.servo.options import ServoOptions
 from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
-from palpate.servo.source import RendererSource, no_support
+from palpate.servo.source import RendererSource
 from palpate.servo.tick import TickParameters, tick_arrays
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
 from render.passivity import passivity_parameters
-from render.support import SupportParameters
+from render.scene import TouchScene, in_the_air, scene_of
 
 
 @dataclass(frozen=True)
@@ -98,7 +98,14 @@ class ServoProcess:
             )
         return renderer.with_series_compliance(compliance)
 
-    def _parameters(self, model: Model | None) -> TickParameters:
+    def _scene(self, renderer: Any, model: Model | None) -> TouchScene:
+        """The renderer on its support, as far as the device can render both."""
+        scene, spec = in_the_air(self._coupled(renderer)), self._device.spec
+        if model is not None:
+            scene = scene_of(scene.renderer, self.job.options.support_plane)
+        return scene.no_stiffer_than(spec.max_stiffness_n_per_m) if spec.has_force else scene
+
+    def _parameters(self) -> TickParameters:
         options, spec = self.job.options, self._device.spec
         return TickParameters(
             options.period_ns,
@@ -110,31 +117,15 @@ class ServoProcess:
                 delay_ticks=self._delay_ticks(),
                 rate_hz=options.rate_hz,
             ),
-            self._support(model),
-        )
-
-    def _support(self, model: Model | None) -> SupportParameters:
-        options = self.job.options
-        if model is None or not options.support:
-            return no_support()
-        stiffness = options.support_stiffness_n_per_m
-        if self._device.spec.has_force:
-            stiffness = min(stiffness, self._device.spec.max_stiffness_n_per_m)
-        return SupportParameters(
-            model.support.point,
-            model.support.normal,
-            stiffness,
-            options.support_damping_n_s_per_m,
-            options.support_friction,
         )
 
     def run(self, commands: BinaryIO) -> None:
         """Warm up, tick, follow commands, and end in zero force."""
         quiet_interpreter()
         self._progress("loading the model", 0.0)
-        renderer, self._model = self._source.make(self._progress)
+        scene = self._scene(*self._source.make(self._progress))
         self._progress("compiling the loop", 0.95)
-        program = make_program(self._coupled(renderer), self._arrays, self._parameters(self._model))
+        program = make_program(scene, self._arrays, self._parameters())
         locked = lock_memory()
         if locked:
             self._tell({"word": locked})
@@ -189,21 +180,26 @@ class ServoProcess:
         assert self._loop is not None
         now = self._loop.program
         if name == "modulus":
-            self._swap(now._replace(renderer=self._coupled(now.renderer.with_modulus(value))))
+            self._put(self._coupled(now.scene.renderer.with_modulus(value)))
         elif name == "change":
-            self._swap(now._replace(renderer=self._coupled(value.changed(now.renderer))))
+            self._put(self._coupled(value.changed(now.scene.renderer)))
         elif name == "friction":
-            self._swap(now._replace(renderer=now.renderer.with_friction(value)))
+            self._put(now.scene.renderer.with_friction(value))
         elif name == "source":
-            renderer, model = value.make(self._progress)
-            program = make_program(self._coupled(renderer), self._arrays, self._parameters(model))
-            self._source, self._model = value, model
-            self._swap(program)
+            scene = self._scene(*value.make(self._progress))
+            self._swap(make_program(scene, self._arrays, self._parameters()))
+            self._source = value
         elif name == "mapping":
             self._mapping = value
             self._pump.set_mapping(value)
         else:
             raise OptionError(f"'{name}' is no command of the servo")
+
+    def _put(self, renderer: Any) -> None:
+        """The renderer that runs, retuned: its state and its support stay."""
+        assert self._loop is not None
+        now = self._loop.program
+        self._swap(now._replace(scene=now.scene.with_renderer(renderer)))
 
     def _swap(self, program: Program) -> None:
         assert self._loop is not None

@@ -9,7 +9,6 @@ from typing import Any, Protocol
 
 from mechanics.model import Model, read_model, write_model
 from mechanics.progress import Progress
-from render.support import SupportParameters
 
 
 class RendererSource(Protocol):
@@ -80,10 +79,3 @@ class ModelFolder:
         """Remove the folder where it was made for this."""
         if self._temporary is not None:
             self._temporary.cleanup()
-
-
-def no_support() -> SupportParameters:
-    """A support plane that is not there."""
-    import numpy as np
-
-    return SupportParameters(np.zeros(3), np.array([0.0, 0.0, 1.0]), 0.0, 0.0, 0.0)

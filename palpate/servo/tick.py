@@ -43,7 +43,7 @@ from render.passivity import (
     passivity_before,
     passivity_state,
 )
-from render.support import SupportParameters, add_support_force
+from render.support import add_support_force
 
 (
     IN_TIME,
@@ -72,7 +72,6 @@ class TickParameters(NamedTuple):
     late_ns: int
     safety: SafetyParameters
     passivity: PassivityParameters
-    support: SupportParameters
 
 
 class TickArrays(NamedTuple):
@@ -145,8 +144,21 @@ def before(arrays):
 
 
 @njit(cache=True, nogil=True)
-def after(arrays, parameters, felt, points, normals, depths, touching, stiffness, radii, now_ns, deadline_ns):
-    """From the renderer's forces `felt` to the command; writes outbox, snapshot and ring."""
+def after(
+    arrays,
+    parameters,
+    support,
+    felt,
+    points,
+    normals,
+    depths,
+    touching,
+    stiffness,
+    radii,
+    now_ns,
+    deadline_ns,
+):
+    """From the renderer's forces `felt` and the support to the command; writes outbox, snapshot and ring."""
     pose, wanted, rendered, forces = arrays.pose, arrays.wanted, arrays.rendered, arrays.forces
     dt_s = _elapsed(arrays, parameters, deadline_ns)
     velocity = pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3]
@@ -157,7 +169,7 @@ def after(arrays, parameters, felt, points, normals, depths, touching, stiffness
     for t in range(forces.shape[0]):
         for i in range(3):
             forces[t, i] = felt[t, i]
-        touches = add_support_force(parameters.support, arrays.tips[t], velocity, radii[t], forces[t])
+        touches = add_support_force(support, arrays.tips[t], velocity, radii[t], forces[t])
         if touches or touching[t] != 0:
             contacts += 1
         for i in range(3):

@@ -6,8 +6,11 @@ import numpy as np
 import pyvista
 
 from mechanics.model import Model
+from mechanics.tetmesh import vertex_normals
 from palpate.window.frames import Frame, View
 from render.base import Renderer
+from render.press import BESIDE
+from render.support import support_plane
 from scenes.phantoms import Region
 
 ARROW_M_PER_N = 0.03
@@ -37,6 +40,10 @@ class ObjectPicture:
         self._rest = np.array(points, dtype=float)
         self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
         self._surface["displacement (mm)"] = np.zeros(len(points))
+        self._bent = False
+        self._flat = vertex_normals(self._rest, np.asarray(triangles))
+        self._smooth = renderer.contact.arrays.normals
+        self._shade()
         self._actor: pyvista.Actor | None = None
         self._title = f"{label}  " if label else ""
         _add_support(plotter, model, self._rest)
@@ -103,6 +110,13 @@ class ObjectPicture:
             },
             render=False,
         )
+        self._actor.prop.interpolation = "Gouraud"
+
+    def _shade(self) -> None:
+        """As the tip feels it: by the contact normals, turned as the surface has turned since."""
+        now = vertex_normals(np.asarray(self._surface.points), self._surface.regular_faces)
+        self._surface.point_data["normals"] = self._smooth + now - self._flat
+        self._surface.point_data.active_normals_name = "normals"
 
     def see_through(self, on: bool) -> None:
         """Show what is inside."""
@@ -119,8 +133,10 @@ class ObjectPicture:
     def update(self, frame: Frame, view: View) -> None:
         """Move surface, tip and arrow to a frame."""
         moved = view.displacement_m
-        if len(moved) == len(self._rest):
+        if len(moved) == len(self._rest) and (self._bent or moved.any()):
+            self._bent = bool(moved.any())
             self._surface.points = self._rest + moved
+            self._shade()
             self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)
         self._tip.SetPosition(*frame.tip_m)
         force = view.force_n
@@ -143,7 +159,9 @@ def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> ob
 
 
 def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> None:
-    size = 2.2 * np.linalg.norm(np.ptp(points, axis=0))
+    size = 2 * BESIDE * np.linalg.norm(np.ptp(points, axis=0))
+    support = support_plane(model)
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
-    plane = pyvista.Plane(center=middle, direction=model.support.normal, i_size=size, j_size=size)
+    middle = middle - ((middle - support.point) @ support.normal) * support.normal
+    plane = pyvista.Plane(center=middle, direction=support.normal, i_size=size, j_size=size)
     plotter.add_mesh(plane, color="#d9dee5", lighting=False)

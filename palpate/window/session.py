@@ -27,7 +27,11 @@ from palpate.window.recording import SessionRecording
 from palpate.window.trace import Trace
 from palpate.window.worker import Worker
 from render.base import Renderer
+from render.effects import rendered_friction
+from render.felt import with_own_stiffness
+from render.options import RenderOptions
 from render.registry import create, names
+from render.scene import scene_of
 from scenes.phantoms import Region
 
 FRICTIONS = (math.inf, 1.0, 0.5, 0.2, 0.05)
@@ -37,7 +41,8 @@ MODULUS_STEP = 1.25
 class TouchSession:
     """Use in a `with` statement, after which every force is zero and the servo is gone.
 
-    beside: a second renderer, '' for none. recording: its file, written on close; None until asked for.
+    beside: a second renderer, '' for none. render_options: of every renderer here, felt or drawn.
+    recording: its file, written on close; None until asked for.
     """
 
     def __init__(
@@ -48,7 +53,7 @@ class TouchSession:
         device: DeviceChoice | str = "simulated",
         renderer: str = "fem",
         beside: str = "",
-        friction: float | None = None,
+        render_options: RenderOptions | None = None,
         mapping: Mapping | None = None,
         options: ServoOptions | None = None,
         recording: Path | None = None,
@@ -58,7 +63,8 @@ class TouchSession:
         self.title = title
         self.trace = Trace()
         self.young_modulus_pa = model.material.young_modulus_pa
-        self.friction = friction
+        self._options = render_options or RenderOptions()
+        self.friction = rendered_friction(model, self._options)
         self.worker = Worker()
         self.recording: SessionRecording | None = None
         self._recording_path = recording
@@ -67,7 +73,14 @@ class TouchSession:
         self._beside: Beside | None = None
         self._device = DeviceChoice(device) if isinstance(device, str) else device
         self._has_force = spec_of(self._device.name).has_force
-        self._servo = Servo(model, renderer=renderer, device=self._device, mapping=mapping, options=options)
+        self._servo = Servo(
+            model,
+            renderer=renderer,
+            device=self._device,
+            mapping=mapping,
+            options=options,
+            render_options=self._options,
+        )
         self._renderers: dict[str, Renderer] = {}
         self._inclusion = InclusionMover(model)
         self._next = 0
@@ -79,9 +92,11 @@ class TouchSession:
             # once, before two processes ask for it at the same time
             load_or_condense(self.model, lambda stage, share: progress(stage, 0.5 * share))
         with ThreadPoolExecutor(1) as pool:
-            loading = {name: pool.submit(create, name, self.model) for name in sorted(drawn)}
+            loading = {name: pool.submit(self._create, name) for name in sorted(drawn)}
             self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share))
             self._renderers = {name: job.result() for name, job in loading.items()}
+        for renderer in self._renderers.values():
+            with_own_stiffness(renderer)
         self._restart_beside()
         self._apply()
         self._next = int(self._servo.arrays.ring_head[0])
@@ -90,11 +105,14 @@ class TouchSession:
         progress("touching", 1.0)
         return self
 
+    def _create(self, name: str) -> Renderer:
+        return create(name, self.model, self._options)
+
     def _apply(self) -> None:
         """What the user changed, to a renderer that is new."""
         if self.young_modulus_pa != self.model.material.young_modulus_pa:
             self._servo.set_modulus(self.young_modulus_pa)
-        if self.friction is not None:
+        if self.friction != rendered_friction(self.model, self._options):
             self._servo.set_friction(self.friction)
         self._inclusion.apply(self._servo)
 
@@ -170,7 +188,15 @@ class TouchSession:
 
     def _restart_beside(self) -> None:
         name = self._beside_name
-        self._beside = Beside(name, self._renderers[name], self._servo.tip_radius_m) if name else None
+        if not name:
+            self._beside = None
+            return
+        # the plane that is felt, which may be softer than the options' for the device's sake
+        scene = scene_of(self._renderers[name], self._servo.options.support_plane)
+        spec = spec_of(self._device.name)
+        if spec.has_force:
+            scene = scene.no_stiffer_than(spec.max_stiffness_n_per_m)
+        self._beside = Beside(name, scene, self._servo.tip_radius_m)
 
     def _add_to_trace(self, rows: np.ndarray, beside: np.ndarray, snapshot: ServoSnapshot) -> None:
         if not len(rows):
@@ -197,7 +223,7 @@ class TouchSession:
 
         def job() -> None:
             if self._pictures and name not in self._renderers:
-                self._renderers[name] = create(name, self.model)
+                self._renderers[name] = self._create(name)
             self._servo.set_renderer(name)
             self._apply()
 
@@ -214,7 +240,7 @@ class TouchSession:
 
         def job() -> None:
             if name and name not in self._renderers:
-                self._renderers[name] = create(name, self.model)
+                self._renderers[name] = self._create(name)
             self._beside_name = name
             self._restart_beside()
 
@@ -236,8 +262,7 @@ class TouchSession:
 
     def next_friction(self) -> None:
         """Stick, then ever more slippery, then stick again."""
-        now = math.inf if self.friction is None else self.friction
-        friction = next((f for f in FRICTIONS if f < now), FRICTIONS[0])
+        friction = next((f for f in FRICTIONS if f < self.friction), FRICTIONS[0])
 
         def job() -> None:
             self._servo.set_friction(friction)
@@ -261,7 +286,7 @@ class TouchSession:
 
     def _follow_inclusion(self) -> None:
         if "fem" not in self._renderers:
-            self._renderers["fem"] = create("fem", self.model).with_modulus(self.young_modulus_pa)
+            self._renderers["fem"] = self._create("fem").with_modulus(self.young_modulus_pa)
         while not self._inclusion.settled:
             self._renderers["fem"] = self._inclusion.follow(self._servo, self._renderers["fem"])
 

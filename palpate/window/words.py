@@ -23,7 +23,7 @@ def heading(name: str, *, felt: bool) -> str:
 
 def status(session: TouchSession, scene: Scene, pointer: Pointer, frame: Frame, notice: str) -> str:
     """The lines in the corner: the object, what is felt, and what goes on."""
-    friction = "sticks" if session.friction in (None, float("inf")) else f"friction {session.friction:g}"
+    friction = "sticks" if session.friction == float("inf") else f"friction {session.friction:g}"
     lines = [f"{scene.title}   {session.young_modulus_pa / 1000:.1f} kPa, {friction}"]
     if scene.about:
         lines.append(scene.about)

@@ -25,6 +25,16 @@ def test_a_cylinder_of_coarse_facets_is_felt_round():
     assert (arrays.normals[side, :2] * outward).sum(axis=1).min() > 0.999
 
 
+def test_the_rim_of_a_round_top_is_even_on_an_uneven_mesh():
+    mesh = shapes.cylinder(0.04, 0.08, (7, 6))  # a square grid drawn out to a disc: long and short edges
+    v = contact_surface(mesh).arrays.vertices
+    around = ((np.arctan2(v[:, 1], v[:, 0]) + np.pi) / (2 * np.pi) * 28).astype(int) % 28
+    outward = (np.linalg.norm(v[:, :2], axis=1) + v[:, 2]) / np.sqrt(2)  # the sharp rim lies at 84.85 mm
+    rim = np.array([outward[around == sector].max() for sector in range(28)])
+    assert np.ptp(rim) < 2.5e-4
+    assert 0.083 < rim.mean() < 0.0845
+
+
 def test_a_block_keeps_its_flat_faces_and_its_edges_are_eased():
     arrays = contact_surface(shapes.block((0.1, 0.1, 0.05), (5, 5, 3))).arrays
     face = arrays.vertices[np.abs(arrays.vertices[:, :2]).max(axis=1) < 0.04]

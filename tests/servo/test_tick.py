@@ -15,7 +15,6 @@ from palpate.servo.elastic_plane import ElasticPlane
 from palpate.servo.layout import DEADLINE, ENABLE, LATE, MISSED, STATUS, STOP, TICKS, total_bytes, views
 from palpate.servo.loop import ServoLoop, make_program, one_tick, run_tick
 from palpate.servo.report import report, ring_rows, snapshot
-from palpate.servo.source import no_support
 from palpate.servo.tick import (
     IN_CALIBRATED,
     IN_CONNECTED,
@@ -35,7 +34,8 @@ from palpate.servo.tick import (
     tick_arrays,
 )
 from render.passivity import PassivityOptions, passivity_parameters
-from render.support import SupportParameters
+from render.scene import TouchScene, in_the_air
+from render.support import SupportParameters, no_support
 
 PERIOD = 1_000_000
 START = 10**9
@@ -52,9 +52,9 @@ class FakeServo:
             200_000,
             safety_parameters(SafetyOptions(), SPEC),
             passivity_parameters(PassivityOptions(), max_damping_n_s_per_m=10.0),
-            support or no_support(),
         )
-        self.program = make_program(ElasticPlane(stiffness), self.arrays, parameters)
+        scene = TouchScene(ElasticPlane(stiffness), support or no_support())
+        self.program = make_program(scene, self.arrays, parameters)
         self.arrays.shared.counts[DEADLINE] = START
         self.arrays.shared.control[ENABLE] = 1
         self.sequence = 0
@@ -210,8 +210,8 @@ def test_the_ring_holds_the_last_seconds_and_tells_where_to_go_on():
 
 
 @njit
-def _one_compiled_tick(kernel, model, state, arrays, parameters, now_ns):
-    one_tick(kernel, model, state, arrays, parameters, now_ns, now_ns)
+def _one_compiled_tick(kernel, model, state, support, arrays, parameters, now_ns):
+    one_tick(kernel, model, state, support, arrays, parameters, now_ns, now_ns)
 
 
 def test_the_loop_of_other_platforms_does_the_same_ticks(monkeypatch):
@@ -226,8 +226,9 @@ def test_the_loop_of_other_platforms_does_the_same_ticks(monkeypatch):
         program = compiled.program
         _one_compiled_tick(
             program.kernel,
-            program.renderer.parameters,
+            program.scene.renderer.parameters,
             program.state,
+            program.scene.support,
             compiled.arrays,
             program.parameters,
             now,
@@ -245,7 +246,7 @@ def test_the_loop_of_other_platforms_runs_swaps_and_stops(monkeypatch):
     loop.start()
     try:
         assert loop.ticked.wait(20.0)
-        stiffer = servo.program._replace(renderer=ElasticPlane(800.0))
+        stiffer = servo.program._replace(scene=in_the_air(ElasticPlane(800.0)))
         assert loop.swap(stiffer, timeout_s=20.0) and loop.program is stiffer
         before = int(servo.shared.counts[TICKS])
         loop.ticked.clear()
