@@ -180,6 +180,8 @@ def press(
     speed_m_per_s: float = 0.01,
     *,
     hold_s: float = 0.0,
+    approach_m: float = 2e-3,
+    rate_hz: float = 1000.0,
     tip_radius_m: float | None = None,
     renderer: str = "fem",
     progress: bool | Progress = True,
@@ -190,8 +192,9 @@ def press(
     model: or a renderer that is there already, which saves seconds where many presses follow. at: (3,) m, the
     point that the tip's centre is aimed at; direction: (3,) of the motion, any length, None is straight onto
     the support; device frame. depth_m: along the surface's normal after first touch; speed_m_per_s, hold_s:
-    of the motion and at depth; tip_radius_m: None takes the model's. options: see `pp.options("press")`.
-    Raises OptionError where the line misses the object or grazes it.
+    of the motion and at depth; approach_m: of free air before; rate_hz: of the samples; tip_radius_m: None
+    takes the model's. options: see `pp.options("press")`. Raises OptionError where the line misses the object
+    or grazes it.
     """
     import numpy as np
 
@@ -203,7 +206,15 @@ def press(
     along = -made.model.support_normal if direction is None else np.asarray(direction, dtype=float)
     radius = made.model.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     curve = pressed(
-        made, np.asarray(at, dtype=float), along, depth_m, speed_m_per_s, hold_s=hold_s, tip_radius_m=radius
+        made,
+        np.asarray(at, dtype=float),
+        along,
+        depth_m,
+        speed_m_per_s,
+        hold_s=hold_s,
+        approach_m=approach_m,
+        rate_hz=rate_hz,
+        tip_radius_m=radius,
     )
     return dressed(Curve, curve, renderer=made, tip_radius_m=radius)
 

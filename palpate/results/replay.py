@@ -95,11 +95,13 @@ class ReplayResult(Result):
     def _draw(self, ax: Axes) -> None:
         ax.plot(self.t, self.recording.force_n, lw=1.6, color=MEASURED, label="measured")
         ax.plot(self.t, np.linalg.norm(self.force_n, axis=1), lw=0.7, color=RENDERED, label=self.renderer)
-        counted = self.t[self.contact] if self.contact.any() else self.t
+        counted = self.contact if self.contact.any() else np.ones_like(self.contact)
+        most = max(self.recording.force_n[counted].max(), np.linalg.norm(self.force_n, axis=1).max())
         ax.set(
             xlabel="time [s]",
             ylabel="force magnitude [N]",
-            xlim=(counted[0], counted[-1]),
+            xlim=(self.t[counted][0], self.t[counted][-1]),
+            ylim=(0, 1.05 * most),
             title=f"error {self.rmse_n:.3f} N rms, {100 * self.relative:.1f} %",
         )
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)

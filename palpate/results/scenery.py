@@ -16,16 +16,14 @@ from render.base import Renderer
 
 OBJECT_COLOUR, SUPPORT_COLOUR, TIP_COLOUR, ARROW_COLOUR = "#ead7bf", "#d9dee5", "#d95f02", "#1b4f9c"
 ARROW_M_PER_N = 0.03
-_BAR = {"n_labels": 3, "fmt": "%.3g", "color": "black", "title_font_size": 18, "label_font_size": 15}
+_BAR = {"n_labels": 2, "fmt": "%.3g", "color": "black", "title_font_size": 18, "label_font_size": 15}
 
 
 def new_plotter(*, off_screen: bool) -> pyvista.Plotter:
     """A plotter of our own; raises OptionError where it would open a window and there is no screen."""
     plotter = pyvista.Plotter(off_screen=off_screen or None, window_size=[1000, 750])
-    screen = not sys.platform.startswith("linux") or os.environ.get(
-        "DISPLAY", os.environ.get("WAYLAND_DISPLAY")
-    )
-    if not (screen or plotter.off_screen or plotter.notebook):
+    screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
+    if sys.platform.startswith("linux") and not (screen or plotter.off_screen or plotter.notebook):
         plotter.close()
         raise OptionError(
             "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): write a picture with "
@@ -79,7 +77,7 @@ def _add_surface(
         look = {"scalars": label, "cmap": colour_map, "clim": limits}
         look["scalar_bar_args"] = {"title": label, **_BAR}
     plotter.add_mesh(surface, ambient=0.3, diffuse=0.75, **look)
-    size = 1.6 * float(np.linalg.norm(np.ptp(points[used], axis=0)))
+    size = 1.5 * float(np.linalg.norm(np.ptp(points[used], axis=0)))
     middle, up = points[used].mean(axis=0), model.support_normal
     foot = middle - ((middle - model.support_point) @ up) * up
     plane = pyvista.Plane(center=foot, direction=up, i_size=size, j_size=size)
@@ -89,7 +87,7 @@ def _add_surface(
 
 def _look_from(plotter: pyvista.Plotter, middle: np.ndarray, up: np.ndarray, size: float) -> None:
     eye = view_axes(up, 25.0, 35.0)[2]
-    plotter.camera_position = [middle + 2.2 * size * eye, middle, up]
+    plotter.camera_position = [middle + 1.9 * size * eye, middle, up]
     plotter.camera.view_angle = 25.0
 
 
@@ -101,7 +99,7 @@ def add_dots(
     label: str = "",
     colour: str = "#c1121f",
     colour_map: str = "viridis",
-    size_m: float = 1.5e-3,
+    size_m: float = 2e-3,
 ) -> None:
     """Small balls at points (k, 3) m, in one colour or by values (k,) named `label`."""
     if not len(points):

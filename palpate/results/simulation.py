@@ -32,16 +32,15 @@ class Simulation(Result, room.Simulation):
         from mechanics.recording import read_recording
 
         written = write_recording(path, self.recording, truth=self.truth)
-        return dressed(
-            Simulation, self, recording=recording_of(read_recording(written)), phantom=self.phantom
-        )
+        return dressed(Simulation, self, recording=recording_of(read_recording(written)))
 
     def lines(self) -> list[str]:
         """What `print` says, line by line, with units."""
         recording = self.recording
         words = [
-            f"{recording.path or 'Simulation'}: {recording.t[-1]:.0f} s, {len(self.touches)} palpations of the "
-            f"{self.phantom}"
+            f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(self.touches)} palpations of the "
+            f"{self.phantom}",
+            f"  effects: {', '.join(self.truth['strengths']) or 'none'}",
         ]
         for name, size in self.truth.get("sizes", {}).items():
             refit = size["rms_after_best_scale_n"]
