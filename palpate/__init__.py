@@ -33,7 +33,7 @@ if TYPE_CHECKING:
     from palpate.api import renderer as renderer
     from palpate.api import replay as replay
     from palpate.api import simulate as simulate
-    from palpate.options import options as options
+    from palpate.keywords import options as options
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
@@ -48,7 +48,7 @@ if TYPE_CHECKING:
 
 _DOOR = {
     "palpate.api": ("read_recording load reconstruct renderer replay press compare diagnose simulate"),
-    "palpate.options": "options",
+    "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.model": "Model",
     "palpate.results.reconstruction": "Reconstruction",

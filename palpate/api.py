@@ -7,15 +7,15 @@ tool. What a room needs is imported when its function is called.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import dataclasses
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import ModelError, OptionError
 from mechanics.progress import Progress, silent
-from palpate.options import taken
+from palpate.keywords import taken
 
 if TYPE_CHECKING:
     import mechanics.model
@@ -29,18 +29,19 @@ if TYPE_CHECKING:
     from palpate.results.replay import ReplayResult
     from palpate.results.simulation import Simulation
     from render.base import Renderer
+    from render.options import RenderOptions
     from scenes.phantoms import Phantom
     from scenes.scene import Scene
 
-    RecordingLike = str | os.PathLike[str] | mechanics.recording.Recording | Simulation
-    ModelLike = str | os.PathLike[str] | mechanics.model.Model | Reconstruction | Scene
+    RecordingLike = str | Path | mechanics.recording.Recording | Simulation
+    ModelLike = str | Path | mechanics.model.Model | Reconstruction | Scene
 
 
 def read_recording(source: RecordingLike) -> Recording:
     """Read a recording: NAME.csv, NAME.csv.gz or NAME.toml, or an embedded one by its name.
 
-    Embedded: "silicone-1-cylinder". Times s, positions of the tip's centre m, forces on the tool N, device
-    frame (docs/recording-format.md). Raises RecordingError for what is missing, impossible or damaged.
+    source: the file, or "silicone-1-cylinder". Times s, positions of the tip's centre m, forces on the tool
+    N, device frame (docs/recording-format.md). Raises RecordingError for what is missing or impossible.
     """
     from mechanics.errors import RecordingError
     from mechanics.recording import Recording as Plain
@@ -55,12 +56,12 @@ def read_recording(source: RecordingLike) -> Recording:
         return recording_of(held)
     if str(source) in embedded_names():
         return recording_of(read(embedded_recording(str(source))))
-    if not isinstance(source, str | os.PathLike):
+    if not isinstance(source, str | Path):
         raise OptionError(f"a {type(source).__name__} is no recording: give one, or the path of its file")
     try:
         return recording_of(read(source))
     except RecordingError as error:
-        if os.path.exists(source) or "." in Path(source).name:
+        if Path(source).exists() or "." in Path(source).name:
             raise
         raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
 
@@ -84,10 +85,10 @@ def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
     held = getattr(source, "model", None)
     if isinstance(held, Plain):
         return model_of(held)
-    if isinstance(source, str | os.PathLike):
+    if isinstance(source, str | Path):
         if Path(source).is_dir():
             return model_of(read_model(source))
-        source = load_scene(Path(source) if isinstance(source, os.PathLike) else source)
+        source = load_scene(source)
     if not isinstance(source, Scene):
         raise OptionError(f"a {type(source).__name__} is no model: give one, a MODEL folder or a scene")
     with _told("load", progress) as tell:
@@ -98,7 +99,7 @@ def reconstruct(
     recording: RecordingLike,
     *,
     method: str = "finite-tip",
-    save: str | os.PathLike[str] | None = None,
+    save: str | Path | None = None,
     seed: int = 0,
     progress: bool | Progress = True,
     **options: Any,
@@ -116,7 +117,12 @@ def reconstruct(
     given = taken("reconstruct", {"method": method, **options})
     if save is not None:
         _check_folder(Path(save))
-    steps = {name: kind(**given[kind]) for name, kind in _steps(ReconstructOptions, given).items()}
+    steps: dict[str, Any] = {
+        field.name: kind(**values)
+        for field in dataclasses.fields(ReconstructOptions)
+        for kind, values in given.items()
+        if field.default_factory is kind
+    }
     chosen = ReconstructOptions(**given[ReconstructOptions], **steps, seed=seed)
     with _told("reconstruct", progress) as tell:
         result = reconstruct_fully(read_recording(recording), chosen, tell)
@@ -133,7 +139,9 @@ def renderer(
     computed, some seconds, or read from its folder. options: see `pp.options("renderer")`. Raises
     OptionError.
     """
-    return _renderer("renderer", model, name, progress, options)
+    chosen = _render_options("renderer", model, options)
+    with _told("renderer", progress) as tell:
+        return _renderer(model, name, chosen, tell)
 
 
 def replay(
@@ -154,9 +162,10 @@ def replay(
     from palpate.results.replay import ReplayResult
     from render.replay import replay_error, replay_recording
 
+    chosen = _render_options("replay", model, options)
     measured = read_recording(recording)
     with _told("replay", progress) as tell:
-        made = _renderer("replay", model, renderer, tell, options)
+        made = _renderer(model, renderer, chosen, tell)
         forces = replay_recording(made, measured, tell)
     error = replay_error(measured, made.model, forces)
     return ReplayResult(
@@ -202,7 +211,9 @@ def press(
     from palpate.results.curve import Curve
     from render.press import press as pressed
 
-    made = _renderer("press", model, renderer, progress, options)
+    chosen = _render_options("press", model, options)
+    with _told("press", progress) as tell:
+        made = _renderer(model, renderer, chosen, tell)
     along = -made.model.support_normal if direction is None else np.asarray(direction, dtype=float)
     radius = made.model.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     curve = pressed(
@@ -291,11 +302,11 @@ def diagnose(
 
 
 def simulate(
-    phantom: str | os.PathLike[str] | Phantom,
+    phantom: str | Path | Phantom,
     effects: Mapping[str, float] | None = None,
     *,
     seed: int = 0,
-    save: str | os.PathLike[str] | None = None,
+    save: str | Path | None = None,
     person: int = 0,
     sizes: bool = True,
     ideal: bool = False,
@@ -312,8 +323,6 @@ def simulate(
     answer. workers: processes, one a core by default. options: see `pp.options("simulate")`. Solved touches
     are kept in the user's cache. Raises OptionError or SceneError.
     """
-    import dataclasses
-
     from palpate.results.simulation import simulation_of
     from scenes.laboratory.hand import HandOptions, cohort_hand
     from scenes.laboratory.simulate import SimulateOptions
@@ -339,36 +348,27 @@ def simulate(
     return result if save is None else result.save(save)
 
 
-def _renderer(
-    function: str,
-    model: ModelLike | Renderer,
-    name: str,
-    progress: bool | Progress,
-    options: Mapping[str, Any],
-) -> Renderer:
+def _render_options(function: str, model: ModelLike | Renderer, options: Mapping[str, Any]) -> RenderOptions:
     from render.base import Renderer
     from render.options import RenderOptions
-    from render.registry import create, names
 
     given = taken(function, options)[RenderOptions]
+    if given and isinstance(model, Renderer):
+        raise OptionError(
+            f"{', '.join(given)}: a renderer that is there keeps its options; give them to pp.renderer"
+        )
+    return RenderOptions(**given)
+
+
+def _renderer(model: ModelLike | Renderer, name: str, options: RenderOptions, tell: Progress) -> Renderer:
+    from render.base import Renderer
+    from render.registry import create, names
+
     if isinstance(model, Renderer):
-        if given:
-            raise OptionError(
-                f"{', '.join(given)}: a renderer that is there keeps its options; give them to pp.renderer"
-            )
         return model
     if name not in names():
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(names())}")
-    with _told("renderer", progress) as tell:
-        return create(name, load(model, progress=tell), RenderOptions(**given), tell)
-
-
-def _steps(whole: type, given: Mapping[type, Any]) -> dict[str, Callable[..., Any]]:
-    """Field name to options dataclass, of the fields of `whole` that hold the options of a step."""
-    import dataclasses
-
-    made = {f.name: f.default_factory for f in dataclasses.fields(whole)}
-    return {name: kind for name, kind in made.items() if kind in given}
+    return create(name, load(model, progress=tell), options, tell)
 
 
 def _check_folder(path: Path) -> None:

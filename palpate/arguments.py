@@ -17,7 +17,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.files import atomic_file
-from palpate.options import kinds, options
+from palpate.keywords import kinds, options
 
 T = TypeVar("T")
 
@@ -56,7 +56,7 @@ def options_from(arguments: argparse.Namespace, kind: type[T], **overrides: Any)
 
 
 def add_options_of(parser: argparse.ArgumentParser, function: str, *, skip: Sequence[str] = ()) -> None:
-    """Add the flags of a function of the door (palpate.options): `given_for` reads them."""
+    """Add the flags of a function of the door (palpate.keywords): `given_for` reads them."""
     for kind in kinds(function):
         add_options(parser, kind, skip=skip)
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 import pytest
 
 from palpate import api
-from palpate.options import options as options_of
+from palpate.keywords import options as options_of
 
 if TYPE_CHECKING:
     from palpate.results.curve import Curve

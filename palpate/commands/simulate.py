@@ -91,12 +91,11 @@ def run(arguments: argparse.Namespace) -> int:
         save=None if arguments.seal else arguments.output,
         **given_for(arguments, "simulate"),
     )
+    path = result.recording.path
     if arguments.seal:
         path = write_sealed(arguments.output, result.recording, result.truth, arguments.truth)
-    else:
-        path = result.recording.path
-        if arguments.truth:
-            emit_json({"truth": result.truth}, arguments.truth)
+    elif arguments.truth:
+        emit_json({"truth": result.truth}, arguments.truth)
     if arguments.pictures:
         from palpate.report.laboratory import simulation_figure
 

@@ -37,15 +37,21 @@ def _ranked(result: Diagnosis) -> np.ndarray:
     return np.argsort(-each)
 
 
+def sites_of(result: Diagnosis) -> np.ndarray:
+    """(k, 3) m, the places that were touched."""
+    assert result.forward is not None, "a diagnosis that `diagnose` made holds its forward model"
+    return result.forward.touches.site_point
+
+
 def gap_at(result: Diagnosis, points: np.ndarray) -> np.ndarray:
     """(n,) N, the rms gap at points (n, 3) m: that of the sites, spread over 15 mm."""
-    distance = np.linalg.norm(points[:, None] - result.forward.touches.site_point[None], axis=2)
+    distance = np.linalg.norm(points[:, None] - sites_of(result)[None], axis=2)
     weight = np.exp(-((distance / SPREAD_M) ** 2)) + 1e-9
     return (weight @ result.where.site_rmse) / weight.sum(axis=1)
 
 
 def _object(ax: Any, model: Model, result: Diagnosis) -> None:
-    places = result.forward.touches.site_point
+    places = sites_of(result)
     nodes = model.mesh.points
     values = gap_at(result, nodes) * 1e3
     draw_object(ax, model, values, label="difference (mN)", colour_map="magma", touches=places)

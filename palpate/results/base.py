@@ -93,7 +93,8 @@ def dressed(kind: type[T], plain: Any, **more: Any) -> T:
     """
     if isinstance(plain, kind) and not more:
         return plain
-    values = {f.name: getattr(plain, f.name) for f in fields(plain) if f.init}
+    made: Any = plain
+    values = {f.name: getattr(made, f.name) for f in fields(made) if f.init}
     return kind(**{**values, **more})
 
 

@@ -22,7 +22,7 @@ _NAMED = 12
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Reconstruction(Result, room.Reconstruction):
-    """The model and every step on the way to it; goes wherever a model goes.
+    """The model and every step on the way to it; goes wherever a model goes. Moduli Pa, lengths m, forces N.
 
     Every field is that of `reconstruct.pipeline.Reconstruction`. `plot`: force over time with the touches
     that were found. `show`: the model.

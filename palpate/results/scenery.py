@@ -29,7 +29,7 @@ def new_plotter(*, off_screen: bool) -> pyvista.Plotter:
             "there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set): write a picture with "
             "show(screenshot='NAME.png'), or hand in a plotter that is off screen"
         )
-    plotter.set_background("white")
+    plotter.background_color = pyvista.Color("white")
     return plotter
 
 
@@ -110,7 +110,8 @@ def add_dots(
         cloud[label] = np.asarray(values, dtype=float)
         look = {"scalars": label, "cmap": colour_map, "scalar_bar_args": {"title": label, **_BAR}}
     ball = pyvista.Sphere(radius=size_m, theta_resolution=16, phi_resolution=16)
-    plotter.add_mesh(cloud.glyph(geom=ball, scale=False, orient=False), **look)
+    balls: Any = cloud.glyph(geom=ball, scale=False, orient=False)
+    plotter.add_mesh(balls, **look)
 
 
 def add_path(
@@ -122,9 +123,8 @@ def add_path(
         plotter.add_mesh(line, color="#8a96a5", line_width=2)
         return
     line[label] = np.asarray(values, dtype=float)
-    plotter.add_mesh(
-        line, scalars=label, cmap="viridis", line_width=2, scalar_bar_args={"title": label, **_BAR}
-    )
+    look: dict[str, Any] = {"scalars": label, "scalar_bar_args": {"title": label, **_BAR}}
+    plotter.add_mesh(line, cmap="viridis", line_width=2, **look)
 
 
 def add_tip(plotter: pyvista.Plotter, centre: np.ndarray, radius_m: float) -> None:
