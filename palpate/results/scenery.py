@@ -16,6 +16,7 @@ from render.base import Renderer
 
 OBJECT_COLOUR, SUPPORT_COLOUR, TIP_COLOUR, ARROW_COLOUR = "#ead7bf", "#d9dee5", "#d95f02", "#1b4f9c"
 ARROW_M_PER_N = 0.03
+_LINE_POINTS = 20_000
 _BAR = {"n_labels": 2, "fmt": "%.3g", "color": "black", "title_font_size": 18, "label_font_size": 15}
 
 
@@ -117,14 +118,14 @@ def add_dots(
 def add_path(
     plotter: pyvista.Plotter, points: np.ndarray, values: np.ndarray | None = None, label: str = ""
 ) -> None:
-    """A line through points (n, 3) m, grey or coloured by values (n,) named `label`."""
-    line = pyvista.lines_from_points(np.asarray(points, dtype=float))
-    if values is None:
-        plotter.add_mesh(line, color="#8a96a5", line_width=2)
-        return
-    line[label] = np.asarray(values, dtype=float)
-    look: dict[str, Any] = {"scalars": label, "scalar_bar_args": {"title": label, **_BAR}}
-    plotter.add_mesh(line, cmap="viridis", line_width=2, **look)
+    """A line through points (n, 3) m, grey or coloured by values (n,) named `label`; thinned where long."""
+    kept = slice(None, None, max(1, len(points) // _LINE_POINTS))
+    line = pyvista.lines_from_points(np.asarray(points, dtype=float)[kept])
+    look: dict[str, Any] = {"color": "#8a96a5"}
+    if values is not None:
+        line[label] = np.asarray(values, dtype=float)[kept]
+        look = {"scalars": label, "cmap": "viridis", "scalar_bar_args": {"title": label, **_BAR}}
+    plotter.add_mesh(line, line_width=3, lighting=False, **look)
 
 
 def add_tip(plotter: pyvista.Plotter, centre: np.ndarray, radius_m: float) -> None:
