@@ -214,8 +214,8 @@ def press(
     chosen = _render_options("press", model, options)
     with _told("press", progress) as tell:
         made = _renderer(model, renderer, chosen, tell)
-    along = -made.model.support_normal if direction is None else np.asarray(direction, dtype=float)
-    radius = made.model.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
+    along = -made.model.support.normal if direction is None else np.asarray(direction, dtype=float)
+    radius = made.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     curve = pressed(
         made,
         np.asarray(at, dtype=float),

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 class Model(Result, room.Model):
     """An object that can be felt: mesh, material, support, tool, presses and effects; SI units, device frame.
 
-    Every field is that of `mechanics.model.Model`. `plot`: the object with the places touched. `show`: the
+    Every field is that of `mechanics.model.Model`: `material.young_modulus_pa`, `support.normal`,
+    `tool.tip_radius_m`, mesh, effects. `plot`: the object with the places touched. `show`: the
     same in 3D on its support, the touches coloured by their own stiffness k_v, N/m.
     """
 
@@ -40,12 +41,13 @@ class Model(Result, room.Model):
 
     def lines(self) -> list[str]:
         """What `print` says, line by line, with units."""
-        up, mesh = np.asarray(self.support_normal), self.mesh
-        height = float(((mesh.points - self.support_point) @ up).max())
+        mesh, nu = self.mesh, self.material.poisson_ratio
+        height = float(self.support.height(mesh.points).max())
         return [
-            f"Model of {self.name}: {modulus_words(self)}, Poisson's ratio {self.poisson_ratio:g}",
-            f"  {quantity(height, 'mm', 1e3, 3)} high; tip radius {quantity(self.tip_radius_m, 'mm', 1e3)}; "
-            f"{len(self.palpations)} presses; effects: {', '.join(self.effects) or 'none'}",
+            f"Model of {self.name}: {modulus_words(self)}, Poisson's ratio {nu:g}",
+            f"  {quantity(height, 'mm', 1e3, 3)} high; "
+            f"tip radius {quantity(self.tool.tip_radius_m, 'mm', 1e3)}; {len(self.palpations)} presses; "
+            f"effects: {', '.join(self.effects) or 'none'}",
             f"  mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
             f"edges of {quantity(self.mesh_size_m, 'mm', 1e3)}",
             f"  folder: {self.path or 'not written; .save(MODEL) writes it'}",
@@ -71,9 +73,9 @@ class Model(Result, room.Model):
 
 def modulus_words(model: room.Model) -> str:
     """The Young's modulus with its 95 % interval, kPa."""
-    low, high = np.array(model.young_modulus_ci95_pa) / 1e3
+    low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
     interval = f" (95 % interval {low:.1f} to {high:.1f})" if np.isfinite([low, high]).all() else ""
-    return f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa{interval}"
+    return f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa{interval}"
 
 
 def touches_of(model: room.Model) -> np.ndarray:

@@ -38,12 +38,12 @@ class Reconstruction(Result, room.Reconstruction):
     @property
     def young_modulus_pa(self) -> float:
         """The global Young's modulus, Pa."""
-        return self.model.young_modulus_pa
+        return self.model.material.young_modulus_pa
 
     @property
     def young_modulus_ci95_pa(self) -> tuple[float, float]:
         """Its 95 % interval (low, high), Pa."""
-        return self.model.young_modulus_ci95_pa
+        return self.model.material.young_modulus_ci95_pa
 
     def report(self, path: Path | str, beside: dict[str, Any] | None = None) -> Path:
         """Write the paper's figures and table, remade, as an HTML page; beside: other models by name."""
@@ -55,7 +55,7 @@ class Reconstruction(Result, room.Reconstruction):
         """What `print` says, line by line, with units."""
         model, exploration, surface = self.model, self.exploration, self.surface
         quality = self.meshing.report
-        low, high = model.young_modulus_ci95_pa
+        low, high = model.material.young_modulus_ci95_pa
         not_used = [*exploration.rejected, *(self.paper_fit.not_used if self.paper_fit else ())]
         more = len(not_used) - _NAMED
         lines = [
@@ -63,7 +63,7 @@ class Reconstruction(Result, room.Reconstruction):
             + (f", {len(not_used)} contacts not used:" if not_used else ""),
             *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
             *([f"  and {more} more (as_json, or --json, names all)"] if more > 0 else []),
-            f"Young's modulus {model.young_modulus_pa / 1e3:.2f} kPa, "
+            f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
             f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
         ]
         if self.modulus:
@@ -87,9 +87,9 @@ class Reconstruction(Result, room.Reconstruction):
         model, exploration, fit = self.model, self.exploration, self.modulus
         figures = {
             "method": model.provenance["method"],
-            "young_modulus_pa": model.young_modulus_pa,
-            "young_modulus_ci95_pa": model.young_modulus_ci95_pa,
-            "poisson_ratio": model.poisson_ratio,
+            "young_modulus_pa": model.material.young_modulus_pa,
+            "young_modulus_ci95_pa": model.material.young_modulus_ci95_pa,
+            "poisson_ratio": model.material.poisson_ratio,
             "palpations": len(exploration.contacts),
             "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
             "noise_n": exploration.noise_n,

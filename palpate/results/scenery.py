@@ -79,8 +79,8 @@ def _add_surface(
         look["scalar_bar_args"] = {"title": label, **_BAR}
     plotter.add_mesh(surface, ambient=0.3, diffuse=0.75, **look)
     size = 1.5 * float(np.linalg.norm(np.ptp(points[used], axis=0)))
-    middle, up = points[used].mean(axis=0), model.support_normal
-    foot = middle - ((middle - model.support_point) @ up) * up
+    middle, up = points[used].mean(axis=0), model.support.normal
+    foot = middle - model.support.height(middle) * up
     plane = pyvista.Plane(center=foot, direction=up, i_size=size, j_size=size)
     plotter.add_mesh(plane, color=SUPPORT_COLOUR, lighting=False)
     _look_from(plotter, middle, up, size)
