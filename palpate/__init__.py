@@ -1,10 +1,92 @@
-"""The shell: command line, servo process, window, reports."""
+"""Palpate: touch a real thing, and feel its copy. One import is the whole program: `import palpate as pp`.
 
-from importlib.metadata import PackageNotFoundError, version
+    recording = pp.read_recording("silicone-1-cylinder")   # an embedded name, or NAME.csv.gz
+    made = pp.reconstruct(recording)                       # its model, and how it came about
+    replayed = pp.replay(made, recording)                  # rendered against measured force
 
-import mechanics as mechanics  # it says where compiled kernels are kept, before the first is decorated
+`dir(pp)` lists the door: functions, what they return, errors. Results print themselves, `.plot()` by
+matplotlib, `.show()` in 3D by PyVista. SI units; device frame; forces on the tool. See docs/python.md.
+Nothing is loaded until it is used (PEP 562).
+"""
 
-try:
-    __version__ = version("palpate")
-except PackageNotFoundError:  # a source tree that was never installed
-    __version__ = "0.0.0+source"
+import importlib
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from mechanics.errors import CacheError as CacheError
+    from mechanics.errors import ContactError as ContactError
+    from mechanics.errors import DeviceError as DeviceError
+    from mechanics.errors import DiagnosisError as DiagnosisError
+    from mechanics.errors import MeshError as MeshError
+    from mechanics.errors import ModelError as ModelError
+    from mechanics.errors import OptionError as OptionError
+    from mechanics.errors import PalpateError as PalpateError
+    from mechanics.errors import RecordingError as RecordingError
+    from mechanics.errors import SceneError as SceneError
+    from mechanics.errors import SurfaceError as SurfaceError
+    from palpate.api import compare as compare
+    from palpate.api import diagnose as diagnose
+    from palpate.api import load as load
+    from palpate.api import press as press
+    from palpate.api import read_recording as read_recording
+    from palpate.api import reconstruct as reconstruct
+    from palpate.api import renderer as renderer
+    from palpate.api import replay as replay
+    from palpate.api import simulate as simulate
+    from palpate.keywords import options as options
+    from palpate.results.comparison import Comparison as Comparison
+    from palpate.results.curve import Curve as Curve
+    from palpate.results.diagnosis import Diagnosis as Diagnosis
+    from palpate.results.model import Model as Model
+    from palpate.results.reconstruction import Reconstruction as Reconstruction
+    from palpate.results.recording import Recording as Recording
+    from palpate.results.replay import ReplayResult as ReplayResult
+    from palpate.results.simulation import Simulation as Simulation
+    from render.base import Renderer as Renderer
+
+    __version__: str
+
+_DOOR = {
+    "palpate.api": ("read_recording load reconstruct renderer replay press compare diagnose simulate"),
+    "palpate.keywords": "options",
+    "palpate.results.recording": "Recording",
+    "palpate.results.model": "Model",
+    "palpate.results.reconstruction": "Reconstruction",
+    "palpate.results.replay": "ReplayResult",
+    "palpate.results.curve": "Curve",
+    "palpate.results.comparison": "Comparison",
+    "palpate.results.diagnosis": "Diagnosis",
+    "palpate.results.simulation": "Simulation",
+    "render.base": "Renderer",
+    "mechanics.errors": (
+        "PalpateError RecordingError ContactError SurfaceError MeshError ModelError CacheError OptionError "
+        "DeviceError SceneError DiagnosisError"
+    ),
+}
+_HOME = {name: module for module, names in _DOOR.items() for name in names.split()}
+
+__all__ = [*_HOME, "__version__"]
+
+
+def __getattr__(name: str) -> object:
+    if name == "__version__":
+        value: object = _version()
+    elif name in _HOME:
+        value = getattr(importlib.import_module(_HOME[name]), name)
+    else:
+        raise AttributeError(f"module 'palpate' has no attribute '{name}'; it has {', '.join(_HOME)}")
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    try:
+        return version("palpate")
+    except PackageNotFoundError:  # a source tree that was never installed
+        return "0.0.0+source"

@@ -17,6 +17,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.files import atomic_file
+from palpate.keywords import kinds, options
 
 T = TypeVar("T")
 
@@ -52,6 +53,18 @@ def options_from(arguments: argparse.Namespace, kind: type[T], **overrides: Any)
         f.name: getattr(arguments, f.name) for f in dataclasses.fields(kind) if hasattr(arguments, f.name)
     }
     return kind(**{**given, **overrides})
+
+
+def add_options_of(parser: argparse.ArgumentParser, function: str, *, skip: Sequence[str] = ()) -> None:
+    """Add the flags of a function of the door (palpate.keywords): `given_for` reads them."""
+    for kind in kinds(function):
+        add_options(parser, kind, skip=skip)
+
+
+def given_for(arguments: argparse.Namespace, function: str) -> dict[str, Any]:
+    """What the command line gave of a function's options, as its keywords."""
+    names = (option.name for option in options(function))
+    return {name: getattr(arguments, name) for name in names if hasattr(arguments, name)}
 
 
 def _base_type(hint: Any) -> type:

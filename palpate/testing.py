@@ -11,46 +11,44 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import cache
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from palpate.sources import open_scene
-from render.options import RenderOptions
-from render.press import Curve, press
-from render.scene import TouchScene
-from render.support import SupportOptions
+from palpate import api
+from palpate.keywords import options as options_of
+
+if TYPE_CHECKING:
+    from palpate.results.curve import Curve
+    from render.base import Renderer
 
 
 @pytest.fixture(scope="session")
 def press_model() -> Callable[..., Curve]:
-    """A function `press_model(model_or_scene, at, direction, depth_m, speed_m_per_s=0.01, renderer="fem",
-    ...)`.
+    """`palpate.press` that reads every model and makes every renderer once a session.
 
-    It returns the render.press.Curve; other keywords go to render.press.press, `options` is a RenderOptions,
-    `support` a SupportOptions. Models and renderers are read and made once a session.
+    A function `press_model(model_or_scene, at, direction=None, depth_m=0.004, speed_m_per_s=0.01,
+    renderer="fem", ...)`; lengths m, speed m/s, forces N on the tool, device frame.
     """
+    ours = {option.name for option in options_of("renderer")}
 
     @cache
-    def scene_of(
-        source: str, name: str, options: RenderOptions | None, support: SupportOptions | None
-    ) -> TouchScene:
-        return open_scene(source, name, options, support)
+    def renderer_of(model: api.ModelLike, name: str, given: tuple[tuple[str, Any], ...]) -> Renderer:
+        return api.renderer(model, name, progress=False, **dict(given))
 
     def pressed(
-        model_or_scene: str | Path,
+        model_or_scene: api.ModelLike,
         at: Sequence[float],
-        direction: Sequence[float],
-        depth_m: float,
+        direction: Sequence[float] | None = None,
+        depth_m: float = 0.004,
         speed_m_per_s: float = 0.01,
         *,
         renderer: str = "fem",
-        options: RenderOptions | None = None,
-        support: SupportOptions | None = None,
         **more: Any,
     ) -> Curve:
-        scene = scene_of(str(model_or_scene), renderer, options, support)
-        return press(scene, at, direction, depth_m, speed_m_per_s, **more)
+        given = tuple(sorted((name, value) for name, value in more.items() if name in ours))
+        made = renderer_of(model_or_scene, renderer, given)
+        rest = {name: value for name, value in more.items() if name not in ours}
+        return api.press(made, at, direction, depth_m, speed_m_per_s, **rest)
 
     return pressed

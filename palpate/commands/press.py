@@ -10,25 +10,15 @@ from __future__ import annotations
 
 import argparse
 
-from palpate.arguments import (
-    add_json,
-    add_options,
-    emit_json,
-    finite,
-    options_from,
-    progress_bar,
-    say,
-    vector,
-)
+from palpate import api
+from palpate.arguments import add_json, add_options_of, emit_json, finite, given_for, say, vector
 
 SUMMARY = "one scripted press on a model, headless"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """MODEL_OR_SCENE, where and how to press, what to expect."""
-    from render.options import RenderOptions
     from render.registry import names
-    from render.support import SupportOptions
 
     parser.add_argument("model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
     parser.add_argument("--at", type=vector, required=True, metavar="X,Y,Z", help="point aimed at [m]")
@@ -45,51 +35,30 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--tolerance", type=finite, default=0.02, metavar="N", help="of --expect (default: 0.02) [N]"
     )
-    add_options(parser, RenderOptions)
-    add_options(parser, SupportOptions)
+    add_options_of(parser, "press")
     add_json(parser)
 
 
 def run(arguments: argparse.Namespace) -> int:
     """Press, write, compare."""
-    from palpate.sources import open_scene
-    from render.options import RenderOptions
-    from render.press import greatest_difference, press, read_curve, write_curve
-    from render.support import SupportOptions
+    from render.press import greatest_difference, read_curve
 
     expected = read_curve(arguments.expect) if arguments.expect else None
-    with progress_bar("press") as progress:
-        scene = open_scene(
-            arguments.model,
-            arguments.renderer,
-            options_from(arguments, RenderOptions),
-            options_from(arguments, SupportOptions),
-            progress,
-        )
-    curve = press(
-        scene,
+    curve = api.press(
+        arguments.model,
         arguments.at,
         arguments.direction,
         arguments.depth,
         arguments.speed,
         hold_s=arguments.hold,
         tip_radius_m=arguments.tip_radius,
+        renderer=arguments.renderer,
+        **given_for(arguments, "press"),
     )
     if arguments.output:
-        write_curve(arguments.output, curve)
-    deepest = curve.force_at(curve.depth.max())
-    result = {
-        "renderer": arguments.renderer,
-        "normal": curve.normal,
-        "depth_m": curve.depth.max(),
-        "force_at_depth_n": deepest,
-        "peak_force_n": curve.peak_force_n,
-    }
-    say(
-        arguments,
-        f"{arguments.renderer}: {curve.peak_force_n:.4g} N at most; at {curve.depth.max() * 1e3:.3g} mm the "
-        f"force on the tool is {', '.join(f'{f:.4g}' for f in deepest)} N",
-    )
+        curve.save(arguments.output)
+    result = curve.as_json()
+    say(arguments, *curve.lines())
     code = 0
     if expected is not None:
         worst, when = greatest_difference(curve, expected)

@@ -10,17 +10,14 @@ costs seconds, and an interrupted run goes on where it stopped.
 from __future__ import annotations
 
 import argparse
-from pathlib import Path
 
 from mechanics.errors import OptionError
 from mechanics.files import atomic_file
-from mechanics.recording import write_recording
-from palpate.arguments import add_json, add_options, add_seed, emit_json, options_from, progress_bar, say
+from palpate import api
+from palpate.arguments import add_json, add_options_of, add_seed, emit_json, given_for, say
 from scenes.laboratory.effects import REGISTRY
-from scenes.laboratory.hand import HandOptions, cohort_hand
 from scenes.laboratory.sealing import write_sealed
-from scenes.laboratory.simulate import SimulateOptions, simulate
-from scenes.phantoms import PHANTOMS, phantom
+from scenes.phantoms import PHANTOMS
 
 SUMMARY = "the virtual laboratory: a person's exploration of a phantom"
 
@@ -58,8 +55,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="also draw the path, the force and every press beside the ideal object",
     )
     parser.add_argument("--workers", type=int, help="processes that solve touches (default: one a core)")
-    add_options(parser, SimulateOptions)
-    add_options(parser, HandOptions)
+    add_options_of(parser, "simulate")
     add_seed(parser)
     add_json(parser)
 
@@ -84,30 +80,22 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
     if arguments.seal and not arguments.truth:
         raise OptionError("--seal withholds the truth: say with --truth PATH where it shall be kept")
-    options = options_from(arguments, SimulateOptions)
-    person = cohort_hand(arguments.person)
-    given = {k: getattr(arguments, k) for k in HandOptions.__dataclass_fields__ if hasattr(arguments, k)}
-    hand = HandOptions(**{**person.__dict__, **given})
-    effects = effects_from(arguments.effect)
-    thing = phantom(arguments.phantom)
-    with progress_bar("simulate") as progress:
-        result = simulate(
-            thing,
-            effects,
-            options,
-            hand=hand,
-            seed=arguments.seed,
-            sizes=arguments.sizes,
-            ideal=arguments.pictures is not None,
-            workers=arguments.workers,
-            progress=progress,
-        )
+    result = api.simulate(
+        arguments.phantom,
+        effects_from(arguments.effect),
+        seed=arguments.seed,
+        person=arguments.person,
+        sizes=arguments.sizes,
+        ideal=arguments.pictures is not None,
+        workers=arguments.workers,
+        save=None if arguments.seal else arguments.output,
+        **given_for(arguments, "simulate"),
+    )
+    path = result.recording.path
     if arguments.seal:
         path = write_sealed(arguments.output, result.recording, result.truth, arguments.truth)
-    else:
-        path = write_recording(arguments.output, result.recording, truth=result.truth)
-        if arguments.truth:
-            emit_json({"truth": result.truth}, arguments.truth)
+    elif arguments.truth:
+        emit_json({"truth": result.truth}, arguments.truth)
     if arguments.pictures:
         from palpate.report.laboratory import simulation_figure
 
@@ -124,13 +112,7 @@ def run(arguments: argparse.Namespace) -> int:
     }
     if not arguments.seal:
         summary["truth"] = result.truth
-    say(
-        arguments,
-        f"{path}: {duration:.0f} s, {len(result.touches)} palpations of the {Path(thing.name).name}",
-    )
-    if not arguments.seal and "sizes" in result.truth:
-        for name, size in result.truth["sizes"].items():
-            refit = size["rms_after_best_scale_n"]
-            say(arguments, f"  {name}: {size['rms_n']:.4f} N, {refit:.4f} N after a refit of the modulus")
+    words = result.lines()
+    say(arguments, *(words[:1] if arguments.seal else words), f"written to {path}")
     emit_json(summary, arguments.json)
     return 0

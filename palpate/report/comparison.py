@@ -62,7 +62,7 @@ def by_press(result: Comparison, ax: Axes | None = None) -> Figure:
     for name in MODELS:
         ax.plot(result.press_rmse_n[name][order], "o-", ms=4, lw=1, color=COLOURS[name], label=name)
     ax.axhline(result.noise_n, color="0.5", ls="--", lw=1, label="sensor noise")
-    ax.set(xlabel="held-out press", ylabel="rms force error, N", yscale="log")
+    ax.set(xlabel="held-out press", ylabel="rms force error [N]", yscale="log")
     ax.legend(frameon=False, ncol=4, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return ax.figure
 

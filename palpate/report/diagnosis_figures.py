@@ -26,7 +26,7 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
     _press(middle, result, int(_ranked(result)[0]))
     middle.set_title("the press that differs most", fontsize=11)
     middle.legend(fontsize=8.5, frameon=False)
-    _gains(right, result)
+    gains(right, result)
     return figure
 
 
@@ -37,12 +37,22 @@ def _ranked(result: Diagnosis) -> np.ndarray:
     return np.argsort(-each)
 
 
-def _object(ax: Any, model: Model, result: Diagnosis) -> None:
-    t = result.forward.touches
-    places = t.site_point
-    distance = cdist(felt_surface(model).points, places)
+def sites_of(result: Diagnosis) -> np.ndarray:
+    """(k, 3) m, the places that were touched."""
+    assert result.forward is not None, "a diagnosis that `diagnose` made holds its forward model"
+    return result.forward.touches.site_point
+
+
+def gap_at(result: Diagnosis, points: np.ndarray) -> np.ndarray:
+    """(n,) N, the rms gap at points (n, 3) m: that of the sites, spread over 15 mm."""
+    distance = cdist(points, sites_of(result))
     weight = np.exp(-((distance / SPREAD_M) ** 2)) + 1e-9
-    values = (weight @ (result.where.site_rmse * 1e3)) / weight.sum(axis=1)
+    return (weight @ result.where.site_rmse) / weight.sum(axis=1)
+
+
+def _object(ax: Any, model: Model, result: Diagnosis) -> None:
+    places = sites_of(result)
+    values = gap_at(result, felt_surface(model).points) * 1e3
     draw_object(ax, model, values, label="difference (mN)", colour_map="magma", touches=places)
     view = view_axes(model.support.normal, 25.0, 35.0)
     worst = (np.array(result.where.worst[0][:3]) - model.mesh.points.mean(axis=0)) @ view.T * 1e3
@@ -68,7 +78,8 @@ def _press(ax: Any, result: Diagnosis, press: int) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
-def _gains(ax: Any, result: Diagnosis) -> None:
+def gains(ax: Any, result: Diagnosis) -> None:
+    """The share of the gap that each effect alone would close on places not fitted, best first."""
     entries = [e for e in result.entries if e.gap_closed is not None][:7]
     colours = [
         IMPROVED if e.name in result.effects else "#f4a261" if e.name in result.candidates else PALE

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import sys
 import zipfile
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -11,6 +12,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 
@@ -187,7 +189,7 @@ def curves(
                 failures.append(_work(*task))
                 progress(label, (done + 1) / len(tasks))
         else:
-            with _one_thread_each(), ProcessPoolExecutor(workers, get_context("spawn")) as pool:
+            with workers_of_ours(workers) as pool:
                 futures = [pool.submit(_work, *task) for task in tasks]
                 for done, future in enumerate(as_completed(futures)):
                     failures.append(future.result())
@@ -199,6 +201,22 @@ def curves(
             )
         found = [_load(path) for path in paths]
     return found
+
+
+@contextmanager
+def workers_of_ours(count: int) -> Iterator[ProcessPoolExecutor]:
+    """Processes of one thread each, which do not run the caller's script again.
+
+    A spawned process imports the main module first, so that a script without `if __name__ == "__main__"`
+    would begin anew in each of them. Our workers need nothing of it: while they start, it is hidden.
+    """
+    main = sys.modules["__main__"]
+    with _one_thread_each(), ProcessPoolExecutor(count, get_context("spawn")) as pool:
+        sys.modules["__main__"] = ModuleType("__main__")
+        try:
+            yield pool
+        finally:
+            sys.modules["__main__"] = main
 
 
 @contextmanager

@@ -1,0 +1,418 @@
+"""The functions behind `import palpate as pp`, which the commands call too: one way to do a thing.
+
+A recording may be given as what `read_recording` returned, a simulation, a file or an embedded name; a model
+as what `load` or `reconstruct` returned, a MODEL folder or a scene. SI units; device frame; forces on the
+tool. What a room needs is imported when its function is called.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mechanics.errors import ModelError, OptionError
+from mechanics.progress import Progress, silent
+from palpate.keywords import taken
+
+if TYPE_CHECKING:
+    import mechanics.model
+    import mechanics.recording
+    from palpate.results.comparison import Comparison
+    from palpate.results.curve import Curve
+    from palpate.results.diagnosis import Diagnosis
+    from palpate.results.model import Model
+    from palpate.results.reconstruction import Reconstruction
+    from palpate.results.recording import Recording
+    from palpate.results.replay import ReplayResult
+    from palpate.results.simulation import Simulation
+    from render.base import Renderer
+    from render.options import RenderOptions
+    from render.scene import TouchScene
+    from scenes.phantoms import Phantom
+    from scenes.scene import Scene
+
+    RecordingLike = str | Path | mechanics.recording.Recording | Simulation
+    ModelLike = str | Path | mechanics.model.Model | Reconstruction | Scene
+
+
+def read_recording(source: RecordingLike) -> Recording:
+    """Read a recording: NAME.csv, NAME.csv.gz or NAME.toml, or an embedded one by its name.
+
+    source: the file, or "silicone-1-cylinder". Times s, positions of the tip's centre m, forces on the tool
+    N, device frame (docs/recording-format.md). Raises RecordingError for what is missing or impossible.
+    """
+    from mechanics.errors import RecordingError
+    from mechanics.recording import Recording as Plain
+    from mechanics.recording import read_recording as read
+    from palpate.results.recording import recording_of
+    from scenes.embedded import embedded_names, embedded_recording
+
+    if isinstance(source, Plain):
+        return recording_of(source)
+    held = getattr(source, "recording", None)
+    if isinstance(held, Plain):
+        return recording_of(held)
+    if str(source) in embedded_names():
+        return recording_of(read(embedded_recording(str(source))))
+    if not isinstance(source, str | Path):
+        raise OptionError(f"a {type(source).__name__} is no recording: give one, or the path of its file")
+    try:
+        return recording_of(read(source))
+    except RecordingError as error:
+        if Path(source).exists() or "." in Path(source).name:
+            raise
+        raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
+
+
+def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
+    """The model of a MODEL folder; or of a scene, which is built the first time and then kept.
+
+    source: a folder that `reconstruct` wrote; the name of a scene ("demo", "nodule", "bean", ...), a scene's
+    .toml, a phantom ("cylinder", ..., or a closed surface as STL, PLY or VTU in m), or a recording, which is
+    then reconstructed. progress: True draws a bar where stderr is a terminal. Raises ModelError or SceneError
+    where there is none.
+    """
+    from mechanics.model import Model as Plain
+    from mechanics.model import read_model
+    from palpate.results.model import model_of
+    from scenes.build import model_of as scene_model
+    from scenes.scene import Scene, load_scene
+
+    if isinstance(source, Plain):
+        return model_of(source)
+    held = getattr(source, "model", None)
+    if isinstance(held, Plain):
+        return model_of(held)
+    if isinstance(source, str | Path):
+        if Path(source).is_dir():
+            return model_of(read_model(source))
+        source = load_scene(source)
+    if not isinstance(source, Scene):
+        raise OptionError(f"a {type(source).__name__} is no model: give one, a MODEL folder or a scene")
+    with _told("load", progress) as tell:
+        return model_of(scene_model(source, tell))
+
+
+def reconstruct(
+    recording: RecordingLike,
+    *,
+    method: str = "finite-tip",
+    save: str | Path | None = None,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Reconstruction:
+    """A recording becomes a model: contacts, base, surface, tetrahedra, Young's modulus, 1D models.
+
+    method: "finite-tip", or "paper" for Goksel et al.'s own. save: MODEL folder to write, where what is
+    computed for the model later is kept too. options: see `pp.options("reconstruct")`; lengths m, forces N.
+    The result goes wherever a model goes. Raises OptionError, ContactError, SurfaceError or MeshError.
+    """
+    from mechanics.model import write_model
+    from palpate.results.reconstruction import reconstruction_of
+    from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+    from render.felt import felt_surface
+
+    given = taken("reconstruct", {"method": method, **options})
+    if save is not None:
+        _check_folder(Path(save))
+    steps: dict[str, Any] = {
+        field.name: kind(**values)
+        for field in dataclasses.fields(ReconstructOptions)
+        for kind, values in given.items()
+        if field.default_factory is kind
+    }
+    chosen = ReconstructOptions(**given[ReconstructOptions], **steps, seed=seed)
+    with _told("reconstruct", progress) as tell:
+        result = reconstruct_fully(read_recording(recording), chosen, tell)
+    made = reconstruction_of(result, None if save is None else write_model(save, result.model))
+    if save is not None:
+        felt_surface(made.model, made.sites)
+    return made
+
+
+def renderer(
+    model: ModelLike | Renderer, name: str = "fem", *, progress: bool | Progress = True, **options: Any
+) -> Renderer:
+    """The renderer of a model: `state = r.start()`, then `state, forces = r.step(state, tips)` at 1 kHz.
+
+    tips (m, 3) m are the tips' centres, forces (m, 3) N act on the tool; device frame. name: "fem",
+    "kelvin-voigt", "hunt-crossley", "hunt-crossley-undamped" or "hunt-crossley-kh". The model's compliance is
+    computed, some seconds, or read from its folder. options: see `pp.options("renderer")`. Raises
+    OptionError.
+    """
+    make = _renderer("renderer", model, name, options)
+    with _told("renderer", progress) as tell:
+        return make(tell).renderer
+
+
+def replay(
+    model: ModelLike | Renderer,
+    recording: RecordingLike,
+    renderer: str = "fem",
+    *,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> ReplayResult:
+    """Feed a recorded tip path to a renderer and compare its force with the measured one.
+
+    model: or a renderer that is there already. The result has t (n,) s, force_n (n, 3) N on the tool, the
+    mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. options: see
+    `pp.options("replay")`. Raises OptionError.
+    """
+    from palpate.results.model import model_of
+    from palpate.results.replay import ReplayResult
+    from render.replay import replay_error, replay_recording
+
+    make = _renderer("replay", model, renderer, options)
+    measured = read_recording(recording)
+    with _told("replay", progress) as tell:
+        scene = make(tell)
+        forces = replay_recording(scene, measured, tell)
+    error = replay_error(measured, _touched(measured, scene.model), forces)
+    return ReplayResult(
+        recording=measured,
+        model=model_of(scene.model),
+        renderer=scene.renderer.name,
+        t=measured.t,
+        force_n=forces,
+        contact=error.contact,
+        rmse_n=error.rmse_n,
+        force_rms_n=error.force_rms_n,
+        relative=error.relative,
+    )
+
+
+def press(
+    model: ModelLike | Renderer,
+    at: Sequence[float],
+    direction: Sequence[float] | None = None,
+    depth_m: float = 0.004,
+    speed_m_per_s: float = 0.01,
+    *,
+    hold_s: float = 0.0,
+    approach_m: float = 2e-3,
+    rate_hz: float = 1000.0,
+    tip_radius_m: float | None = None,
+    renderer: str = "fem",
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Curve:
+    """One scripted press: the force response of a model at one place.
+
+    model: or a renderer that is there already, which saves seconds where many presses follow. at: (3,) m, the
+    point that the tip's centre is aimed at; direction: (3,) of the motion, any length, None is straight onto
+    the support; device frame. depth_m: along the surface's normal after first touch; speed_m_per_s, hold_s:
+    of the motion and at depth; approach_m: of free air before; rate_hz: of the samples; tip_radius_m: None
+    takes the model's. options: see `pp.options("press")`. Raises OptionError where the line misses object
+    and support, or grazes them.
+    """
+    import numpy as np
+
+    from palpate.results.base import dressed
+    from palpate.results.curve import Curve
+    from render.press import press as pressed
+
+    make = _renderer("press", model, renderer, options)
+    with _told("press", progress) as tell:
+        scene = make(tell)
+    along = -scene.model.support.normal if direction is None else np.asarray(direction, dtype=float)
+    radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
+    curve = pressed(
+        scene,
+        np.asarray(at, dtype=float),
+        along,
+        depth_m,
+        speed_m_per_s,
+        hold_s=hold_s,
+        approach_m=approach_m,
+        rate_hz=rate_hz,
+        tip_radius_m=radius,
+    )
+    return dressed(Curve, curve, renderer=scene.renderer, tip_radius_m=radius)
+
+
+def compare(
+    recording: RecordingLike,
+    model: ModelLike | None = None,
+    *,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Comparison:
+    """FEM against the interpolated 1D models, on presses and regions that no fit has seen; errors N rms.
+
+    model: only its geometry is used, every parameter is refitted in each fold; without one the recording is
+    reconstructed. options: see `pp.options("compare")`. Raises ContactError for fewer sites than two.
+    """
+    from palpate.comparison import CompareOptions
+    from palpate.comparison import compare as compared
+    from palpate.results.base import dressed
+    from palpate.results.comparison import Comparison
+    from palpate.results.model import model_of
+
+    chosen = CompareOptions(**taken("compare", options)[CompareOptions])
+    measured = read_recording(recording)
+    with _told("compare", progress) as tell:
+        plain = None if model is None else load(model, progress=tell)
+        result = compared(measured, plain, chosen, seed=seed, progress=tell)
+    return dressed(Comparison, result, recording=measured, model=model_of(result.model))
+
+
+def diagnose(
+    recording: RecordingLike,
+    model: ModelLike | None = None,
+    *,
+    fast: bool = False,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Diagnosis:
+    """The sim-to-real gap: where simulated and measured force differ, which effect was left out, how far the
+    gap shrinks with it on places that were not fitted; N rms.
+
+    model: of this recording or of another of the same object; without one the recording is reconstructed.
+    fast: fewer effects, one in an answer. options: see `pp.options("diagnose")`. Raises DiagnosisError where
+    the data cannot carry it.
+    """
+    from diagnose.judging import AttributionOptions
+    from diagnose.pipeline import DiagnoseOptions
+    from diagnose.pipeline import diagnose as diagnosed
+    from diagnose.whiten import NuisanceOptions
+    from palpate.results.base import dressed
+    from palpate.results.diagnosis import Diagnosis
+    from palpate.results.model import model_of
+    from reconstruct.placing import presses_on
+
+    given = taken("diagnose", {"fast": fast, "seed": seed, **({"most": 1} if fast else {}), **options})
+    measured = read_recording(recording)
+    with _told("diagnose", progress) as tell:
+        if model is None:
+            made = reconstruct(measured, progress=lambda s, x: tell(f"model: {s}", 0.3 * x)).model
+            begun = 0.3
+        else:
+            plain = load(model, progress=tell)
+            made, begun = model_of(plain.replaced(presses=presses_on(measured, plain))), 0.0
+        result = diagnosed(
+            measured,
+            made,
+            DiagnoseOptions(**given[DiagnoseOptions]),
+            lambda s, x: tell(s, begun + (1 - begun) * x),
+            nuisance=NuisanceOptions(**given[NuisanceOptions]),
+            attribution=AttributionOptions(**given[AttributionOptions]),
+        )
+    return dressed(Diagnosis, result, recording=measured, model=made)
+
+
+def simulate(
+    phantom: str | Path | Phantom,
+    effects: Mapping[str, float] | None = None,
+    *,
+    seed: int = 0,
+    save: str | Path | None = None,
+    person: int = 0,
+    sizes: bool = True,
+    ideal: bool = False,
+    workers: int | None = None,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Simulation:
+    """The virtual laboratory: a person explores a phantom, and what a device would have read is written down.
+
+    phantom: a name ("cylinder", "block", "half-sphere", "bean", "dome", "wedge", "bowl") or a closed STL, PLY
+    or VTU surface, m. effects: name to strength, 1 is the table's in docs/laboratory.md; none is the ideal
+    model. save: NAME.csv.gz to write, with the truth in NAME.toml. person: whose hand, 0 the average. sizes:
+    state each effect's size in N, which solves without it too; ideal: also what the ideal object would
+    answer. workers: processes, one a core by default. options: see `pp.options("simulate")`. Solved touches
+    are kept in the user's cache. Raises OptionError or SceneError.
+    """
+    from palpate.results.simulation import simulation_of
+    from scenes.laboratory.hand import HandOptions, cohort_hand
+    from scenes.laboratory.simulate import SimulateOptions
+    from scenes.laboratory.simulate import simulate as simulated
+    from scenes.phantoms import Phantom
+    from scenes.phantoms import phantom as named
+
+    given = taken("simulate", options)
+    thing = phantom if isinstance(phantom, Phantom) else named(phantom)
+    with _told("simulate", progress) as tell:
+        plain = simulated(
+            thing,
+            effects,
+            SimulateOptions(**given[SimulateOptions]),
+            hand=dataclasses.replace(cohort_hand(person), **given[HandOptions]),
+            seed=seed,
+            sizes=sizes,
+            ideal=ideal,
+            workers=workers,
+            progress=tell,
+        )
+    result = simulation_of(plain, Path(thing.name).name)
+    return result if save is None else result.save(save)
+
+
+def _renderer(
+    function: str, model: ModelLike | Renderer, name: str, options: Mapping[str, Any]
+) -> Callable[[Progress], TouchScene]:
+    """What will make the renderer, on its model's support; options are checked at once."""
+    from render.base import Renderer
+    from render.options import RenderOptions
+    from render.registry import create, names
+    from render.scene import scene_of
+    from render.support import SupportOptions
+
+    given = taken(function, options)
+    support = SupportOptions(**given.get(SupportOptions, {}))
+    if isinstance(model, Renderer):
+        if given[RenderOptions]:
+            words = "a renderer that is there keeps its options; give them to pp.renderer"
+            raise OptionError(f"{', '.join(given[RenderOptions])}: {words}")
+        return lambda tell: scene_of(model, support)
+    if name not in names():
+        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(names())}")
+    chosen = _with_scene(model, RenderOptions(**given[RenderOptions]))
+    return lambda tell: scene_of(create(name, load(model, progress=tell), chosen, tell), support)
+
+
+def _with_scene(model: ModelLike, options: RenderOptions) -> RenderOptions:
+    """The options with what the scene's file says, where a scene was given."""
+    from palpate.sources import with_friction
+    from scenes.scene import Scene, load_scene
+
+    scene = load_scene(model) if isinstance(model, str | Path) else model
+    return with_friction(options, scene) if isinstance(scene, Scene) else options
+
+
+def _touched(recording: room.Recording, model: Model) -> Presses:
+    """The recording's presses on the model; none where it holds none."""
+    from mechanics.errors import ContactError
+    from mechanics.presses import no_presses
+    from reconstruct.placing import presses_on
+
+    try:
+        return presses_on(recording, model)
+    except ContactError:
+        return no_presses(recording.tip_radius_m)
+
+
+def _check_folder(path: Path) -> None:
+    """Before a minute's work, what `write_model` would say after it."""
+    if path.exists() and not (path / "model.toml").exists() and (path.is_file() or any(path.iterdir())):
+        raise ModelError(f"'{path}' exists and is no MODEL folder: name another output")
+
+
+@contextmanager
+def _told(label: str, progress: bool | Progress) -> Iterator[Progress]:
+    """Where progress goes: to a callable, to a bar on a terminal, or nowhere."""
+    if callable(progress):
+        yield progress
+    elif progress:
+        from palpate.arguments import progress_bar
+
+        with progress_bar(label) as bar:
+            yield bar
+    else:
+        yield silent
