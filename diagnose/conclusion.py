@@ -13,7 +13,6 @@ from diagnose.confusable import alike
 from diagnose.gaps import closed_share, gap
 from diagnose.intervals import parameter_intervals
 from diagnose.judging import Score, Search
-from diagnose.library import effect
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry, NextTouch
 from diagnose.shape import repeat_scatter
@@ -21,6 +20,8 @@ from diagnose.sureness import FINITE_STRAIN, SHAPE, odds, sureness
 from diagnose.validation import held_out_by_refit
 from diagnose.verdict import Answer, Evidence, answer_of
 from diagnose.where import locate
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effect
 
 
 @dataclass(frozen=True)
@@ -103,29 +104,31 @@ def _entries(
     draws = max(100, evidence.bootstrap // 4)
     entries = []
     for name, score in found.scores.items():
+        own = score.effect
         closed, interval = closed_share(gaps.before, score.candidate.plain, counts, noise, added, rng, draws)
         fitted = found.final.found if name in found.chosen else score.candidate.found
         entries.append(
             EffectEntry(
                 name,
-                effect(name).domain,
+                own.domain,
                 sure if name in found.chosen else odds(score, search, best),
                 gap(score.candidate.plain, counts, added),
                 closed,
                 interval,
-                effect(name).report(fitted.of(name), forward),
+                own.report(fitted.of(name), forward, fitted.modulus),
                 score.gain,
                 parameter_intervals(fitted, name, forward, search.dof, rng),
                 found.standing[name],
             )
         )
-    if found.finite_strain_gain > LINEAR_UNLESS or "finite_strain" in answer.names:
+    strain = search.finite_strain
+    if found.finite_strain_gain > LINEAR_UNLESS or strain.name in answer.names:
         deep = found.deep
         closed, interval = closed_share(gaps.before, deep.plain, counts, noise, added, rng, draws)
-        probability = FINITE_STRAIN if "finite_strain" in answer.names else 0.1
+        probability = FINITE_STRAIN if strain.name in answer.names else 0.1
         entries.append(
             EffectEntry(
-                "finite_strain", "object", probability, gap(deep.plain, counts, added), closed, interval, {},
+                strain.name, strain.domain, probability, gap(deep.plain, counts, added), closed, interval, {},
                 found.finite_strain_gain,
             )
         )  # fmt: skip
@@ -133,9 +136,9 @@ def _entries(
         dataclasses.replace(e, probability=min(e.probability, sure))
         for e in settled.entries(gaps.before, found.ideal, counts, noise, added, rng)
     ]
-    if "surface_shape" in answer.names:
+    for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
-        entries.append(EffectEntry("surface_shape", "boundary", SHAPE, left, 0.0, None, {}))
+        entries.append(EffectEntry(rest.name, rest.domain, SHAPE, left, 0.0, None, {}))
     place = {n: i for i, n in enumerate(answer.names)}
     entries.sort(key=lambda e: (place.get(e.name, 99), -e.probability, -e.gain))
     return tuple(entries)

@@ -15,8 +15,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve, solve_triangular
 
-from diagnose.forward import Forward, Settings
+from diagnose.forward import Forward
 from diagnose.touches import Touches
+from mechanics.effects.settings import Settings
 from mechanics.options import option
 
 
