@@ -11,16 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.confidence_set import confidence_p
-from diagnose.effects.base import Effect
-from diagnose.judging import EVERYWHERE, SPATIAL, Candidate, Score, Search, sideways_off
-from diagnose.solved_again import solve_inclusion
+from diagnose.judging import Candidate, Score, Search, sideways_off
+from mechanics.effects.base import Effect, Scope
 from mechanics.progress import Progress, silent
 
 REEXAMINED = 4
 """The strongest effects of a step that are weighed once more before they are turned down."""
-
-IN_TIME = ("time_delay", "viscoelasticity", "backlash", "adhesion", "mullins_softening")
-"""Effects that are also tried two at a time where none helps alone."""
 
 OUT_OF_SET = 0.1
 """An effect with a smaller p value is not in the model confidence set of 90 %."""
@@ -28,11 +24,8 @@ OUT_OF_SET = 0.1
 RIVAL_CLOSES = 0.3
 """A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
 
-HIDING = (*EVERYWHERE, "skin_layer", "compliant_base")
-"""Effects that bend the depth law the other way than finite strain does, so that neither shows alone."""
-
 HIDDEN_LEAST = 10.0
-"""Such an effect gains this much alone before it is tried with finite strain as well."""
+"""What may hide finite strain gains this much alone before it is tried with it as well."""
 
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
@@ -63,25 +56,24 @@ class Attribution:
 
 
 def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:
-    """Forward selection with backward check; rivals of the first choice are declared."""
+    """Forward selection with backward check of effects to be tried; rivals of the first are declared."""
     fs = search.finite_strain
     ideal, deep = search.judge([]), search.judge([fs])
     _, strain_gain = _with_strain(search, [])
     base = deep if strain_gain > LINEAR_UNLESS else ideal
-    library = [e for e in effects if e.name not in ("finite_strain", "surface_shape")]
     current = base
     chosen: list[str] = []
     steps: list[dict[str, Score]] = []
     for step in range(search.options.most):
         scores: dict[str, Score] = {}
-        for i, effect in enumerate(library):
+        for i, effect in enumerate(effects):
             if effect.name in current.found.names:
                 continue
-            progress(f"effect {step + 1}: {effect.name}", (step + i / len(library)) / search.options.most)
+            progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
             candidate = search.judge([*current.found.effects, effect], like=current)
             if not chosen:
                 candidate = _with_hidden_strain(search, effect, candidate, current)
-            scores[effect.name] = search.score(effect.name, candidate, current)
+            scores[effect.name] = search.score([effect], candidate, current)
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
             if score.gain > search.options.plain_gain and not search.passes(score, first=first):
@@ -91,9 +83,9 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
         off = sideways_off(search.forward, current)
         if off:
-            passing = _not_blind_to_slip(search, passing, scores.get("friction_slip"), off)
+            passing = _not_blind_to_slip(search, passing, list(scores.values()), off)
         if not passing:
-            pair = None if step + 2 > search.options.most else _paired(search, library, current)
+            pair = None if step + 2 > search.options.most else _paired(search, effects, current)
             if pair is None:
                 break
             chosen += [n for n in pair.found.names if n not in current.found.names]
@@ -106,8 +98,9 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
     picked = list(zip(steps, chosen, strict=False))
     current, chosen = _without_idle(search, chosen, current)
-    if "inclusion" in chosen:
-        current = _solved_again(search, current)
+    for effect in current.found.effects:
+        if effect.refine is not None:
+            current = _refined(search, effect, current)
     sets = [standing(scores) for scores in steps]
     rivals = _rivals(search, picked, sets, chosen)
     order = _strongest_first(search, current, chosen)
@@ -130,7 +123,7 @@ def _with_hidden_strain(
     search: Search, effect: Effect, candidate: Candidate, current: Candidate
 ) -> Candidate:
     """The candidate, or with finite strain beside it where each may have hidden the other."""
-    if effect.name not in HIDING or "finite_strain" in current.found.names:
+    if not effect.hides_strain or search.finite_strain in current.found.effects:
         return candidate
     if (
         current.found.loss - candidate.found.loss
@@ -141,42 +134,43 @@ def _with_hidden_strain(
     return both if both.found.loss < candidate.found.loss else candidate
 
 
-def _paired(search: Search, library: Sequence[Effect], current: Candidate) -> Candidate | None:
+def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Candidate | None:
     """Two effects in time that close the gap only together: memory and delay bend loops opposite ways."""
     if current.chi < search.options.unknown_chi:
         return None
-    able = [e for e in library if e.name in IN_TIME and e.name not in current.found.names]
+    able = [e for e in effects if e.scope is Scope.TIME and e.name not in current.found.names]
     found = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
-        score = search.score(f"{one.name}+{two.name}", candidate, current)
+        score = search.score([one, two], candidate, current)
         if candidate.chi < 0.5 * current.chi and score.gain > 2 * search.options.gain and score.share > 0:
             found.append(candidate)
     return min(found, key=lambda c: c.found.loss, default=None)
 
 
-def _not_blind_to_slip(search: Search, passing: list[Score], slip: Score | None, off: float) -> list[Score]:
+def _not_blind_to_slip(search: Search, passing: list[Score], scores: list[Score], off: float) -> list[Score]:
     """What may be named while the sideways force is off by a share: slip where it helps; of effects that
     differ from place to place only those that mend it, or a sliding tip is taken for a soft place."""
     kept = [
-        s for s in passing if s.name not in SPATIAL or sideways_off(search.forward, s.candidate) < 0.7 * off
+        s
+        for s in passing
+        if not s.effect.scope.between_places or sideways_off(search.forward, s.candidate) < 0.7 * off
     ]
-    if slip is not None and slip not in kept:
-        if slip.gain > search.options.plain_gain and slip.share > search.options.further_share:
-            kept.append(slip)
-    return kept
+    o = search.options
+    slips = [s for s in scores if s.effect.slips and s.gain > o.plain_gain and s.share > o.further_share]
+    return kept + [s for s in slips if s not in kept]
 
 
-def _solved_again(search: Search, current: Candidate) -> Candidate:
-    """The set with its lump solved anew; as it was where that fits worse."""
+def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
+    """The set with an effect's law made exact at its fit, twice; as it was where that fits worse."""
     first = current
     for _ in range(2):
-        solve_inclusion(search.forward, current.found.of("inclusion"))
+        effect.refine(search.forward, current.found.of(effect.name))
         search.renew(current.found)
         current = search.judge(current.found.effects, like=current)
     if current.found.loss < first.found.loss + search.options.plain_gain:
         return current
-    del search.forward.stages["inclusion_scale"]
+    effect.forget(search.forward)
     search.renew(first.found)
     return first
 
@@ -189,13 +183,13 @@ def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
     there = search.reweighed(score.candidate.found)
     old = there.judge(current.found.effects, like=current)
     new = there.judge(score.candidate.found.effects, like=score.candidate)
-    again = there.score(score.name, new, old)
+    again = there.score(score.added, new, old)
     return dataclasses.replace(again, gain=score.gain, z=score.z, per_group=score.per_group)
 
 
 def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float]:
     """The set with or without finite strain, whichever fits better, and the gain of having it."""
-    rest = [e for e in effects if e.name != "finite_strain"]
+    rest = [e for e in effects if e is not search.finite_strain]
     without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
     over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.noise.variance_inflation
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
@@ -211,9 +205,10 @@ def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tupl
         if len(chosen) < 2:
             break
         without = search.judge([e for e in current.found.effects if e.name != name])
-        if name == "friction_slip" and sideways_off(search.forward, without):
+        effect = next(e for e in current.found.effects if e.name == name)
+        if effect.slips and sideways_off(search.forward, without):
             continue
-        score = search.score(name, current, without)
+        score = search.score([effect], current, without)
         if score.gain < search.options.strong_gain * current.chi and not search.passes(score, first=False):
             chosen.remove(name)
             current = without
@@ -244,7 +239,7 @@ def _rivals(
         for score in scores.values():
             if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
                 continue
-            if score.share < RIVAL_CLOSES * max(first.share, 0.0) and score.name != "inclusion":
+            if score.share < RIVAL_CLOSES * max(first.share, 0.0) and not score.effect.few_places:
                 continue
             behind = first.gain - score.gain
             difference = first.per_group - score.per_group

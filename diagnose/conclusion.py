@@ -13,7 +13,7 @@ from diagnose.confusable import alike
 from diagnose.gaps import closed_share, gap
 from diagnose.intervals import parameter_intervals
 from diagnose.judging import Score, Search
-from diagnose.library import effect
+from diagnose.never_worse import never_worse
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry, NextTouch
 from diagnose.shape import repeat_scatter
@@ -21,6 +21,8 @@ from diagnose.sureness import FINITE_STRAIN, SHAPE, odds, sureness
 from diagnose.validation import held_out_by_refit
 from diagnose.verdict import Answer, Evidence, answer_of
 from diagnose.where import locate
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effect
 
 
 @dataclass(frozen=True)
@@ -44,6 +46,7 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
     gaps = _gaps(evidence)
     lap("held out")
     answer = answer_of(evidence, counts)
+    gaps = dataclasses.replace(gaps, after=_never_worse(evidence, answer, gaps, counts))
     before_n = gap(gaps.before, counts, added)
     after_n = gap(gaps.after, counts, added) if answer.names else before_n
     closed, interval = closed_share(gaps.before, gaps.after, counts, noise, added, rng, evidence.bootstrap)
@@ -89,6 +92,34 @@ def _gaps(evidence: Evidence) -> Gaps:
     return Gaps(old.plain, new.plain, held)
 
 
+def _never_worse(evidence: Evidence, answer: Answer, gaps: Gaps, counts: np.ndarray) -> np.ndarray:
+    """(g,) N^2, held out with what may be named; the answer loses, to its candidates, what makes the gap grow."""
+    search, settled = evidence.search, evidence.settled
+    whitener = search.whitener
+    final, base = evidence.found.final.found, evidence.found.base.found.names
+    added = evidence.forward.touches.thinned_away
+
+    def after(names: tuple[str, ...]) -> np.ndarray:
+        if names == tuple(answer.names):
+            return gaps.after
+        fitted = search.judge([e for e in final.effects if e.name in (*names, *base)])
+        put_back = None if set(settled.names) <= set(names) else settled.residual
+        if evidence.refit:
+            return held_out_by_refit(search, fitted.found, put_back, added).plain
+        return fitted.plain if put_back is None else fitted.plain + settled.plain(whitener, fitted)
+
+    kept = never_worse(answer.names, gaps.before, after, counts, whitener.explained, seed=evidence.seed)
+    if kept.dropped:
+        answer.names = list(kept.names)
+        answer.candidates += kept.dropped
+        answer.remainder |= kept.unexplained
+        dropped = " and ".join(n.replace("_", " ") for n in kept.dropped)
+        answer.reasons.append(
+            f"{dropped}: the gap grows with it on places that were not fitted, so it is not named"
+        )
+    return kept.after
+
+
 def _entries(
     evidence: Evidence,
     answer: Answer,
@@ -103,29 +134,31 @@ def _entries(
     draws = max(100, evidence.bootstrap // 4)
     entries = []
     for name, score in found.scores.items():
+        own = score.effect
         closed, interval = closed_share(gaps.before, score.candidate.plain, counts, noise, added, rng, draws)
         fitted = found.final.found if name in found.chosen else score.candidate.found
         entries.append(
             EffectEntry(
                 name,
-                effect(name).domain,
+                own.domain,
                 sure if name in found.chosen else odds(score, search, best),
                 gap(score.candidate.plain, counts, added),
                 closed,
                 interval,
-                effect(name).report(fitted.of(name), forward),
+                own.report(fitted.of(name), forward, fitted.modulus),
                 score.gain,
                 parameter_intervals(fitted, name, forward, search.dof, rng),
                 found.standing[name],
             )
         )
-    if found.finite_strain_gain > LINEAR_UNLESS or "finite_strain" in answer.names:
+    strain = search.finite_strain
+    if found.finite_strain_gain > LINEAR_UNLESS or strain.name in answer.names:
         deep = found.deep
         closed, interval = closed_share(gaps.before, deep.plain, counts, noise, added, rng, draws)
-        probability = FINITE_STRAIN if "finite_strain" in answer.names else 0.1
+        probability = FINITE_STRAIN if strain.name in answer.names else 0.1
         entries.append(
             EffectEntry(
-                "finite_strain", "object", probability, gap(deep.plain, counts, added), closed, interval, {},
+                strain.name, strain.domain, probability, gap(deep.plain, counts, added), closed, interval, {},
                 found.finite_strain_gain,
             )
         )  # fmt: skip
@@ -133,9 +166,9 @@ def _entries(
         dataclasses.replace(e, probability=min(e.probability, sure))
         for e in settled.entries(gaps.before, found.ideal, counts, noise, added, rng)
     ]
-    if "surface_shape" in answer.names:
+    for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
-        entries.append(EffectEntry("surface_shape", "boundary", SHAPE, left, 0.0, None, {}))
+        entries.append(EffectEntry(rest.name, rest.domain, SHAPE, left, 0.0, None, {}))
     place = {n: i for i, n in enumerate(answer.names)}
     entries.sort(key=lambda e: (place.get(e.name, 99), -e.probability, -e.gain))
     return tuple(entries)

@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.effects.base import Effect
-from diagnose.forward import Forward, Settings
+from diagnose.forward import Forward
 from diagnose.whiten import Whitener
+from mechanics.effects.base import Effect
+from mechanics.effects.settings import Settings
 
 MODULUS_STEP = 0.01
 
@@ -76,7 +77,7 @@ def settings_of(
     i = 1
     for effect in effects:
         k = len(effect.parameters)
-        effect.change(settings, values[i : i + k], forward)
+        effect.act(settings, values[i : i + k], forward)
         i += k
     return settings
 
@@ -100,7 +101,7 @@ def fit(
     else:
         starts = [np.array([np.log(modulus)])]
         for effect in effects:
-            starts = [np.concatenate([s, own]) for s in starts for own in effect.starts(forward)]
+            starts = [np.concatenate([s, own]) for s in starts for own in effect.starts()]
     descent = Descent(forward, whitener, effects, weights)
     onset = np.zeros(len(forward.touches)) if onset is None else onset
     if len(starts) > 3:

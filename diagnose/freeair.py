@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.kinematics import acceleration
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 
@@ -131,24 +132,19 @@ def _mass(
 ) -> tuple[float, float]:
     """Mass whose inertia the free-air force shows, kg, and its standard error: force = -m a over 50 ms
     fits."""
-    rate = recording.sample_rate_hz
-    width = max(5, round(width_s * rate) | 1)
+    width = max(5, round(width_s * recording.sample_rate_hz) | 1)
     half = width // 2
-    offsets = (np.arange(width) - half) / rate
-    columns = np.stack([np.ones(width), offsets, offsets**2 / 2], axis=1)
-    second = np.linalg.pinv(columns)[2]
     inner = np.flatnonzero(np.convolve(free, np.ones(width), mode="same") > width - 0.5)[::width]
     inner = inner[(inner > half) & (inner < len(free) - half)]
     if len(inner) < 20:
         return 0.0, float("inf")
-    windows = inner[:, None] + np.arange(-half, half + 1)
-    acceleration = np.einsum("wkc,k->wc", recording.position[windows], second)
-    force = read[windows].mean(axis=1)
-    acceleration = acceleration - acceleration.mean(axis=0)
+    hand = acceleration(recording.t, recording.position, width_s=width_s)[inner]
+    force = read[inner[:, None] + np.arange(-half, half + 1)].mean(axis=1)
+    hand = hand - hand.mean(axis=0)
     force = force - force.mean(axis=0)
-    power = (acceleration**2).sum()
+    power = (hand**2).sum()
     if power <= 0:
         return 0.0, float("inf")
-    mass = -float((force * acceleration).sum() / power)
-    left = force + mass * acceleration
+    mass = -float((force * hand).sum() / power)
+    left = force + mass * hand
     return mass, float(np.sqrt((left**2).mean() / power))

@@ -8,36 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.effects.base import Effect
 from diagnose.first_touch import first_touches
 from diagnose.fit import Descent, Fit, fit, settings_of
 from diagnose.forward import Forward
 from diagnose.leave_one_out import held_out, levelled
 from diagnose.shape import repeat_scatter
 from diagnose.whiten import NuisanceOptions, Whitener
+from mechanics.effects.base import Effect, Scope
 from mechanics.options import option
 
-SPATIAL = (
-    "inclusion",
-    "modulus_gradient",
-    "skin_layer",
-    "poisson_ratio",
-    "unbonded_base",
-    "compliant_base",
-    "tip_radius",
-    "tool_compliance",
-    "force_gain",
-    "surface_offset",
-    "strain_stiffening",
-)
-"""Effects that differ from site to site rather than within a press."""
-
-EVERYWHERE = ("tip_radius", "tool_compliance", "strain_stiffening", "poisson_ratio", "force_gain")
-"""Those of them that every site feels: one site alone that a wrong surface bends cannot speak for them."""
-
 STEADY_Z = 2.0
-"""Such an effect, and any further one that differs from place to place, gains by this many standard errors
-across sites."""
+"""What every site feels, and any further effect that differs from place to place, gains by this many standard
+errors across sites: one site alone that a wrong surface bends cannot speak for them."""
 
 SURE_Z = 3.0
 """What every site feels is named on a small gain only if so many standard errors of the sites agree ..."""
@@ -116,7 +98,8 @@ class Candidate:
 class Score:
     """How much better a candidate is than what it was added to.
 
-    gain: log likelihood, deflated by its own lack of fit. z: gain over its standard error across sites.
+    added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit. z: gain
+    over its standard error across sites.
     per_group: (g,) the gain of each site, deflated likewise.
     size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
     share: of the old excess over the noise.
@@ -124,7 +107,7 @@ class Score:
     scatter_n: N rms by which repeats at one place still differ.
     """
 
-    name: str
+    added: tuple[Effect, ...]
     gain: float
     z: float
     size_n: float
@@ -136,14 +119,27 @@ class Score:
     scatter_n: float = 0.0
 
     @property
+    def effect(self) -> Effect:
+        """The effect that is scored; the first of a pair."""
+        return self.added[0]
+
+    @property
+    def name(self) -> str:
+        """Its name; of a pair both."""
+        return "+".join(e.name for e in self.added)
+
+    @property
     def evidence(self) -> float:
         """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
         is wrong, speaks for whatever bends it; a lump lives in few places, so there all of it."""
-        return self.gain if self.name == "inclusion" else self.gain - max(float(self.per_group.max()), 0.0)
+        return self.gain if self.effect.few_places else self.gain - max(float(self.per_group.max()), 0.0)
 
 
 class Search:
-    """Holds what all fits share: forward model, whitener, options, and a cache of fits by names."""
+    """Holds what all fits share: forward model, whitener, options, and a cache of fits by names.
+
+    starts: start vectors by effect that were sought in the data, in place of the effect's own.
+    """
 
     def __init__(
         self,
@@ -160,6 +156,7 @@ class Search:
         onset = first_touches(forward, whitener, modulus)
         rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
         self.finite_strain = finite_strain
+        self.starts: dict[str, list[np.ndarray]] = {}
         self.felt_n = FELT * forward.touches.vector_noise_n
         self.renew(rough)
 
@@ -185,7 +182,8 @@ class Search:
         near = self._near if like is None else like.found
         starts = [np.array([near.values[0]])]
         for effect in effects:
-            own = [near.of(effect.name)] if effect.name in near.names else effect.starts(self.forward)
+            known = effect.name in near.names
+            own = [near.of(effect.name)] if known else self.starts.get(effect.name) or effect.starts()
             starts = [np.concatenate([s, o]) for s in starts for o in own]
         found = self._best(list(effects), starts, near.onset)
         held, plain = held_out(found)
@@ -209,13 +207,13 @@ class Search:
             found = anew if anew.loss < ANEW * found.loss else found
         return found
 
-    def score(self, name: str, new: Candidate, old: Candidate) -> Score:
-        """Compare two candidates."""
+    def score(self, added: Sequence[Effect], new: Candidate, old: Candidate) -> Score:
+        """Compare a candidate with the one that lacks `added`."""
         extra = len(new.found.values) - len(old.found.values)
         over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
         per_group = old.held - new.held
         gain = float(per_group.sum())
-        if name in SPATIAL:
+        if all(e.scope.between_places for e in added):
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
             gain = old.found.loss - new.found.loss - 4.0 * extra
@@ -231,24 +229,25 @@ class Search:
         share = closes / excess
         scatter = np.nan_to_num(repeat_scatter(new.residual, self.forward.touches))
         return Score(
-            name, float(gain / over), float(z), size, closes, share, toward, per_group / over, new, scatter
+            tuple(added), float(gain / over), float(z), size, closes, share, toward, per_group / over, new,
+            scatter,
         )  # fmt: skip
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect; one beside another must close a fair share of what is left."""
-        o = self.options
+        o, effect = self.options, score.effect
+        everywhere, between = effect.scope is Scope.EVERYWHERE, effect.scope.between_places
         if score.size_n < o.size_n:
             return False
-        if score.name == "surface_offset" and not first:
-            # a delay or a play has already moved the first touches that the surface was fitted to
+        if effect.only_first and not first:
             return False
-        if score.name == "inclusion":
+        if effect.few_places:
             return score.evidence > o.lump_gain and score.share > -0.3 and score.toward > o.toward
-        if score.name in EVERYWHERE:
+        if everywhere:
             unfelt = score.size_n < self.felt_n and score.evidence < PLENTY
             if score.z < STEADY_Z or unfelt:
                 return False
-        if not first and score.name in SPATIAL and score.z < STEADY_Z:
+        if not first and between and score.z < STEADY_Z:
             # one place that a law misses by far must not name a second effect
             return False
         if first and score.evidence > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
@@ -256,12 +255,12 @@ class Search:
         if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
             return False
         closing = score.evidence > CLOSING_GAIN and score.share > CLOSING_SHARE
-        steady = SURE_Z if score.name in EVERYWHERE and not closing else STEADY_Z
+        steady = SURE_Z if everywhere and not closing else STEADY_Z
         if score.evidence > o.plain_gain and score.share > o.plain_share and score.z > steady:
             # repeats of one place that differ by more than the effect changes may be all that it fits
-            if score.name not in SPATIAL or score.size_n > score.scatter_n:
+            if not between or score.size_n > score.scatter_n:
                 return True
-        if score.name in SPATIAL:
+        if between:
             return score.evidence > o.spatial_gain
         return score.evidence > o.gain and score.z > o.z
 

@@ -1,13 +1,10 @@
-"""The press integrator: from a tip path to the force on the tool, at one site, with the contact effects in
+"""The press integrator: from a tip path to the force on the tool, at one place, with the contact effects in
 it.
 
-Local frame of a site: axis 0 is the outward normal, axes 1 and 2 are tangents. `y` is how far the tip's
-centre
-has gone INTO the object since first touch (y[0] is the depth), `f` the force on the tool, so that pressing
-gives
-f[0] > 0. The touch itself is mechanics.touch, so that what is fitted is what is rendered; here slip is added,
-as
-the renderer does it: where the tangential force exceeds mu F the anchor walks until it does not.
+Local frame of a place: axis 0 is the outward normal, axes 1 and 2 are tangents. `y` is how far the tip's
+centre has gone INTO the object since first touch (y[0] is the depth), `f` the force on the tool, so that
+pressing gives f[0] > 0. The touch is mechanics.touch, slip that of mechanics.effects.friction_slip, and what
+follows the path mechanics.effects.path: what is fitted is what is rendered.
 """
 
 from __future__ import annotations
@@ -15,18 +12,23 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from mechanics.dent import dent_load
+from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
+from mechanics.effects.path import sharp_laws, smooth_laws
 from mechanics.touch import STATE_SIZE, touch_remember, touch_solve
 
+SUB_PLACES = 5
+"""Of a thinned step's path, over which a sharp law is averaged."""
 
-@numba.njit(cache=True)
+
+@numba.njit(cache=True, error_model="numpy")
 def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_give, mu, out):
     """Force on the tool along every press.
 
     start: (p + 1,) first sample of each press. y: (n, 3) m. far: (p, 3, 3) unit modulus, 1/m.
     radius: (p,) m, of tip and surface together. e_dent, e_far: (p,) Pa, modulus under the tip and of the
-    whole.
-    table: of a dent law. tool_give: 1 / k of a spring in series, m/N. mu: friction; negative: the tip sticks.
-    Writes out: (n, 3) N.
+    whole. table: of a dent law. tool_give: 1 / k of a spring in series, m/N. mu: friction; inf: the tip
+    sticks. Writes out: (n, 3) N.
     """
     order = np.array([1, 2, 0])
     state = np.zeros(STATE_SIZE)
@@ -49,53 +51,69 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_give, mu, ou
                 out[i, 0] = out[i, 1] = out[i, 2] = 0.0
                 continue
             fu = fv = fn = dent = a = du = dv = 0.0
-            for _ in range(4):
+            length = before = 0.0
+            for slip in range(SLIPS):
                 d[0] = anchor1 - y[i, 1]
                 d[1] = anchor2 - y[i, 2]
                 d[2] = -y[i, 0]
                 fu, fv, fn, dent, a, du, dv, _k = touch_solve(
                     state, d, give, table, radius[p], plane_strain, stick
                 )
-                if mu < 0.0:
+                state[1] = dent  # where the next solution starts from
+                pull = np.sqrt(fu * fu + fv * fv)
+                excess, kept = slip_excess(slip, pull, fn, mu)
+                fu *= kept
+                fv *= kept
+                if excess == 0.0:
                     break
-                size = np.sqrt(fu * fu + fv * fv)
-                over = size - mu * fn
-                if over <= 1e-5:
-                    break
-                walk = over / size * (1.0 / (stick * max(a, 1e-6)) + 0.5 * (give[0, 0] + give[1, 1]))
-                anchor1 += walk * fu
-                anchor2 += walk * fv
+                both = 1.0 / (stick * a) + 0.5 * (give[0, 0] + give[1, 1])
+                length = slip_length(slip, excess, before, length, both, 1.0)
+                before = excess
+                anchor1 += length * fu / pull
+                anchor2 += length * fv / pull
             touch_remember(state, dent, a, du, dv, radius[p])
             out[i, 0] = fn
             out[i, 1] = fu
             out[i, 2] = fv
 
 
-@numba.njit(cache=True)
-def relax(start, t, force, g, tau, out):
-    """Prony memory: out = force + sum_k g_k int exp(-(t - s) / tau_k) dforce(s), exact for linear pieces."""
-    for p in range(start.shape[0] - 1):
-        for k in range(g.shape[0]):
-            h0 = h1 = h2 = 0.0
-            for i in range(start[p], start[p + 1]):
-                if i > start[p]:
-                    dt = t[i] - t[i - 1]
-                    decay = np.exp(-dt / tau[k])
-                    gain = tau[k] / dt * (1.0 - decay)
-                    h0 = decay * h0 + gain * (force[i, 0] - force[i - 1, 0])
-                    h1 = decay * h1 + gain * (force[i, 1] - force[i - 1, 1])
-                    h2 = decay * h2 + gain * (force[i, 2] - force[i - 1, 2])
-                out[i, 0] += g[k] * h0
-                out[i, 1] += g[k] * h1
-                out[i, 2] += g[k] * h2
+@numba.njit(cache=True, error_model="numpy")
+def follow(start, t, depth, site, felt, numbers, reach_m, sub_places, memory, f):
+    """Let the laws along the path act on the quasi-static force f (n, 3) N of every press, in place.
 
-
-@numba.njit(cache=True)
-def play(start, y, width, out):
-    """Play operator (backlash), axis by axis: what follows is dragged once it is width / 2 behind."""
-    half = 0.5 * width
+    depth: (n,) m. site: (p,) and felt: (s,) greatest load of each site, changed. numbers, reach_m: of
+    mechanics.effects.path; memory: (laws, m). sub_places: of a sample's path over which sharp laws are
+    averaged, 1 where samples are no means.
+    """
+    normal = np.array([1.0, 0.0, 0.0])
+    force, mean = np.empty(3), np.empty(3)
     for p in range(start.shape[0] - 1):
-        for k in range(3):
-            out[start[p], k] = y[start[p], k]
-            for i in range(start[p] + 1, start[p + 1]):
-                out[i, k] = min(max(out[i - 1, k], y[i, k] - half), y[i, k] + half)
+        a, b = start[p], start[p + 1]
+        memory[:] = 0.0
+        deepest = 0.0
+        for i in range(a, b):
+            load = dent_load(depth[i])
+            felt[site[p]] = max(felt[site[p]], load)
+            deepest = max(deepest, depth[i])
+            dt = t[i] - t[i - 1] if i > a else 0.0
+            most = felt[site[p]]
+            smooth_laws(numbers, memory, depth[i], deepest, load, most, dt, normal, f[i])
+            mean[:] = 0.0
+            before = 0.5 * (depth[i] + depth[max(i - 1, a)])
+            after = 0.5 * (depth[i] + depth[min(i + 1, b - 1)])
+            for k in range(sub_places):
+                # along the way from half a step before to half a step after
+                share = (k + 0.5) / sub_places
+                x = depth[i]
+                if share < 0.5:
+                    x = before + 2.0 * share * (depth[i] - before)
+                elif share > 0.5:
+                    x = depth[i] + (2.0 * share - 1.0) * (after - depth[i])
+                force[:] = f[i]
+                sharp_laws(numbers, memory, x, deepest, dent_load(x), most, dt, normal, force)
+                for c in range(3):
+                    mean[c] += force[c] / sub_places
+            f[i] = mean
+            if depth[i] <= -reach_m:
+                memory[:] = 0.0
+                deepest = 0.0

@@ -10,28 +10,21 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.inclusions import inclusion_starts
 from diagnose.judging import AttributionOptions, Search
-from diagnose.library import NAMES, effect
+from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
 from diagnose.settled import settle
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of
 from diagnose.verdict import Evidence
 from diagnose.whiten import NuisanceOptions
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effects
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from reconstruct.placing import presses_on
-
-FAST_LEAVES_OUT = (
-    "poisson_ratio",
-    "unbonded_base",
-    "compliant_base",
-    "skin_layer",
-    "modulus_gradient",
-)
 
 
 @dataclass(frozen=True)
@@ -81,25 +74,22 @@ def diagnose(
     forward = build_forward(touches, model)
     lap("sites")
     excluded = {n.strip() for n in options.without.split(",") if n.strip()}
-    for name in excluded:
-        effect(name)
+    allowed = effects(without=excluded)
     settled = settle(forward, free, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
     search = Search(
         forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
-        finite_strain=effect("finite_strain"),
+        finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
-    left_out = set(FAST_LEAVES_OUT) if options.fast else set()
-    skip = excluded | left_out | {"force_bias", "force_drift", "tool_gravity_inertia"} | {"surface_shape"}
-    library = [effect(n) for n in NAMES if n not in skip]
+    left_out = {e.name for e in effects() if e.costly and options.fast}
+    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in left_out]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
-    if "inclusion" not in excluded:
-        inclusion_starts(forward, base.found, site_sd)
+    misfit = misfit_of(forward, base.found, site_sd)
+    search.starts = {e.name: e.seek(forward, misfit) for e in tried if e.seek is not None}
     lap("baseline")
-    found = attribute(search, library, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
+    found = attribute(search, tried, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
-    forward.stages["modulus"] = found.final.found.modulus
     evidence = Evidence(
         forward, search, found, free, settled, site_sd, frozenset(excluded), options.shape_gain,
         options.bootstrap, options.seed, refit=not options.fast,

@@ -10,10 +10,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from diagnose.forward import STANDARD_GRAVITY, Forward
+from diagnose.forward import Forward
 from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
 from diagnose.result import EffectEntry
+from mechanics.effects.force_bias import EFFECT as BIAS
+from mechanics.effects.force_drift import EFFECT as DRIFT
+from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
+from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
 Z = 6.0
 LEAST_BIAS_N = 0.008
@@ -71,10 +75,10 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
     level, level_se = free.bias_n.copy(), free.bias_se_n
     drift = np.abs(free.rate_n_per_s).max()
     if drift > Z * free.rate_se_n_per_s and drift * duration / np.sqrt(12) > LEAST_BIAS_N / 2:
-        if "force_drift" not in excluded:
+        if DRIFT.name not in excluded:
             # a drifting zero was zero when the recording began
-            parts["force_drift"] = t.t[:, None] * free.rate_n_per_s
-            parameters["force_drift"] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
+            parts[DRIFT.name] = t.t[:, None] * free.rate_n_per_s
+            parameters[DRIFT.name] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
             reasons.append(f"in free air the force drifts by {drift * duration:.3f} N over the presses")
             middle = free.t.mean()
             level = level - middle * free.rate_n_per_s
@@ -83,13 +87,13 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
     turns = turning is not None and np.linalg.norm(turning.tool_n) > max(
         Z * turning.se_n, LEAST_MASS_KG * STANDARD_GRAVITY
     )
-    if turns and "tool_gravity_inertia" not in excluded and t.quaternion is not None:
+    if turns and INERTIA.name not in excluded and t.quaternion is not None:
         # a tare took the weight off as it lay in the tool at first; it stays where the tool turns
         mass = float(np.linalg.norm(turning.tool_n)) / STANDARD_GRAVITY
         weight = -turning.first @ turning.tool_n
         turned = np.einsum("nij,j->ni", matrices(t.quaternion), turning.tool_n)
-        parts["tool_gravity_inertia"] = weight + turned - mass * forward.acceleration
-        parameters["tool_gravity_inertia"] = {
+        parts[INERTIA.name] = weight + turned - mass * forward.acceleration
+        parameters[INERTIA.name] = {
             "mass_kg": mass,
             "tared": True,
             "weight_n": weight.tolist(),
@@ -98,30 +102,30 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
         level_se = float(np.hypot(level_se, turning.se_n))
         reasons.append(f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared")
     heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
-    if heavy and not turns and "tool_gravity_inertia" not in excluded:
+    if heavy and not turns and INERTIA.name not in excluded:
         weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
         part = -free.mass_kg * forward.acceleration
         if untared:
             part = part + free.mass_kg * weight
             level = level - free.mass_kg * weight
-        parts["tool_gravity_inertia"] = part
-        parameters["tool_gravity_inertia"] = {"mass_kg": free.mass_kg, "tared": not untared}
+        parts[INERTIA.name] = part
+        parameters[INERTIA.name] = {"mass_kg": free.mass_kg, "tared": not untared}
         reasons.append(
             f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
         )
     if (
         np.abs(level).max() > Z * level_se
         and np.linalg.norm(level) > LEAST_BIAS_N
-        and "force_bias" not in excluded
+        and BIAS.name not in excluded
     ):
-        parts["force_bias"] = np.broadcast_to(level, t.f.shape).copy()
-        parameters["force_bias"] = {"bias_n": level.tolist()}
+        parts[BIAS.name] = np.broadcast_to(level, t.f.shape).copy()
+        parameters[BIAS.name] = {"bias_n": level.tolist()}
         reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
     if not parts:
         return Settled((), {}, {}, nothing, ())
     turn_se = np.inf if turning is None else turning.se_n / STANDARD_GRAVITY
-    mass_kg = parameters.get("tool_gravity_inertia", {}).get("mass_kg", 0.0)
+    mass_kg = parameters.get(INERTIA.name, {}).get("mass_kg", 0.0)
     error = {
         "bias_n": level_se,
         "rate_n_per_s": free.rate_se_n_per_s,

@@ -26,7 +26,7 @@ def sureness(remainder: bool, closed: float | None, rivalled: bool) -> float:
 
 def odds(score: Score, search: Search, best: float) -> float:
     """Rough odds of what is not named: its share of the best gain, and how near the threshold it comes."""
-    need = search.options.lump_gain if score.name == "inclusion" else search.options.gain
+    need = search.options.lump_gain if score.effect.few_places else search.options.gain
     over = 1 / (1 + np.exp(np.clip(-(score.gain - need) / max(0.25 * need, 1.0), -50, 50)))
     rank = np.exp(min(0.0, (score.gain - best) / max(0.1 * best, 20.0)))
     return float(np.clip(over * rank, 0.0, 0.25))

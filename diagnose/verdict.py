@@ -10,10 +10,11 @@ from diagnose.attribution import Attribution
 from diagnose.finite import predicted_size
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir
-from diagnose.judging import EVERYWHERE, Search, sideways_off
-from diagnose.library import effect
+from diagnose.judging import Search, sideways_off
 from diagnose.settled import Settled
 from diagnose.shape import heterogeneity, site_factors
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effect, effects
 
 FINITE_STRAIN_LEAST = 0.7
 """Finite strain is named where it must be larger than this share of the noise ..."""
@@ -27,7 +28,9 @@ SHAPE_FELT = 0.6
 """Sites that differ by more than their shape may are a cause where that is this share of the noise."""
 LUMP_CLOSES = 0.1
 """Share of the held-out gap that a lump closes, or its rival is the shape."""
-SHAPE_RIVALS = ("inclusion", "modulus_gradient", "unbonded_base", "compliant_base")
+RIVALS_OF_SHAPE = 2
+"""At most, of those that gain more than SHAPE_RIVAL_GAIN."""
+SHAPE_RIVAL_GAIN = 10.0
 
 
 @dataclass(frozen=True)
@@ -100,7 +103,7 @@ def answer_of(evidence: Evidence, counts: np.ndarray) -> Answer:
 def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[bool, bool]:
     """(something is left that no law explains, it is one place alone)."""
     found, search = evidence.found, evidence.search
-    slack = max([effect(n).extra.get("slack", 1.0) for n in found.chosen], default=1.0)
+    slack = max([effect(n).slack for n in found.chosen], default=1.0)
     most = slack * search.options.unknown_chi
     if found.final.chi <= most:
         return False, False
@@ -119,16 +122,17 @@ def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[boo
 def _slipping(evidence: Evidence, answer: Answer) -> None:
     """Sticking is only trusted to a quarter, press by press, so a fit may let the sideways force go wrong."""
     off = sideways_off(evidence.forward, evidence.found.final)
-    if off and "friction_slip" not in answer.names:
-        answer.candidates.insert(0, "friction_slip")
+    slips = [e.name for e in effects() if e.slips]
+    if off and not set(slips) & set(answer.names):
+        answer.candidates[:0] = slips
         answer.remainder = True
         answer.reasons.append(f"the sideways force is off by {off:.0%} of itself: the tip may slip")
 
 
 def _finite_strain(evidence: Evidence, answer: Answer) -> None:
-    if "finite_strain" in evidence.excluded:
+    found, strain = evidence.found, evidence.search.finite_strain
+    if strain.name in evidence.excluded:
         return
-    found = evidence.found
     size_n = predicted_size(evidence.forward, found.base.found)
     if size_n <= FINITE_STRAIN_LEAST * evidence.noise_n:
         return
@@ -138,23 +142,24 @@ def _finite_strain(evidence: Evidence, answer: Answer) -> None:
         names = answer.names
         names.insert(
             next((i for i, n in enumerate(names) if sizes.get(n, np.inf) < beyond), len(names)),
-            "finite_strain",
+            strain.name,
         )
         answer.reasons.append(
             f"the presses are deep enough that small-strain elasticity is off by about {size_n:.3f} N"
         )
-    elif any(n in (*EVERYWHERE, "skin_layer") for n in found.chosen):
+    elif any(effect(n).stands_for_strain for n in found.chosen):
         # deep enough for it, and it fitted no worse than the linear law until another took its place
-        if "finite_strain" in (*found.final.found.names, *found.base.found.names):
-            answer.candidates.append("finite_strain")
+        if strain in (*found.final.found.effects, *found.base.found.effects):
+            answer.candidates.append(strain.name)
 
 
 def _unconfirmed_lump(evidence: Evidence, answer: Answer) -> None:
     """A lump that closes nothing where it was not fitted may be a shape that is wrong there."""
     found = evidence.found
     for scores, name in zip(found.steps, found.picked, strict=False):
-        if name == "inclusion" and name in found.chosen and scores[name].share < LUMP_CLOSES:
-            answer.candidates.append("surface_shape")
+        lives_in_few = name in scores and scores[name].effect.few_places
+        if lives_in_few and name in found.chosen and scores[name].share < LUMP_CLOSES:
+            answer.candidates += _rest()
             answer.reasons.append(
                 "places that were not fitted do not confirm the lump: the shape may be wrong there instead"
             )
@@ -170,12 +175,19 @@ def _shape(evidence: Evidence, answer: Answer) -> None:
     felt_n = spread * float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
     if gain <= evidence.shape_gain or felt_n <= SHAPE_FELT * evidence.noise_n:
         return
-    if "inclusion" not in found.chosen:
-        if "surface_shape" not in evidence.excluded and not answer.remainder:
-            answer.names.append("surface_shape")
+    allowed = [n for n in _rest() if n not in evidence.excluded]
+    if not any(effect(n).few_places for n in found.chosen):
+        if allowed and not answer.remainder:
+            answer.names += allowed
             ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
-            answer.candidates += [s.name for s in ranked if s.name in SHAPE_RIVALS and s.gain > 10][:2]
+            rivals = [s.name for s in ranked if s.effect.shape_rival and s.gain > SHAPE_RIVAL_GAIN]
+            answer.candidates += rivals[:RIVALS_OF_SHAPE]
         answer.reasons.append(
             f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"
         )
-    answer.nameless_shape = "surface_shape" in evidence.excluded
+    answer.nameless_shape = not allowed
+
+
+def _rest() -> list[str]:
+    """What stands for a difference between places that nothing else explains."""
+    return [e.name for e in effects() if e.role is Role.REST]

@@ -4,7 +4,8 @@ site.
 A residual is weighed against the covariance sigma^2 I + N N^T of its site, N holding one column a nuisance:
 how the force would change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its
 normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space
-between them, against what an error of shape could do. Woodbury keeps it to small matrices.
+between
+them, against what an error of shape could do. Woodbury keeps it to small matrices.
 """
 
 from __future__ import annotations
@@ -12,9 +13,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import cho_factor, cho_solve, solve_triangular
+from scipy.linalg import cho_factor, solve_triangular
 
-from diagnose.forward import Forward, Settings
+from diagnose.forward import Forward
+from mechanics.effects.settings import Settings
 from mechanics.options import option
 from mechanics.presses import Presses
 
@@ -91,15 +93,11 @@ class Whitener:
         """(g,) thinned contact samples of each group."""
         return np.array([len(b.rows) for b in self.blocks])
 
-    def cleaned(self, residual: np.ndarray) -> np.ndarray:
-        """(n, 3) the residual less the most likely nuisance: what no error of onset, site or stick
-        explains."""
-        out = residual.copy()
-        for block in self.blocks:
-            part = residual[block.rows].reshape(-1)
-            weight = cho_solve(block.factor, block.nuisance.T @ part) / self.variance
-            out[block.rows] = (part - block.nuisance @ weight).reshape(-1, 3)
-        return out
+    @property
+    def explained(self) -> float:
+        """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
+        nuisance = sum(float((block.nuisance**2).sum()) for block in self.blocks)
+        return 3 * self.variance + nuisance / float(self.counts().sum())
 
 
 def nuisance_columns(

@@ -137,3 +137,9 @@ def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> floa
     1 / R_eff = 1 / R + curvature (Hertz; convex positive). A hollow tighter than the tip is cut at 4 R.
     """
     return 1.0 / np.maximum(1.0 / tip_radius_m + curvature, 0.25 / tip_radius_m)
+
+
+@njit(cache=True, error_model="numpy")
+def dent_load(depth_m):  # type: ignore[no-untyped-def]
+    """A measure of the load on a place, m^2.5, at a depth, m: its stored energy grows as a dent's."""
+    return depth_m**2.5 if depth_m > 0.0 else 0.0

@@ -84,8 +84,13 @@ class PatchSampler:
 
     def triangle_mean(self, point: np.ndarray, values: np.ndarray) -> float:
         """Mean under the patch at `point` of a value a triangle of the touchable surface."""
+        near, weights = self.triangle_weights(point)
+        return float(weights @ values[near])
+
+    def triangle_weights(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(triangles of the touchable surface (k,), their weights (k,), which sum to 1) under the patch."""
         near, density = self._density(point)
-        return float(density.sum(axis=1) @ values[near] / density.sum())
+        return near, density.sum(axis=1) / density.sum()
 
     def _density(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """(triangles that the patch meets (k,), its unscaled weight at their quadrature points (k, q))."""

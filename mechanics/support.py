@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import scipy.sparse as sp
 
+from mechanics.effects.registry import effects as known_effects
 from mechanics.elasticity import triangle_mass
 from mechanics.errors import OptionError
 from mechanics.tetmesh import TetMesh
@@ -95,17 +96,11 @@ def base_triangles(mesh: TetMesh) -> np.ndarray:
 def base_hold(
     effects: Mapping[str, Mapping[str, Any]], normal: np.ndarray, young_modulus_pa: float
 ) -> BaseHold | None:
-    """The base as compliant_base and unbonded_base say; None where it is bonded. normal: (3,) unit."""
-    springs, fraction, direction = None, 1.0, None
-    if "compliant_base" in effects:
-        keys = effects["compliant_base"]
-        springs = tuple(
-            float(keys[k]) / young_modulus_pa for k in ("k_normal_pa_per_m", "k_tangential_pa_per_m")
-        )
-    if "unbonded_base" in effects:
-        keys = effects["unbonded_base"]
-        fraction = float(keys["bonded_fraction"])
-        direction = np.asarray(keys["direction"], dtype=float)
-    if springs is None and fraction >= 1:
+    """The base as effects of a model say that it is held; None where it is bonded. normal: (3,) unit."""
+    said: dict[str, Any] = {}
+    for effect in known_effects():
+        if effect.hold is not None and effect.name in effects:
+            said |= effect.hold(effects[effect.name], young_modulus_pa)
+    if said.get("springs") is None and said.get("bonded_fraction", 1.0) >= 1:
         return None
-    return BaseHold(np.asarray(normal, dtype=float), springs, fraction, direction)
+    return BaseHold(np.asarray(normal, dtype=float), **said)

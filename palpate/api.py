@@ -20,6 +20,7 @@ from palpate.keywords import taken
 if TYPE_CHECKING:
     import mechanics.model
     import mechanics.recording
+    from mechanics.presses import Presses
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
@@ -386,7 +387,7 @@ def _with_scene(model: ModelLike, options: RenderOptions) -> RenderOptions:
     return with_friction(options, scene) if isinstance(scene, Scene) else options
 
 
-def _touched(recording: room.Recording, model: Model) -> Presses:
+def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Model) -> Presses:
     """The recording's presses on the model; none where it holds none."""
     from mechanics.errors import ContactError
     from mechanics.presses import no_presses

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import OptionError
+from mechanics.errors import NoBaseError, OptionError
 from mechanics.linear_range import linear_range
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
@@ -18,7 +18,7 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.sites import TouchSites, touch_sites, touch_solver
-from reconstruct.boundary import BoundaryOptions
+from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
@@ -93,14 +93,7 @@ def reconstruct_fully(
     nu = _poisson_ratio(recording, options)
     clock = _Clock()
     progress("contacts", 0.02)
-    exploration = explore(
-        recording,
-        method="paper" if paper else "noise",
-        contact_options=options.contact,
-        boundary_options=options.boundary,
-        filter_options=options.filter,
-        boundary=_known_base(recording),
-    )
+    exploration = _explored(recording, options)
     clock.lap("contacts")
     surface = reconstruct_surface(
         evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
@@ -192,11 +185,25 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     return float(nu)
 
 
-def _known_base(recording: Recording) -> Any:
-    """The base of [object] model = PATH where the recording states no phase I of its own; else None."""
-    if recording.base_model is None or recording.boundary_phase is not None:
-        return None
-    return base_of_model(read_model(recording.base_model), recording.tip_radius_m)
+def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
+    """Where the recording traces no base, that of [object] model = PATH stands in."""
+
+    def explored(base: Boundary | None = None) -> Exploration:
+        return explore(
+            recording,
+            method="paper" if options.method == "paper" else "noise",
+            contact_options=options.contact,
+            boundary_options=options.boundary,
+            filter_options=options.filter,
+            boundary=base,
+        )
+
+    try:
+        return explored()
+    except NoBaseError:
+        if recording.base_model is None:
+            raise
+    return explored(base_of_model(read_model(recording.base_model), recording.tip_radius_m))
 
 
 def _provenance(

@@ -34,10 +34,7 @@ def tool_weight(recording: Recording, filtered: np.ndarray, cutoff_hz: float, sp
     hand = acceleration(recording.t, recording.position, width_s=1 / cutoff_hz)
     # rows of the model: constant (3), tool frame (3), minus the acceleration (1)
     model = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned, -hand[:, :, None]], axis=2)
-    start = 0
-    if recording.boundary_phase is not None:
-        start = int(np.searchsorted(recording.t, recording.boundary_phase[1] + 0.2))
-    rows = np.linspace(start, len(filtered) - 1, min(_SUBSAMPLE, len(filtered) - start)).astype(int)
+    rows = np.linspace(0, len(filtered) - 1, min(_SUBSAMPLE, len(filtered))).astype(int)
     best, inside = _consensus(model[rows], filtered[rows], 6 * spread_n + 0.005)
     if best is None or inside.mean() < _LEAST_SHARE:
         return none

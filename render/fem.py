@@ -15,7 +15,7 @@ from mechanics.surface_compliance import SurfaceCompliance
 from render.base import Renderer, check_radii
 from render.bvh import STACK, closest_triangle
 from render.drawing import draw_dent
-from render.effects import effect_arrays, rendered_dent_law, rendered_friction
+from render.effects import effect_arrays, rendered_touch
 from render.fem_kernel import fem_path, fem_step
 from render.fem_state import FemParameters, FemState, new_fem_state
 from render.field import far_field
@@ -45,7 +45,7 @@ class FemRenderer(Renderer):
         self.options = options or RenderOptions()
         self.compliance = compliance or load_or_condense(model, progress=progress)
         self.contact = touched_surface(model, self.options)
-        self.dent_law = rendered_dent_law(model, self.options)
+        touch = rendered_touch(model, self.options)
         field = far_field(model, self.contact, self.compliance)
         number = np.full(len(model.mesh.points), len(self.compliance.nodes))
         number[self.compliance.nodes] = np.arange(len(self.compliance.nodes))
@@ -59,13 +59,13 @@ class FemRenderer(Renderer):
             parent_weights=self.contact.parent_weights,
             blocks=np.array(self.compliance.blocks),
             factor=np.array(self.compliance.factor),
-            table=np.array(self.dent_law.table),
+            table=np.array(touch.law_of_dent(model.material.poisson_ratio).table),
             young_modulus_pa=np.array([model.material.young_modulus_pa]),
             poisson_ratio=np.array([model.material.poisson_ratio]),
-            friction=np.array([rendered_friction(model, self.options)]),
+            friction=np.array([touch.friction]),
             series_compliance=np.zeros(1),
             edition=np.zeros(1, dtype=np.int64),
-            effects=effect_arrays(model, self.options),
+            effects=effect_arrays(touch),
         )
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> FemState:

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from mechanics.effects.adhesion import adhesive_pull
-from mechanics.effects.mullins_softening import dent_energy, softening
-from mechanics.effects.viscoelasticity import prony_step
+from mechanics.dent import dent_load
+from mechanics.effects.path import sharp_laws, smooth_laws
 from mechanics.touch import touch_remember
 from render.contact import release
 from render.kernels import part
@@ -17,10 +16,9 @@ def forget(state, i):
     for k in range(4):
         state.memory[i, k] = 0.0
     state.deepest[i] = 0.0
-    for k in range(3):
-        state.before[i, k] = 0.0
-        for branch in range(state.prony.shape[1]):
-            state.prony[i, branch, k] = 0.0
+    for law in range(state.remembered.shape[1]):
+        for k in range(state.remembered.shape[2]):
+            state.remembered[i, law, k] = 0.0
 
 
 @part
@@ -48,37 +46,33 @@ def conclude(p, state, tips, i):
     state.depths[i] = depth if depth > 0.0 else 0.0
     state.deepest[i] = max(state.deepest[i], depth)
     _force(p, state, i, depth)
-    if not pressed and depth <= -p.effects.adhesion[1]:
+    if not pressed and depth <= -p.effects.path.reach_m[0]:
         forget(state, i)
         release(grip, i, tips[i])
 
 
 @part
 def _force(p, state, i, depth):
-    """The force that is rendered: softened, with its memory, never pulling but for adhesion."""
-    force, normal, e = state.forces[i], state.normals[i], p.effects
-    factor = _softened(p, state, i, depth) if e.mullins[0] > 0.0 else 1.0
-    push = 0.0
+    """The force that is rendered: what the laws along the path make of the quasi-static one."""
+    force, path = state.forces[i], p.effects.path
     for k in range(3):
-        slow = factor * state.elastic[i, k]
-        force[k] = slow + prony_step(
-            state.prony[i], slow - state.before[i, k], state.dt_s[0], e.g, e.tau_s, k
-        )
-        state.before[i, k] = slow
-        push += force[k] * normal[k]
-    pull = 0.0
-    if e.adhesion[0] > 0.0:
-        pull = adhesive_pull(depth, state.deepest[i], e.adhesion[0], e.adhesion[1], e.adhesion[2])
-    for k in range(3):
-        force[k] = (force[k] if push > 0.0 else 0.0) - pull * normal[k]
+        force[k] = state.elastic[i, k]
+    load = most = 0.0
+    if path.loads[0] > 0:
+        load = dent_load(depth)
+        most = _felt(p, state, i, load)
+    memory, deepest, dt, normal = state.remembered[i], state.deepest[i], state.dt_s[0], state.normals[i]
+    smooth_laws(path.numbers, memory, depth, deepest, load, most, dt, normal, force)
+    sharp_laws(path.numbers, memory, depth, deepest, load, most, dt, normal, force)
 
 
 @part
-def _softened(p, state, i, depth):
+def _felt(p, state, i, load):
+    """The greatest load that the place of tip i has felt, this one included."""
     t, weights = state.grip.triangle[i], state.grip.weights[i]
-    energy, greatest = dent_energy(depth), 0.0
+    most = 0.0
     for c in range(3):
         vertex = p.surface.triangles[t, c]
-        state.felt[vertex] = max(state.felt[vertex], energy)
-        greatest += weights[c] * state.felt[vertex]
-    return softening(energy, greatest, p.effects.mullins[0], p.effects.mullins[1])
+        state.felt[vertex] = max(state.felt[vertex], load)
+        most += weights[c] * state.felt[vertex]
+    return most

@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
 from mechanics.touch import touch_solve
 from render.fem_coupling import carry
 from render.frames import turn_frame
 from render.kernels import part
 from render.walking import place, walk
 
-SLIPS = 12
-CAUTION, SECANT_CAUTION = 0.9, 0.98
-LEAST_N, SLIPPED = 1e-9, 1e-4
 CONVERGED_N = 1e-5
 
 
@@ -79,20 +77,15 @@ def solve_one(p, state, tips, i):
         )
         state.memory[i, 1] = dent  # where the next solution starts from
         pull = np.sqrt(fu * fu + fv * fv)
-        excess = pull - mu * fn
-        if not excess > 0.0 or fn <= 0.0:
+        excess, kept = slip_excess(slip, pull, fn, mu)
+        fu *= kept
+        fv *= kept
+        if excess == 0.0:
             break
-        if slip == SLIPS - 1 or excess <= LEAST_N + SLIPPED * mu * fn:
-            fu *= mu * fn / pull
-            fv *= mu * fn / pull
-            break
-        # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho.
-        # a little less than that, so that the force comes down onto the cone and is never left inside it
-        if slip > 0 and excess < 0.5 * before:
-            length *= SECANT_CAUTION * excess / (before - excess)
-        else:
-            give = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
-            length = CAUTION * give * excess / max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
+        # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho
+        give = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
+        lever = max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
+        length = slip_length(slip, excess, before, length, give, lever)
         before = excess
         for k in range(3):
             move[k] = -length * (fu * frame[0, k] + fv * frame[1, k]) / pull

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.effects.path import new_memory
 from mechanics.touch import STATE_SIZE
 from render.base import Grip, new_grip
 from render.bvh import STACK
@@ -45,9 +46,9 @@ class FemState(NamedTuple):
     """render.base.State, and what the step keeps between ticks.
 
     grip: where each tip is held. frames: (m, 3, 3) rows u, v, n. elastic: (m, 3) N, quasi-static forces on
-    the tools. memory: (m, STATE_SIZE) of the sticks. prony: (m, k, 3) N and before: (m, 3) N of
-    viscoelasticity. young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,) greatest load
-    of each fine vertex (Mullins).
+    the tools. memory: (m, STATE_SIZE) of the sticks. remembered: (m, laws, k) by the laws along each touch's
+    path (mechanics.effects.path). young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,)
+    greatest load of each fine vertex.
     Between contacts (render.fem_coupling): nodes (m, 3), node_weights (m, 3) interpolate at each tip; moved
     (m, 2) whether nodes or weights changed this tick; corners (m, m, 9, 9) 1/m, blocks of the corners of
     pairs j < i; mixed (m, 3, r) the factor at each tip; links (m, 3, 3, m) m/N, [j, c, k, i] the displacement
@@ -67,8 +68,7 @@ class FemState(NamedTuple):
     grip: Grip
     frames: np.ndarray
     elastic: np.ndarray
-    prony: np.ndarray
-    before: np.ndarray
+    remembered: np.ndarray
     deepest: np.ndarray
     felt: np.ndarray
     memory: np.ndarray
@@ -106,8 +106,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         grip=new_grip(m),
         frames=np.zeros((m, 3, 3)),
         elastic=np.zeros((m, 3)),
-        prony=np.zeros((m, len(parameters.effects.g), 3)),
-        before=np.zeros((m, 3)),
+        remembered=new_memory(parameters.effects.path, m),
         deepest=np.zeros(m),
         felt=np.zeros(len(parameters.surface.vertices)),
         memory=np.zeros((m, STATE_SIZE)),

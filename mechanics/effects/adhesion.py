@@ -3,7 +3,10 @@ range. A share of the pull may hold deeper in the contact as well, after a milli
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
+
+from mechanics.effects.base import Effect, Law, Parameter, Scope, check, unchanged
 
 _TURN = 0.25  # of the range: the way back over which the pull sets in, so that no force steps
 _TURN_INSIDE_M = 1e-3  # the same deeper in the contact
@@ -22,3 +25,45 @@ def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside):  # type: ign
     if depth_m > 0.0:
         reach = max(reach, inside * min(max(returned / _TURN_INSIDE_M, 0.0), 1.0))
     return pull_off_n * reach
+
+
+@njit(cache=True, error_model="numpy")
+def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+    pull = adhesive_pull(depth, deepest, numbers[0], numbers[1], numbers[2])
+    for k in range(3):
+        force[k] -= pull * normal[k]
+
+
+LAW = Law(_step, order=2, sharp=True, reach=lambda numbers: float(numbers[1]))
+
+
+def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+    pull, reach, inside = float(keys["pull_off_n"]), float(keys["range_m"]), float(keys.get("inside", 0.0))
+    check(
+        pull >= 0 and reach > 0 and 0 <= inside <= 1,
+        "adhesion",
+        "pull_off_n at least 0, range_m above 0, inside from 0 to 1",
+    )
+    touch.numbers[LAW] = np.array([pull, reach, inside])
+
+
+def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    return {"pull_off_n": float(values[0]), "range_m": float(values[1]), "inside": float(values[2])}
+
+
+EFFECT = Effect(
+    name="adhesion",
+    domain="contact",
+    scope=Scope.TIME,
+    words="the surface is sticky: it pulls the tip as it leaves",
+    parameters=(
+        Parameter("pull_off_n", "N", 0.0, 1.5, 0.0, (0.05, 0.05, 0.05), 0.005),
+        Parameter("range_m", "m", 1e-4, 4e-3, 1e-3, (3e-4, 1.2e-3, 6e-4), 1e-4),
+        Parameter("inside", "1", 0.0, 1.0, 0.0, (0.1, 0.3, 0.9), 0.05),
+    ),
+    report=_report,
+    touch=_touch,
+    law=LAW,
+    apply=unchanged,
+    systematic_share=(0.1, 0.2, 0.0),
+)

@@ -8,18 +8,60 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 from numba import njit
 
+from mechanics.dent import dent_load
+from mechanics.effects.base import Effect, Law, Parameter, Scope, check, unchanged
+from mechanics.model import Model
+
+_NONE = 1e-6  # 1 / r that counts as none
+
 
 @njit(cache=True, error_model="numpy")
-def dent_energy(depth_m):  # type: ignore[no-untyped-def]
-    """The measure W of the load, m^2.5, at a depth, m."""
-    return depth_m**2.5 if depth_m > 0.0 else 0.0
-
-
-@njit(cache=True, error_model="numpy")
-def softening(energy, greatest, r, m):  # type: ignore[no-untyped-def]
-    """Factor on the force, 1 while loading afresh; energy, greatest and m in the measure of `dent_energy`."""
-    if greatest <= energy:
+def softening(load, most, r, m):  # type: ignore[no-untyped-def]
+    """Factor on the force, 1 while loading afresh; load, most and m in the measure of `dent_load`."""
+    if most <= load:
         return 1.0
-    return 1.0 - math.erf((greatest - energy) / m) / r
+    return 1.0 - math.erf((most - load) / m) / r
+
+
+@njit(cache=True, error_model="numpy")
+def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+    factor = softening(load, most, numbers[0], numbers[1])
+    for k in range(3):
+        force[k] *= factor
+
+
+LAW = Law(_step, order=0, reads_load=True)
+
+
+def greatest_load(model: Model) -> float:
+    """`dent_load` of the deepest press of the exploration that the model was made from."""
+    depths = model.presses.depth_m[np.isfinite(model.presses.depth_m)]
+    return float(dent_load(max(depths, default=model.tool.tip_radius_m)))
+
+
+def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+    r, m_rel = float(keys["r"]), float(keys["m_rel"])
+    check(r >= 1 and m_rel > 0, "mullins_softening", "r at least 1, m_rel greater than 0")
+    touch.numbers[LAW] = np.array([r, m_rel * greatest_load(model)])
+
+
+EFFECT = Effect(
+    name="mullins_softening",
+    domain="object",
+    scope=Scope.TIME,
+    words="the material is softer the second time it is pressed",
+    parameters=(
+        Parameter("inverse_r", "1", 0.0, 0.8, 0.0, (0.1, 0.1), 0.01),
+        Parameter("m_rel", "1", 0.01, 2.0, 0.3, (0.1, 0.4), 0.02),
+    ),
+    report=lambda values, scene, modulus_pa: {
+        "r": float(1 / max(values[0], _NONE)),
+        "m_rel": float(values[1]),
+    },
+    touch=_touch,
+    law=LAW,
+    apply=unchanged,
+)

@@ -9,7 +9,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.dent import DentLaw, grid
+from mechanics.dent import grid
+from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.far_field import energy_fields, far_with_weights
+from mechanics.material import Skin
 
 
 def film_weight(thickness_over_contact: np.ndarray, poisson_ratio: float) -> np.ndarray:
@@ -28,10 +31,56 @@ def film_factor(
     return modulus_ratio**weight
 
 
-def skinned(
-    law: DentLaw, thickness_m: float, modulus_ratio: float, tip_radius_m: float, poisson_ratio: float
-) -> DentLaw:
-    """The dent law of a tip on an object with a skin; its modulus stays that of the object within."""
-    contact = tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
-    factor = film_factor(contact, thickness_m, modulus_ratio, poisson_ratio)
-    return law.scaled(factor, factor, name=f"{law.name}, skin")
+_FAR_SHARE = 0.3
+"""Of the change that the elements' energies say: what lies within the dent's own reach is no far field."""
+
+
+def _set(touch, skin, model):  # type: ignore[no-untyped-def]
+    contact = model.tool.tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
+
+    def factors(poisson_ratio: float) -> tuple[np.ndarray, np.ndarray]:
+        own = film_factor(contact, skin.thickness_m, skin.modulus_ratio, poisson_ratio)
+        return own, own
+
+    touch.factors.append(factors)
+
+
+def _of_material(touch, model):  # type: ignore[no-untyped-def]
+    if model.material.skin is not None:
+        _set(touch, model.material.skin, model)
+
+
+def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    return {"thickness_m": float(values[0]), "modulus_ratio": float(np.exp(values[1]))}
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
+    _set(settings.touch, skin, places.model)
+    thickness, depth = skin.thickness_m, energy_fields(places).depth
+    inside = np.clip(thickness / np.maximum(depth, 1e-6), 0, 1) * (depth < 2 * thickness)
+    changed = far_with_weights(places, 1 + inside * (1 / skin.modulus_ratio - 1))
+    settings.far = settings.far + _FAR_SHARE * (changed - places.far)
+
+
+def _apply(model, keys):  # type: ignore[no-untyped-def]
+    return model.with_material(skin=Skin(**keys))
+
+
+EFFECT = Effect(
+    name="skin_layer",
+    domain="object",
+    scope=Scope.PLACES,
+    words="a skin of another stiffness covers the object",
+    parameters=(
+        Parameter("thickness_m", "m", 3e-4, 8e-3, 3e-3, (2e-3, 2e-3), 2e-4),
+        Parameter("log_ratio", "1", -2.0, 3.0, 0.0, (0.5, -0.4), 0.03),
+    ),
+    report=_report,
+    of_material=_of_material,
+    change=_change,
+    apply=_apply,
+    hides_strain=True,
+    stands_for_strain=True,
+    costly=True,
+)

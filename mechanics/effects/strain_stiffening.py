@@ -8,17 +8,38 @@ left as it is.
 
 from __future__ import annotations
 
-from mechanics.dent import DentLaw, grid
+import numpy as np
+
+from mechanics.dent import grid
+from mechanics.effects.base import Effect, Parameter, Scope, unchanged
 
 FORCE_PER_C20, FORCE_POWER = 0.197, 1.25
 SIDEWAYS_PER_C20, SIDEWAYS_POWER = 0.129, 1.7
 
 
-def stiffened(law: DentLaw, c20_over_c10: float) -> DentLaw:
-    """The dent law of a material with Yeoh's c20 / c10, from that of the neo-Hookean one."""
+def stiffening(c20_over_c10: float) -> tuple[np.ndarray, np.ndarray]:
+    """Factors (k,) on the dent's normal force and sideways stiffness at mechanics.dent.grid()."""
     x = grid()
-    return law.scaled(
+    return (
         1 + FORCE_PER_C20 * c20_over_c10 * x**FORCE_POWER,
         1 + SIDEWAYS_PER_C20 * c20_over_c10 * x**SIDEWAYS_POWER,
-        name=f"{law.name}, stiffening",
     )
+
+
+def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+    ratio = float(keys["c20_over_c10"])
+    touch.factors.append(lambda poisson_ratio: stiffening(ratio))
+
+
+EFFECT = Effect(
+    name="strain_stiffening",
+    domain="object",
+    scope=Scope.EVERYWHERE,
+    words="the material stiffens as it is strained",
+    parameters=(Parameter("c20_over_c10", "1", 0.0, 4.0, 0.0, (0.3,), 0.02),),
+    report=lambda values, scene, modulus_pa: {"c20_over_c10": float(values[0])},
+    touch=_touch,
+    apply=unchanged,
+    hides_strain=True,
+    stands_for_strain=True,
+)

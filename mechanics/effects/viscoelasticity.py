@@ -1,23 +1,45 @@
 """Viscoelasticity: a Prony series on the elastic force, shares of the equilibrium force.
 
 f(t) = F(t) + sum over k of g_k integral of exp(-(t - s) / tau_k) dF(s), F the quasi-static force. One step is
-exact where F runs straight between samples (the recursion of Taylor, Pister & Goudreau 1970).
+exact where F runs straight between samples (the recursion of Taylor, Pister & Goudreau 1970). A surface that
+comes back more slowly than the tip leaves lets go of it: it cannot pull.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any
-
 import numpy as np
 from numba import njit
 
+from mechanics.effects.base import Effect, Law, Parameter, Scope, unchanged
 from mechanics.errors import ModelError
 
 
-def prony_series(keys: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
-    """(g, tau_s), (k,) each, of an effect's keys `g` (1) and `tau_s` (s); raises ModelError where they
-    disagree."""
+@njit(cache=True, error_model="numpy")
+def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+    """Add the memory of the force. numbers: (2 k,) pairs of g and tau, s; memory: (3 + 3 k,) the last force,
+    then each branch."""
+    push = 0.0
+    for axis in range(3):
+        change = force[axis] - memory[axis]
+        memory[axis] = force[axis]
+        for k in range(numbers.shape[0] // 2):
+            g, tau = numbers[2 * k], numbers[2 * k + 1]
+            if g == 0.0:
+                continue
+            decay = np.exp(-dt / tau)
+            gain = tau / dt * (1.0 - decay) if dt > 0.0 else 1.0
+            branch = 3 + 3 * k + axis
+            memory[branch] = decay * memory[branch] + gain * change
+            force[axis] += g * memory[branch]
+        push += force[axis] * normal[axis]
+    if not push > 0.0:
+        force[0] = force[1] = force[2] = 0.0
+
+
+LAW = Law(prony_step, order=1, memory=lambda numbers: 3 + 3 * (len(numbers) // 2))
+
+
+def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
     g = np.atleast_1d(np.asarray(keys["g"], dtype=float))
     tau = np.atleast_1d(np.asarray(keys["tau_s"], dtype=float))
     if g.shape != tau.shape or not (tau > 0).all() or not (g >= 0).all():
@@ -25,19 +47,57 @@ def prony_series(keys: Mapping[str, Any]) -> tuple[np.ndarray, np.ndarray]:
             f"viscoelasticity has g = {g.tolist()} and tau_s = {tau.tolist()}: as many of each, g at least "
             "0, tau_s greater than 0 s"
         )
-    return g, tau
+    touch.numbers[LAW] = np.column_stack([g, tau]).ravel()
 
 
-@njit(cache=True, error_model="numpy")
-def prony_step(memory, change, dt, g, tau, axis):  # type: ignore[no-untyped-def]
-    """Advance one component: memory (k, 3), its `axis` changed in place; change of the force, N, over dt, s.
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    # a term too weak to be told is not reported, but a fit must see it grow
+    _touch(settings.touch, {"g": values[[0, 2]], "tau_s": np.exp(values[[1, 3]])}, scene.places.model)
 
-    Returns what the memory adds to the force, N.
-    """
-    total = 0.0
-    for k in range(g.shape[0]):
-        decay = np.exp(-dt / tau[k])
-        gain = tau[k] / dt * (1.0 - decay) if dt > 0.0 else 1.0
-        memory[k, axis] = decay * memory[k, axis] + gain * change
-        total += g[k] * memory[k, axis]
-    return total
+
+def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    pairs = sorted((float(np.exp(values[i + 1])), float(values[i])) for i in (0, 2) if values[i] > 0.005)
+    return {"g": [g for _, g in pairs], "tau_s": [tau for tau, _ in pairs]}
+
+
+def _in_words(keys):  # type: ignore[no-untyped-def]
+    pairs = zip(keys["g"], keys["tau_s"], strict=True)
+    terms = [f"{g:.0%} that fades within {tau:.2g} s" for g, tau in pairs]
+    return f"extra force right after a fast press: {' and '.join(terms)}"
+
+
+def _starts():  # type: ignore[no-untyped-def]
+    return [
+        np.array([fast, np.log(tau_fast), slow, np.log(tau_slow)])
+        for fast, tau_fast, slow, tau_slow in (
+            (0.1, 0.1, 0.05, 1.0),
+            (0.3, 0.1, 0.15, 1.0),
+            (0.3, 0.04, 0.2, 0.4),
+            (0.05, 0.1, 0.3, 0.5),
+            (0.05, 0.15, 0.2, 3.0),
+            (0.0, 0.1, 0.05, 10.0),
+        )
+    ]
+
+
+EFFECT = Effect(
+    name="viscoelasticity",
+    domain="object",
+    scope=Scope.TIME,
+    words="the material creeps and relaxes: force depends on how fast and how long",
+    parameters=(
+        Parameter("g_fast", "1", 0.0, 3.0, 0.0, (0.1, 0.0), 0.01, 1.0),
+        Parameter("log_tau_fast", "ln s", np.log(0.02), np.log(0.3), np.log(0.1), (np.log(0.1),), 0.05, 1.0),
+        Parameter("g_slow", "1", 0.0, 3.0, 0.0, (0.1, 0.2), 0.01, 1.0),
+        Parameter("log_tau_slow", "ln s", np.log(0.2), np.log(20.0), np.log(0.7), (np.log(0.7),), 0.05, 1.0),
+    ),
+    report=_report,
+    keys_in_words=_in_words,
+    touch=_touch,
+    change=_change,
+    law=LAW,
+    apply=unchanged,
+    candidates=_starts,
+    # a contact that shrinks is slower than the elastic force, and two terms stand for what may be more
+    systematic=(0.015, 0.06, 0.015, 0.3),
+)

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.apply import corrected, improved, rendered, with_effects, with_replayed_modulus
+from diagnose.apply import corrected, improved, with_effects, with_replayed_modulus
 from diagnose.pipeline import DiagnoseOptions, diagnose
+from mechanics.effects.registry import effect
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file
 from mechanics.model import Model, read_model, write_model
@@ -60,7 +61,7 @@ def one(path: Path, share: float, work: Path) -> dict[str, Any]:
     row["ideal_n"] = replayed(ideal, recording, after, fit=before)
     better = with_replayed_modulus(better.replaced(path=folder), corrected(first, result))
     row["improved_n"] = replayed(better, recording, after)
-    true = {n: k for n, k in truth_effects(recording).items() if rendered(n)}
+    true = {n: k for n, k in truth_effects(recording).items() if effect(n).rendered}
     if true:
         law = "neo-hookean" if "finite_strain" in true else "linear"
         stated = plain.with_modulus(recording.truth["young_modulus_pa"]).with_material(dent_law=law)

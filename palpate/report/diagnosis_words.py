@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.library import effect
 from diagnose.result import Diagnosis
+from mechanics.effects.registry import effect
 
 AXIS_WORDS = {
     "depth": "how deep the press is",
@@ -59,6 +59,7 @@ WORDS = {
     "direction": "the loose part lies towards",
     "pull_off_n": "greatest pull",
     "range_m": "felt up to this distance",
+    "inside": "share of it that holds within the contact too",
     "stiffness_n_per_m": "the tool's stiffness",
     "bias_n": "reading in free air, x y z",
     "rate_n_per_s": "zero drifts by, x y z",
@@ -70,17 +71,9 @@ WORDS = {
 }
 
 
-MEANINGS = {
-    "finite_strain": "the presses are so deep that the material is stretched and squeezed strongly, where "
-    "force no longer follows the simple law of elasticity",
-    "force_gain": "the force sensor's axes read too much or too little, or into one another",
-}
-"""Where the library's own words need knowledge of mechanics."""
-
-
 def meaning(name: str) -> str:
     """What an effect is, for a person who has never heard of it."""
-    return MEANINGS.get(name, effect(name).words)
+    return effect(name).plain_words or effect(name).words
 
 
 LITTLE = 0.1
@@ -164,7 +157,8 @@ def _which(result: Diagnosis) -> tuple[str, str, str]:
     parts = []
     for name in result.effects:
         keys = parameters.get(name, {})
-        said = _fading(keys) if name == "viscoelasticity" and keys else short(keys)
+        in_words = effect(name).keys_in_words
+        said = in_words(keys) if in_words is not None and keys else short(keys)
         parts.append(meaning(name) + (f" ({said})" if said else ""))
     text = "; ".join(parts)
     text = text[0].upper() + text[1:] + ". " + _suspects(result)
@@ -174,13 +168,6 @@ def _which(result: Diagnosis) -> tuple[str, str, str]:
     if result.candidates:
         answer += f" (or {spoken(result.candidates, 'or')})"
     return question, answer[0].upper() + answer[1:], text.strip()
-
-
-def _fading(keys: dict[str, Any]) -> str:
-    """A Prony series in words."""
-    pairs = zip(keys["g"], keys["tau_s"], strict=True)
-    terms = [f"{g:.0%} that fades within {tau:.2g} s" for g, tau in pairs]
-    return f"extra force right after a fast press: {' and '.join(terms)}"
 
 
 def _suspects(result: Diagnosis) -> str:

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 
 import mechanics.surface_compliance as made
-from diagnose.apply import improved, rendered, with_effects, with_replayed_modulus
+from diagnose.apply import improved, with_effects, with_replayed_modulus
 from diagnose.pipeline import DiagnoseOptions, diagnose
+from mechanics.effects.registry import effect
 from mechanics.material import Ball
 from mechanics.model import read_model, write_model
 from mechanics.near_field import surface_softness
@@ -170,7 +171,9 @@ def test_adhesion_that_holds_inside_pulls_all_the_way_out(model, folder):
 
 
 def test_only_what_belongs_into_a_model_is_put_there(model):
-    assert [n for n in ("force_bias", "time_delay", "surface_shape", "surface_offset") if rendered(n)] == []
+    assert [
+        n for n in ("force_bias", "time_delay", "surface_shape", "surface_offset") if effect(n).rendered
+    ] == []
     better = with_effects(model, {"time_delay": {"delay_s": 0.02}, "friction_slip": {"mu": 0.1}})
     assert list(better.effects) == ["friction_slip"]
     assert with_effects(better, {"adhesion": {"pull_off_n": 0.1, "range_m": 1e-3}}).effects.keys() == {

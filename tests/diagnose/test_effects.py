@@ -6,11 +6,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.effects.base import DOMAINS
 from diagnose.fit import settings_of
 from diagnose.forward import build_forward
-from diagnose.library import NAMES, effect, library
 from diagnose.touches import touches_of
+from mechanics.effects.base import DOMAINS, Role, Scope
+from mechanics.effects.registry import NAMES, effect, effects
 from mechanics.errors import OptionError
 
 CONTRACT = {
@@ -26,7 +26,7 @@ CONTRACT = {
     "surface_offset": {"shift_m", "rotation_rad"},
     "tip_radius": {"tip_radius_m"},
     "friction_slip": {"mu"},
-    "adhesion": {"pull_off_n", "range_m"},
+    "adhesion": {"pull_off_n", "range_m", "inside"},
     "tool_compliance": {"stiffness_n_per_m"},
     "force_bias": {"bias_n"},
     "force_drift": {"rate_n_per_s"},
@@ -40,12 +40,32 @@ CONTRACT = {
 @pytest.fixture(scope="module")
 def forward(bench):  # type: ignore[no-untyped-def]
     recording, model = bench.record()
-    return build_forward(touches_of(model.presses), model)
+    return build_forward(touches_of(recording, model), model)
 
 
-def test_all_22_names():
-    assert len(NAMES) == 22 and len(set(NAMES)) == 22
-    assert all(e.domain in DOMAINS for e in library())
+MODULUS = 20e3
+
+
+def test_every_name_of_the_contract_is_an_effect():
+    assert {*CONTRACT, "finite_strain", "surface_shape"} == set(NAMES) and len(NAMES) == 22
+    assert [e.name for e in effects()] == list(NAMES)
+    assert all(e.domain in DOMAINS for e in effects())
+
+
+def test_instruments_are_corrected_and_the_others_rendered():
+    for each in effects():
+        assert not (each.rendered and each.domain == "instrument"), each.name
+        assert each.correct is None or each.domain == "instrument", each.name
+    assert {e.name for e in effects() if not e.rendered and e.domain != "instrument"} == {
+        "surface_shape", "surface_offset",
+    }  # fmt: skip
+    assert {e.name for e in effects() if e.domain == "instrument" and e.correct is None} == {"backlash"}
+
+
+def test_what_free_air_settles_is_on_every_reading():
+    for each in effects():
+        assert (each.role is Role.FREE_AIR) == (each.scope is Scope.READING), each.name
+    assert [e.name for e in effects() if e.role is Role.KNOWN] == ["finite_strain"]
 
 
 def test_unknown_name_lists_what_is_allowed():
@@ -58,30 +78,29 @@ def test_unknown_name_lists_what_is_allowed():
 )
 def test_ideal_values_change_nothing_and_starts_do(forward, name):
     chosen = effect(name)
-    ideal = forward.predict(settings_of(forward, [], np.array([np.log(20e3)])))
-    values = np.concatenate([[np.log(20e3)], chosen.ideal])
+    ideal = forward.predict(settings_of(forward, [], np.array([np.log(MODULUS)])))
+    values = np.concatenate([[np.log(MODULUS)], chosen.ideal])
     scale = np.abs(ideal).max()
     # a stick that may slide at 1.5 F is not quite a stick; everything else vanishes exactly
     tolerance = 2e-2 if name == "friction_slip" else 1e-6
     assert np.abs(forward.predict(settings_of(forward, [chosen], values)) - ideal).max() < tolerance * scale
-    start = chosen.starts(forward)[0].astype(float).copy()
+    start = chosen.starts()[0].astype(float).copy()
     if name in ("force_bias", "force_drift", "surface_offset"):
         start[:3] = 2e-3
     if name == "force_gain":
         start[1] = 0.1
     if name == "tool_gravity_inertia":
         start[:] = (0.05, 1.0)
-    moved = forward.predict(settings_of(forward, [chosen], np.concatenate([[np.log(20e3)], start])))
+    moved = forward.predict(settings_of(forward, [chosen], np.concatenate([[np.log(MODULUS)], start])))
     assert np.abs(moved - ideal).max() > 1e-3 * scale
-    assert set(chosen.report(start, forward)) == CONTRACT[name]
+    assert set(chosen.report(start, forward, MODULUS)) == CONTRACT[name]
 
 
 def test_delay_is_a_shift_in_time(forward):
     t = forward.touches
-    plain = forward.predict(forward.ideal(20e3))
-    settings = forward.ideal(20e3)
-    settings.delay = 0.02
-    late = forward.predict(settings)
+    plain = forward.predict(forward.ideal(MODULUS))
+    values = np.array([np.log(MODULUS), 0.02])
+    late = forward.predict(settings_of(forward, [effect("time_delay")], values))
     step = np.median(np.diff(t.t[: t.starts[1]]))
     rows = slice(t.starts[1] + 2, t.starts[2])
     before = slice(t.starts[1], t.starts[2] - 2)
@@ -90,9 +109,9 @@ def test_delay_is_a_shift_in_time(forward):
 
 
 def test_relaxation_decays_by_its_time_constant(forward):
-    settings = forward.ideal(20e3)
-    settings.g, settings.tau = np.array([0.5]), np.array([0.1])
-    plain, slow = forward.predict(forward.ideal(20e3)), forward.predict(settings)
+    values = np.array([np.log(MODULUS), 0.5, np.log(0.1), 0.0, 0.0])
+    memory = settings_of(forward, [effect("viscoelasticity")], values)
+    plain, slow = forward.predict(forward.ideal(MODULUS)), forward.predict(memory)
     t = forward.touches
     press = int(
         np.argmax([(t.phase[a:b] == 1).sum() for a, b in zip(t.starts[:-1], t.starts[1:], strict=True)])
@@ -101,3 +120,25 @@ def test_relaxation_decays_by_its_time_constant(forward):
     extra = slow[hold, 0] - plain[hold, 0]
     decay = np.polyfit(t.t[hold], np.log(extra), 1)[0]
     assert decay == pytest.approx(-10.0, rel=0.05)
+
+
+def test_springs_of_a_base_are_stated_for_the_fitted_modulus(forward):
+    """Twice the modulus on the same give of the height: springs twice as stiff."""
+    base = effect("compliant_base")
+    one, two = (base.report(np.log([0.2, 0.5]), forward, e) for e in (MODULUS, 2 * MODULUS))
+    assert one["k_normal_pa_per_m"] == pytest.approx(MODULUS / (0.2 * 0.04))
+    assert one["k_tangential_pa_per_m"] == pytest.approx(0.5 * one["k_normal_pa_per_m"])
+    assert two["k_normal_pa_per_m"] == pytest.approx(2 * one["k_normal_pa_per_m"])
+
+
+def test_drift_is_counted_from_the_recordings_start(forward, bench):
+    """What is added to a prediction is what is taken off a recording."""
+    drift, rate = effect("force_drift"), np.array([1e-3, -2e-3, 3e-3])
+    plain = forward.predict(forward.ideal(MODULUS))
+    drifted = forward.predict(settings_of(forward, [drift], np.concatenate([[np.log(MODULUS)], rate])))
+    frame = forward.touches.frame[forward.press]
+    added = np.einsum("nji,nj->ni", frame, drifted - plain)
+    np.testing.assert_allclose(added, forward.t[:, None] * rate, atol=1e-9)
+    recording, _ = bench.record()
+    taken = recording.force_on_tool - drift.correct(recording, {"rate_n_per_s": rate}).force_on_tool
+    np.testing.assert_allclose(taken, recording.t[:, None] * rate, atol=1e-12)

@@ -8,13 +8,16 @@ import pytest
 from diagnose.attribution import _with_strain
 from diagnose.judging import AttributionOptions, Score, Search
 from diagnose.verdict import FINITE_STRAIN_GAIN
+from mechanics.effects.registry import effect
 
 
 def score(name, per_group, **changes):
     gains = np.asarray(per_group, float)
     z = gains.sum() / (gains.std() * np.sqrt(len(gains)))
     values = {"gain": gains.sum(), "z": z, "size_n": 0.014, "closes": 1e-4, "share": 0.7, "toward": 0.9}
-    return Score(name, **{**values, **changes}, per_group=gains, candidate=SimpleNamespace(chi=0.85))
+    return Score(
+        (effect(name),), **{**values, **changes}, per_group=gains, candidate=SimpleNamespace(chi=0.85)
+    )
 
 
 @pytest.fixture
@@ -53,7 +56,7 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
         return SimpleNamespace(chi=1.0, found=SimpleNamespace(gram=gram, loss=gram.sum() / 2))
 
     search.judge = judged
-    search.finite_strain = SimpleNamespace(name="finite_strain")
+    search.finite_strain = effect("finite_strain")
     search.forward = SimpleNamespace(touches=SimpleNamespace(slowness=1.0))
     _, gain = _with_strain(search, [])
     assert (gain > FINITE_STRAIN_GAIN) == named

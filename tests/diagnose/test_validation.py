@@ -5,16 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.effects.time_delay import EFFECT as DELAY
 from diagnose.fit import Descent, fit
 from diagnose.forward import build_forward
 from diagnose.intervals import covariance, parameter_intervals
 from diagnose.judging import AttributionOptions, Search
-from diagnose.library import effect
 from diagnose.shape import repeat_scatter
 from diagnose.touches import touches_of
 from diagnose.validation import deepest, held_out_by_refit, neighbours
 from diagnose.whiten import NuisanceOptions
+from mechanics.effects.registry import effect
+from mechanics.effects.time_delay import EFFECT as DELAY
 
 MODULUS = 20e3
 
@@ -57,7 +57,7 @@ def test_what_no_noise_tells_is_added(late):
     rng = np.random.default_rng(0)
     low, high = parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"]
     formal = np.sqrt(covariance(found, 1.0, search.dof)[1, 1])
-    expected = 2 * 1.96 * np.hypot(formal, DELAY.extra["systematic"][0])
+    expected = 2 * 1.96 * np.hypot(formal, DELAY.systematic[0])
     assert high - low == pytest.approx(expected, rel=0.2)
 
 

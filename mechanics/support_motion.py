@@ -14,12 +14,11 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, solve
 
-from diagnose.fields import energy_fields
-from diagnose.forward import Forward, places_of
-from diagnose.stages import stored
 from mechanics.elasticity import stiffness, triangle_mass
+from mechanics.far_field import energy_fields
 from mechanics.floor import resting
 from mechanics.model import Model
+from mechanics.places import Places
 from mechanics.support import base_triangles
 from mechanics.tetmesh import EDGES, TetMesh
 
@@ -32,30 +31,26 @@ _BATCH = 128
 class SupportMotion:
     """plane: (b, 2) m, corner nodes of the base in the support's axes. stiffness: (3 b, 3 b) m, of the object
     against motions of its base (normal, across, along). mass: (b, b) m^2. reaction: (q, 3 b, 3) for unit
-    loads at q places. place: (p,) of each press."""
+    loads at q places."""
 
     plane: np.ndarray
     stiffness: np.ndarray
     mass: np.ndarray
     reaction: np.ndarray
-    place: np.ndarray
 
 
-def support_motion(forward: Forward) -> SupportMotion:
-    """Condense the base; kept in forward.stages['support']."""
-    if "support" in forward.stages:
-        return forward.stages["support"]
-    kept = stored("support", forward.model, forward.touches, lambda: _condensed(forward))
-    result = SupportMotion(**kept, place=places_of(forward.touches)[2].ravel())
-    forward.stages["support"] = result
-    return result
+def support_motion(places: Places) -> SupportMotion:
+    """Condense the base; solved for once."""
+    return places.stage(
+        "support", lambda: SupportMotion(**places.stored("support", lambda: _condensed(places)))
+    )
 
 
-def _condensed(forward: Forward) -> dict[str, np.ndarray]:
-    fields = energy_fields(forward)
+def _condensed(places: Places) -> dict[str, np.ndarray]:
+    fields = energy_fields(places)
     solver = fields.solver
     mesh, free = solver.mesh, solver.free
-    axes = np.stack([forward.model.support.normal, *support_axes(forward.model)])
+    axes = np.stack([places.model.support.normal, *support_axes(places.model)])
     corners, interpolation = _corner_motion(mesh)
     fixed = np.setdiff1d(np.arange(3 * len(mesh.points)), free)
     full = stiffness(mesh, solver.poisson_ratio)
@@ -69,7 +64,7 @@ def _condensed(forward: Forward) -> dict[str, np.ndarray]:
     loads = fields.solution.reshape(3 * len(mesh.points), -1)[free]
     reaction = (coupling.T @ loads).reshape(len(own), -1, 3).transpose(1, 0, 2)
     return {
-        "plane": (mesh.points[corners] - forward.model.support.point) @ axes[1:].T,
+        "plane": (mesh.points[corners] - places.model.support.point) @ axes[1:].T,
         "stiffness": own - 0.5 * (give + give.T),
         "mass": _mass(mesh, corners),
         "reaction": np.ascontiguousarray(reaction),
@@ -118,29 +113,27 @@ def _mass(mesh: TetMesh, corners: np.ndarray) -> np.ndarray:
     return mass
 
 
-def far_on_springs(forward: Forward, normal: float, tangential: float) -> np.ndarray:
+def far_on_springs(places: Places, normal: float, tangential: float) -> np.ndarray:
     """(p, 3, 3) far field on springs of these stiffnesses a unit of area over the modulus, 1/m."""
-    motion = support_motion(forward)
+    motion = support_motion(places)
     springs = np.diag([normal, tangential, tangential])
     factor = cho_factor(motion.stiffness + np.kron(motion.mass, springs), overwrite_a=True)
     q, b3, _ = motion.reaction.shape
     flat = motion.reaction.transpose(1, 0, 2).reshape(b3, 3 * q)
     moved = cho_solve(factor, flat).reshape(b3, q, 3)
     give = np.einsum("qbi,bqj->qij", motion.reaction, moved)
-    return forward.far + give[motion.place]
+    return places.far + give[places.place]
 
 
-def far_partly_bonded(forward: Forward, free_fraction: float, angle: float, floor: float) -> np.ndarray:
+def far_partly_bonded(places: Places, free_fraction: float, angle: float, floor: float) -> np.ndarray:
     """(p, 3, 3) far field with a share of the base loose, the one towards `angle` in the support plane.
 
     floor: 1 where a rigid support still carries what presses on it, 0 where nothing is under the loose part.
     Interpolated between the fractions and angles of a table.
     """
-    table = forward.stages.get("loose")
-    if table is None:
-        motion = support_motion(forward)
-        table = stored("loose", forward.model, forward.touches, lambda: {"give": _table(motion)})["give"]
-        forward.stages["loose"] = table
+    table = places.stage(
+        "loose", lambda: places.stored("loose", lambda: {"give": _table(support_motion(places))})["give"]
+    )
     known = np.array([0.0, *FREE_FRACTIONS])
     i = int(np.clip(np.searchsorted(known, free_fraction) - 1, 0, len(known) - 2))
     w = (free_fraction - known[i]) / (known[i + 1] - known[i])
@@ -151,7 +144,7 @@ def far_partly_bonded(forward: Forward, free_fraction: float, angle: float, floo
     upper = (1 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
     both = (1 - w) * lower + w * upper
     give = (1 - floor) * both[0] + floor * both[1]
-    return forward.far + give[support_motion(forward).place]
+    return places.far + give[places.place]
 
 
 def _table(motion: SupportMotion) -> np.ndarray:

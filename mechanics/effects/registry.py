@@ -1,10 +1,10 @@
-"""The library of effects: one file each in diagnose.effects, found by name."""
+"""The registry of effects: one line each, the contract's order; an effect is mechanics/effects/NAME.py."""
 
 from __future__ import annotations
 
 import importlib
 
-from diagnose.effects.base import Effect
+from mechanics.effects.base import Effect
 from mechanics.errors import OptionError
 
 NAMES = (
@@ -31,18 +31,17 @@ NAMES = (
     "time_delay",
     "backlash",
 )
-"""Every effect that can be named, the contract's order."""
 
 
 def effect(name: str) -> Effect:
     """The effect of that name; raises OptionError for an unknown one."""
     if name not in NAMES:
         raise OptionError(f"'{name}' is no effect; allowed are {', '.join(NAMES)}")
-    return importlib.import_module(f"diagnose.effects.{name}").EFFECT
+    return importlib.import_module(f"mechanics.effects.{name}").EFFECT
 
 
-def library(*, without: tuple[str, ...] = ()) -> tuple[Effect, ...]:
-    """All effects but those named."""
+def effects(*, without: frozenset[str] | set[str] = frozenset()) -> tuple[Effect, ...]:
+    """All effects but those named; raises OptionError where one of these is unknown."""
     for name in without:
         effect(name)
     return tuple(effect(name) for name in NAMES if name not in without)

@@ -1,0 +1,233 @@
+"""What an effect is: words, domain, scope, parameters, its law, and what it does to a model or a recording.
+
+A law stands once. What a tip feels where it touches is set on a `Touch`, which prediction and renderer both
+read; what follows the path of a press is a compiled `Law`, which both step along it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from enum import Enum
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechanics.errors import ModelError
+from mechanics.model import Model
+from mechanics.recording import Recording
+
+if TYPE_CHECKING:
+    from mechanics.effects.settings import Scene, Settings, Touch
+
+DOMAINS = ("object", "contact", "boundary", "instrument")
+Keys = Mapping[str, Any]
+"""An effect's parameters as recording, model and JSON state them: SI units, device frame."""
+
+
+class Scope(Enum):
+    """Where an effect shows; it says how evidence for it is weighed."""
+
+    TIME = "in the time course of a press"
+    PRESS = "within a press, whatever its time course"
+    PLACES = "from place to place"
+    EVERYWHERE = "at every place alike, from depth to depth or direction to direction"
+    READING = "on every reading, in free air too"
+
+    @property
+    def between_places(self) -> bool:
+        """Whether leaving a place out of a fit takes evidence with it: judged in sample, at a price."""
+        return self in (Scope.PLACES, Scope.EVERYWHERE)
+
+
+class Role(Enum):
+    """How a diagnosis comes to an effect."""
+
+    SEARCHED = "tried, alone and beside others"
+    FREE_AIR = "settled in free air before any press is looked at"
+    KNOWN = "known physics without a parameter: in every solid, so that only its size is asked"
+    REST = "what is left between places where nothing else explains them"
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One scalar that a fit moves: bounds, starts and step in the stated unit; `ideal` is its value without
+    effect.
+
+    prior_std: width of a Gaussian pull towards `ideal` (None: only the bounds hold it).
+    """
+
+    name: str
+    unit: str
+    low: float
+    high: float
+    ideal: float
+    starts: tuple[float, ...]
+    step: float
+    prior_std: float | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Law:
+    """What an effect does to the force along the path of a touch; compiled, allocates nothing.
+
+    step(numbers, memory, depth, deepest, load, most, dt, normal, force): changes force (3,) N on the tool in
+    place. numbers: what the effect's keys come to, (k,). memory: (m,), zero when a touch begins. depth,
+    deepest of this touch: m, negative above the surface. load: `dent_load` of the depth, most: the greatest
+    that the place has felt. dt: s since the last step. normal: (3,) outward.
+    order: in which laws follow one another. sharp: changes so fast along the path that a sample which is a
+    mean over some time is a mean of the law; such a law keeps no memory. reads_load: it needs `load`.
+    memory: how many numbers it keeps. reach: m, how far above the surface it still holds the tip.
+    """
+
+    step: Any
+    order: int
+    sharp: bool = False
+    reads_load: bool = False
+    memory: Callable[[np.ndarray], int] = lambda numbers: 0
+    reach: Callable[[np.ndarray], float] = lambda numbers: 0.0
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """What starts can be sought from; p presses. level: (p,) share by which each is stiffer than predicted.
+    answer: (p,) change of that share a unit of give along the normal, unit modulus, m. weight: (p,) of the
+    level, 1 over its variance."""
+
+    level: np.ndarray
+    answer: np.ndarray
+    weight: np.ndarray
+
+
+@dataclass(frozen=True)
+class Effect:
+    """A departure from the ideal model.
+
+    words: what it is; plain_words: the same for a person who knows no mechanics, where that needs others.
+    report(values, scene, modulus_pa): its keys; keys_in_words(keys): where a list of numbers says little.
+    touch(touch, keys, model): its law, where it acts on what one tip feels; prediction and renderer run it.
+    change(settings, values, scene): what it does to a prediction besides, or instead where its keys say less
+    than its values.
+    of_material(touch, model): its law, where the model's material says it.
+    law: what it does along the path of a touch; `touch` sets its numbers.
+    apply(model, keys): the model with the effect; None: it is not rendered. `unchanged` where the law reads
+    the keys.
+    hold(keys, young_modulus_pa): how the base is held, as fields of mechanics.support.BaseHold.
+    correct(recording, keys): the recording without it; None: it cannot be taken off.
+    read_as: place among the corrections of a reading; what the instrument does last is taken off first.
+    candidates(): start vectors, where the parameters' own are not enough. seek(scene, misfit): start vectors
+    found from the data. refine(scene, values): makes its law exact near a fit; forget(scene) undoes that.
+    few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
+    shape_rival: what a wrong shape may be taken for. slips: it caps the sideways force, where a fit that
+    trusts the stick may go wrong. only_first: first touches that another effect moved speak for nothing.
+    hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
+    stands_for_strain: once it is named, finite strain may have been taken for it. costly: a quick diagnosis
+    leaves it out.
+    slack: factor on the lack of fit that its law may leave. systematic: (k,) standard deviations of its
+    values that no noise tells, from known cases; systematic_share: the same in shares of the values;
+    common_factor: standard deviation of a factor on all values that the modulus takes up. signed: values
+    whose sign is sure once named.
+    """
+
+    name: str
+    domain: str
+    scope: Scope
+    words: str
+    parameters: tuple[Parameter, ...]
+    report: Callable[[np.ndarray, Scene, float], dict[str, Any]]
+    plain_words: str = ""
+    keys_in_words: Callable[[Keys], str] | None = None
+    role: Role = Role.SEARCHED
+    touch: Callable[[Touch, Keys, Model], None] | None = None
+    change: Callable[[Settings, np.ndarray, Scene], None] | None = None
+    of_material: Callable[[Touch, Model], None] | None = None
+    law: Law | None = None
+    apply: Callable[[Model, Keys], Model] | None = None
+    hold: Callable[[Keys, float], dict[str, Any]] | None = None
+    correct: Callable[[Recording, Keys], Recording] | None = None
+    read_as: int = 0
+    candidates: Callable[[], list[np.ndarray]] | None = None
+    seek: Callable[[Scene, Misfit], list[np.ndarray]] | None = None
+    refine: Callable[[Scene, np.ndarray], None] | None = None
+    forget: Callable[[Scene], None] | None = None
+    few_places: bool = False
+    shape_rival: bool = False
+    slips: bool = False
+    only_first: bool = False
+    hides_strain: bool = False
+    stands_for_strain: bool = False
+    costly: bool = False
+    slack: float = 1.0
+    systematic: tuple[float, ...] = ()
+    systematic_share: tuple[float, ...] = ()
+    common_factor: float = 0.0
+    signed: tuple[int, ...] = ()
+
+    @property
+    def rendered(self) -> bool:
+        """Whether it belongs into a model."""
+        return self.apply is not None
+
+    @property
+    def ideal(self) -> np.ndarray:
+        """(k,) values at which the effect is absent."""
+        return np.array([p.ideal for p in self.parameters])
+
+    @property
+    def bounds(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lowest and highest values, (k,) each."""
+        return np.array([p.low for p in self.parameters]), np.array([p.high for p in self.parameters])
+
+    def starts(self) -> list[np.ndarray]:
+        """Start vectors of a fit."""
+        if self.candidates is not None:
+            return self.candidates()
+        count = max((len(p.starts) for p in self.parameters), default=1)
+        return [
+            np.array([p.starts[min(i, len(p.starts) - 1)] for p in self.parameters], dtype=float)
+            for i in range(count)
+        ]
+
+    def act(self, settings: Settings, values: np.ndarray, scene: Scene) -> None:
+        """Set what a prediction needs for these values (k,), in place."""
+        if self.change is not None:
+            self.change(settings, values, scene)
+        elif self.touch is not None:
+            keys = self.report(values, scene, settings.modulus)
+            self.touch(settings.touch, keys, scene.places.model)
+
+    def set_touch(self, touch: Touch, keys: Keys, model: Model) -> None:
+        """Set what a tip feels for these keys; raises ModelError where they are missing or impossible."""
+        if self.touch is None:
+            return
+        try:
+            self.touch(touch, keys, model)
+        except KeyError as error:
+            raise ModelError(
+                f"an effect of the model lacks its key {error}: diagnose the recording again"
+            ) from error
+        except (TypeError, ValueError) as error:
+            raise ModelError(f"an effect of the model has a value that is no number: {error}") from error
+
+    def applied(self, model: Model, keys: Keys) -> Model:
+        """The model with the effect, named among its effects; itself where the effect is not rendered."""
+        if self.apply is None:
+            return model
+        effects = {**{name: dict(known) for name, known in model.effects.items()}, self.name: dict(keys)}
+        return self.apply(model, keys).replaced(effects=effects, path=None)
+
+
+def unchanged(model: Model, keys: Keys) -> Model:
+    """The `apply` of an effect whose law reads the model's keys."""
+    return model
+
+
+def no_keys(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+    """The `report` of an effect without parameters."""
+    return {}
+
+
+def check(good: bool, name: str, allowed: str) -> None:
+    """Raise ModelError where an effect's keys are impossible."""
+    if not good:
+        raise ModelError(f"the model's effect {name} is impossible: allowed are {allowed}")

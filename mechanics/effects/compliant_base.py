@@ -1,0 +1,51 @@
+"""Compliant base: the support gives, springs under the whole base."""
+
+import numpy as np
+
+from mechanics.effects.base import Effect, Parameter, Scope, unchanged
+from mechanics.support_motion import far_on_springs
+
+_FELT = 1.5e-3  # share of the object's height that counts as no give
+
+
+def _springs(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    """(normal, tangential) stiffness a unit of area, Pa/m."""
+    give, ratio = np.exp(values)
+    normal = modulus_pa / (give * float(scene.places.height.max()))
+    return float(normal), float(normal * ratio)
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    if np.exp(values[0]) < _FELT:
+        return
+    springs = [k / settings.modulus for k in _springs(values, scene, settings.modulus)]
+    settings.far = settings.far - scene.places.far + far_on_springs(scene.places, *springs)
+
+
+def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    normal, tangential = _springs(values, scene, modulus_pa)
+    return {"k_normal_pa_per_m": normal, "k_tangential_pa_per_m": tangential}
+
+
+def _hold(keys, young_modulus_pa):  # type: ignore[no-untyped-def]
+    stated = (keys["k_normal_pa_per_m"], keys["k_tangential_pa_per_m"])
+    return {"springs": tuple(float(k) / young_modulus_pa for k in stated)}
+
+
+EFFECT = Effect(
+    name="compliant_base",
+    domain="boundary",
+    scope=Scope.PLACES,
+    words="the support under the object gives",
+    parameters=(
+        Parameter("log_give_of_height", "ln 1", np.log(1e-3), 2.5, np.log(1e-3), (-1.5, 0.0), 0.05),
+        Parameter("log_tangential", "ln 1", -2.5, 1.0, -0.5, (-0.5, -0.5), 0.05, 0.7),
+    ),
+    report=_report,
+    change=_change,
+    apply=unchanged,
+    hold=_hold,
+    shape_rival=True,
+    hides_strain=True,
+    costly=True,
+)

@@ -1,0 +1,34 @@
+"""Finite strain: a neo-Hookean solid instead of a linear one. It has no parameter: it grows with the
+depth."""
+
+from mechanics.effects.base import Effect, Role, Scope, no_keys
+
+LAW = "neo-hookean"
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    settings.touch.dent_law = LAW
+
+
+def _of_material(touch, model):  # type: ignore[no-untyped-def]
+    touch.dent_law = model.material.dent_law
+
+
+def _apply(model, keys):  # type: ignore[no-untyped-def]
+    return model.with_material(dent_law=LAW)
+
+
+EFFECT = Effect(
+    name="finite_strain",
+    domain="object",
+    scope=Scope.PRESS,
+    words="the presses are so deep that small-strain elasticity no longer holds",
+    parameters=(),
+    report=no_keys,
+    plain_words="the presses are so deep that the material is stretched and squeezed strongly, where force "
+    "no longer follows the simple law of elasticity",
+    role=Role.KNOWN,
+    change=_change,
+    of_material=_of_material,
+    apply=_apply,
+)

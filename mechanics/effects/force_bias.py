@@ -1,0 +1,32 @@
+"""Force bias: a constant vector on every reading, seen best in free air."""
+
+import dataclasses
+
+import numpy as np
+
+from mechanics.effects.base import Effect, Parameter, Role, Scope
+from mechanics.effects.settings import SHIFTED
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    settings.read(SHIFTED, lambda force: force + values)
+
+
+def _correct(recording, keys):  # type: ignore[no-untyped-def]
+    return dataclasses.replace(
+        recording, force_on_tool=recording.force_on_tool - np.asarray(keys["bias_n"], dtype=float)
+    )
+
+
+EFFECT = Effect(
+    name="force_bias",
+    domain="instrument",
+    scope=Scope.READING,
+    words="the force sensor does not read zero in free air",
+    parameters=tuple(Parameter(f"bias_{a}_n", "N", -2.0, 2.0, 0.0, (0.0,), 0.005) for a in "xyz"),
+    report=lambda values, scene, modulus_pa: {"bias_n": [float(v) for v in values]},
+    role=Role.FREE_AIR,
+    change=_change,
+    correct=_correct,
+    read_as=SHIFTED,
+)

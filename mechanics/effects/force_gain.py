@@ -1,0 +1,41 @@
+"""Force gain: readings are a matrix times the truth. A common factor is the modulus's and cannot be told."""
+
+import dataclasses
+
+import numpy as np
+
+from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.settings import MIXED
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    settings.read(MIXED, lambda force: force @ values.reshape(3, 3).T)
+
+
+def _correct(recording, keys):  # type: ignore[no-untyped-def]
+    back = np.linalg.inv(np.asarray(keys["matrix"], dtype=float))
+    return dataclasses.replace(recording, force_on_tool=recording.force_on_tool @ back.T)
+
+
+EFFECT = Effect(
+    name="force_gain",
+    domain="instrument",
+    scope=Scope.EVERYWHERE,
+    words="the force sensor's axes have wrong gains or talk to each other",
+    parameters=tuple(
+        Parameter(
+            f"g{a}{b}", "1", -0.5 + (a == b), 0.5 + (a == b), float(a == b), (float(a == b),), 0.01, 0.08
+        )
+        for a in "xyz"
+        for b in "xyz"
+    ),
+    report=lambda values, scene, modulus_pa: {"matrix": np.asarray(values).reshape(3, 3).tolist()},
+    plain_words="the force sensor's axes read too much or too little, or into one another",
+    change=_change,
+    correct=_correct,
+    read_as=MIXED,
+    hides_strain=True,
+    stands_for_strain=True,
+    # the modulus takes up any factor common to all axes: how far a sensor may be off on the whole is a guess
+    common_factor=0.12,
+)

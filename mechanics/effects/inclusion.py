@@ -1,0 +1,164 @@
+"""Inclusion: a stiffer (or softer) ball inside. Felt at the places above it.
+
+The give that the ball's elements hold is divided by Eshelby's factor of a spherical inclusion in an
+incompressible solid, so that a hard ball does not vanish from the sum: share = 5 (m - 1) / (2 m + 3). That is
+first order, which finds a ball; at a fit it is multiplied, place by place, so that it equals the change of a
+new factorisation there (`refine`). Fitting again moves the ball a little; twice is enough.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.effects.base import Effect, Misfit, Parameter, Scope
+from mechanics.far_field import energy_fields, far_with_weights
+from mechanics.material import Ball
+from mechanics.moduli import inclusion_ratio
+from mechanics.patch import PatchSampler
+from mechanics.refine import typical_edge
+from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES
+from mechanics.solver import Solver
+
+RATIO_LIMITS = (0.15, 20.0)
+GRID_M = 0.007
+RADII_M = (0.006, 0.010, 0.015)
+STARTS = 6
+_SCALE = "inclusion_scale"
+_SCALE_LIMITS = (0.2, 4.0)
+FOUND = "diagnosed"
+
+
+def softness(ratio: float) -> float:
+    """Factor on the give of the ball's elements for a modulus ratio (Eshelby, nu = 0.5)."""
+    return 1 - 5 * (ratio - 1) / (2 * ratio + 3)
+
+
+def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float) -> np.ndarray:
+    """(m,) share of each element in the ball, with a soft edge of the elements' size."""
+    distance = np.linalg.norm(centroid - centre, axis=1)
+    return 1 / (1 + np.exp(np.clip((distance - radius) / (0.35 * blur), -40, 40)))
+
+
+def first_order(values, places):  # type: ignore[no-untyped-def]
+    """(p, 3, 3) 1/m, change of each press's give, unit modulus, to first order in the ball's own energy."""
+    fields = energy_fields(places)
+    share = inside(fields.centroid, values[:3], values[3], _blur(fields))
+    return far_with_weights(places, 1 + share * (softness(np.exp(values[4])) - 1)) - places.far
+
+
+def _blur(fields) -> float:  # type: ignore[no-untyped-def]
+    return float(np.cbrt(np.median(fields.volume))) * 1.5
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    change = first_order(values, scene.places)
+    scale = scene.places.stages.get(_SCALE)
+    settings.far = settings.far + (change if scale is None else change * scale[:, None, None])
+
+
+def _refine(scene, values):  # type: ignore[no-untyped-def]
+    """Hold how much a new factorisation changes each place over what first order says, (p,)."""
+    places = scene.places
+    fields = energy_fields(places)
+    mesh = fields.solver.mesh
+    ratio = inclusion_ratio(mesh, values[:3], float(values[3]), float(np.exp(values[4])))
+    solver = Solver(mesh, places.model.material.poisson_ratio, ratio)
+    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+    forces = np.zeros((len(mesh.points), 3, len(places.first)))
+    for k, press in enumerate(places.first):
+        nodes, weights = sampler.weights(places.point[press])
+        forces[nodes, :, k] = weights[:, None] * places.normal[press]
+    give = np.einsum("nik,nik->k", forces, solver.solve(forces))
+    exact = (give - fields.energy[:, :, 0, 0].sum(axis=1))[places.place]
+    first = first_order(values, places)[:, 0, 0]
+    known = np.abs(first) > 1e-3 * np.abs(first).max()
+    scale = np.where(known, exact / np.where(known, first, 1.0), 1.0)
+    places.stages[_SCALE] = np.clip(scale, *_SCALE_LIMITS)
+
+
+def _seek(scene, misfit: Misfit) -> list[np.ndarray]:  # type: ignore[no-untyped-def]
+    """Balls on a grid inside the object, ranked by how well they explain the places' stiffness.
+
+    First order: the share of each place's give that lies in the ball, times how its force answers to its
+    give, against each press's factor on the force, weighted, with a free common factor.
+    """
+    places = scene.places
+    fields = energy_fields(places)
+    give = fields.energy[:, :, 0, 0]
+    centres = _centres(fields.centroid)
+    blur = _blur(fields)
+    weight, level = misfit.weight, misfit.level
+    found = []
+    for radius in RADII_M:
+        share = np.array([inside(fields.centroid, c, radius, blur) for c in centres], dtype=np.float32)
+        pattern = (give @ share.T)[places.place] * misfit.answer[:, None]
+        for centre, column in zip(centres, pattern.T, strict=True):
+            x = np.stack([np.ones_like(column), column], axis=1)
+            normal = x.T @ (weight[:, None] * x)
+            if abs(np.linalg.det(normal)) < 1e-12:
+                continue
+            side = x.T @ (weight * level)
+            beta = np.linalg.solve(normal, side)
+            # softness - 1 lies between -1.5 (hard) and 1.67 (void)
+            found.append((float(0.5 * beta @ side), centre, radius, float(np.clip(beta[1], -1.2, 1.3))))
+    found.sort(key=lambda item: -item[0])
+    starts: list[np.ndarray] = []
+    for _, centre, radius, effect in found:
+        if all(np.linalg.norm(centre - s[:3]) > 1.5 * GRID_M or abs(radius - s[3]) > 1e-6 for s in starts):
+            starts.append(np.array([*centre, radius, _log_ratio(effect)]))
+        if len(starts) == STARTS:
+            break
+    return starts
+
+
+def _centres(centroid: np.ndarray) -> np.ndarray:
+    """(c, 3) m, of a grid, those that lie in the object."""
+    low, high = centroid.min(axis=0), centroid.max(axis=0)
+    axes = [np.arange(a + GRID_M / 2, b, GRID_M) for a, b in zip(low, high, strict=True)]
+    centres = np.array(np.meshgrid(*axes, indexing="ij")).reshape(3, -1).T
+    near = np.linalg.norm(centres[:, None] - centroid[None, ::4], axis=2).min(axis=1)
+    return centres[near < GRID_M]
+
+
+def _log_ratio(change: float) -> float:
+    grid = np.linspace(-1.8, 2.9, 200)
+    return float(grid[np.argmin([abs(softness(np.exp(g)) - 1 - change) for g in grid])])
+
+
+def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    return {
+        "centre_m": [float(v) for v in values[:3]],
+        "radius_m": float(values[3]),
+        "modulus_ratio": float(np.exp(values[4])),
+    }
+
+
+def _apply(model, keys):  # type: ignore[no-untyped-def]
+    known = model.material.inclusions
+    return model.with_material(inclusions={**known, f"{FOUND}-{len(known) + 1}": Ball(**keys)})
+
+
+EFFECT = Effect(
+    name="inclusion",
+    domain="object",
+    scope=Scope.PLACES,
+    words="a harder or softer lump lies inside",
+    parameters=(
+        *(Parameter(f"centre_{a}_m", "m", -10.0, 10.0, 0.0, (0.0,), 1e-3) for a in "xyz"),
+        Parameter("radius_m", "m", 3e-3, 0.03, 8e-3, (8e-3,), 5e-4, 0.006),
+        Parameter(
+            "log_ratio", "1", np.log(RATIO_LIMITS[0]), np.log(RATIO_LIMITS[1]), 0.0, (1.0, -0.7), 0.05, 1.5
+        ),
+    ),
+    report=_report,
+    change=_change,
+    apply=_apply,
+    seek=_seek,
+    refine=_refine,
+    forget=lambda scene: scene.places.stages.pop(_SCALE, None),
+    few_places=True,
+    shape_rival=True,
+    # a large soft ball and a small hard one look alike, and first order pulls the place towards the tip
+    systematic=(3e-3, 3e-3, 3e-3, 4e-3, 0.7),
+    signed=(4,),
+)

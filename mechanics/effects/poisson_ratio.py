@@ -1,0 +1,28 @@
+"""Poisson's ratio: not what was stated. Thin places against thick ones, normal against tangential."""
+
+from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.far_field import far_at_poisson
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    settings.nu = float(values[0])
+    settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
+
+
+def _apply(model, keys):  # type: ignore[no-untyped-def]
+    return model.with_material(poisson_ratio=keys["poisson_ratio"])
+
+
+EFFECT = Effect(
+    name="poisson_ratio",
+    domain="object",
+    scope=Scope.EVERYWHERE,
+    words="the material is more compressible than stated",
+    parameters=(Parameter("poisson_ratio", "1", 0.30, 0.49, 0.49, (0.40,), 0.01),),
+    report=lambda values, scene, modulus_pa: {"poisson_ratio": float(values[0])},
+    change=_change,
+    apply=_apply,
+    hides_strain=True,
+    stands_for_strain=True,
+    costly=True,
+)

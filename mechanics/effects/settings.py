@@ -1,0 +1,97 @@
+"""What a prediction is told, the ideal model until effects change it; and what it lets effects see."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import numpy as np
+
+from mechanics.dent import DentLaw, dent_law
+from mechanics.effects.base import Law
+from mechanics.places import Places
+
+STICKS = float("inf")
+
+
+@dataclass
+class Touch:
+    """What one tip feels where it touches; prediction and renderer read it.
+
+    dent_law: name of the dent's law; factors: functions of Poisson's ratio that give the factors on its
+    normal force and sideways stiffness, (k,) each, at mechanics.dent.grid(). tip_ratio: radius of the tip
+    over the stated one. friction: Coulomb's coefficient. numbers: (k,) of each law along the path.
+    """
+
+    dent_law: str = "linear"
+    factors: list[Callable[[float], tuple[np.ndarray, np.ndarray]]] = field(default_factory=list)
+    tip_ratio: float = 1.0
+    friction: float = STICKS
+    numbers: dict[Law, np.ndarray] = field(default_factory=dict)
+
+    def law_of_dent(self, poisson_ratio: float) -> DentLaw:
+        """The dent's law with all factors."""
+        law = dent_law(self.dent_law)
+        for factor in self.factors:
+            law = law.scaled(*factor(poisson_ratio))
+        return law
+
+
+@dataclass
+class Settings:
+    """What a prediction is told; the defaults are the ideal model.
+
+    modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the
+    tip over the global one. onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,)
+    factor. tool_give: m/N, of a spring in series at the stated modulus. moves: where the tip is, (n, 3) m,
+    from where it reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the
+    order of their numbers.
+    """
+
+    modulus: float
+    nu: float
+    far: np.ndarray
+    dent_ratio: np.ndarray
+    onset: np.ndarray
+    stiffness: np.ndarray
+    touch: Touch = field(default_factory=Touch)
+    tool_give: float = 0.0
+    moves: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
+    readings: list[tuple[int, Callable[[np.ndarray], np.ndarray]]] = field(default_factory=list)
+
+    def move(self, where: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Add what takes the tip from its reading to where it is."""
+        self.moves.append(where)
+
+    def read(self, order: int, reading: Callable[[np.ndarray], np.ndarray]) -> None:
+        """Add what the instrument does to the force."""
+        self.readings.append((order, reading))
+
+
+LATE, WEIGHED, MIXED, SHIFTED = range(4)
+"""What an instrument does to a force, in order: reads it late, adds the tool, mixes axes, shifts its zero."""
+
+
+class Scene(Protocol):
+    """What effects see of a recording's presses: p presses, n samples.
+
+    places: the pressed places. start: (p + 1,) rows of each press. t: (n,) s, the recording's clock. press:
+    (n,). lead: (n, 3) side of the tip in a play that the reading follows. quaternion: (n, 4) tool to device,
+    or None. acceleration: (n, 3) m/s^2, device frame.
+    """
+
+    places: Places
+
+    @property
+    def start(self) -> np.ndarray: ...
+    @property
+    def t(self) -> np.ndarray: ...
+    @property
+    def press(self) -> np.ndarray: ...
+    @property
+    def lead(self) -> np.ndarray: ...
+    @property
+    def quaternion(self) -> np.ndarray | None: ...
+    @property
+    def acceleration(self) -> np.ndarray: ...

@@ -1,0 +1,19 @@
+"""Surface shape: the reconstructed surface is wrong where nobody touched, so places are too stiff or too
+soft.
+
+No few numbers describe it: it predicts nothing at a place that was held out; it is named where places differ
+by more than their shape's uncertainty and nothing else explains how. What the surface should be it does not
+say, so it is not rendered.
+"""
+
+from mechanics.effects.base import Effect, Role, Scope, no_keys
+
+EFFECT = Effect(
+    name="surface_shape",
+    domain="boundary",
+    scope=Scope.PLACES,
+    words="the reconstructed shape is wrong where nobody touched",
+    parameters=(),
+    report=no_keys,
+    role=Role.REST,
+)

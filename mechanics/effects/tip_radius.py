@@ -1,0 +1,27 @@
+"""Tip radius: the sphere is not as large as stated; the dent's force goes with its square root."""
+
+from mechanics.effects.base import Effect, Parameter, Scope, check, unchanged
+
+
+def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+    radius = float(keys["tip_radius_m"])
+    check(radius > 0, "tip_radius", "tip_radius_m greater than 0")
+    touch.tip_ratio = radius / model.tool.tip_radius_m
+
+
+EFFECT = Effect(
+    name="tip_radius",
+    domain="contact",
+    scope=Scope.EVERYWHERE,
+    words="the tip is larger or smaller than stated",
+    parameters=(Parameter("ratio", "1", 0.4, 2.5, 1.0, (0.8, 1.25), 0.02),),
+    report=lambda values, scene, modulus_pa: {
+        "tip_radius_m": float(values[0] * scene.places.model.tool.tip_radius_m)
+    },
+    touch=_touch,
+    apply=unchanged,
+    hides_strain=True,
+    stands_for_strain=True,
+    # a site law that bends a little differently looks like another tip
+    systematic=(0.1,),
+)

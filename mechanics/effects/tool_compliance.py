@@ -1,0 +1,31 @@
+"""Tool compliance: a spring between the position sensor and the tip. Felt more where the object is stiff."""
+
+import dataclasses
+
+import numpy as np
+
+from mechanics.effects.base import Effect, Parameter, Scope
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    settings.tool_give = values[0]
+
+
+def _correct(recording, keys):  # type: ignore[no-untyped-def]
+    moved = recording.force_on_tool / keys["stiffness_n_per_m"]
+    return dataclasses.replace(recording, position=recording.position + moved)
+
+
+EFFECT = Effect(
+    name="tool_compliance",
+    domain="instrument",
+    scope=Scope.EVERYWHERE,
+    words="the tool bends: the tip is not where the position sensor says",
+    parameters=(Parameter("give_m_per_n", "m/N", 0.0, 0.01, 0.0, (5e-4,), 5e-5),),
+    report=lambda values, scene, modulus_pa: {"stiffness_n_per_m": float(1 / np.maximum(values[0], 1e-9))},
+    change=_change,
+    correct=_correct,
+    read_as=-1,
+    hides_strain=True,
+    stands_for_strain=True,
+)

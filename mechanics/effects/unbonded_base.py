@@ -1,0 +1,45 @@
+"""Unbonded base: part of the base is free to lift and slip; what presses on the support is still carried."""
+
+import numpy as np
+
+from mechanics.effects.base import Effect, Parameter, Scope, unchanged
+from mechanics.support_motion import ANGLES, far_partly_bonded, support_axes
+
+
+def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+    settings.far = settings.far - scene.places.far + far_partly_bonded(scene.places, *values)
+
+
+def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+    across, along = support_axes(scene.places.model)
+    direction = np.cos(values[1]) * across + np.sin(values[1]) * along
+    return {"bonded_fraction": float(1 - values[0]), "direction": [float(v) for v in direction]}
+
+
+def _hold(keys, young_modulus_pa):  # type: ignore[no-untyped-def]
+    direction = np.asarray(keys["direction"], dtype=float)
+    return {"bonded_fraction": float(keys["bonded_fraction"]), "direction": direction}
+
+
+def _starts():  # type: ignore[no-untyped-def]
+    return [np.array([0.4, k * 2 * np.pi / ANGLES, floor]) for floor in (0.95, 0.05) for k in range(ANGLES)]
+
+
+EFFECT = Effect(
+    name="unbonded_base",
+    domain="boundary",
+    scope=Scope.PLACES,
+    words="part of the object's base is loose",
+    parameters=(
+        Parameter("free_fraction", "1", 0.0, 0.75, 0.0, (0.3,), 0.02),
+        Parameter("angle", "rad", -7.0, 14.0, 0.0, (0.0,), 0.1),
+        Parameter("floor", "1", 0.0, 1.0, 1.0, (1.0,), 0.05, 0.7),
+    ),
+    report=_report,
+    change=_change,
+    apply=unchanged,
+    hold=_hold,
+    candidates=_starts,
+    shape_rival=True,
+    costly=True,
+)

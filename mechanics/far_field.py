@@ -1,0 +1,126 @@
+"""The far field of places in an object that is not uniform, or not of the stated Poisson's ratio.
+
+The give of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that are
+stiffer by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on one
+array. Another Poisson's ratio is a new factorisation, done once at a few values and interpolated.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechanics.elasticity import element_stiffness
+from mechanics.patch import PatchSampler, half_space_compliance
+from mechanics.places import Places
+from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES, typical_edge
+from mechanics.solver import Solver
+from mechanics.tetmesh import TetMesh
+
+_CHUNK = 600
+
+
+@dataclass(frozen=True)
+class EnergyFields:
+    """energy: (q, m, 3, 3) of q places, local frames, unit modulus, 1/m. centroid: (m, 3) m, device frame.
+
+    volume: (m,) m^3. depth: (m,) m, distance of the centroid to the touchable surface. half_space: (3, 3)
+    taken off the sum, local frame. solver: of the model's own mesh, bonded. solution: (n, 3, 3 q) its nodal
+    displacements for the unit loads.
+    """
+
+    energy: np.ndarray
+    centroid: np.ndarray
+    volume: np.ndarray
+    depth: np.ndarray
+    half_space: np.ndarray
+    solver: Solver
+    solution: np.ndarray
+
+
+def energy_fields(places: Places) -> EnergyFields:
+    """Energies of all places; solved for once."""
+    return places.stage("fields", lambda: _energies(places))
+
+
+def _energies(places: Places) -> EnergyFields:
+    model = places.model
+    mesh = model.mesh.quadratic()
+    solver = Solver(mesh, model.material.poisson_ratio)
+    sampler = _sampler(mesh)
+    u = solver.solve(_unit_loads(places, mesh, sampler))
+    m, q = len(mesh.tetrahedra), len(places.first)
+    energy = np.empty((q, m, 3, 3), dtype=np.float32)
+    for a in range(0, m, _CHUNK):
+        nodes = mesh.tetrahedra[a : a + _CHUNK]
+        stiff = element_stiffness(mesh.points[nodes[:, :4]], 2, model.material.poisson_ratio).reshape(
+            len(nodes), 30, 30
+        )
+        local = u[nodes].reshape(len(nodes), 30, 3 * q)
+        product = (stiff @ local).reshape(len(nodes), 30, q, 3)
+        energy[:, a : a + _CHUNK] = np.einsum(
+            "mxqi,mxqj->qmij", local.reshape(len(nodes), 30, q, 3), product, optimize=True
+        )
+    centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
+    depth = cKDTree(sampler._positions.reshape(-1, 3)).query(centroid)[0]
+    half = half_space_compliance(np.array([1.0, 0, 0]), model.material.poisson_ratio, sampler.width_m)
+    return EnergyFields(energy, centroid, mesh.volumes, depth, half, solver, u)
+
+
+def far_with_weights(places: Places, softness: np.ndarray) -> np.ndarray:
+    """(p, 3, 3) far field with each element's share of the give multiplied by softness (m,) (1:
+    unchanged)."""
+    energy = energy_fields(places).energy
+    change = np.einsum("qmij,m->qij", energy, (softness - 1).astype(np.float32), optimize=True)
+    return places.far + change[places.place]
+
+
+def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30, 0.40, 0.46)) -> np.ndarray:
+    """(p, 3, 3) far field at another Poisson's ratio, interpolated between factorisations."""
+
+    def solve() -> dict[str, np.ndarray]:
+        stated = places.model.material.poisson_ratio
+        known = sorted({*ratios, stated})
+        mesh = places.model.mesh.quadratic()
+        own = energy_fields(places).solution
+        fars = np.array([_far(places, mesh, r, own if r == stated else None) for r in known])
+        return {"ratios": np.array(known), "far": fars - fars[known.index(stated)]}
+
+    table = places.stage("poisson", lambda: places.stored("poisson", solve))
+    return places.far + _interpolate(table["ratios"], table["far"], nu)
+
+
+def _sampler(mesh: TetMesh) -> PatchSampler:
+    return PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+
+
+def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler) -> np.ndarray:
+    """(n, 3, 3 q) nodal forces of unit loads along the local axes of q places."""
+    forces = np.zeros((len(mesh.points), 3, 3 * len(places.first)))
+    for k, press in enumerate(places.first):
+        nodes, weights = sampler.weights(places.point[press])
+        for axis in range(3):
+            forces[nodes, :, 3 * k + axis] = weights[:, None] * places.frame[press][axis]
+    return forces
+
+
+def _far(places: Places, mesh: TetMesh, nu: float, solution: np.ndarray | None = None) -> np.ndarray:
+    """(p, 3, 3) local far field at a Poisson's ratio; solution: known displacements for the unit loads."""
+    sampler = _sampler(mesh)
+    u = Solver(mesh, nu).solve(_unit_loads(places, mesh, sampler)) if solution is None else solution
+    far = np.empty((len(places.first), 3, 3))
+    half = half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m)
+    for k, press in enumerate(places.first):
+        nodes, weights = sampler.weights(places.point[press])
+        mean = np.einsum("n,nar->ar", weights, u[nodes][:, :, 3 * k : 3 * k + 3])
+        block = places.frame[press] @ mean
+        far[k] = (block + block.T) / 2 - half
+    return far[places.place]
+
+
+def _interpolate(x: np.ndarray, table: np.ndarray, value: float) -> np.ndarray:
+    i = int(np.clip(np.searchsorted(x, value) - 1, 0, len(x) - 2))
+    w = (value - x[i]) / (x[i + 1] - x[i])
+    return (1 - w) * table[i] + w * table[i + 1]
