@@ -93,7 +93,7 @@ def _gaps(evidence: Evidence) -> Gaps:
 
 
 def _never_worse(evidence: Evidence, answer: Answer, gaps: Gaps, counts: np.ndarray) -> np.ndarray:
-    """(g,) N^2, held out with what may be named; the answer loses, to its candidates, what makes the gap grow."""
+    """(g,) N^2, held out with what may be named; what makes the gap grow goes to the answer's candidates."""
     search, settled = evidence.search, evidence.settled
     whitener = search.whitener
     final, base = evidence.found.final.found, evidence.found.base.found.names

@@ -93,7 +93,7 @@ class Presses:
     error of the first touch along it. point, normal (p, 3): of the object's surface at first touch, outward.
     depth_m: (p,) greatest travel along -normal. site: (p,) number of the place. fits: (p,) each, FITS.
     The recording: tip_radius_m; sample_rate_hz; noise; delay_s: by how much the force reads late (free_air is
-    as late), delay_error_s its standard error; segments; recording_sha256. block: raw samples in a row.
+    as late), delay_error_s its standard error; segments; recording, the key of its samples (Recording.content). block: raw samples in a row.
     """
 
     starts: np.ndarray
@@ -117,7 +117,7 @@ class Presses:
     delay_s: float = 0.0
     delay_error_s: float = 0.0
     segments: tuple[Segment, ...] = ()
-    recording_sha256: str = ""
+    recording: str = ""
     quaternion: np.ndarray | None = None
     fits: Mapping[str, np.ndarray] = field(default_factory=dict)
     columns: Mapping[str, np.ndarray] = field(default_factory=dict)
@@ -577,7 +577,7 @@ def cut(
         delay_s=delay_s,
         delay_error_s=delay_error_s,
         segments=(*segments, *air),
-        recording_sha256=recording.sha256,
+        recording=recording.content,
     )
     quiet = table.within("free", t)
     return dataclasses.replace(table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet))
@@ -728,7 +728,7 @@ def write_presses(path: Path, presses: Presses) -> None:
     arrays["segments"] = np.array(
         [[KINDS.index(s.kind), s.start_s, s.end_s] for s in presses.segments], dtype=float
     ).reshape(-1, 3)
-    arrays["recording"] = np.frombuffer(presses.recording_sha256.encode(), dtype=np.uint8)
+    arrays["recording"] = np.frombuffer(presses.recording.encode(), dtype=np.uint8)
     write_arrays(path, _FORMAT, arrays)
 
 
@@ -744,7 +744,7 @@ def read_presses(path: Path) -> Presses:
             fits={n: np.array(arrays[f"fit {n}"]) for n in FITS},
             noise=Noise(*arrays["noise"].tolist()),
             segments=tuple(Segment(KINDS[int(k)], a, b) for k, a, b in arrays["segments"].tolist()),
-            recording_sha256=bytes(arrays["recording"]).decode(),
+            recording=bytes(arrays["recording"]).decode(),
         )
     except (CacheError, KeyError, ValueError) as error:
         raise ModelError(f"'{path}' is damaged ({error}): reconstruct the model again") from error

@@ -11,6 +11,7 @@ import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
+from functools import cached_property
 from pathlib import Path
 from types import MappingProxyType
 from typing import Any
@@ -20,6 +21,7 @@ import tomli_w
 
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file, sha256_of_file
+from mechanics.store import content_key
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
@@ -70,6 +72,13 @@ class Recording:
     def name(self) -> str:
         """The stem of the files, or the object's name where the recording was never on disk."""
         return self.path.name.removesuffix(".gz").rsplit(".", 1)[0] if self.path else self.object_name
+
+    @cached_property
+    def content(self) -> str:
+        """A key of the samples themselves: what was altered after reading has another."""
+        none = np.zeros(0)
+        quaternion = none if self.quaternion is None else self.quaternion
+        return content_key(self.t, self.position, self.force_on_tool, quaternion, self.tip_radius_m)
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled by its fields and built anew, since a mapping proxy cannot be and arrays come back

@@ -20,7 +20,7 @@ def presses_on(recording: Recording, model: Model) -> Presses:
     Raises ContactError where the recording holds no press.
     """
     own = model.presses
-    if own.sampled and own.recording_sha256 and own.recording_sha256 == recording.sha256:
+    if own.sampled and own.recording == recording.content:
         return own
     try:
         found = explore(recording, contact_options=_ANY).presses

@@ -7,9 +7,9 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.effects.base import Effect, Parameter, Role, Scope
 from mechanics.effects.settings import WEIGHED
+from mechanics.kinematics import acceleration
 
 STANDARD_GRAVITY = 9.80665
-SMOOTHED_S = 0.05
 
 
 def left_by_tare(weight_n: np.ndarray, quaternion: np.ndarray | None, share: float) -> np.ndarray:

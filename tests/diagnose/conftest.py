@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import itertools
 
 import numpy as np
@@ -10,7 +9,7 @@ import pytest
 
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.presses import cut
+from mechanics.presses import Presses, cut
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh
@@ -99,21 +98,23 @@ class Bench:
             x, f = alter(t, x, f)
         f = f + rng.normal(0, NOISE, f.shape)
         recording = Recording(
-            t=t, position=x, force_on_tool=f, sample_rate_hz=rate, tip_radius_m=RADIUS, poisson_ratio=NU,
-            sha256=f"the bench {hashlib.sha256(f.tobytes()).hexdigest()}",
-        )  # fmt: skip
-        place = [i for i, _ in presses]
-        known = self.points[place], self.normals[place]
-        table = cut(
-            recording, onset_s=np.array(onsets), peak_s=np.array(peaks),
-            centre=known[0] + RADIUS * known[1], normal=known[1],
-        )  # fmt: skip
+            t=t, position=x, force_on_tool=f, sample_rate_hz=rate, tip_radius_m=RADIUS, poisson_ratio=NU
+        )
+        self.known = np.array(onsets), np.array(peaks), np.array([i for i, _ in presses])
         model = Model(
             mesh=self.mesh, material=Material(MODULUS, NU),
             support=Support(np.zeros(3), np.array([0, 0, 1.0])), tool=Tool(RADIUS), mesh_size_m=0.02,
-            presses=table,
+            presses=self.table(recording),
         )  # fmt: skip
         return recording, model
+
+    def table(self, recording: Recording) -> Presses:
+        """The presses of a recording (as `record` made the last one, altered or not), where they are known to
+        be."""
+        onset, peak, place = self.known
+        normal = self.normals[place]
+        centre = self.points[place] + RADIUS * normal
+        return cut(recording, onset_s=onset, peak_s=peak, centre=centre, normal=normal)
 
 
 @pytest.fixture(scope="session")

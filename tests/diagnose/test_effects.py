@@ -40,7 +40,7 @@ CONTRACT = {
 @pytest.fixture(scope="module")
 def forward(bench):  # type: ignore[no-untyped-def]
     recording, model = bench.record()
-    return build_forward(touches_of(recording, model), model)
+    return build_forward(touches_of(model.presses), model)
 
 
 MODULUS = 20e3

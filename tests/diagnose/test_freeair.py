@@ -22,11 +22,12 @@ def heavy(bench):  # type: ignore[no-untyped-def]
     weight = np.array([0.0, 0.0, -0.06 * 9.80665])
     force = recording.force_on_tool + weight - turn.apply(turn[0].inv().apply(weight)) + [0.0, 0.04, 0.0]
     quaternion = turn.as_quat(scalar_first=True)
-    return dataclasses.replace(recording, quaternion=quaternion, force_on_tool=force), model
+    recording = dataclasses.replace(recording, quaternion=quaternion, force_on_tool=force)
+    return recording, model.replaced(presses=bench.table(recording))
 
 
 def test_a_weight_that_turns_is_told_from_a_bias(heavy):
-    free = free_air_of(*heavy, 0.004)
+    free = free_air_of(heavy[0], heavy[1].presses)
     assert np.linalg.norm(free.turning.tool_n) == pytest.approx(0.588, rel=0.05)
     np.testing.assert_allclose(free.turning.first @ free.turning.tool_n, [0, 0, 0.588], atol=0.03)
 
@@ -39,5 +40,5 @@ def test_it_is_named_and_taken_off(heavy):
     assert keys["tool_gravity_inertia"]["mass_kg"] == pytest.approx(0.06, rel=0.05)
     np.testing.assert_allclose(keys["force_bias"]["bias_n"], [0, 0.04, 0], atol=0.005)
     clean = corrected(recording, result)
-    free = free_air_of(clean, model, 0.004)
+    free = free_air_of(clean, model.presses)
     assert np.abs(free.bias_n).max() < 0.01 and np.linalg.norm(free.turning.tool_n) < 0.03

@@ -57,7 +57,7 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
 
     search.judge = judged
     search.finite_strain = effect("finite_strain")
-    search.forward = SimpleNamespace(touches=SimpleNamespace(slowness=1.0))
+    search.forward = SimpleNamespace(touches=SimpleNamespace(noise=SimpleNamespace(variance_inflation=1.0)))
     _, gain = _with_strain(search, [])
     assert (gain > FINITE_STRAIN_GAIN) == named
 

@@ -18,7 +18,7 @@ from mechanics.support_motion import far_on_springs, far_partly_bonded, loosened
 @pytest.fixture(scope="module")
 def places(bench):  # type: ignore[no-untyped-def]
     recording, model = bench.record()
-    return build_forward(touches_of(recording, model), model).places
+    return build_forward(touches_of(model.presses), model).places
 
 
 def _give(places, hold):  # type: ignore[no-untyped-def]
