@@ -4,8 +4,7 @@ site.
 A residual is weighed against the covariance sigma^2 I + N N^T of its site, N holding one column a nuisance:
 how the force would change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its
 normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space
-between
-them, against what an error of shape could do. Woodbury keeps it to small matrices.
+between them, against what an error of shape could do. Woodbury keeps it to small matrices.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
 """Options: one frozen dataclass a step; the command line is generated from its fields.
 
-@dataclass(frozen=True)
-class MeshingOptions:
+@dataclass(frozen=True) class MeshingOptions:
     mesh_size_m: float = option(0.010, "edge length of the tetrahedra", unit="m", flag="--mesh-size")
 """
 

@@ -93,7 +93,8 @@ class Presses:
     error of the first touch along it. point, normal (p, 3): of the object's surface at first touch, outward.
     depth_m: (p,) greatest travel along -normal. site: (p,) number of the place. fits: (p,) each, FITS.
     The recording: tip_radius_m; sample_rate_hz; noise; delay_s: by how much the force reads late (free_air is
-    as late), delay_error_s its standard error; segments; recording, the key of its samples (Recording.content). block: raw samples in a row.
+    as late), delay_error_s its standard error; segments; recording, the key of its samples
+    (Recording.content). block: raw samples in a row.
     """
 
     starts: np.ndarray

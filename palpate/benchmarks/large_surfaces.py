@@ -5,8 +5,7 @@ beyond some 2,000 corners. Dense: the mutual table of all corners in float32; it
 column, timed on a sample and scaled. Errors are against solves: of the force of a press of 5 mm at
 corners of the table and at places drawn at random (interpolated), greatest and root mean square; and of how
 one place moves another, over the give of a place under itself.
-Times are CPU seconds. A tick is a step of the finite-element renderer with 1 and
-with 8 tips in contact.
+Times are CPU seconds. A tick is a step of the finite-element renderer with 1 and with 8 tips in contact.
 """
 
 from __future__ import annotations

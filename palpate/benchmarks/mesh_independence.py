@@ -1,10 +1,9 @@
 """Does the force depend on the mesh? One press at ten places of the paper's three samples on meshes of 10,
 7, 5 mm.
 
-Each place is pressed straight down to the same depth with the tip of 5 mm; forces for 20 kPa,
-finite-strain dent. The change is (greatest - least) / mean over the meshes, place by place. `--point-load`
-shows the paper's way beside
-it: a unit force on the nearest node of linear tetrahedra.
+Each place is pressed straight down to the same depth with the tip of 5 mm; forces for 20 kPa, finite-strain
+dent. The change is (greatest - least) / mean over the meshes, place by place. `--point-load` shows the
+paper's way beside it: a unit force on the nearest node of linear tetrahedra.
 """
 
 from __future__ import annotations

@@ -1,9 +1,9 @@
 """A nearly incompressible solid at finite strain: quadratic tetrahedra with mean dilatation.
 
-Total Lagrangian. Isochoric energy W(I1bar) (neo-Hookean or Yeoh) split from the volumetric
-K U(theta), U = ((theta^2 - 1)/2 - ln theta)/2, with theta the element's mean volume ratio (Nagtegaal, Parks &
-Rice 1974; Simo, Taylor & Pister 1985), which cures locking near a Poisson ratio of 0.5. Voigt order 11 22 33
-12 23 13. Lengths mm; stresses in units of the matrix's Young's modulus.
+Total Lagrangian. Isochoric energy W(I1bar) (neo-Hookean or Yeoh) split from the volumetric K U(theta), U =
+((theta^2 - 1)/2 - ln theta)/2, with theta the element's mean volume ratio (Nagtegaal, Parks & Rice 1974;
+Simo, Taylor & Pister 1985), which cures locking near a Poisson ratio of 0.5. Voigt order 11 22 33 12 23 13.
+Lengths mm; stresses in units of the matrix's Young's modulus.
 """
 
 from __future__ import annotations
