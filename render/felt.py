@@ -25,7 +25,7 @@ from mechanics.sites import TouchSites
 from mechanics.store import content_key
 from mechanics.touch import touch_forces
 from render.base import Renderer
-from render.effects import rendered_dent_law, rendered_friction
+from render.effects import rendered_touch
 from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.snapping import surface_uncertainty, touched_surface
@@ -94,7 +94,7 @@ def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.n
         poisson_ratio=model.material.poisson_ratio,
         tip_radius_m=model.tool.tip_radius_m,
         curvature=spread[:, 1],
-        law=rendered_dent_law(model, RenderOptions()),
+        law=rendered_touch(model, RenderOptions()).law_of_dent(model.material.poisson_ratio),
     )
     return forces[_STEPS - 1 :: _STEPS, 2] / OWN_DEPTH_M
 
@@ -110,7 +110,7 @@ def with_own_stiffness(renderer: Renderer) -> FeltSurface:
     plain = RenderOptions()
     if replace(renderer.options, friction=plain.friction) != plain:
         return surface  # not the surface or the law that the model has by itself
-    ideal = renderer.with_friction(rendered_friction(renderer.model, plain))
+    ideal = renderer.with_friction(rendered_touch(renderer.model, plain).friction)
     stiffness = local_stiffness(ideal, renderer.model.tool.tip_radius_m, OWN_DEPTH_M)
     made = replace(surface, own_stiffness_n_per_m=stiffness, stiffness_from=PRESSES)
     return _keep(renderer.model, made)
@@ -178,7 +178,7 @@ def _material_key(model: Model) -> str:
         float(model.material.poisson_ratio),
         model.element_ratio,
         json.dumps(model.effects, sort_keys=True, default=_plain),
-        rendered_dent_law(model, RenderOptions()).table,
+        rendered_touch(model, RenderOptions()).law_of_dent(model.material.poisson_ratio).table,
     )
 
 

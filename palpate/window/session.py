@@ -27,7 +27,7 @@ from palpate.window.recording import SessionRecording
 from palpate.window.trace import Trace
 from palpate.window.worker import Worker
 from render.base import Renderer
-from render.effects import rendered_friction
+from render.effects import rendered_touch
 from render.felt import with_own_stiffness
 from render.options import RenderOptions
 from render.registry import create, names
@@ -64,7 +64,7 @@ class TouchSession:
         self.trace = Trace()
         self.young_modulus_pa = model.material.young_modulus_pa
         self._options = render_options or RenderOptions()
-        self.friction = rendered_friction(model, self._options)
+        self.friction = rendered_touch(model, self._options).friction
         self.worker = Worker()
         self.recording: SessionRecording | None = None
         self._recording_path = recording
@@ -112,7 +112,7 @@ class TouchSession:
         """What the user changed, to a renderer that is new."""
         if self.young_modulus_pa != self.model.material.young_modulus_pa:
             self._servo.set_modulus(self.young_modulus_pa)
-        if self.friction != rendered_friction(self.model, self._options):
+        if self.friction != rendered_touch(self.model, self._options).friction:
             self._servo.set_friction(self.friction)
         self._inclusion.apply(self._servo)
 

@@ -11,6 +11,9 @@ from scipy.spatial.transform import Rotation
 from diagnose.apply import corrected
 from diagnose.freeair import free_air_of
 from diagnose.pipeline import DiagnoseOptions, diagnose
+from reconstruct.contacts import explore
+
+from ..reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 @pytest.fixture(scope="module")
@@ -42,3 +45,12 @@ def test_it_is_named_and_taken_off(heavy):
     clean = corrected(recording, result)
     free = free_air_of(clean, model.presses)
     assert np.abs(free.bias_n).max() < 0.01 and np.linalg.norm(free.turning.tool_n) < 0.03
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_the_tracing_of_the_base_is_no_bias(stated):
+    """Phase I left unstated once read as 1.4 N in free air."""
+    recording, _ = explore_cylinder(state_phase=stated)
+    free = free_air_of(recording, explore(recording).presses)
+    assert np.abs(free.bias_n).max() < 0.005
+    assert np.abs(free.rate_n_per_s).max() * np.ptp(recording.t) < 0.01

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mechanics.model import Model, read_model, write_model
-from mechanics.palpation import Palpation
+from mechanics.presses import no_presses, of_places
 from mechanics.sites import TouchSites
 from palpate.cli import main
 from render.felt import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
@@ -27,8 +27,9 @@ DOUBT_M = 8e-4
 def folder(tmp_path) -> Model:
     """A block, uncertain by 0.8 mm but for four touches on its top, as a MODEL folder."""
     mesh = shapes.block((0.1, 0.1, 0.05), (6, 6, 3))
-    rows = tuple(Palpation(1.0, 2.0, x, y, 0.0502, 0.0, 0.0, 1.0, 0.004) for x, y in TOUCHED)
-    made = shapes.model(mesh, palpations=rows, shape_uncertainty_m=np.full(len(mesh.points), DOUBT_M))
+    places = np.array([[x, y, 0.0502] for x, y in TOUCHED])
+    rows = of_places(places, np.tile([0.0, 0.0, 1.0], (4, 1)), 0.005)
+    made = shapes.model(mesh, presses=rows, shape_uncertainty_m=np.full(len(mesh.points), DOUBT_M))
     return read_model(write_model(tmp_path / "block", made))
 
 
@@ -56,7 +57,7 @@ def test_touches_pin_the_surface_and_far_from_them_the_models_doubt_is_left(fold
     assert surface.uncertainty_m[far] == pytest.approx(DOUBT_M, rel=1e-3)
     assert (surface.uncertainty_m <= DOUBT_M * (1 + 1e-9)).all()
     # one touch, its own place: the product of two Gaussians
-    one = folder.replaced(palpations=folder.palpations[:1], path=None)
+    one = folder.replaced(presses=folder.presses.of(np.arange(1)), path=None)
     at = felt_surface(one)
     near = np.linalg.norm(at.points - [*TOUCHED[0], 0.05], axis=1).argmin()
     away = np.linalg.norm(at.points[near, :2] - TOUCHED[0])
@@ -71,7 +72,7 @@ def test_the_file_is_read_again_and_never_believed_of_another_mesh_or_touch(fold
     assert (folder.path / FILE).stat().st_mtime_ns == stamp
     assert np.array_equal(first.points, again.points) and np.array_equal(first.normals, again.normals)
     assert np.array_equal(first.uncertainty_m, again.uncertainty_m)
-    other = folder.replaced(palpations=())
+    other = folder.replaced(presses=no_presses(0.005))
     assert felt_surface(other).points[:, 2].max() == pytest.approx(0.05)
     assert felt_surface(folder).points[:, 2].max() == pytest.approx(0.0502, abs=5e-5)
 
@@ -122,7 +123,7 @@ def test_before_that_the_touch_sites_tell_it(folder):
 
 
 def test_a_press_by_the_command_leaves_the_stiffness_in_the_folder(folder, tmp_path):
-    plain = replace(folder, palpations=())
+    plain = replace(folder, presses=no_presses(0.005))
     path = write_model(tmp_path / "plain", plain)
     words = ["--at", "0,0,0.05", "--direction", "0,0,-1", "--depth", "0.001", "--json", str(tmp_path / "j")]
     assert main(["press", str(path), *words]) == 0

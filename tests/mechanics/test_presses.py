@@ -1,0 +1,191 @@
+"""The table of presses: its views, its file, the sites and segments that every later step relies on."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mechanics.errors import ModelError
+from mechanics.presses import (
+    FITS,
+    cut,
+    free_segments,
+    of_places,
+    read_csv,
+    read_presses,
+    sites_of,
+    write_csv,
+    write_presses,
+)
+from mechanics.recording import Recording
+
+UP = np.array([0.0, 0.0, 1.0])
+TIP, RATE, STIFF = 0.005, 1000.0, 300.0
+
+
+def recording(
+    *, places=3, repeats=2, delay=0, bias=(0.0, 0.0, 0.0), noise=0.01, seed=0, rate=RATE
+) -> Recording:
+    """Straight presses onto z = 0 by a spring of 300 N/m: 1 s of air, 0.5 s down, 0.5 s up, at places 20 mm
+    apart, each pressed `repeats` times; the force is read `delay` samples late."""
+    n = round(2.0 * rate)
+    clock = np.arange(n) / rate
+    depth = np.interp(clock, [0, 0.6, 1.0, 1.5, 2.0], [-0.01, -0.01, -0.002, 0.004, -0.002])
+    x = np.repeat(np.tile(np.arange(places) * 0.02, repeats), n)
+    depths = np.tile(depth, places * repeats)
+    position = np.column_stack([x, np.zeros_like(x), TIP - depths])
+    force = STIFF * np.clip(depths, 0, None)[:, None] * UP + np.array(bias)
+    force = np.roll(force, delay, axis=0) + noise * np.random.default_rng(seed).standard_normal(
+        position.shape
+    )
+    return Recording(np.arange(len(x)) / rate, position, force, rate, TIP, force_noise_std_n=noise)
+
+
+def table(made: Recording, places=3, repeats=2, **known):
+    count = places * repeats
+    begin = 2.0 * np.arange(count)
+    x = np.tile(np.arange(places) * 0.02, repeats)
+    centre = np.column_stack([x, np.zeros(count), np.full(count, TIP)])
+    return cut(
+        made, onset_s=begin + 1.0 + 1 / 6, peak_s=begin + 1.5, centre=centre, normal=np.tile(UP, (count, 1)),
+        **known,
+    )  # fmt: skip
+
+
+def test_a_table_knows_touch_depth_site_and_noise():
+    presses = table(recording())
+    assert len(presses) == 6 and presses.sites == 3
+    assert list(presses.site) == [0, 1, 2, 0, 1, 2] and list(presses.repeat) == [0, 0, 0, 1, 1, 1]
+    # back at what it was in the air within 2 % of the greatest force
+    assert presses.end_s - presses.onset_s == pytest.approx(np.full(6, 2 / 3), abs=0.015)
+    assert presses.depth_m == pytest.approx(np.full(6, 0.004), rel=1e-3)
+    assert presses.noise.raw_n == pytest.approx(0.01, rel=0.05)
+    assert presses.noise.step_n == pytest.approx(0.01 / np.sqrt(10), rel=0.1)
+    assert presses.noise.variance_inflation < 1.5
+    assert not presses.t.flags.writeable
+
+
+def test_rows_are_seen_from_the_place_that_was_touched():
+    presses = table(recording(noise=0.0))
+    assert presses.y[:, 0] == pytest.approx(presses.depth, abs=1e-12)
+    assert presses.f[:, 0] == pytest.approx(STIFF * np.clip(presses.depth, 0, None), abs=1e-9)
+    assert np.abs(presses.f[:, 1:]).max() < 1e-12
+    counted = presses.touching(presses.t)
+    assert (counted[presses.counted]).all()
+
+
+def test_net_undoes_bias_and_delay():
+    bias = (0.1, -0.2, 0.3)
+    made = recording(delay=20, bias=bias, noise=0.0)
+    late = table(made, delay_s=0.02, free_air=np.tile(bias, (len(made.t), 1)))
+    assert late.net.push == pytest.approx(STIFF * np.clip(late.depth, 0, None), abs=1e-9)
+    assert late.net.delay_s == 0 and np.abs(late.net.free_air).max() == 0
+
+
+def test_thinning_keeps_means_and_whitens_by_its_root():
+    presses = table(recording())
+    thin = presses.thinned(0.01)
+    first = presses.rows([0])[:10]
+    assert thin.force[0] == pytest.approx(presses.force[first].mean(axis=0))
+    assert thin.block == 10 and thin.noise_n == presses.noise.step_n
+    assert len(thin) == len(presses) and (np.diff(thin.starts) == np.diff(presses.starts) // 10).all()
+
+
+def test_views_cut_rows_and_presses():
+    presses = table(recording())
+    near = presses.window(0.05, 0.0)
+    since = near.t - near.onset_s[near.press]
+    assert since.min() >= -0.05 and (near.t <= near.end_s[near.press]).all()
+    some = presses.of(np.array([1, 4, 5]))
+    assert len(some) == 3 and list(some.site) == [0, 0, 1]
+    assert np.array_equal(some.t, presses.t[presses.rows([1, 4, 5])])
+    assert len(presses.of(presses.site == 2)) == 2
+
+
+def test_free_air_keeps_clear_of_every_touch_and_of_the_tracing():
+    made = recording()
+    presses = table(made, trace_s=(0.0, 0.3), others_s=[(6.5, 6.6)])
+    free = presses.within("free", made.t)
+    assert free.any() and not (free & presses.touching(made.t, 0.149)).any()
+    assert not free[made.t < 0.8].any()
+    assert not free[(made.t > 6.36) & (made.t < 6.74)].any()
+    assert presses.within("trace", np.array([0.1, 0.4])).tolist() == [True, False]
+    assert free_segments(np.arange(5.0), np.array([2.0]), np.array([2.0]), 10.0) == ()
+
+
+@pytest.mark.parametrize("rate", [300.0, 500.0, 1000.0, 2000.0])
+def test_the_rate_of_sampling_does_not_matter(rate):
+    presses = table(recording(rate=rate))
+    assert presses.end_s - presses.onset_s == pytest.approx(np.full(6, 2 / 3), abs=0.02)
+    assert presses.depth_m == pytest.approx(np.full(6, 0.004), rel=0.01)
+    assert presses.noise.raw_n == pytest.approx(0.01, rel=0.05)
+
+
+def scattered(spacing: float, spread: float, *, count=5, repeats=3, seed=0) -> tuple[np.ndarray, np.ndarray]:
+    """(points, true sites) of a square raster, each place touched again with an error."""
+    random = np.random.default_rng(seed)
+    grid = spacing * np.stack(np.meshgrid(np.arange(count), np.arange(count)), axis=-1).reshape(-1, 2)
+    flat = np.tile(grid, (repeats, 1)) + spread * random.standard_normal((repeats * len(grid), 2))
+    return np.column_stack([flat, np.zeros(len(flat))]), np.tile(np.arange(len(grid)), repeats)
+
+
+@pytest.mark.parametrize(
+    ("spacing", "spread", "repeats"),
+    [
+        (0.02, 0.5e-3, 3),
+        (0.02, 1.5e-3, 3),
+        (0.005, 0.0, 1),
+        (0.003, 0.0, 1),
+        (0.005, 0.2e-3, 3),
+        (0.012, 1e-3, 2),
+    ],
+)
+def test_sites_follow_the_datas_own_spacing(spacing, spread, repeats):
+    points, truth = scattered(spacing, spread, repeats=repeats)
+    assert np.array_equal(sites_of(points, np.tile(UP, (len(points), 1))), truth)
+
+
+def test_two_faces_of_a_rim_are_two_sites():
+    points = np.array([[0.0, 0, 0], [0.001, 0, 0], [0.0005, 0, 0]])
+    assert list(sites_of(points, np.array([UP, [1.0, 0, 0], UP]))) == [0, 1, 0]
+
+
+def test_a_table_comes_back_from_its_files_bit_for_bit(tmp_path):
+    fits = {name: np.arange(6.0) for name in FITS}
+    made = recording()
+    presses = table(made, trace_s=(0.0, 0.3), delay_s=0.004, delay_error_s=1e-4).with_fits(**fits)
+    write_presses(tmp_path / "presses.bin", presses)
+    again = read_presses(tmp_path / "presses.bin")
+    for field in dataclasses.fields(presses):
+        one, other = getattr(presses, field.name), getattr(again, field.name)
+        if field.name in ("fits", "columns"):
+            assert all(np.array_equal(one[n], other[n]) for n in one)
+        else:
+            assert np.array_equal(one, other) if isinstance(one, np.ndarray) else one == other, field.name
+    assert again.recording == made.content
+    write_csv(tmp_path / "palpations.csv", presses)
+    plain = read_csv(tmp_path / "palpations.csv", TIP)
+    assert np.array_equal(plain.point, presses.point) and np.array_equal(plain.fits["k_kv"], fits["k_kv"])
+    assert not plain.sampled and presses.sampled
+
+
+def test_a_damaged_table_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "presses.bin"
+    write_presses(path, table(recording()))
+    content = bytearray(path.read_bytes())
+    content[-5] ^= 1
+    path.write_bytes(content)
+    with pytest.raises(ModelError, match="damaged.*reconstruct"):
+        read_presses(path)
+
+
+def test_columns_of_another_length_are_refused():
+    with pytest.raises(ModelError, match="other lengths"):
+        dataclasses.replace(of_places(np.zeros((3, 3)), np.tile(UP, (3, 1)), TIP), onset_s=np.zeros(2))
+
+
+def test_an_altered_recording_is_another_one():
+    made = recording()
+    louder = dataclasses.replace(made, force_on_tool=1.1 * made.force_on_tool)
+    assert made.content != louder.content
+    assert made.content == dataclasses.replace(made, object_name="another name").content
