@@ -360,6 +360,7 @@ def _renderer(
 ) -> Callable[[Progress], TouchScene]:
     """What will make the renderer, on its model's support; options are checked at once."""
     from render.base import Renderer
+    from render.felt import with_own_stiffness
     from render.options import RenderOptions
     from render.registry import create, names
     from render.scene import scene_of
@@ -375,7 +376,14 @@ def _renderer(
     if name not in names():
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(names())}")
     chosen = _with_scene(model, RenderOptions(**given[RenderOptions]))
-    return lambda tell: scene_of(create(name, load(model, progress=tell), chosen, tell), support)
+
+    def make(tell: Progress) -> TouchScene:
+        made = create(name, load(model, progress=tell), chosen, tell)
+        if made.model.path is not None:
+            with_own_stiffness(made)
+        return scene_of(made, support)
+
+    return make
 
 
 def _with_scene(model: ModelLike, options: RenderOptions) -> RenderOptions:
