@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import pytest
 
 from diagnose.pipeline import diagnose
@@ -18,11 +20,14 @@ EXPECTED = {
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("stated", [True, False], ids=["phase stated", "phase left out"])
 @pytest.mark.parametrize("name", EXPECTED)
-def test_labelled(shared_recordings, name):
+def test_labelled(shared_recordings, name, stated):
     from reconstruct.pipeline import ReconstructOptions, reconstruct
 
     recording = read_recording(shared_recordings / f"{name}.toml")
+    if not stated:
+        recording = dataclasses.replace(recording, boundary_phase=None)
     result = diagnose(recording, reconstruct(recording, ReconstructOptions()))
     assert list(result.effects) == [EXPECTED[name]], result.words()
     assert result.gap_after_n < result.gap_before_n or EXPECTED[name] == "inclusion"
