@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mechanics.errors import DiagnosisError as DiagnosisError
     from mechanics.errors import MeshError as MeshError
     from mechanics.errors import ModelError as ModelError
+    from mechanics.errors import NoBaseError as NoBaseError
     from mechanics.errors import OptionError as OptionError
     from mechanics.errors import PalpateError as PalpateError
     from mechanics.errors import RecordingError as RecordingError
@@ -59,7 +60,7 @@ _DOOR = {
     "palpate.results.simulation": "Simulation",
     "render.base": "Renderer",
     "mechanics.errors": (
-        "PalpateError RecordingError ContactError SurfaceError MeshError ModelError CacheError OptionError "
+        "PalpateError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError CacheError OptionError "
         "DeviceError SceneError DiagnosisError"
     ),
 }

@@ -6,10 +6,13 @@ import dataclasses
 import inspect
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 
 import pytest
 
 import palpate as pp
+import render.press
+import render.replay  # noqa: F401
 from palpate.keywords import FUNCTIONS, kinds
 
 from ..render import shapes
@@ -34,9 +37,14 @@ def rooms(monkeypatch):
     ):
         monkeypatch.setattr(name, listening)
     rendered = []
-    monkeypatch.setattr("render.registry.create", lambda name, model, options, tell: rendered.append(options))
+
+    def created(name, model, options, tell):
+        rendered.append(options)
+        return SimpleNamespace(model=SimpleNamespace(path=None))
+
+    monkeypatch.setattr("render.registry.create", created)
     monkeypatch.setattr("render.scene.scene_of", lambda made, support: listening(*rendered, support))
-    monkeypatch.setattr("diagnose.placing.placed", lambda recording, model: model)
+    monkeypatch.setattr("reconstruct.placing.presses_on", lambda recording, model: model.presses)
 
 
 def call(name, recording, **options):
