@@ -60,8 +60,8 @@ _DOOR = {
     "palpate.results.simulation": "Simulation",
     "render.base": "Renderer",
     "mechanics.errors": (
-        "PalpateError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError CacheError OptionError "
-        "DeviceError SceneError DiagnosisError"
+        "PalpateError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError CacheError "
+        "OptionError DeviceError SceneError DiagnosisError"
     ),
 }
 _HOME = {name: module for module, names in _DOOR.items() for name in names.split()}

@@ -7,8 +7,8 @@ held, dragged, lifted and set down again.
 from __future__ import annotations
 
 import itertools
+from dataclasses import replace
 from functools import partial
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -20,6 +20,7 @@ from mechanics.compliance import load_or_condense
 from mechanics.effects.registry import effect, effects
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.places import solve_places
+from mechanics.presses import of_paths
 from mechanics.sites import tangents, touch_solver
 from render.fem import FemRenderer
 from render.options import RenderOptions
@@ -87,13 +88,14 @@ def places(model):  # type: ignore[no-untyped-def]
 
 
 def _forward(places, y) -> Forward:  # type: ignore[no-untyped-def]
-    n = len(y)
-    view = SimpleNamespace(
-        start=np.array([0, n]), t=STEP_S * np.arange(n), y=y, press=np.zeros(n, dtype=int), presses=1,
-        sites=1, site=np.zeros(1, dtype=int), frame=places.frame, point=places.point, normal=places.normal,
-        samples_per_step=1, extra={"position": np.zeros((n, 3)), "lead": np.zeros((n, 3))},
+    tip = places.model.tool.tip_radius_m
+    centre = POINT + tip * UP
+    position = centre - y @ places.frame[0]
+    presses = of_paths(
+        np.array([0, len(y)]), position, np.zeros_like(y), centre[None], UP[None], tip_radius_m=tip,
+        sample_rate_hz=1 / STEP_S,
     )  # fmt: skip
-    return Forward(view, places)
+    return Forward(replace(presses, columns={"lead": np.zeros_like(y)}), places)
 
 
 def predicted_and_rendered(names, model, places, compliance, seed=0):  # type: ignore[no-untyped-def]
