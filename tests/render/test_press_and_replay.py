@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import OptionError, RecordingError
+from mechanics.presses import cut
 from mechanics.recording import Recording
 from palpate.cli import main
 from render.press import greatest_difference, press, read_curve, write_curve
@@ -72,7 +73,12 @@ def test_replay_error_counts_contact_samples_of_phase_two_only(cylinder_renderer
     force[200:600] += [0.5, 0, 0]  # phase I: the tip leans on the support
     recording = Recording(t, position, force, 1000.0, TIP, boundary_phase=(0.1, 0.8))
     forces = replay(cylinder_renderer, t, position)
-    error = replay_error(recording, cylinder_renderer.model, forces)
+    touched = np.flatnonzero(curve.depth > 0)[0]
+    presses = cut(
+        recording, onset_s=t[[lead + touched]], peak_s=t[[lead + int(np.argmax(curve.depth))]],
+        centre=curve.position[[touched]], normal=np.array([[0.0, 0.0, 1.0]]),
+    )  # fmt: skip
+    error = replay_error(recording, presses, forces)
     assert error.rmse_n == pytest.approx(0.01 * np.sqrt(3), rel=0.05)
     touched = np.linalg.norm(np.vstack([np.zeros((lead, 3)), curve.force]), axis=1) > 0.05
     assert error.contact[touched].all() and not error.contact[:1000].any()
