@@ -29,11 +29,12 @@ def regressed_gap(forward: Forward, residual: np.ndarray, penalty: float = 1.0) 
     t = forward.touches
     rows = np.flatnonzero(t.counted)
     r = residual[rows]
-    f = (t.f - residual)[rows, 0]
-    depth = np.clip(t.y[rows, 0], 0, None) / max(t.deepest.max(), 1e-6)
+    f = (t.local_force - residual)[rows, 0]
+    deepest = max(t.deepest.max(), 1e-6)
+    depth = np.clip(t.travel[rows, 0], 0, None) / deepest
     speed = t.speed[rows] / max(np.abs(t.speed[rows]).max(), 1e-9)
     since = np.clip(t.t[rows] - t.onset_s[t.press[rows]], 0, 3)
-    lags = [np.clip(np.roll(t.y[:, 0], k)[rows], 0, None) / max(t.deepest.max(), 1e-6) for k in (2, 5, 10)]
+    lags = [np.clip(np.roll(t.travel[:, 0], k)[rows], 0, None) / deepest for k in (2, 5, 10)]
     place = (t.point[t.press[rows]] - t.point.mean(axis=0)) / max(t.point.std(), 1e-9)
     base = [np.ones_like(f), depth, depth**2, speed, speed**2, since, *lags, *place.T]
     features = np.stack([b * f for b in base] + base[1:] + [depth * speed, speed * since], axis=1)

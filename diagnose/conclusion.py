@@ -53,7 +53,7 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
     sure = sureness(answer.remainder, closed, bool(answer.candidates))
-    residual_before = found.ideal.residual + evidence.settled.residual
+    residual_before = found.ideal.residual + evidence.instrument_offsets.residual
     result = Diagnosis(
         noise_n=noise,
         gap_before_n=before_n,
@@ -82,11 +82,11 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
 
 
 def _gaps(evidence: Evidence) -> Gaps:
-    search, found, settled = evidence.search, evidence.found, evidence.settled
+    search, found, offsets = evidence.search, evidence.found, evidence.instrument_offsets
     if not evidence.refit:
-        return Gaps(found.ideal.plain + settled.plain(search.whitener, found.ideal), found.final.plain, {})
+        return Gaps(found.ideal.plain + offsets.plain(search.whitener, found.ideal), found.final.plain, {})
     added = evidence.forward.touches.thinned_away
-    old = held_out_by_refit(search, found.ideal.found, settled.residual, added)
+    old = held_out_by_refit(search, found.ideal.found, offsets.residual, added)
     new = held_out_by_refit(search, found.final.found, None, added)
     held = {"deepest": (old.deepest_n, new.deepest_n), "fastest": (old.fastest_n, new.fastest_n)}
     return Gaps(old.plain, new.plain, held)
@@ -94,7 +94,7 @@ def _gaps(evidence: Evidence) -> Gaps:
 
 def _never_worse(evidence: Evidence, answer: Answer, gaps: Gaps, counts: np.ndarray) -> np.ndarray:
     """(g,) N^2, held out with what may be named; what makes the gap grow goes to the answer's candidates."""
-    search, settled = evidence.search, evidence.settled
+    search, offsets = evidence.search, evidence.instrument_offsets
     whitener = search.whitener
     final, base = evidence.found.final.found, evidence.found.base.found.names
     added = evidence.forward.touches.thinned_away
@@ -103,10 +103,10 @@ def _never_worse(evidence: Evidence, answer: Answer, gaps: Gaps, counts: np.ndar
         if names == tuple(answer.names):
             return gaps.after
         fitted = search.judge([e for e in final.effects if e.name in (*names, *base)])
-        put_back = None if set(settled.names) <= set(names) else settled.residual
+        put_back = None if set(offsets.names) <= set(names) else offsets.residual
         if evidence.refit:
             return held_out_by_refit(search, fitted.found, put_back, added).plain
-        return fitted.plain if put_back is None else fitted.plain + settled.plain(whitener, fitted)
+        return fitted.plain if put_back is None else fitted.plain + offsets.plain(whitener, fitted)
 
     kept = never_worse(answer.names, gaps.before, after, counts, whitener.explained, seed=evidence.seed)
     if kept.dropped:
@@ -128,7 +128,8 @@ def _entries(
     sure: float,
     rng: np.random.Generator,
 ) -> tuple[EffectEntry, ...]:
-    forward, search, found, settled = evidence.forward, evidence.search, evidence.found, evidence.settled
+    forward, search, found = evidence.forward, evidence.search, evidence.found
+    offsets = evidence.instrument_offsets
     noise, added = evidence.noise_n, evidence.forward.touches.thinned_away
     best = max((max(s.gain, 0.0) for s in found.scores.values()), default=0.0)
     draws = max(100, evidence.bootstrap // 4)
@@ -164,7 +165,7 @@ def _entries(
         )  # fmt: skip
     entries += [
         dataclasses.replace(e, probability=min(e.probability, sure))
-        for e in settled.entries(gaps.before, found.ideal, counts, noise, added, rng)
+        for e in offsets.entries(gaps.before, found.ideal, counts, noise, added, rng)
     ]
     for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
@@ -178,7 +179,7 @@ def _errors(evidence: Evidence) -> dict[str, float]:
     """Our own errors in newtons rms: sensor noise, repeatability of sites, shape, and the rest of the
     model."""
     t = evidence.forward.touches
-    rms = float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
+    rms = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
     residual = evidence.found.final.residual
     return {
         "sensor": evidence.noise_n,

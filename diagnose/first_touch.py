@@ -18,7 +18,7 @@ def first_touches(
     t = forward.touches
     shifts = np.linspace(-reach_m, reach_m, 25)
     cost = np.empty((len(shifts), len(t)))
-    measured = np.where(t.counted, t.f[:, 0], 0.0)
+    measured = np.where(t.counted, t.local_force[:, 0], 0.0)
     for i, shift in enumerate(shifts):
         settings = forward.ideal(modulus)
         settings.onset = settings.onset + shift

@@ -145,7 +145,7 @@ class Descent:
 
     def residual(self, values: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(n, 3) N, measured less predicted."""
-        return self.forward.touches.f - self.forward.predict(
+        return self.forward.touches.local_force - self.forward.predict(
             settings_of(self.forward, self.effects, values, onset)
         )
 
@@ -163,7 +163,7 @@ class Descent:
 
     def jacobian(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(n, 3, k) of the prediction, by forward differences."""
-        base = self.forward.touches.f - residual
+        base = self.forward.touches.local_force - residual
         columns = np.empty((*residual.shape, len(values)))
         for i in range(len(values)):
             moved = values.copy()
@@ -226,7 +226,7 @@ class Descent:
         """(p,) misfit of every press beside the likeliest factor on its force, and the price of its shift."""
         t = self.forward.touches
         keep = t.counted[:, None]
-        r, f = np.where(keep, residual, 0.0), np.where(keep, t.f - residual, 0.0)
+        r, f = np.where(keep, residual, 0.0), np.where(keep, t.local_force - residual, 0.0)
 
         def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
             each = (a * b).sum(axis=1)
@@ -239,7 +239,7 @@ class Descent:
         """One Gauss-Newton move of every first touch, beside a free factor on its press's force."""
         t = self.forward.touches
         h = 2e-5
-        predicted = t.f - residual
+        predicted = t.local_force - residual
         ahead = self.forward.predict(settings_of(self.forward, self.effects, values, onset + h))
         slope = np.nan_to_num((ahead - predicted) / h)
         slope[~t.counted] = 0.0

@@ -88,7 +88,7 @@ class Forward:
     def predict(self, s: Settings) -> np.ndarray:
         """(n, 3) N on the tool, local frames."""
         t = self.touches
-        y = t.y.copy()
+        y = t.travel.copy()
         y[:, 0] += s.onset[t.press]
         for move in s.moves:
             y = move(y)
@@ -106,10 +106,10 @@ class Forward:
         t = self.touches
         table = np.array(s.touch.law_of_dent(s.nu).table)
         usual = self.model.material.young_modulus_pa
-        give = s.tool_give * s.modulus / usual
+        compliance = float(s.tool_compliance * s.modulus / usual)
         arrays = (y, s.far, s.stiffness, s.dent_ratio, table)
         tip = self.tip_radius * s.touch.tip_ratio
-        key = hash((tip, s.nu, give, s.touch.friction, *(a.tobytes() for a in arrays)))
+        key = hash((tip, s.nu, compliance, s.touch.friction, *(a.tobytes() for a in arrays)))
         f = self._kept.get(key)
         if f is None:
             radius = effective_radius(tip, self.places.curvature)
@@ -118,7 +118,7 @@ class Forward:
             modulus = usual * s.stiffness
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)
             kernel.integrate(
-                t.starts, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, float(give), mu, f
+                t.starts, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, compliance, mu, f
             )
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))

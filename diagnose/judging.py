@@ -276,7 +276,7 @@ def sideways_off(forward: Forward, candidate: Candidate) -> float:
     """
     t = forward.touches
     residual = candidate.residual[t.counted, 1:]
-    predicted = t.f[t.counted, 1:] - residual
+    predicted = t.local_force[t.counted, 1:] - residual
     missed, force = (float(np.sqrt((x**2).sum(axis=1).mean())) for x in (residual, predicted))
     if missed < np.sqrt(2) * t.noise.raw_n or missed < SIDEWAYS_SHARE * force:
         return 0.0

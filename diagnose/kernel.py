@@ -22,22 +22,23 @@ SUB_PLACES = 5
 
 
 @numba.njit(cache=True, error_model="numpy")
-def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_give, mu, out):
+def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, mu, out):
     """Force on the tool along every press.
 
     start: (p + 1,) first sample of each press. y: (n, 3) m. far: (p, 3, 3) unit modulus, 1/m.
     radius: (p,) m, of tip and surface together. e_dent, e_far: (p,) Pa, modulus under the tip and of the
-    whole. table: of a dent law. tool_give: 1 / k of a spring in series, m/N. mu: friction; inf: the tip
+    whole. table: of a dent law. tool_compliance: 1 / k of a spring in series, m/N. mu: friction; inf: the tip
     sticks. Writes out: (n, 3) N.
     """
     order = np.array([1, 2, 0])
     state = np.zeros(STATE_SIZE)
-    give = np.empty((3, 3))
+    compliance = np.empty((3, 3))
     d = np.empty(3)
     for p in range(start.shape[0] - 1):
         for i in range(3):
             for j in range(3):
-                give[i, j] = far[p, order[i], order[j]] / e_far[p] + (tool_give if i == j else 0.0)
+                own = tool_compliance if i == j else 0.0
+                compliance[i, j] = far[p, order[i], order[j]] / e_far[p] + own
         plane_strain = e_dent[p] / (1.0 - nu * nu)
         stick = 4.0 * e_dent[p] / ((1.0 + nu) * (2.0 - nu))
         touch_remember(state, 0.0, 0.0, 0.0, 0.0, radius[p])
@@ -57,7 +58,7 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_give, mu, ou
                 d[1] = anchor2 - y[i, 2]
                 d[2] = -y[i, 0]
                 fu, fv, fn, dent, a, du, dv, _k = touch_solve(
-                    state, d, give, table, radius[p], plane_strain, stick
+                    state, d, compliance, table, radius[p], plane_strain, stick
                 )
                 state[1] = dent  # where the next solution starts from
                 pull = np.sqrt(fu * fu + fv * fv)
@@ -66,7 +67,7 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_give, mu, ou
                 fv *= kept
                 if excess == 0.0:
                     break
-                both = 1.0 / (stick * a) + 0.5 * (give[0, 0] + give[1, 1])
+                both = 1.0 / (stick * a) + 0.5 * (compliance[0, 0] + compliance[1, 1])
                 length = slip_length(slip, excess, before, length, both, 1.0)
                 before = excess
                 anchor1 += length * fu / pull

@@ -13,10 +13,10 @@ LEAST_SD = 0.015
 
 
 def misfit_of(forward: Forward, base: Fit, site_sd: np.ndarray) -> Misfit:
-    """Each press's factor on the force, and how it answers to a give; site_sd: (p,) prior of the shape."""
+    """Each press's factor on the force, and how it answers to compliance. site_sd: (p,) of the shape."""
     t = forward.touches
     keep = t.counted[:, None]
-    predicted = np.where(keep, t.f - base.residual, 0.0)[:, 0]
+    predicted = np.where(keep, t.local_force - base.residual, 0.0)[:, 0]
     residual = np.where(keep, base.residual, 0.0)[:, 0]
 
     def sums(a: np.ndarray) -> np.ndarray:

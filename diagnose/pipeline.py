@@ -10,10 +10,10 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
+from diagnose.instrument_offsets import find_instrument_offsets
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
-from diagnose.settled import settle
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of
 from diagnose.verdict import Evidence
@@ -75,7 +75,7 @@ def diagnose(
     lap("sites")
     excluded = {n.strip() for n in options.without.split(",") if n.strip()}
     allowed = effects(without=excluded)
-    settled = settle(forward, free, excluded)
+    offsets = find_instrument_offsets(forward, free, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
     search = Search(
         forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
@@ -91,7 +91,7 @@ def diagnose(
     found = attribute(search, tried, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
     evidence = Evidence(
-        forward, search, found, free, settled, site_sd, frozenset(excluded), options.shape_gain,
+        forward, search, found, free, offsets, site_sd, frozenset(excluded), options.shape_gain,
         options.bootstrap, options.seed, refit=not options.fast,
     )  # fmt: skip
     result = conclude(evidence, lap)

@@ -34,7 +34,7 @@ def site_factors(found: Fit, touches: Presses) -> tuple[np.ndarray, np.ndarray]:
     """(s,) factor by which each site is stiffer than predicted, and its standard error (repeats and
     noise)."""
     factor, error = np.ones(touches.sites), np.ones(touches.sites)
-    predicted = touches.f - found.residual
+    predicted = touches.local_force - found.residual
     for site in range(touches.sites):
         rows = (touches.site[touches.press] == site) & touches.counted
         f, r = predicted[rows].ravel(), found.residual[rows].ravel()
@@ -50,7 +50,7 @@ def repeat_scatter(residual: np.ndarray, touches: Presses) -> float:
     each = np.zeros(len(t))
     for press in range(len(t)):
         rows = (t.press == press) & t.counted
-        f, r = (t.f[rows] - residual[rows]).ravel(), residual[rows].ravel()
+        f, r = (t.local_force[rows] - residual[rows]).ravel(), residual[rows].ravel()
         each[press] = f @ r / max(f @ f, 1e-12)
     factors = [
         each[own] - each[own].mean()
@@ -60,7 +60,7 @@ def repeat_scatter(residual: np.ndarray, touches: Presses) -> float:
     if not factors:
         return float("nan")
     spread = np.concatenate(factors)
-    rms = np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean())
+    rms = np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean())
     return float(np.sqrt((spread**2).sum() / max(len(spread) / 2, 1)) * rms)
 
 

@@ -30,7 +30,7 @@ class HeldOut:
 def held_out_by_refit(search: Search, found: Fit, extra: np.ndarray | None, added: float) -> HeldOut:
     """Fit modulus, effects and first touches again without each fold, and weigh the fold.
 
-    extra: (n, 3) N, put back onto the residual (readings that free air settled). added: N^2, noise that
+    extra: (n, 3) N, put back onto the residual (instrument offsets). added: N^2, noise that
     thinning took off. A press's own first touch is a nuisance and is moved for held-out presses too; neither
     modulus nor effects see them.
     """

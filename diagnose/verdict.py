@@ -10,8 +10,8 @@ from diagnose.attribution import Attribution
 from diagnose.finite import predicted_size
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir
+from diagnose.instrument_offsets import InstrumentOffsets
 from diagnose.judging import Search, sideways_off
-from diagnose.settled import Settled
 from diagnose.shape import heterogeneity, site_factors
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
@@ -41,7 +41,7 @@ class Evidence:
     search: Search
     found: Attribution
     free: FreeAir | None
-    settled: Settled
+    instrument_offsets: InstrumentOffsets
     site_sd: np.ndarray
     excluded: frozenset[str]
     shape_gain: float
@@ -80,8 +80,8 @@ class Answer:
 
 def answer_of(evidence: Evidence, counts: np.ndarray) -> Answer:
     """Weigh the search's outcome. counts: (g,) thinned contact samples of each site."""
-    found, settled = evidence.found, evidence.settled
-    answer = Answer([*settled.names, *found.chosen], list(found.rivals), list(settled.reasons))
+    found, offsets = evidence.found, evidence.instrument_offsets
+    answer = Answer([*offsets.names, *found.chosen], list(found.rivals), list(offsets.reasons))
     misfit, lone = _misfit(evidence, counts, answer)
     answer.remainder = misfit
     _slipping(evidence, answer)
@@ -172,7 +172,7 @@ def _shape(evidence: Evidence, answer: Answer) -> None:
     factor, error = site_factors(found.final.found, t)
     per_site = np.array([evidence.site_sd[t.site == s].mean() for s in range(t.sites)])
     gain, spread = heterogeneity(factor, error, per_site)
-    felt_n = spread * float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
+    felt_n = spread * float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
     if gain <= evidence.shape_gain or felt_n <= SHAPE_FELT * evidence.noise_n:
         return
     allowed = [n for n in _rest() if n not in evidence.excluded]

@@ -81,8 +81,8 @@ def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:
         rows = np.flatnonzero((t.press == p) & t.counted & (t.phase != 3))
         if len(rows) < 8:
             continue
-        r, y, v, phase = residual[rows], t.y[rows, 0], t.speed[rows], t.phase[rows]
-        force = max(np.abs(t.f[rows, 0]).max(), 1e-3)
+        r, y, v, phase = residual[rows], t.travel[rows, 0], t.speed[rows], t.phase[rows]
+        force = max(np.abs(t.local_force[rows, 0]).max(), 1e-3)
         level[p] = r[:, 0].mean() / force
         shape = y / max(y.max(), 1e-4)
         out["depth"][p] = _slope(shape - shape.mean(), r[:, 0]) / force
@@ -96,7 +96,7 @@ def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:
             a, b = half[: len(half) // 2], half[len(half) // 2 :]
             decay = (r[a, 0].mean() - r[b, 0].mean()) / force
             out["phase"][p] = decay if np.isnan(out["phase"][p]) else out["phase"][p] + decay
-        drag = t.y[rows, 1:] - t.y[rows[0], 1:]
+        drag = t.travel[rows, 1:] - t.travel[rows[0], 1:]
         length = np.linalg.norm(drag, axis=1)
         if length.max() > 2e-4:
             out["direction"][p] = (r[:, 1:] * drag).sum() / (length.sum() * force)
@@ -150,7 +150,7 @@ def _levels(t: Presses, residual: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     level, se = np.zeros(t.sites), np.zeros(t.sites)
     for site in range(t.sites):
         rows = (t.site[t.press] == site) & t.counted
-        f = (t.f - residual)[rows, 0]
+        f = (t.local_force - residual)[rows, 0]
         power = max(f @ f, 1e-9)
         level[site] = f @ residual[rows, 0] / power
         se[site] = t.noise_n / np.sqrt(power)
@@ -187,9 +187,9 @@ def _shares(t: Presses, residual: np.ndarray) -> dict[str, float]:
     """Share of the mean square that each axis's own patterns explain, alone, by least squares."""
     rows = np.flatnonzero(t.counted)
     r = residual[rows]
-    f = (t.f - residual)[rows]
+    f = (t.local_force - residual)[rows]
     normal = f[:, 0]
-    press, y, v = t.press[rows], t.y[rows, 0], t.speed[rows]
+    press, y, v = t.press[rows], t.travel[rows, 0], t.speed[rows]
     depth = np.clip(y, 0, None)
     total = (r**2).sum()
     floor = 3 * len(rows) * t.noise_n**2
@@ -222,7 +222,7 @@ def _curves(t: Presses, residual: np.ndarray) -> dict[str, tuple[np.ndarray, np.
     normal, site = residual[rows, 0], t.site[t.press[rows]]
     result = {}
     axes = {
-        "depth (mm)": t.y[rows, 0] * 1e3,
+        "depth (mm)": t.travel[rows, 0] * 1e3,
         "speed of pressing (mm/s)": t.speed[rows] * 1e3,
         "time since first touch (s)": t.t[rows] - t.onset_s[t.press[rows]],
         "clock (s)": t.t[rows],

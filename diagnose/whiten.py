@@ -111,7 +111,7 @@ def nuisance_columns(
     moved.onset = settings.onset + small
     site_sd = np.full(len(t), options.site_stiffness) if site_sd is None else site_sd
     deepest = np.maximum(t.deepest[t.press], 1e-4)
-    bend = np.clip(t.y[:, 0], 0, None) / deepest - 0.7
+    bend = np.clip(t.travel[:, 0], 0, None) / deepest - 0.7
     normal = f[:, 0]
     zero = np.zeros_like(normal)
     tangential = np.column_stack([zero, f[:, 1], f[:, 2]])

@@ -1,8 +1,8 @@
 """The far field of places in an object that is not uniform, or not of the stated Poisson's ratio.
 
-The give of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that are
-stiffer by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on one
-array. Another Poisson's ratio is a new factorisation, done once at a few values and interpolated.
+The compliance of a place is a sum over elements, C(p, p) = sum_e u_e^T K_e u_e (unit modulus). Elements that
+are stiffer by m_e take their share divided by about m_e, so inclusions, gradients and skins are weights on
+one array. Another Poisson's ratio is a new factorisation, done once at a few values and interpolated.
 """
 
 from __future__ import annotations
@@ -70,7 +70,7 @@ def _energies(places: Places) -> EnergyFields:
 
 
 def far_with_weights(places: Places, softness: np.ndarray) -> np.ndarray:
-    """(p, 3, 3) far field with each element's share of the give multiplied by softness (m,) (1:
+    """(p, 3, 3) far field with each element's share of the compliance multiplied by softness (m,) (1:
     unchanged)."""
     energy = energy_fields(places).energy
     change = np.einsum("qmij,m->qij", energy, (softness - 1).astype(np.float32), optimize=True)

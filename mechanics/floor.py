@@ -24,7 +24,7 @@ _NEAR = 12  # places among which one that is solved already gives the guess
 def carried_by_floor(
     solver: Solver, points: np.ndarray, normals: np.ndarray, patch_width_m: float
 ) -> np.ndarray:
-    """(k, 3, 3) 1/m that the floor takes off the give of patches at points (k, 3) m, unit modulus.
+    """(k, 3, 3) 1/m that the floor takes off the compliance of patches at points (k, 3) m, unit modulus.
 
     solver: its base bonded in part. normals: (k, 3) outward at the points.
     """
@@ -35,7 +35,7 @@ def carried_by_floor(
         return result
     up = solver.hold.normal
     average = PatchSampler(mesh, patch_width_m).matrix(points)
-    give = np.empty((len(nodes), len(nodes)))
+    compliance = np.empty((len(nodes), len(nodes)))
     reach = np.empty((len(points), 3, len(nodes)))
     for start in range(0, len(nodes), _COLUMNS):
         some = nodes[start : start + _COLUMNS]
@@ -43,33 +43,33 @@ def carried_by_floor(
         loads[some, :, np.arange(len(some))] = up
         moved = solver.solve(loads)
         part = slice(start, start + len(some))
-        give[:, part] = np.einsum("bxc,x->bc", moved[nodes], up)
+        compliance[:, part] = np.einsum("bxc,x->bc", moved[nodes], up)
         means = average @ moved.reshape(len(mesh.points), -1)
         reach[:, :, part] = means.reshape(len(points), 3, len(some))
-    give = 0.5 * (give + give.T)
+    compliance = 0.5 * (compliance + compliance.T)
     near = cKDTree(points).query(points, k=min(_NEAR, len(points)))[1].reshape(len(points), -1)
     known: dict[int, np.ndarray] = {}
     for k, normal in enumerate(normals):
         guess = next((known[j] for j in near[k] if j in known), None)
-        held = known[k] = resting(give, -normal @ reach[k], guess)
+        held = known[k] = resting(compliance, -normal @ reach[k], guess)
         if held.any():
             own = reach[k][:, held]
-            result[k] = own @ solve(give[np.ix_(held, held)], own.T, assume_a="pos")
+            result[k] = own @ solve(compliance[np.ix_(held, held)], own.T, assume_a="pos")
     return result
 
 
-def resting(give: np.ndarray, motion: np.ndarray, guess: np.ndarray | None = None) -> np.ndarray:
+def resting(compliance: np.ndarray, motion: np.ndarray, guess: np.ndarray | None = None) -> np.ndarray:
     """(b,) bool: nodes that rest on the floor, where their motion (b,) upward without it may not go down.
 
-    give: (b, b), motion a unit push of the floor. guess: (b,) bool, to begin with. Complementarity by
+    compliance: (b, b), motion a unit push of the floor. guess: (b,) bool, to begin with. Complementarity by
     switching the wrong ones until none is left, or a few rounds are over.
     """
     held = (motion < 0) if guess is None else guess.copy()
     for _ in range(_ROUNDS):
         pressure = np.zeros(len(motion))
         if held.any():
-            pressure[held] = solve(give[np.ix_(held, held)], -motion[held], assume_a="pos")
-        gap = motion + give @ pressure
+            pressure[held] = solve(compliance[np.ix_(held, held)], -motion[held], assume_a="pos")
+        gap = motion + compliance @ pressure
         pulls = pressure < -_SMALL * np.abs(pressure).max()
         wrong = (held & pulls) | (~held & (gap < -_SMALL * np.abs(motion).max()))
         if not wrong.any():

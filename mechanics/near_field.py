@@ -22,7 +22,7 @@ CONTACT_IN_TIP_RADII = 0.44
 solution (tops 4, 8, 14 mm deep: 1.05, 1.00, 1.00 of the contrast; docs/mechanics.md)."""
 
 USUAL_TIP_RADIUS_M = 0.005
-_NEGLIGIBLE = 1e-3  # of the contact's own give
+_NEGLIGIBLE = 1e-3  # of the contact's own compliance
 _BATCH = 32
 
 
@@ -53,7 +53,7 @@ def sharpening(
     tip_radius_m: float = USUAL_TIP_RADIUS_M,
     progress: Progress = silent,
 ) -> np.ndarray:
-    """(k, 3, 3) 1/m: to add to the give of places (k, 3) under their patches, unit modulus.
+    """(k, 3, 3) 1/m: to add to the compliance of places (k, 3) under their patches, unit modulus.
 
     (C[n, n] - C[s, s]) - (the same of the uniform object) / m, for the contact's width n, the patch's s and
     the modulus ratio m of the surface there. Zero for an object of one modulus, and where first-order
@@ -82,7 +82,7 @@ def sharpening(
 
 
 def _estimate(solver: Solver, points: np.ndarray, soft: np.ndarray, narrow: float, wide: float) -> np.ndarray:
-    """(k,) about how much the width of the load matters, over the contact's own give.
+    """(k,) about how much the width of the load matters, over the contact's own compliance.
 
     First-order energies of the elements that differ from the surface, with Eshelby's factor of a ball, in
     the strain of a force on an incompressible half-space, 3 (F.x)^2 / (2 pi^2 E rho^6) an energy.

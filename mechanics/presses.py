@@ -212,15 +212,15 @@ class Presses:
         return np.array([np.stack([n, *tangents(n)]) for n in self.normal]).reshape(-1, 3, 3)
 
     @cached_property
-    def y(self) -> np.ndarray:
+    def travel(self) -> np.ndarray:
         """(n, 3) m, how far the tip's centre has gone into the object since it met the surface, local frame:
-        y[:, 0] is the depth along -normal."""
+        travel[:, 0] is the depth along -normal."""
         met = (self.point + self.tip_radius_m * self.normal)[self.press]
         return -np.einsum("nij,nj->ni", self.frame[self.press], self.position - met)
 
     @cached_property
-    def f(self) -> np.ndarray:
-        """(n, 3) N on the tool, local frame: pressing gives f[:, 0] > 0."""
+    def local_force(self) -> np.ndarray:
+        """(n, 3) N on the tool, local frame: pressing gives local_force[:, 0] > 0."""
         return np.einsum("nij,nj->ni", self.frame[self.press], self.force)
 
     @cached_property
@@ -247,7 +247,7 @@ class Presses:
         """(n,) LOADING, HOLDING (within a tenth of the greatest depth), UNLOADING, or OUTSIDE the touch."""
         out = np.full(len(self.t), HOLDING)
         for p, (a, b) in enumerate(zip(self.starts[:-1], self.starts[1:], strict=True)):
-            depth, t = self.y[a:b, 0], self.t[a:b]
+            depth, t = self.travel[a:b, 0], self.t[a:b]
             if not len(depth):
                 continue
             deepest = depth.max()
@@ -262,7 +262,7 @@ class Presses:
     def deepest(self) -> np.ndarray:
         """(p,) m, greatest depth below the surface."""
         return np.array(
-            [self.y[a:b, 0].max() for a, b in zip(self.starts[:-1], self.starts[1:], strict=True)]
+            [self.travel[a:b, 0].max() for a, b in zip(self.starts[:-1], self.starts[1:], strict=True)]
         )
 
     @cached_property
@@ -270,7 +270,7 @@ class Presses:
         """(n,) m/s, rate of the depth below the surface, smoothed over five rows."""
         out = np.zeros(len(self.t))
         for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
-            smooth = np.convolve(np.pad(self.y[a:b, 0], 2, mode="edge"), np.full(5, 0.2), mode="valid")
+            smooth = np.convolve(np.pad(self.travel[a:b, 0], 2, mode="edge"), np.full(5, 0.2), mode="valid")
             out[a:b] = np.gradient(smooth, self.t[a:b])
         return out
 

@@ -1,6 +1,6 @@
 """A nodal field between the corners of a surface: its second derivatives, from the corners around.
 
-Beside an edge the give of a place bends within one triangle of 5 mm; linear interpolation is felt there.
+Beside an edge the compliance of a place bends within one triangle of 5 mm; linear interpolation is felt.
 """
 
 from __future__ import annotations

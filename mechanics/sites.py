@@ -1,4 +1,4 @@
-"""Touch sites: the far-field give of an object at given points of its surface, from one solve each."""
+"""Touch sites: the far-field compliance of an object at given points of its surface, from one solve each."""
 
 from __future__ import annotations
 

@@ -57,15 +57,15 @@ def _condensed(places: Places) -> dict[str, np.ndarray]:
     lift = sp.kron(interpolation, axes.T, format="csr")[fixed]  # support axes to the device's
     coupling = (full[free][:, fixed] @ lift).tocsc()
     own = (lift.T @ (full[fixed][:, fixed] @ lift)).toarray()
-    give = np.empty_like(own)
+    compliance = np.empty_like(own)
     for a in range(0, len(own), _BATCH):
         part = coupling[:, a : a + _BATCH].toarray()
-        give[:, a : a + _BATCH] = coupling.T @ solver.solve_free(part).reshape(part.shape)
+        compliance[:, a : a + _BATCH] = coupling.T @ solver.solve_free(part).reshape(part.shape)
     loads = fields.solution.reshape(3 * len(mesh.points), -1)[free]
     reaction = (coupling.T @ loads).reshape(len(own), -1, 3).transpose(1, 0, 2)
     return {
         "plane": (mesh.points[corners] - places.model.support.point) @ axes[1:].T,
-        "stiffness": own - 0.5 * (give + give.T),
+        "stiffness": own - 0.5 * (compliance + compliance.T),
         "mass": _mass(mesh, corners),
         "reaction": np.ascontiguousarray(reaction),
     }
@@ -121,8 +121,8 @@ def far_on_springs(places: Places, normal: float, tangential: float) -> np.ndarr
     q, b3, _ = motion.reaction.shape
     flat = motion.reaction.transpose(1, 0, 2).reshape(b3, 3 * q)
     moved = cho_solve(factor, flat).reshape(b3, q, 3)
-    give = np.einsum("qbi,bqj->qij", motion.reaction, moved)
-    return places.far + give[places.place]
+    compliance = np.einsum("qbi,bqj->qij", motion.reaction, moved)
+    return places.far + compliance[places.place]
 
 
 def far_partly_bonded(places: Places, free_fraction: float, angle: float, floor: float) -> np.ndarray:
@@ -143,8 +143,8 @@ def far_partly_bonded(places: Places, free_fraction: float, angle: float, floor:
     lower = (1 - v) * table[i, j] + v * table[i, j + 1]
     upper = (1 - v) * table[i + 1, j] + v * table[i + 1, j + 1]
     both = (1 - w) * lower + w * upper
-    give = (1 - floor) * both[0] + floor * both[1]
-    return places.far + give[places.place]
+    compliance = (1 - floor) * both[0] + floor * both[1]
+    return places.far + compliance[places.place]
 
 
 def _table(motion: SupportMotion) -> np.ndarray:
@@ -158,7 +158,7 @@ def _table(motion: SupportMotion) -> np.ndarray:
 
 
 def loosened(motion: SupportMotion, fraction: float, angle: float) -> np.ndarray:
-    """(2, q, 3, 3) give added by a loose part: without and with a floor under it."""
+    """(2, q, 3, 3) compliance added by a loose part: without and with a floor under it."""
     where = motion.plane @ [np.cos(angle), np.sin(angle)]
     weight = motion.mass.sum(axis=1)
     order = np.argsort(where, kind="stable")
@@ -172,13 +172,13 @@ def loosened(motion: SupportMotion, fraction: float, angle: float) -> np.ndarray
     free = np.einsum("qbi,bc,qcj->qij", reaction, inverse, reaction, optimize=True)
     normal = np.arange(0, len(rows), 3)
     # eliminating the tangential motion leaves the normal one, to which the floor's pressure is dual
-    give_normal = inverse[np.ix_(normal, normal)]
+    normal_compliance = inverse[np.ix_(normal, normal)]
     carried = np.empty_like(free)
     for k in range(q):
         motion_free = -inverse[normal] @ reaction[k]
-        held = resting(give_normal, -motion_free[:, 0])
+        held = resting(normal_compliance, -motion_free[:, 0])
         carried[k] = free[k]
         if held.any():
             part = motion_free[held]
-            carried[k] -= part.T @ solve(give_normal[np.ix_(held, held)], part, assume_a="pos")
+            carried[k] -= part.T @ solve(normal_compliance[np.ix_(held, held)], part, assume_a="pos")
     return np.stack([free, carried])

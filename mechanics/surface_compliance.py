@@ -30,7 +30,7 @@ from mechanics.solver import Solver
 from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
-WIDE_PATCH_M = 0.008  # of the mutual give of a large surface, whatever its elements
+WIDE_PATCH_M = 0.008  # of the mutual compliance of a large surface, whatever its elements
 _CORNERS = 32  # patches solved at once
 
 
@@ -129,7 +129,7 @@ def surface_compliance(
     width = patch_width(coarse.mesh)
     tables = {}
     if low_rank_error is None:
-        blocks = patch_blocks(coarse, points, width, lambda f: progress("give between places", 0.3 * f))
+        blocks = patch_blocks(coarse, points, width, lambda f: progress("compliance between places", 0.3 * f))
     else:
         width = max(width, WIDE_PATCH_M)
         blocks = np.zeros((0, 0, 3, 3), dtype=np.float32)
@@ -143,12 +143,13 @@ def surface_compliance(
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
     own_width = patch_width(fine.mesh)
-    own = own_blocks(fine, own_points, own_width, lambda f: progress("give of each place", 0.3 + 0.5 * f))
+    each = "compliance of each place"
+    own = own_blocks(fine, own_points, own_width, lambda f: progress(each, 0.3 + 0.5 * f))
     if balls:  # what covers the whole surface is in the dent: its law, and the modulus under the tip
         own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
     if loose:
         own -= carried_by_floor(fine, own_points, own_normals, own_width)
-    progress("give of each place", 1.0)
+    progress(each, 1.0)
     return SurfaceCompliance(
         nodes=nodes,
         points=points,

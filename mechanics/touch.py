@@ -1,6 +1,6 @@
 """The force of a touch: a sphere that sticks to an elastic body, followed along the path of its centre.
 
-The displacement d of the tip since first touch is shared by the local dent and the give of the whole
+The displacement d of the tip since first touch is shared by the local dent and the compliance of the whole
 object,
     d = dent(F) + far F / E,
 with the normal dent after a law of mechanics.dent and a tangential stick: every ring of the contact circle
@@ -20,7 +20,7 @@ from numba import njit
 from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
 from mechanics.sites import TouchSites, tangents
 
-_STIFFEST = 0.8  # of a contact's own give, the most that a near support may take away
+_STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
 STATE_SIZE = 4 + 3 * _RINGS
 """state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
@@ -117,33 +117,34 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
     low, high = 0.0, (press + np.sqrt(d[0] * d[0] + d[1] * d[1])) / (1.0 - _STIFFEST)
     dent = state[1] if 0.0 < state[1] < high else 0.5 * press
     tolerance = 1e-10 * radius
-    fn = fu = fv = a = du = dv = stiffness = give = 0.0
+    fn = fu = fv = a = du = dv = stiffness = compliance = 0.0
     for _ in range(80):
         fn, stiffness, a = dent_force(table, dent, radius, plane_strain_modulus)
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
-        give = max(cnn, -_STIFFEST / stiffness)
-        # near an edge the coupling may exceed what keeps the joint give positive definite
+        compliance = max(cnn, -_STIFFEST / stiffness)
+        # near an edge the coupling may exceed what keeps the joint compliance positive definite
         cun, cvn = far[0, 2], far[1, 2]
         couple = cun * cun + cvn * cvn
-        least = (1.0 / stiffness + give) * (1.0 / (stick * a) + max(min(cuu, cvv), -_STIFFEST / (stick * a)))
+        held = stick * a
+        least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -_STIFFEST / held))
         if couple > _STIFFEST * least:
             cun *= np.sqrt(_STIFFEST * least / couple)
             cvn *= np.sqrt(_STIFFEST * least / couple)
-        # on the object the normal force is -fn n; its far-field give appears in the tangential balance
+        # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
         fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[0] + cun * fn, d[1] + cvn * fn)
-        excess = dent + give * fn - cun * fu - cvn * fv - press
+        excess = dent + compliance * fn - cun * fu - cvn * fv - press
         if excess > 0.0:
             high = dent
         else:
             low = dent
-        step = -excess / (1.0 + give * stiffness)
+        step = -excess / (1.0 + compliance * stiffness)
         if abs(step) < tolerance:
             break
         dent += step
         if not (low < dent < high):
             dent = 0.5 * (low + high)
-    return -fu, -fv, fn, dent, a, du, dv, stiffness / (1.0 + give * stiffness)
+    return -fu, -fv, fn, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness)
 
 
 @njit(cache=True, error_model="numpy")

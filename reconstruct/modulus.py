@@ -177,7 +177,7 @@ def _greatest_consistent(
     """Greatest depth whose moduli agree, site by site, with those of every smaller depth (after Lepski).
 
     far: (k,) far-field compliance along the normal, 1/m. Two depths disagree where the mean of ln(deep /
-    shallow), or its trend with the far-field compliance (which a law that fails for the whole body's give
+    shallow), or its trend with the far-field compliance (which a law that fails for the whole body
     brings about), is beyond its 99 % interval and half a percent.
     """
     chosen, rows = ladder[0], []
@@ -197,18 +197,18 @@ def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) 
     if len(labels) < 4:
         return False
     mean = np.array([np.median(difference[both & (site == s)]) for s in labels])
-    give = np.array([np.median(far[both & (site == s)]) for s in labels])
+    compliance = np.array([np.median(far[both & (site == s)]) for s in labels])
     middle = np.median(mean)
     certain = float(student.ppf(0.995, len(mean) - 1))
     error = 1.25 * _scatter(mean - middle) / np.sqrt(len(mean))
     if abs(middle) > max(certain * error, _AGREE):
         return True
-    if len(labels) < 8 or np.ptp(give) <= 0:
+    if len(labels) < 8 or np.ptp(compliance) <= 0:
         return False
     # the trend over the sites' whole range, Theil-Sen, with the error of a least-squares line of that scatter
-    slope, intercept, _, _ = theilslopes(mean, give)
-    error = _scatter(mean - intercept - slope * give) / (np.sqrt(len(give)) * np.std(give))
-    return bool(abs(slope) * np.ptp(give) > max(certain * error * np.ptp(give), _AGREE))
+    slope, intercept, _, _ = theilslopes(mean, compliance)
+    error = _scatter(mean - intercept - slope * compliance) / (np.sqrt(len(compliance)) * np.std(compliance))
+    return bool(abs(slope) * np.ptp(compliance) > max(certain * error * np.ptp(compliance), _AGREE))
 
 
 def _scatter(values: np.ndarray) -> float:

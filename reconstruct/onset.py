@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-_LEAST_GIVE = 1e-12
+_LEAST_COMPLIANCE = 1e-12
 _NEWTON_STEPS = 8
 _LEAST_SQUARES_STEPS = 60
 _SOFT = 3.0  # standard deviations
@@ -24,25 +24,25 @@ class Rise:
     u0_m: float
     u0_error_m: float
     hertz: float
-    give: float
+    compliance: float
     misfit_n: float
 
 
-def contact_law(u: np.ndarray, hertz: float, give: float) -> np.ndarray:
+def contact_law(u: np.ndarray, hertz: float, compliance: float) -> np.ndarray:
     """Force F (N) at travel u (m) with u = (F / h)^(2/3) + c F, zero for u <= 0.
 
-    hertz: h = 4/3 E* sqrt(R), N/m^1.5; give: c, m/N.
+    hertz: h = 4/3 E* sqrt(R), N/m^1.5; compliance: c, m/N.
     """
-    return _cube_root(np.asarray(u, dtype=float), hertz ** (-2 / 3), give) ** 3
+    return _cube_root(np.asarray(u, dtype=float), hertz ** (-2 / 3), compliance) ** 3
 
 
-def _cube_root(u: np.ndarray, dent: float, give: float) -> np.ndarray:
+def _cube_root(u: np.ndarray, dent: float, compliance: float) -> np.ndarray:
     """y = F^(1/3) of c y^3 + dent y^2 = u, by Newton; dent = h^(-2/3)."""
     u = np.maximum(u, 0.0)
     # the lesser of the two laws alone bounds the root from above: Newton on this convex cubic falls onto it
-    y = np.minimum(np.sqrt(u / dent), np.cbrt(u / max(give, _LEAST_GIVE)))
+    y = np.minimum(np.sqrt(u / dent), np.cbrt(u / max(compliance, _LEAST_COMPLIANCE)))
     for _ in range(_NEWTON_STEPS):
-        y -= (give * y**3 + dent * y**2 - u) / np.maximum(3 * give * y**2 + 2 * dent * y, 1e-30)
+        y -= (compliance * y**3 + dent * y**2 - u) / np.maximum(3 * compliance * y**2 + 2 * dent * y, 1e-30)
     return np.maximum(y, 0.0)
 
 
@@ -91,11 +91,11 @@ def _residual(
     p: np.ndarray, travel: np.ndarray, force: np.ndarray, noise_n: float
 ) -> tuple[np.ndarray, np.ndarray]:
     """Residuals (n,) in standard deviations and their derivatives (n, 3) by u0, ln c and ln h."""
-    give, dent = np.exp(p[1]), np.exp(-2 / 3 * p[2])
-    y = _cube_root(travel - p[0], dent, give)
+    compliance, dent = np.exp(p[1]), np.exp(-2 / 3 * p[2])
+    y = _cube_root(travel - p[0], dent, compliance)
     # dF/du, of the same cubic; the other derivatives follow from du = y^3 dc + y^2 d(dent)
-    slope = 3 * y / np.maximum(3 * give * y + 2 * dent, 1e-30)
-    by = np.column_stack([-slope, -slope * give * y**3, slope * 2 / 3 * dent * y**2])
+    slope = 3 * y / np.maximum(3 * compliance * y + 2 * dent, 1e-30)
+    by = np.column_stack([-slope, -slope * compliance * y**3, slope * 2 / 3 * dent * y**2])
     return (y**3 - force) / noise_n, by / noise_n
 
 

@@ -112,8 +112,8 @@ class FemRenderer(Renderer):
             )
             for corner, weight in zip(p.parents[t], weights @ p.parent_weights[t], strict=True):
                 if corner >= 0:
-                    give = weight / p.young_modulus_pa[0]
-                    corners[:-1] -= give * self.compliance.displacement(corner, force)
+                    compliance = weight / p.young_modulus_pa[0]
+                    corners[:-1] -= compliance * self.compliance.displacement(corner, force)
         moved = np.einsum("vc,vcx->vx", self.contact.node_weights, corners[self._drawn])
         for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
             draw_dent(arrays.vertices, moved, point, normal, radius, depth)

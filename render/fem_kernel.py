@@ -1,4 +1,4 @@
-"""The step of the finite-element renderer: local dents in series with the condensed give of the whole object.
+"""The step of the finite-element renderer: local dents in series with the object's condensed compliance.
 
 For each tip i that is held at the surface point p_i (render.contact), with the tip's centre at c_i,
 

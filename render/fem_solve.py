@@ -83,9 +83,9 @@ def solve_one(p, state, tips, i):
         if excess == 0.0:
             break
         # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho
-        give = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
+        compliance = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
         lever = max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
-        length = slip_length(slip, excess, before, length, give, lever)
+        length = slip_length(slip, excess, before, length, compliance, lever)
         before = excess
         for k in range(3):
             move[k] = -length * (fu * frame[0, k] + fv * frame[1, k]) / pull

@@ -44,7 +44,7 @@ class Role(Enum):
     """How a diagnosis comes to an effect."""
 
     SEARCHED = "tried, alone and beside others"
-    FREE_AIR = "settled in free air before any press is looked at"
+    FREE_AIR = "found in free air before any press is looked at"
     KNOWN = "known physics without a parameter: in every solid, so that only its size is asked"
     REST = "what is left between places where nothing else explains them"
 
@@ -91,8 +91,8 @@ class Law:
 @dataclass(frozen=True)
 class Misfit:
     """What starts can be sought from; p presses. level: (p,) share by which each is stiffer than predicted.
-    answer: (p,) change of that share a unit of give along the normal, unit modulus, m. weight: (p,) of the
-    level, 1 over its variance."""
+    answer: (p,) change of that share a unit of compliance along the normal, unit modulus, m. weight: (p,) of
+    the level, 1 over its variance."""
 
     level: np.ndarray
     answer: np.ndarray

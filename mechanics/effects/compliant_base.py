@@ -5,13 +5,13 @@ import numpy as np
 from mechanics.effects.base import Effect, Parameter, Scope, unchanged
 from mechanics.support_motion import far_on_springs
 
-_FELT = 1.5e-3  # share of the object's height that counts as no give
+_FELT = 1.5e-3  # share of the object's height that counts as no compliance
 
 
 def _springs(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
     """(normal, tangential) stiffness a unit of area, Pa/m."""
-    give, ratio = np.exp(values)
-    normal = modulus_pa / (give * float(scene.places.height.max()))
+    compliance, ratio = np.exp(values)
+    normal = modulus_pa / (compliance * float(scene.places.height.max()))
     return float(normal), float(normal * ratio)
 
 
@@ -38,7 +38,7 @@ EFFECT = Effect(
     scope=Scope.PLACES,
     words="the support under the object gives",
     parameters=(
-        Parameter("log_give_of_height", "ln 1", np.log(1e-3), 2.5, np.log(1e-3), (-1.5, 0.0), 0.05),
+        Parameter("log_compliance_of_height", "ln 1", np.log(1e-3), 2.5, np.log(1e-3), (-1.5, 0.0), 0.05),
         Parameter("log_tangential", "ln 1", -2.5, 1.0, -0.5, (-0.5, -0.5), 0.05, 0.7),
     ),
     report=_report,

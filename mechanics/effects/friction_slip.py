@@ -28,16 +28,16 @@ def slip_excess(slip, pull, push, mu):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def slip_length(slip, excess, before, length, give, lever):  # type: ignore[no-untyped-def]
+def slip_length(slip, excess, before, length, compliance, lever):  # type: ignore[no-untyped-def]
     """How far the anchor walks, m, for an excess, N; before: that of the last walk of `length`.
 
-    give: m/N, of dent and object together. lever: by how much the centre moves over a surface that is bent,
-    1 on a plane. A little less than what the excess stretches, so that the force comes down onto the cone and
-    is never left inside it.
+    compliance: m/N, of dent and object together. lever: by how much the centre moves over a surface that is
+    bent, 1 on a plane. A little less than what the excess stretches, so that the force comes down onto the
+    cone and is never left inside it.
     """
     if slip > 0 and excess < 0.5 * before:
         return length * SECANT_CAUTION * excess / (before - excess)
-    return CAUTION * give * excess / lever
+    return CAUTION * compliance * excess / lever
 
 
 def _touch(touch, keys, model):  # type: ignore[no-untyped-def]

@@ -1,6 +1,6 @@
 """Inclusion: a stiffer (or softer) ball inside. Felt at the places above it.
 
-The give that the ball's elements hold is divided by Eshelby's factor of a spherical inclusion in an
+The compliance that the ball's elements hold is divided by Eshelby's factor of a spherical inclusion in an
 incompressible solid, so that a hard ball does not vanish from the sum: share = 5 (m - 1) / (2 m + 3). That is
 first order, which finds a ball; at a fit it is multiplied, place by place, so that it equals the change of a
 new factorisation there (`refine`). Fitting again moves the ball a little; twice is enough.
@@ -29,7 +29,7 @@ FOUND = "diagnosed"
 
 
 def softness(ratio: float) -> float:
-    """Factor on the give of the ball's elements for a modulus ratio (Eshelby, nu = 0.5)."""
+    """Factor on the compliance of the ball's elements for a modulus ratio (Eshelby, nu = 0.5)."""
     return 1 - 5 * (ratio - 1) / (2 * ratio + 3)
 
 
@@ -40,7 +40,7 @@ def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float)
 
 
 def first_order(values, places):  # type: ignore[no-untyped-def]
-    """(p, 3, 3) 1/m, change of each press's give, unit modulus, to first order in the ball's own energy."""
+    """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
     fields = energy_fields(places)
     share = inside(fields.centroid, values[:3], values[3], _blur(fields))
     return far_with_weights(places, 1 + share * (softness(np.exp(values[4])) - 1)) - places.far
@@ -68,8 +68,8 @@ def _refine(scene, values):  # type: ignore[no-untyped-def]
     for k, press in enumerate(places.first):
         nodes, weights = sampler.weights(places.point[press])
         forces[nodes, :, k] = weights[:, None] * places.normal[press]
-    give = np.einsum("nik,nik->k", forces, solver.solve(forces))
-    exact = (give - fields.energy[:, :, 0, 0].sum(axis=1))[places.place]
+    compliance = np.einsum("nik,nik->k", forces, solver.solve(forces))
+    exact = (compliance - fields.energy[:, :, 0, 0].sum(axis=1))[places.place]
     first = first_order(values, places)[:, 0, 0]
     known = np.abs(first) > 1e-3 * np.abs(first).max()
     scale = np.where(known, exact / np.where(known, first, 1.0), 1.0)
@@ -79,19 +79,19 @@ def _refine(scene, values):  # type: ignore[no-untyped-def]
 def _seek(scene, misfit: Misfit) -> list[np.ndarray]:  # type: ignore[no-untyped-def]
     """Balls on a grid inside the object, ranked by how well they explain the places' stiffness.
 
-    First order: the share of each place's give that lies in the ball, times how its force answers to its
-    give, against each press's factor on the force, weighted, with a free common factor.
+    First order: the share of each place's compliance that lies in the ball, times how its force answers to
+    compliance, against each press's factor on the force, weighted, with a free common factor.
     """
     places = scene.places
     fields = energy_fields(places)
-    give = fields.energy[:, :, 0, 0]
+    compliance = fields.energy[:, :, 0, 0]
     centres = _centres(fields.centroid)
     blur = _blur(fields)
     weight, level = misfit.weight, misfit.level
     found = []
     for radius in RADII_M:
         share = np.array([inside(fields.centroid, c, radius, blur) for c in centres], dtype=np.float32)
-        pattern = (give @ share.T)[places.place] * misfit.answer[:, None]
+        pattern = (compliance @ share.T)[places.place] * misfit.answer[:, None]
         for centre, column in zip(centres, pattern.T, strict=True):
             x = np.stack([np.ones_like(column), column], axis=1)
             normal = x.T @ (weight[:, None] * x)

@@ -44,8 +44,8 @@ class Settings:
 
     modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the
     tip over the global one. onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,)
-    factor. tool_give: m/N, of a spring in series at the stated modulus. moves: where the tip is, (n, 3) m,
-    from where it reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the
+    factor. tool_compliance: m/N, of a spring in series at the stated modulus. moves: where the tip is, (n, 3)
+    m, from where it reads. readings: what is read, (n, 3) N in the device frame, from what is felt; in the
     order of their numbers.
     """
 
@@ -56,7 +56,7 @@ class Settings:
     onset: np.ndarray
     stiffness: np.ndarray
     touch: Touch = field(default_factory=Touch)
-    tool_give: float = 0.0
+    tool_compliance: float = 0.0
     moves: list[Callable[[np.ndarray], np.ndarray]] = field(default_factory=list)
     readings: list[tuple[int, Callable[[np.ndarray], np.ndarray]]] = field(default_factory=list)
 

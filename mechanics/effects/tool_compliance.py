@@ -8,7 +8,7 @@ from mechanics.effects.base import Effect, Parameter, Scope
 
 
 def _change(settings, values, scene):  # type: ignore[no-untyped-def]
-    settings.tool_give = values[0]
+    settings.tool_compliance = values[0]
 
 
 def _correct(recording, keys):  # type: ignore[no-untyped-def]
@@ -21,7 +21,7 @@ EFFECT = Effect(
     domain="instrument",
     scope=Scope.EVERYWHERE,
     words="the tool bends: the tip is not where the position sensor says",
-    parameters=(Parameter("give_m_per_n", "m/N", 0.0, 0.01, 0.0, (5e-4,), 5e-5),),
+    parameters=(Parameter("compliance_m_per_n", "m/N", 0.0, 0.01, 0.0, (5e-4,), 5e-5),),
     report=lambda values, scene, modulus_pa: {"stiffness_n_per_m": float(1 / np.maximum(values[0], 1e-9))},
     change=_change,
     correct=_correct,

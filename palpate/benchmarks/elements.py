@@ -1,8 +1,8 @@
 """Which tetrahedron: linear, quadratic, quadratic with mean dilatation, on a thin bonded block near nu =
 0.5.
 
-The give of a 100 x 100 x 30 mm block, bonded below, under a Gaussian patch of 15 mm at the middle of its
-top, over that of a mixed element (Taylor-Hood: quadratic displacement, linear pressure; scikit-fem), which
+The compliance of a 100 x 100 x 30 mm block, bonded below, under a Gaussian patch of 15 mm amid its top,
+over that of a mixed element (Taylor-Hood: quadratic displacement, linear pressure; scikit-fem), which
 cannot lock, on a finer mesh; and degrees of freedom. An element that locks is too stiff: a ratio below 1.
 """
 
@@ -42,14 +42,14 @@ def patch_load(mesh: TetMesh) -> np.ndarray:
     return force
 
 
-def give(mesh: TetMesh, nu: float, mean_dilatation: bool | None) -> tuple[float, int]:
+def compliance(mesh: TetMesh, nu: float, mean_dilatation: bool | None) -> tuple[float, int]:
     """(compliance of the patch for unit modulus 1/m, degrees of freedom)."""
     solver = Solver(mesh, nu, mean_dilatation=mean_dilatation)
     force = patch_load(mesh)
     return float((solver.solve(force) * force).sum()), len(solver.free)
 
 
-def mixed_give(mesh: TetMesh, nu: float) -> float:
+def mixed_compliance(mesh: TetMesh, nu: float) -> float:
     """The same by Taylor-Hood elements; mesh: quadratic."""
     lam, mu = lame_parameters(1.0, nu)
     linear = mesh.linear()
@@ -72,21 +72,21 @@ def mixed_give(mesh: TetMesh, nu: float) -> float:
 
 
 def run(arguments: argparse.Namespace) -> dict:
-    """Print give over the mixed element's, element by element and mesh by mesh."""
+    """Print compliance over the mixed element's, element by element and mesh by mesh."""
     if not available():
         raise OptionError("the mixed element's system is factorised by MKL Pardiso, which is not here")
     sizes = {"15 mm": (7, 7, 2), "10 mm": (10, 10, 3), "7.5 mm": (13, 13, 4), "6 mm": (17, 17, 5)}
     finest = box_mesh((18, 18, 6), (0.1, 0.1, 0.03)).quadratic()
     result: dict = {}
     for nu in arguments.poisson_ratio:
-        reference = mixed_give(finest, nu)
-        coarser = mixed_give(box_mesh((13, 13, 4), (0.1, 0.1, 0.03)).quadratic(), nu)
+        reference = mixed_compliance(finest, nu)
+        coarser = mixed_compliance(box_mesh((13, 13, 4), (0.1, 0.1, 0.03)).quadratic(), nu)
         rows = []
         for kind, (order, mean) in KINDS.items():
             row: list = [kind]
             for name, cells in sizes.items():
                 mesh = box_mesh(cells, (0.1, 0.1, 0.03))
-                value, dofs = give(mesh if order == 1 else mesh.quadratic(), nu, mean)
+                value, dofs = compliance(mesh if order == 1 else mesh.quadratic(), nu, mean)
                 row += [value / reference, dofs]
                 result[f"{nu} {kind} {name}"] = value / reference
             rows.append(row)

@@ -4,7 +4,7 @@ The block of the paper, refined towards its surface; the tables that `load_or_co
 beyond some 2,000 corners. Dense: the mutual table of all corners in float32; its precompute is a solve a
 column, timed on a sample and scaled. Errors are against solves: of the force of a press of 5 mm at
 corners of the table and at places drawn at random (interpolated), greatest and root mean square; and of how
-one place moves another, over the give of a place under itself.
+one place moves another, over the compliance of a place under itself.
 Times are CPU seconds. A tick is a step of the finite-element renderer with 1 and with 8 tips in contact.
 """
 
@@ -59,7 +59,7 @@ def press_errors(
 
 
 def errors(made: SurfaceCompliance, solver: Solver, places: int, seed: int) -> dict[str, float]:
-    """Errors of force and of mutual give at random places, against solves there."""
+    """Errors of force and of mutual compliance at random places, against solves there."""
     rng = np.random.default_rng(seed)
     corners = rng.choice(len(made.own_points), places, replace=False)
     at_corners = press_errors(made, solver, made.own_points[corners], made.own_normals[corners])
@@ -82,8 +82,8 @@ def errors(made: SurfaceCompliance, solver: Solver, places: int, seed: int) -> d
             found = np.zeros((3, 3))
             for corner, weight in zip(made.triangles[triangle[j]], weights[j], strict=True):
                 for axis in range(3):
-                    give = made.displacement(corner, np.eye(3)[axis])[made.triangles[triangle[i]]]
-                    found[:, axis] += weight * (weights[i] @ give)
+                    compliance = made.displacement(corner, np.eye(3)[axis])[made.triangles[triangle[i]]]
+                    found[:, axis] += weight * (weights[i] @ compliance)
             worst = max(worst, np.linalg.norm(found - exact) / np.linalg.norm(own))
     return {
         "corner_error_greatest": float(at_corners.max()),

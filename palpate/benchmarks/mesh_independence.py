@@ -55,8 +55,8 @@ def point_force(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, depth: f
     for k, (node, normal) in enumerate(zip(nodes, normals, strict=True)):
         forces[node, :, k] = normal
     moved = solver.solve(forces)
-    give = np.array([moved[node, :, k] @ normals[k] for k, node in enumerate(nodes)])
-    return MODULUS * depth / give
+    compliance = np.array([moved[node, :, k] @ normals[k] for k, node in enumerate(nodes)])
+    return MODULUS * depth / compliance
 
 
 def run(arguments: argparse.Namespace) -> dict:

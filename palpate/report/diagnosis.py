@@ -30,7 +30,7 @@ MOST_EFFECTS = 8
 def write_report(path: Path | str, recording: Recording, model: Model, result: Diagnosis) -> Path:
     """Write one self-contained HTML page; returns its path."""
     t = result.forward.touches
-    typical = float(np.sqrt((t.f[t.counted] ** 2).sum(axis=1).mean()))
+    typical = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
     page = Page(f"Simulated touch against measured touch: {recording.name}")
     page.lead(verdict(result))
     page.cards(answers(result, typical))

@@ -66,7 +66,7 @@ def _press(ax: Any, result: Diagnosis, press: int) -> None:
     t = result.forward.touches
     rows = (t.press == press) & t.counted
     clock = t.t[rows] - t.onset_s[press]
-    force = t.f[rows, 0]
+    force = t.local_force[rows, 0]
     ax.plot(clock, force, color=MEASURED, lw=1.8, label="measured")
     ax.plot(clock, force - result.residual_before[rows, 0], color=IDEAL, lw=1.2, label="simulated")
     if result.effects:

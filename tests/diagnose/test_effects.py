@@ -116,14 +116,14 @@ def test_relaxation_decays_by_its_time_constant(forward):
     press = int(
         np.argmax([(t.phase[a:b] == 1).sum() for a, b in zip(t.starts[:-1], t.starts[1:], strict=True)])
     )
-    hold = np.flatnonzero((t.press == press) & (np.abs(t.speed) < 1e-4) & (t.y[:, 0] > 1e-3))[4:-4]
+    hold = np.flatnonzero((t.press == press) & (np.abs(t.speed) < 1e-4) & (t.travel[:, 0] > 1e-3))[4:-4]
     extra = slow[hold, 0] - plain[hold, 0]
     decay = np.polyfit(t.t[hold], np.log(extra), 1)[0]
     assert decay == pytest.approx(-10.0, rel=0.05)
 
 
 def test_springs_of_a_base_are_stated_for_the_fitted_modulus(forward):
-    """Twice the modulus on the same give of the height: springs twice as stiff."""
+    """Twice the modulus on the same compliance of the height: springs twice as stiff."""
     base = effect("compliant_base")
     one, two = (base.report(np.log([0.2, 0.5]), forward, e) for e in (MODULUS, 2 * MODULUS))
     assert one["k_normal_pa_per_m"] == pytest.approx(MODULUS / (0.2 * 0.04))

@@ -119,7 +119,7 @@ def predicted_and_rendered(names, model, places, compliance, seed=0):  # type: i
     renderer = renderer._with(surface=flat, curvature=np.zeros(vertices))
     renderer = renderer.with_field(np.tile(frame.T @ settings.far[0] @ frame, (vertices, 1, 1)))
     centre = POINT + model.tool.tip_radius_m * UP
-    tips = centre - forward.touches.y @ frame
+    tips = centre - forward.touches.travel @ frame
     forces = renderer.follow(renderer.start(), tips[:, None], np.full(len(tips), STEP_S))[:, 0]
     return predicted, forces @ frame.T
 

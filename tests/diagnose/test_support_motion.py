@@ -21,7 +21,7 @@ def places(bench):  # type: ignore[no-untyped-def]
     return build_forward(touches_of(model.presses), model).places
 
 
-def _give(places, hold):  # type: ignore[no-untyped-def]
+def _compliance(places, hold):  # type: ignore[no-untyped-def]
     """(q, 3, 3) added by a support, by factorising it."""
     fields = energy_fields(places)
     mesh = fields.solver.mesh
@@ -41,7 +41,7 @@ def _give(places, hold):  # type: ignore[no-untyped-def]
 
 @pytest.mark.parametrize(("normal", "tangential"), [(25.0, 25.0), (60.0, 20.0)])
 def test_springs(places, normal, tangential):
-    expected = _give(places, BaseHold(np.array([0, 0, 1.0]), springs=(normal, tangential)))
+    expected = _compliance(places, BaseHold(np.array([0, 0, 1.0]), springs=(normal, tangential)))
     got = far_on_springs(places, normal, tangential) - places.far
     place = places.place
     # the base moves linearly between nodes 10 mm apart here, quadratically in the factorised solution
@@ -52,7 +52,7 @@ def test_springs(places, normal, tangential):
 def test_partly_loose(places):
     across, _ = support_axes(places.model)
     # the same rows of nodes let go: here nodes are freed, there triangles
-    expected = _give(places, BaseHold(np.array([0, 0, 1.0]), bonded_fraction=0.26, direction=across))
+    expected = _compliance(places, BaseHold(np.array([0, 0, 1.0]), bonded_fraction=0.26, direction=across))
     got = loosened(support_motion(places), 0.6, 0.0)[0]
     np.testing.assert_allclose(got[:, 0, 0], expected[:, 0, 0], rtol=0.2, atol=1.0)
 

@@ -106,4 +106,4 @@ def test_repeats_that_disagree_are_told(late):
     t = search.forward.touches
     assert repeat_scatter(found.residual, t) < 0.01
     again = (t.repeat > 0)[t.press][:, None]
-    assert repeat_scatter(found.residual + 0.2 * again * t.f, t) > 0.05
+    assert repeat_scatter(found.residual + 0.2 * again * t.local_force, t) > 0.05

@@ -125,8 +125,8 @@ def test_a_held_corner_does_not_move(tables):
     assert (out == 0).all()
 
 
-def test_low_rank_tables_serve_the_same_give(box):
-    """On elements of 4 mm: mutual give from a factor, own give as in the dense form."""
+def test_low_rank_tables_serve_the_same_compliance(box):
+    """On elements of 4 mm: mutual compliance from a factor, own compliance as in the dense form."""
     mesh = box((8, 8, 5), (0.032, 0.032, 0.02))
     made = surface_compliance(mesh, 0.45, low_rank_error=0.01)
     assert made.blocks.size == 0

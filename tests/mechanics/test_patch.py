@@ -87,11 +87,11 @@ def test_wider_patches_and_stiffer_places_give_less(box):
     mesh = box((8, 8, 4), (0.1, 0.1, 0.05)).quadratic()
     solver = Solver(mesh, NU)
     middle, low = np.array([0.0, 0.0, 0.05]), np.array([0.05, 0.0, 0.012])
-    give = {}
+    compliance = {}
     for width in (patch_width(mesh), 0.02):
         sampler = PatchSampler(mesh, width)
-        give[width] = patch_compliance(solver, [sampler.weights(middle), sampler.weights(low)])
-    narrow, wide = give.values()
+        compliance[width] = patch_compliance(solver, [sampler.weights(middle), sampler.weights(low)])
+    narrow, wide = compliance.values()
     assert wide[0][2, 2] < narrow[0][2, 2]
     for block in narrow:
         assert np.array_equal(block, block.T)

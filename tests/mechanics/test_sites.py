@@ -43,8 +43,8 @@ def test_sites_near_the_base_give_less(box):
     points = np.array([[0.05, 0.0, z] for z in (0.01, 0.03, 0.05)])
     normals = np.tile([1.0, 0, 0], (3, 1))
     sites = touch_sites(mesh, points, normals, 0.49, solver=Solver(mesh.quadratic(), 0.49))
-    give = sites.far[:, 0, 0]
-    assert give[0] < give[1] < give[2]
+    compliance = sites.far[:, 0, 0]
+    assert compliance[0] < compliance[1] < compliance[2]
     assert np.array_equal(sites.far, sites.far.transpose(0, 2, 1))
     assert np.abs(sites.curvature).max() < 1e-6
 

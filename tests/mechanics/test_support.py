@@ -41,14 +41,14 @@ def test_hard_springs_are_a_bond_and_a_free_part_gives_more(box):
     points = np.array([[0.05, 0.0, 0.03], [-0.05, 0.0, 0.03]])
     normals = np.array([[1.0, 0, 0], [-1.0, 0, 0]])
 
-    def give(hold):
+    def compliance(hold):
         solver = Solver(mesh, 0.49, hold=hold)
         return touch_sites(mesh, points, normals, 0.49, solver=solver, curvature=0.0).far[:, 0, 0]
 
-    bonded = give(None)
-    assert give(BaseHold(UP, springs=(1e7, 1e7))) == pytest.approx(bonded, rel=1e-3)
-    assert (give(BaseHold(UP, springs=(20.0, 20.0))) > bonded).all()
-    half = give(BaseHold(UP, bonded_fraction=0.5, direction=np.array([1.0, 0, 0])))
+    bonded = compliance(None)
+    assert compliance(BaseHold(UP, springs=(1e7, 1e7))) == pytest.approx(bonded, rel=1e-3)
+    assert (compliance(BaseHold(UP, springs=(20.0, 20.0))) > bonded).all()
+    half = compliance(BaseHold(UP, bonded_fraction=0.5, direction=np.array([1.0, 0, 0])))
     assert half[0] - bonded[0] > 2 * (half[1] - bonded[1]) > 0
 
 

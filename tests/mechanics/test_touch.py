@@ -1,4 +1,4 @@
-"""The touch law: shared give, stick along a path, unilateral, no energy made."""
+"""The touch law: shared compliance, stick along a path, unilateral, no energy made."""
 
 from __future__ import annotations
 

@@ -35,11 +35,11 @@ TILTED = Frame(
 )
 
 
-def hertz_with_give(u: np.ndarray, modulus: float, give: float) -> np.ndarray:
-    """Force at travel u: u = (F / h)^(2/3) + give F, by tabulating its inverse."""
+def hertz_with_compliance(u: np.ndarray, modulus: float, compliance: float) -> np.ndarray:
+    """Force at travel u: u = (F / h)^(2/3) + compliance F, by tabulating its inverse."""
     h = 4 / 3 * modulus / (1 - 0.49**2) * np.sqrt(TIP)
     force = np.linspace(0, 8, 200001)
-    return np.interp(u, (force / h) ** (2 / 3) + give * force, force)
+    return np.interp(u, (force / h) ** (2 / 3) + compliance * force, force)
 
 
 def sites() -> tuple[np.ndarray, np.ndarray]:
@@ -73,7 +73,7 @@ def explore_cylinder(
     *,
     frame: Frame = TILTED,
     modulus: float = 16e3,
-    give: float = 2e-3,
+    compliance: float = 2e-3,
     depth: float = 0.006,
     noise: float = NOISE,
     bias: tuple[float, float, float] = (0.0, 0.0, 0.0),
@@ -134,7 +134,7 @@ def explore_cylinder(
         side = np.cross(normal, [0.3, 0.5, 0.8])
         path = start - travel[:, None] * (normal + 0.08 * side)
         inside = travel - 0.02
-        push = hertz_with_give(np.maximum(inside, 0), modulus, give)
+        push = hertz_with_compliance(np.maximum(inside, 0), modulus, compliance)
         if point[2] == 0:
             push = np.maximum(inside, 0) * 4000
         if adhesion_n:

@@ -37,7 +37,7 @@ def test_every_press_is_found_with_its_first_touch(cylinder):
 
 
 def test_the_fitted_onset_beats_the_papers_threshold():
-    recording, _ = explore_cylinder(modulus=60e3, give=5e-4, seed=3)
+    recording, _ = explore_cylinder(modulus=60e3, compliance=5e-4, seed=3)
     fitted, backtracked = onset_errors(explore(recording)), onset_errors(explore(recording, method="paper"))
     assert np.median(np.abs(fitted)) < 0.5 * np.median(np.abs(backtracked))
 
@@ -138,7 +138,7 @@ def test_a_press_on_the_support_is_rejected_and_named():
 
 
 def test_the_papers_mode_names_presses_below_its_threshold():
-    recording, onsets = explore_cylinder(modulus=29e3, give=5e-4)
+    recording, onsets = explore_cylinder(modulus=29e3, compliance=5e-4)
     exploration = explore(recording, method="paper", contact_options=ContactOptions(least_palpations=1))
     weak = [reason for _, reason in exploration.rejected if "below 1 N" in reason]
     assert weak

@@ -28,9 +28,9 @@ def pressed(deep: float = 0.011) -> Presses:
     for node, start in zip(nodes, centres, strict=True):
         load = np.zeros((len(MESH.points), 3))
         load[node, 2] = -1.0
-        give = -solver.solve(load)[node, 2]
+        compliance = -solver.solve(load)[node, 2]
         positions.append(start - travel[:, None] * np.array([0, 0, 1.0]))
-        forces.append(np.outer(travel * E / give, [0, 0, 1.0]))
+        forces.append(np.outer(travel * E / compliance, [0, 0, 1.0]))
     up = np.tile([0.0, 0.0, 1.0], (len(nodes), 1))
     return of_paths(
         200 * np.arange(len(nodes) + 1), np.vstack(positions), np.vstack(forces), centres, up,

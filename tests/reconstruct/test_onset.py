@@ -6,12 +6,12 @@ import pytest
 from reconstruct.onset import contact_law, fit_rise
 
 
-@pytest.mark.parametrize(("hertz", "give"), [(2000.0, 2e-3), (2000.0, 1e-9), (1e5, 5e-3), (50.0, 1e-3)])
-def test_the_law_solves_its_equation(hertz, give):
+@pytest.mark.parametrize(("hertz", "compliance"), [(2000.0, 2e-3), (2000.0, 1e-9), (1e5, 5e-3), (50.0, 1e-3)])
+def test_the_law_solves_its_equation(hertz, compliance):
     u = np.linspace(-1e-3, 8e-3, 200)
-    force = contact_law(u, hertz, give)
+    force = contact_law(u, hertz, compliance)
     assert (force[u <= 0] == 0).all()
-    assert (force / hertz) ** (2 / 3) + give * force == pytest.approx(np.maximum(u, 0), abs=1e-9)
+    assert (force / hertz) ** (2 / 3) + compliance * force == pytest.approx(np.maximum(u, 0), abs=1e-9)
 
 
 def test_the_fit_recovers_the_law_and_its_error_is_honest():

@@ -214,12 +214,12 @@ def test_the_modulus_scales_the_force_without_precomputation(cylinder_renderer):
 
 
 def test_a_series_compliance_is_felt_as_a_spring(cylinder_renderer):
-    give = 1e-3
+    compliance = 1e-3
     path = down((0, 0, 0.08), 4e-3, 2000)
     plain = run(cylinder_renderer, path)[0][:, 0, 2]
-    soft = run(cylinder_renderer.with_series_compliance(give), path)[0][-1, 0, 2]
+    soft = run(cylinder_renderer.with_series_compliance(compliance), path)[0][-1, 0, 2]
     depth = np.linspace(-5e-4, 4e-3, 2000)
-    assert soft == pytest.approx(np.interp(4e-3 - give * soft, depth, plain), rel=2e-3)
+    assert soft == pytest.approx(np.interp(4e-3 - compliance * soft, depth, plain), rel=2e-3)
 
 
 def test_replaying_a_path_is_bit_identical(cylinder_renderer):

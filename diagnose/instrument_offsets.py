@@ -1,4 +1,4 @@
-"""Effects settled from free air before any press is looked at: bias, drift, the tool's own mass.
+"""Instrument offsets, found in free air before any press is looked at: bias, drift, the tool's own weight.
 
 Their readings are taken off the forces, so that the search for other effects starts from clean ones.
 """
@@ -27,7 +27,7 @@ MASS_SHARE = 0.03
 
 
 @dataclass(frozen=True)
-class Settled:
+class InstrumentOffsets:
     """names: asserted, strongest first. residual: (n, 3) N, local: what was taken off the forces. reasons:
     words."""
 
@@ -62,12 +62,12 @@ class Settled:
         return result
 
 
-def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settled:
-    """Decide the free-air effects and take them off forward.touches.f."""
+def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]) -> InstrumentOffsets:
+    """Decide the free-air effects and take them off the forces of forward.touches."""
     t = forward.touches
-    nothing = np.zeros_like(t.f)
+    nothing = np.zeros_like(t.local_force)
     if free is None:
-        return Settled((), {}, {}, nothing, ())
+        return InstrumentOffsets((), {}, {}, nothing, ())
     duration = np.ptp(t.t) + 1e-9
     parts: dict[str, np.ndarray] = {}
     parameters: dict[str, dict] = {}
@@ -119,11 +119,11 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
         and np.linalg.norm(level) > LEAST_BIAS_N
         and BIAS.name not in excluded
     ):
-        parts[BIAS.name] = np.broadcast_to(level, t.f.shape).copy()
+        parts[BIAS.name] = np.broadcast_to(level, t.local_force.shape).copy()
         parameters[BIAS.name] = {"bias_n": level.tolist()}
         reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
     if not parts:
-        return Settled((), {}, {}, nothing, ())
+        return InstrumentOffsets((), {}, {}, nothing, ())
     turn_se = np.inf if turning is None else turning.se_n / STANDARD_GRAVITY
     mass_kg = parameters.get(INERTIA.name, {}).get("mass_kg", 0.0)
     error = {
@@ -139,7 +139,7 @@ def settle(forward: Forward, free: FreeAir | None, excluded: set[str]) -> Settle
     intervals = {
         n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters
     }
-    return Settled(tuple(order), parameters, local, taken, tuple(reasons), intervals)
+    return InstrumentOffsets(tuple(order), parameters, local, taken, tuple(reasons), intervals)
 
 
 def _around(value, error: float) -> list:  # type: ignore[no-untyped-def]
