@@ -33,10 +33,10 @@ def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
         # known physics that the fit did without is left out of the model as well
         fitted = diagnosis.attribution.final.found.names
         held = {*fitted, *diagnosis.effects, *model.effects}
-        known = [e for e in effects() if e.role is Role.KNOWN]
         model = model.with_material(dent_law="linear")
-        for each in known:
-            model = each.apply(model, {}) if each.name in held else model
+        for each in effects():
+            if each.role is Role.KNOWN and each.name in held and each.apply is not None:
+                model = each.apply(model, {})
     better = with_effects(model.with_modulus(diagnosis.young_modulus_pa), asserted)
     better = better.replaced(provenance=provenance)
     return better, [name for name in asserted if effect(name).rendered]

@@ -99,8 +99,7 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
     picked = list(zip(steps, chosen, strict=False))
     current, chosen = _without_idle(search, chosen, current)
     for effect in current.found.effects:
-        if effect.refine is not None:
-            current = _refined(search, effect, current)
+        current = _refined(search, effect, current)
     sets = [standing(scores) for scores in steps]
     rivals = _rivals(search, picked, sets, chosen)
     order = _strongest_first(search, current, chosen)
@@ -162,7 +161,10 @@ def _not_blind_to_slip(search: Search, passing: list[Score], scores: list[Score]
 
 
 def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
-    """The set with an effect's law made exact at its fit, twice; as it was where that fits worse."""
+    """The set with an effect's law made exact at its fit, twice; as it was where that fits worse or its law
+    is exact already."""
+    if effect.refine is None or effect.forget is None:
+        return current
     first = current
     for _ in range(2):
         effect.refine(search.forward, current.found.of(effect.name))

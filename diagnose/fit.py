@@ -128,7 +128,7 @@ def bounds_of(
             step.append(p.step)
             prior.append(0.0 if p.prior_std is None else 1 / p.prior_std**2)
             centre.append(p.ideal)
-    return tuple(map(np.array, (low, high, step, prior, centre)))  # type: ignore[return-value]
+    return np.array(low), np.array(high), np.array(step), np.array(prior), np.array(centre)
 
 
 class Descent:
@@ -139,7 +139,13 @@ class Descent:
     Gaussian width.
     """
 
-    def __init__(self, forward: Forward, whitener: Whitener, effects: tuple[Effect, ...], weights) -> None:  # type: ignore[no-untyped-def]
+    def __init__(
+        self,
+        forward: Forward,
+        whitener: Whitener,
+        effects: tuple[Effect, ...],
+        weights: np.ndarray | None,
+    ) -> None:
         self.forward, self.whitener, self.effects, self.weights = forward, whitener, effects, weights
         self.low, self.high, self.step, self.prior, self.centre = bounds_of(effects)
 

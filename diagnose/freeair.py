@@ -59,21 +59,23 @@ def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
     t, force = recording.t, recording.force_on_tool
     edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
     size = max(1, round(BLOCK_S * rate))
-    times, means = [], []
+    centres, levels = [], []
     for a, b in zip(edges[::2], edges[1::2], strict=True):
         for i in range(a, b - size + 1, size):
-            times.append(t[i : i + size].mean())
-            means.append(force[i : i + size].mean(axis=0))
-    if len(times) < MIN_BLOCKS:
+            centres.append(t[i : i + size].mean())
+            levels.append(force[i : i + size].mean(axis=0))
+    if len(centres) < MIN_BLOCKS:
         return None
-    times, means = np.array(times), np.array(means)
+    times, means = np.array(centres), np.array(levels)
     clock = times - times.mean()
     turning, carried = None, np.zeros_like(force)
-    turned = _orientations(recording, times, size)
-    if turned is not None:
-        turning = _turning(recording, turned, clock, means)
-        carried = np.einsum("nij,j->ni", matrices(recording.quaternion), turning.tool_n)
-        means = means - np.einsum("bij,j->bi", turned, turning.tool_n)
+    if recording.quaternion is not None:
+        frames = matrices(recording.quaternion)
+        turned = frames[np.clip(np.searchsorted(t, times), 0, len(t) - 1)]
+        if turned.std(axis=0).max() > LEAST_TURN:
+            turning = _turning(turned, clock, means, frames[0])
+            carried = np.einsum("nij,j->ni", frames, turning.tool_n)
+            means = means - np.einsum("bij,j->bi", turned, turning.tool_n)
     rate_fit = clock @ means / (clock @ clock)
     left = means - means.mean(axis=0) - np.outer(clock, rate_fit)
     noise = max(float(np.sqrt((left**2).sum() / (3 * (len(times) - 2)))), noise_n / np.sqrt(size))
@@ -104,17 +106,11 @@ def matrices(quaternion: np.ndarray) -> np.ndarray:
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 
-def _orientations(recording: Recording, times: np.ndarray, size: int) -> np.ndarray | None:
-    """(b, 3, 3) tool to device at block centres; None without orientations or where they hardly change."""
-    if recording.quaternion is None:
-        return None
-    at = np.clip(np.searchsorted(recording.t, times), 0, len(recording.t) - 1)
-    turned = matrices(recording.quaternion[at])
-    return turned if turned.std(axis=0).max() > LEAST_TURN else None
+def _turning(turned: np.ndarray, clock: np.ndarray, means: np.ndarray, first: np.ndarray) -> Turning:
+    """Least squares of block means on a constant, a drift, and a vector that turns with the tool.
 
-
-def _turning(recording: Recording, turned: np.ndarray, clock: np.ndarray, means: np.ndarray) -> Turning:
-    """Least squares of block means on a constant, a drift, and a vector that turns with the tool."""
+    turned: (b, 3, 3) tool to device at the blocks' centres; first: (3, 3) at the recording's start.
+    """
     b = len(clock)
     eye = np.eye(3)
     columns = np.concatenate([np.tile(eye, (b, 1, 1)), clock[:, None, None] * eye, turned], axis=2).reshape(
@@ -124,7 +120,7 @@ def _turning(recording: Recording, turned: np.ndarray, clock: np.ndarray, means:
     left = means.reshape(-1) - columns @ solution
     covariance = np.linalg.pinv(columns.T @ columns)
     spread = np.sqrt(left @ left / max(3 * b - 9, 1) * np.diag(covariance)[6:].max())
-    return Turning(solution[6:], float(spread), matrices(recording.quaternion[:1])[0])
+    return Turning(solution[6:], float(spread), first)
 
 
 def _mass(

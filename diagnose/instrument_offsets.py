@@ -9,11 +9,14 @@ import dataclasses
 from dataclasses import dataclass, field
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
+from diagnose.judging import Candidate
 from diagnose.result import EffectEntry
+from diagnose.whiten import Whitener
 from mechanics.effects.force_bias import EFFECT as BIAS
 from mechanics.effects.force_drift import EFFECT as DRIFT
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
@@ -38,7 +41,7 @@ class InstrumentOffsets:
     reasons: tuple[str, ...]
     intervals: dict[str, dict] = field(default_factory=dict)
 
-    def plain(self, whitener, candidate) -> np.ndarray:  # type: ignore[no-untyped-def]
+    def plain(self, whitener: Whitener, candidate: Candidate) -> np.ndarray:
         """(g,) N^2: what putting the readings back adds to a candidate's plain sums of squares."""
         if not self.names:
             return np.zeros(whitener.groups)
@@ -47,8 +50,16 @@ class InstrumentOffsets:
         gram = whitener.raw_gram(both)
         return gram[:, 1, 1] + 2 * gram[:, 0, 1]
 
-    def entries(self, before, candidate, counts, noise, added, rng):  # type: ignore[no-untyped-def]
-        """The effects' lines."""
+    def entries(
+        self,
+        before: np.ndarray,
+        candidate: Candidate,
+        counts: np.ndarray,
+        noise: float,
+        added: float,
+        rng: np.random.Generator,
+    ) -> list[EffectEntry]:
+        """The effects' lines. before: (g,) N^2, what the ideal model misses; counts: (g,) samples."""
         result = []
         for name in self.names:
             after = candidate.plain
@@ -84,10 +95,11 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
             level = level - middle * free.rate_n_per_s
             level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
     turning = free.turning
-    turns = turning is not None and np.linalg.norm(turning.tool_n) > max(
+    if turning is not None and np.linalg.norm(turning.tool_n) <= max(
         Z * turning.se_n, LEAST_MASS_KG * STANDARD_GRAVITY
-    )
-    if turns and INERTIA.name not in excluded and t.quaternion is not None:
+    ):
+        turning = None  # too little to be told
+    if turning is not None and INERTIA.name not in excluded and t.quaternion is not None:
         # a tare took the weight off as it lay in the tool at first; it stays where the tool turns
         mass = float(np.linalg.norm(turning.tool_n)) / STANDARD_GRAVITY
         weight = -turning.first @ turning.tool_n
@@ -102,7 +114,7 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
         level_se = float(np.hypot(level_se, turning.se_n))
         reasons.append(f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared")
     heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
-    if heavy and not turns and INERTIA.name not in excluded:
+    if heavy and turning is None and INERTIA.name not in excluded:
         weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
         part = -free.mass_kg * forward.acceleration
@@ -124,12 +136,12 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
         reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
     if not parts:
         return InstrumentOffsets((), {}, {}, nothing, ())
-    turn_se = np.inf if turning is None else turning.se_n / STANDARD_GRAVITY
+    mass_se = free.mass_se_kg if turning is None else turning.se_n / STANDARD_GRAVITY
     mass_kg = parameters.get(INERTIA.name, {}).get("mass_kg", 0.0)
     error = {
         "bias_n": level_se,
         "rate_n_per_s": free.rate_se_n_per_s,
-        "mass_kg": np.hypot(turn_se if turns else free.mass_se_kg, MASS_SHARE * abs(mass_kg)),
+        "mass_kg": np.hypot(mass_se, MASS_SHARE * abs(mass_kg)),
     }
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
@@ -142,5 +154,5 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
     return InstrumentOffsets(tuple(order), parameters, local, taken, tuple(reasons), intervals)
 
 
-def _around(value, error: float) -> list:  # type: ignore[no-untyped-def]
+def _around(value: ArrayLike, error: float) -> list:
     return [(np.asarray(value) - 1.96 * error).tolist(), (np.asarray(value) + 1.96 * error).tolist()]

@@ -21,7 +21,7 @@ def leads(t: np.ndarray, position: np.ndarray) -> np.ndarray:
 
 
 @njit(cache=True)
-def _decayed(t, x):  # type: ignore[no-untyped-def]
+def _decayed(t, x):
     """The direction of the last step before each sample, fading with time."""
     out = np.zeros(x.shape)
     for axis in range(x.shape[1]):

@@ -78,9 +78,13 @@ def next_touch(
     if plan.drag:
         direction = direction + plan.drag / depth * _sideways(forward, press)
         direction = direction / np.linalg.norm(direction)
+    x, y, z = map(float, t.point[press])
+    towards = (float(direction[0]), float(direction[1]), float(direction[2]))
     return NextTouch(
-        *map(float, t.point[press]),
-        direction=tuple(float(d) for d in direction),
+        x,
+        y,
+        z,
+        direction=towards,
         depth_m=float(depth),
         speed_m_per_s=plan.speed,
         hold_s=plan.hold,

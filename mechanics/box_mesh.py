@@ -25,16 +25,17 @@ def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float], grad
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     points = grid.reshape(-1, 3)
     index = np.arange(len(points)).reshape(grid.shape[:3])
+    nx, ny, nz = cells
     corner = {
-        bits: index[tuple(slice(b, n - 1 + b) for b, n in zip(bits, index.shape, strict=True))].ravel()
-        for bits in itertools.product((0, 1), repeat=3)
+        (i, j, k): index[i : nx + i, j : ny + j, k : nz + k].ravel()
+        for i, j, k in itertools.product((0, 1), repeat=3)
     }
     tetrahedra = []
     for order in itertools.permutations(range(3)):
         bits, path = [0, 0, 0], [corner[(0, 0, 0)]]
         for axis in order:
             bits[axis] = 1
-            path.append(corner[tuple(bits)])
+            path.append(corner[bits[0], bits[1], bits[2]])
         tets = np.stack(path, axis=1)
         p = points[tets[0]]
         if np.linalg.det(p[1:] - p[0]) < 0:

@@ -89,7 +89,8 @@ def condense(
         first = k if result.nbytes <= _SMALL else int(_CONDENSED * k)
         matrix = stiffness(mesh, poisson_ratio, modulus_ratio)[free][:, free].tocsr()
         _condense_first(matrix, place[:first], result, progress)
-        solve = pardiso.Pardiso(matrix).solve if first < k else None
+        if first < k:
+            solve = pardiso.Pardiso(matrix).solve
         del matrix
     else:
         solve = Solver(mesh, poisson_ratio, modulus_ratio, backend=backend).solve_free

@@ -140,6 +140,6 @@ def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> floa
 
 
 @njit(cache=True, error_model="numpy")
-def dent_load(depth_m):  # type: ignore[no-untyped-def]
+def dent_load(depth_m):
     """A measure of the load on a place, m^2.5, at a depth, m: its stored energy grows as a dent's."""
     return depth_m**2.5 if depth_m > 0.0 else 0.0

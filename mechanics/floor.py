@@ -31,7 +31,7 @@ def carried_by_floor(
     mesh = solver.mesh
     nodes = _loose_corners(solver)
     result = np.zeros((len(points), 3, 3))
-    if not len(nodes):
+    if solver.hold is None or not len(nodes):
         return result
     up = solver.hold.normal
     average = PatchSampler(mesh, patch_width_m).matrix(points)

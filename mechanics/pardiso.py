@@ -34,6 +34,13 @@ def available() -> bool:
     return _library() is not None
 
 
+def _mkl() -> ctypes.CDLL:
+    library = _library()
+    if library is None:
+        raise ImportError("MKL Pardiso cannot be loaded: install pypardiso, or take another backend")
+    return library
+
+
 def invert(matrix: np.ndarray) -> int:
     """Inverse of a symmetric positive definite matrix (C order) in its upper triangle; 0, or the failing row.
 
@@ -42,8 +49,8 @@ def invert(matrix: np.ndarray) -> int:
     size, info = ctypes.c_int32(len(matrix)), ctypes.c_int32(0)
     lower = ctypes.c_char(b"L")  # in Fortran's order
     data = ctypes.c_void_p(matrix.ctypes.data)
-    for step in (_library().dpotrf, _library().dpotri):
-        step(*map(ctypes.byref, (lower, size)), data, ctypes.byref(size), ctypes.byref(info))
+    for step in (_mkl().dpotrf, _mkl().dpotri):
+        step(ctypes.byref(lower), ctypes.byref(size), data, ctypes.byref(size), ctypes.byref(info))
         if info.value:
             return int(info.value)
     return 0
@@ -100,14 +107,14 @@ class Pardiso:
         return half
 
     def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int) -> None:
-        def integer(value: int) -> ctypes._Pointer:
+        def integer(value: int) -> object:
             return ctypes.byref(ctypes.c_int32(value))
 
         def pointer(array: np.ndarray) -> ctypes.c_void_p:
             return ctypes.c_void_p(array.ctypes.data)
 
         error = ctypes.c_int32(0)
-        _library().pardiso(
+        _mkl().pardiso(
             pointer(self._handle),
             integer(1),
             integer(1),

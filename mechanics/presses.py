@@ -354,11 +354,14 @@ class Presses:
             ]
             return np.concatenate(parts) if parts else values[:0]
 
-        rows = {n: mean(getattr(self, n)) for n in _ROWS if n != "starts" and getattr(self, n) is not None}
         return dataclasses.replace(
             self,
             starts=np.concatenate([[0], np.cumsum([count for *_, count in spans])]),
-            **rows,
+            t=mean(self.t),
+            position=mean(self.position),
+            force=mean(self.force),
+            free_air=mean(self.free_air),
+            quaternion=None if self.quaternion is None else mean(self.quaternion),
             columns={n: mean(v) for n, v in self.columns.items()},
             block=size,
         )
@@ -403,7 +406,7 @@ _PRESS = (
 
 
 def _frozen(value: Any, kind: type) -> np.ndarray:
-    array = np.ascontiguousarray(value, dtype=kind)
+    array: np.ndarray = np.ascontiguousarray(value, dtype=kind)
     if array.flags.writeable:
         array = array.copy()
         array.setflags(write=False)
@@ -550,9 +553,9 @@ def cut(
         stop = min(end[i] + AROUND_S, onset[i + 1] if i + 1 < count else np.inf)
         pieces.append(np.arange(*np.searchsorted(t, [onset[i] - AROUND_S, stop])))
     rows = np.concatenate(pieces) if pieces else np.zeros(0, dtype=int)
-    touches = [*zip(onset, end, strict=True), *others_s]
+    touches = np.array([*zip(onset, end, strict=True), *others_s]).reshape(-1, 2)
     begin = -np.inf if trace_s is None else trace_s[1] + SETTLED_S
-    air = free_segments(t, *np.array(touches).reshape(-1, 2).T, begin)
+    air = free_segments(t, touches[:, 0], touches[:, 1], begin)
     segments = [] if trace_s is None else [Segment("trace", *map(float, trace_s))]
     segments += [Segment("press", float(a), float(b)) for a, b in zip(onset, end, strict=True)]
     point = centre - recording.tip_radius_m * normal
@@ -737,11 +740,11 @@ def read_presses(path: Path) -> Presses:
     """Read what `write_presses` wrote; raises ModelError where the file is damaged."""
     try:
         arrays = read_arrays(path, _FORMAT)
-        numbers = dict(zip(_NUMBERS, arrays["numbers"].tolist(), strict=True))
-        numbers["block"] = int(numbers["block"])
+        named: dict[str, Any] = {n: np.array(arrays[n]) for n in (*_ROWS, *_PRESS) if n in arrays}
+        named |= zip(_NUMBERS, arrays["numbers"].tolist(), strict=True)
+        named["block"] = int(named["block"])
         return Presses(
-            **{n: np.array(arrays[n]) for n in (*_ROWS, *_PRESS) if n in arrays},
-            **numbers,
+            **named,
             fits={n: np.array(arrays[f"fit {n}"]) for n in FITS},
             noise=Noise(*arrays["noise"].tolist()),
             segments=tuple(Segment(KINDS[int(k)], a, b) for k, a, b in arrays["segments"].tolist()),

@@ -80,7 +80,7 @@ def read_arrays(path: Path, key: str) -> dict[str, np.ndarray]:
         if path.stat().st_size != first + header["size"]:
             raise CacheError(f"'{path}' is truncated or longer than it was written")
         data = np.memmap(path, dtype=np.uint8, mode="r", offset=first, shape=(header["size"],))
-        if hashlib.sha256(data).hexdigest() != header["sha256"]:
+        if hashlib.sha256(data.data).hexdigest() != header["sha256"]:
             raise CacheError(f"'{path}' fails its checksum")
         result = {}
         for name, entry in header["arrays"].items():

@@ -37,12 +37,12 @@ def free_air_force(
         levels.append(np.median(f[crowd], axis=0))
     if not times:
         return np.zeros_like(force), 0.0
-    times, levels = np.array(times), np.array(levels)
+    at, level = np.array(times), np.array(levels)
     # a long hold crowds as well: what stands far from the median of its neighbours is such a hold
-    typical = np.array([np.median(levels[max(0, i - 3) : i + 4], axis=0) for i in range(len(levels))])
-    lowest = levels[np.argmin(np.linalg.norm(levels, axis=1))]
-    good = np.linalg.norm(levels - typical, axis=1) < 4 * reach * spread_n
+    typical = np.array([np.median(level[max(0, i - 3) : i + 4], axis=0) for i in range(len(level))])
+    lowest = level[np.argmin(np.linalg.norm(level, axis=1))]
+    good = np.linalg.norm(level - typical, axis=1) < 4 * reach * spread_n
     if not good.any():
         return np.broadcast_to(lowest, force.shape).copy(), 0.0
-    times, levels = times[good], levels[good]
-    return np.column_stack([np.interp(t, times, levels[:, a]) for a in range(3)]), len(times) / len(starts)
+    at, level = at[good], level[good]
+    return np.column_stack([np.interp(t, at, level[:, a]) for a in range(3)]), len(at) / len(starts)

@@ -61,22 +61,27 @@ def _profiles(presses: Presses, least_force_n: float) -> list[_Profile]:
     return [_Profile(*(c[r[inside[r]]] for c in columns)) for r in rows]
 
 
+_Fitted = tuple[tuple[float, float], tuple[float, float, float], float, tuple[float, float]]
+
+
 def fit_paper(presses: Presses, least_force_n: float = 0.0) -> list[OneD]:
     """Equations (3), (4), (5), (6) as the paper fits them; k_h is (6) again at the mean exponent of all
     presses."""
     seen = _profiles(presses, least_force_n)
-    fits = []
+    fits: list[_Fitted | None] = []
     for p in seen:
         if len(p.u) < 4:
             fits.append(None)
             continue
-        kv = np.linalg.lstsq(np.column_stack([p.u, p.v]), p.f, rcond=None)[0]
+        k_kv, b_kv = np.linalg.lstsq(np.column_stack([p.u, p.v]), p.f, rcond=None)[0]
         log_u, log_f = np.log(p.u), np.log(np.maximum(p.f, 1e-6))
         ones = np.ones_like(log_u)
         c = np.linalg.lstsq(np.column_stack([ones, p.v, log_u]), log_f, rcond=None)[0]
         d = np.linalg.lstsq(np.column_stack([ones, log_u]), log_f, rcond=None)[0]
         k_hc = float(np.exp(c[0]))
-        fits.append((kv, (k_hc, k_hc * c[1], c[2]), float(p.u @ p.f / (p.u @ p.u)), (np.exp(d[0]), d[1])))
+        fits.append(
+            ((k_kv, b_kv), (k_hc, k_hc * c[1], c[2]), float(p.u @ p.f / (p.u @ p.u)), (np.exp(d[0]), d[1]))
+        )
     exponents = [f[3][1] for f in fits if f]
     mean_r = float(np.mean(exponents)) if exponents else 1.0
     result = []

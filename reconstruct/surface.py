@@ -287,12 +287,12 @@ def bounds(evidence: Evidence) -> tuple[float, float]:
     nan)."""
     import trimesh
 
-    low = trimesh.Trimesh(*hull_surface(evidence), process=False).volume
+    low = float(trimesh.Trimesh(*hull_surface(evidence), process=False).volume)
     try:
-        high = trimesh.Trimesh(*tangent_surface(evidence), process=False).volume
+        high = float(trimesh.Trimesh(*tangent_surface(evidence), process=False).volume)
     except SurfaceError:
         high = float("nan")
-    return float(low), float(high)
+    return low, high
 
 
 def _spread(vertices: np.ndarray, best: Explained, tried: list[Explained]) -> np.ndarray:

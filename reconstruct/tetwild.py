@@ -47,19 +47,20 @@ def tetrahedralize(
     """
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
-        given = {
-            "vertices": np.asarray(vertices, dtype=np.float64),
-            "triangles": np.asarray(triangles, dtype=np.int32),
-            "edge_length_abs": edge_m,
-            "epsilon": envelope_m / diagonal,
-            "simplify": simplify,
-            "stop_energy": energy,
-            "num_opt_iter": passes,
-        }
         done = None
         # now and then its threads wait for each other for ever; one thread alone does not
         for count, limit_s in ((threads, timeout_s / 3), (1, timeout_s)):
-            np.savez(Path(folder) / "surface.npz", **given, num_threads=count)
+            np.savez(
+                Path(folder) / "surface.npz",
+                vertices=np.asarray(vertices, dtype=np.float64),
+                triangles=np.asarray(triangles, dtype=np.int32),
+                edge_length_abs=edge_m,
+                epsilon=envelope_m / diagonal,
+                simplify=simplify,
+                stop_energy=energy,
+                num_opt_iter=passes,
+                num_threads=count,
+            )
             with contextlib.suppress(subprocess.TimeoutExpired):
                 done = subprocess.run(
                     [sys.executable, "-c", _CHILD],

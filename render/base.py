@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, Self
 
 import numpy as np
 
@@ -69,7 +69,7 @@ class Renderer(ABC):
             raise OptionError(f"series compliance is {compliance_m_per_n}; it must be 0 m/N or greater")
         return self._with(series_compliance=np.array([float(compliance_m_per_n)]))
 
-    def _with(self, **changes: np.ndarray) -> Renderer:
+    def _with(self, **changes: np.ndarray) -> Self:
         copy = object.__new__(type(self))
         copy.__dict__.update(self.__dict__)
         copy.parameters = self.parameters._replace(**changes)

@@ -15,7 +15,7 @@ STACK = 128
 class Bvh(NamedTuple):
     """low, high: (b, 3) box corners. left, right: (b,) children, -1 in a leaf.
 
-    start, count: (b,) the leaf's part of order, count 0 in inner boxes. order: (k,) triangles.
+    start, held: (b,) the leaf's part of order, held 0 in inner boxes. order: (k,) triangles.
     """
 
     low: np.ndarray
@@ -23,7 +23,7 @@ class Bvh(NamedTuple):
     left: np.ndarray
     right: np.ndarray
     start: np.ndarray
-    count: np.ndarray
+    held: np.ndarray
     order: np.ndarray
 
 
@@ -52,11 +52,15 @@ def build_bvh(corners: np.ndarray) -> Bvh:
         return box
 
     split(0, len(corners))
-    columns = list(zip(*boxes, strict=True))
+    box_low, box_high, *numbers = zip(*boxes, strict=True)
+    left, right, start, held = (np.array(column, dtype=np.int64) for column in numbers)
     return Bvh(
-        np.array(columns[0]),
-        np.array(columns[1]),
-        *(np.array(column, dtype=np.int64) for column in columns[2:]),
+        np.array(box_low),
+        np.array(box_high),
+        left,
+        right,
+        start,
+        held,
         order,
     )
 
@@ -128,8 +132,8 @@ def closest_triangle(bvh, vertices, triangles, p, limit, weights, stack):
         top -= 1
         if _box_distance(p, bvh.low[box], bvh.high[box]) >= best:
             continue
-        if bvh.count[box] > 0:
-            for k in range(bvh.start[box], bvh.start[box] + bvh.count[box]):
+        if bvh.held[box] > 0:
+            for k in range(bvh.start[box], bvh.start[box] + bvh.held[box]):
                 t = bvh.order[k]
                 squared, u, v, w = closest_on_triangle(
                     p, vertices[triangles[t, 0]], vertices[triangles[t, 1]], vertices[triangles[t, 2]]

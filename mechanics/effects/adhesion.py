@@ -3,17 +3,21 @@ range. A share of the pull may hold deeper in the contact as well, after a milli
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
-from mechanics.effects.base import Effect, Law, Parameter, Scope, check, unchanged
+from mechanics.effects.base import Effect, Keys, Law, Parameter, Scope, check, unchanged
+from mechanics.effects.settings import Scene, Touch
+from mechanics.model import Model
 
 _TURN = 0.25  # of the range: the way back over which the pull sets in, so that no force steps
 _TURN_INSIDE_M = 1e-3  # the same deeper in the contact
 
 
 @njit(cache=True, error_model="numpy")
-def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside):  # type: ignore[no-untyped-def]
+def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside):
     """Pull towards the object, N, at least 0; depth (negative: above the surface), the touch's deepest, m.
 
     inside: 0 to 1, the share of it that holds wherever the tip is in the object.
@@ -28,7 +32,7 @@ def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside):  # type: ign
 
 
 @njit(cache=True, error_model="numpy")
-def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     pull = adhesive_pull(depth, deepest, numbers[0], numbers[1], numbers[2])
     for k in range(3):
         force[k] -= pull * normal[k]
@@ -37,7 +41,7 @@ def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # ty
 LAW = Law(_step, order=2, sharp=True, reach=lambda numbers: float(numbers[1]))
 
 
-def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     pull, reach, inside = float(keys["pull_off_n"]), float(keys["range_m"]), float(keys.get("inside", 0.0))
     check(
         pull >= 0 and reach > 0 and 0 <= inside <= 1,
@@ -47,7 +51,7 @@ def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
     touch.numbers[LAW] = np.array([pull, reach, inside])
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     return {"pull_off_n": float(values[0]), "range_m": float(values[1]), "inside": float(values[2])}
 
 

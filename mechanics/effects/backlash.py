@@ -9,10 +9,11 @@ import numpy as np
 from numba import njit
 
 from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings
 
 
 @njit(cache=True)
-def play(start, y, width, out):  # type: ignore[no-untyped-def]
+def play(start, y, width, out):
     """Play operator, axis by axis: what follows is dragged once it is width / 2 behind. start: (p + 1,)."""
     half = 0.5 * width
     for p in range(start.shape[0] - 1):
@@ -22,7 +23,7 @@ def play(start, y, width, out):  # type: ignore[no-untyped-def]
                 out[i, k] = min(max(out[i - 1, k], y[i, k] - half), y[i, k] + half)
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     width, frame = values[0], scene.places.frame[scene.press]
 
     def move(y: np.ndarray) -> np.ndarray:

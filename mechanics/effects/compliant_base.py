@@ -1,33 +1,36 @@
 """Compliant base: the support gives, springs under the whole base."""
 
+from typing import Any
+
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Scope, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.settings import Scene, Settings
 from mechanics.support_motion import far_on_springs
 
 _FELT = 1.5e-3  # share of the object's height that counts as no compliance
 
 
-def _springs(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _springs(values: np.ndarray, scene: Scene, modulus_pa: float) -> tuple[float, float]:
     """(normal, tangential) stiffness a unit of area, Pa/m."""
     compliance, ratio = np.exp(values)
     normal = modulus_pa / (compliance * float(scene.places.height.max()))
     return float(normal), float(normal * ratio)
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     if np.exp(values[0]) < _FELT:
         return
     springs = [k / settings.modulus for k in _springs(values, scene, settings.modulus)]
     settings.far = settings.far - scene.places.far + far_on_springs(scene.places, *springs)
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     normal, tangential = _springs(values, scene, modulus_pa)
     return {"k_normal_pa_per_m": normal, "k_tangential_pa_per_m": tangential}
 
 
-def _hold(keys, young_modulus_pa):  # type: ignore[no-untyped-def]
+def _hold(keys: Keys, young_modulus_pa: float) -> dict[str, Any]:
     stated = (keys["k_normal_pa_per_m"], keys["k_tangential_pa_per_m"])
     return {"springs": tuple(float(k) / young_modulus_pa for k in stated)}
 

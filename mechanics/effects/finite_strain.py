@@ -1,20 +1,24 @@
 """Finite strain: a neo-Hookean solid instead of a linear one. It has no parameter: it grows with the
 depth."""
 
-from mechanics.effects.base import Effect, Role, Scope, no_keys
+import numpy as np
+
+from mechanics.effects.base import Effect, Keys, Role, Scope, no_keys
+from mechanics.effects.settings import Scene, Settings, Touch
+from mechanics.model import Model
 
 LAW = "neo-hookean"
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.touch.dent_law = LAW
 
 
-def _of_material(touch, model):  # type: ignore[no-untyped-def]
+def _of_material(touch: Touch, model: Model) -> None:
     touch.dent_law = model.material.dent_law
 
 
-def _apply(model, keys):  # type: ignore[no-untyped-def]
+def _apply(model: Model, keys: Keys) -> Model:
     return model.with_material(dent_law=LAW)
 
 

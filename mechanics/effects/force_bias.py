@@ -4,15 +4,16 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Role, Scope
-from mechanics.effects.settings import SHIFTED
+from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from mechanics.effects.settings import SHIFTED, Scene, Settings
+from mechanics.recording import Recording
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.read(SHIFTED, lambda force: force + values)
 
 
-def _correct(recording, keys):  # type: ignore[no-untyped-def]
+def _correct(recording: Recording, keys: Keys) -> Recording:
     return dataclasses.replace(
         recording, force_on_tool=recording.force_on_tool - np.asarray(keys["bias_n"], dtype=float)
     )

@@ -4,8 +4,9 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Role, Scope
-from mechanics.effects.settings import SHIFTED
+from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from mechanics.effects.settings import SHIFTED, Scene, Settings
+from mechanics.recording import Recording
 
 
 def drifted(t: np.ndarray, rate_n_per_s: np.ndarray) -> np.ndarray:
@@ -13,11 +14,11 @@ def drifted(t: np.ndarray, rate_n_per_s: np.ndarray) -> np.ndarray:
     return t[:, None] * np.asarray(rate_n_per_s, dtype=float)
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.read(SHIFTED, lambda force: force + drifted(scene.t, values))
 
 
-def _correct(recording, keys):  # type: ignore[no-untyped-def]
+def _correct(recording: Recording, keys: Keys) -> Recording:
     force = recording.force_on_tool - drifted(recording.t, keys["rate_n_per_s"])
     return dataclasses.replace(recording, force_on_tool=force)
 

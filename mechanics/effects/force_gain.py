@@ -4,15 +4,16 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Scope
-from mechanics.effects.settings import MIXED
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.settings import MIXED, Scene, Settings
+from mechanics.recording import Recording
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.read(MIXED, lambda force: force @ values.reshape(3, 3).T)
 
 
-def _correct(recording, keys):  # type: ignore[no-untyped-def]
+def _correct(recording: Recording, keys: Keys) -> Recording:
     back = np.linalg.inv(np.asarray(keys["matrix"], dtype=float))
     return dataclasses.replace(recording, force_on_tool=recording.force_on_tool @ back.T)
 

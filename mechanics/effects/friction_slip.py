@@ -8,7 +8,9 @@ from __future__ import annotations
 
 from numba import njit
 
-from mechanics.effects.base import Effect, Parameter, Scope, check, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.settings import Touch
+from mechanics.model import Model
 
 SLIPS = 12
 CAUTION, SECANT_CAUTION = 0.9, 0.98
@@ -16,7 +18,7 @@ LEAST_N, SLIPPED = 1e-9, 1e-4
 
 
 @njit(cache=True, error_model="numpy")
-def slip_excess(slip, pull, push, mu):  # type: ignore[no-untyped-def]
+def slip_excess(slip, pull, push, mu):
     """(what the tangential force `pull` has too much, N; the share of it that is to be kept) after `slip`
     walks; nothing too much where it is within a hair of the cone, or after the last walk."""
     excess = pull - mu * push
@@ -28,7 +30,7 @@ def slip_excess(slip, pull, push, mu):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def slip_length(slip, excess, before, length, compliance, lever):  # type: ignore[no-untyped-def]
+def slip_length(slip, excess, before, length, compliance, lever):
     """How far the anchor walks, m, for an excess, N; before: that of the last walk of `length`.
 
     compliance: m/N, of dent and object together. lever: by how much the centre moves over a surface that is
@@ -40,7 +42,7 @@ def slip_length(slip, excess, before, length, compliance, lever):  # type: ignor
     return CAUTION * compliance * excess / lever
 
 
-def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     mu = float(keys["mu"])
     check(mu >= 0, "friction_slip", "mu at least 0")
     touch.friction = mu

@@ -8,13 +8,18 @@ new factorisation there (`refine`). Fitting again moves the ball a little; twice
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from mechanics.effects.base import Effect, Misfit, Parameter, Scope
-from mechanics.far_field import energy_fields, far_with_weights
+from mechanics.effects.base import Effect, Keys, Misfit, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings
+from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
 from mechanics.material import Ball
+from mechanics.model import Model
 from mechanics.moduli import inclusion_ratio
 from mechanics.patch import PatchSampler
+from mechanics.places import Places
 from mechanics.refine import typical_edge
 from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES
 from mechanics.solver import Solver
@@ -39,24 +44,24 @@ def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float)
     return 1 / (1 + np.exp(np.clip((distance - radius) / (0.35 * blur), -40, 40)))
 
 
-def first_order(values, places):  # type: ignore[no-untyped-def]
+def first_order(values: np.ndarray, places: Places) -> np.ndarray:
     """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
     fields = energy_fields(places)
     share = inside(fields.centroid, values[:3], values[3], _blur(fields))
     return far_with_weights(places, 1 + share * (softness(np.exp(values[4])) - 1)) - places.far
 
 
-def _blur(fields) -> float:  # type: ignore[no-untyped-def]
+def _blur(fields: EnergyFields) -> float:
     return float(np.cbrt(np.median(fields.volume))) * 1.5
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     change = first_order(values, scene.places)
     scale = scene.places.stages.get(_SCALE)
     settings.far = settings.far + (change if scale is None else change * scale[:, None, None])
 
 
-def _refine(scene, values):  # type: ignore[no-untyped-def]
+def _refine(scene: Scene, values: np.ndarray) -> None:
     """Hold how much a new factorisation changes each place over what first order says, (p,)."""
     places = scene.places
     fields = energy_fields(places)
@@ -76,7 +81,7 @@ def _refine(scene, values):  # type: ignore[no-untyped-def]
     places.stages[_SCALE] = np.clip(scale, *_SCALE_LIMITS)
 
 
-def _seek(scene, misfit: Misfit) -> list[np.ndarray]:  # type: ignore[no-untyped-def]
+def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
     """Balls on a grid inside the object, ranked by how well they explain the places' stiffness.
 
     First order: the share of each place's compliance that lies in the ball, times how its force answers to
@@ -125,7 +130,7 @@ def _log_ratio(change: float) -> float:
     return float(grid[np.argmin([abs(softness(np.exp(g)) - 1 - change) for g in grid])])
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     return {
         "centre_m": [float(v) for v in values[:3]],
         "radius_m": float(values[3]),
@@ -133,7 +138,7 @@ def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
     }
 
 
-def _apply(model, keys):  # type: ignore[no-untyped-def]
+def _apply(model: Model, keys: Keys) -> Model:
     known = model.material.inclusions
     return model.with_material(inclusions={**known, f"{FOUND}-{len(known) + 1}": Ball(**keys)})
 

@@ -1,10 +1,14 @@
 """Modulus gradient: stiffness runs linearly from the base to the top, along the support's normal."""
 
+from typing import Any
+
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import Gradient
+from mechanics.model import Model
 from mechanics.moduli import gradient_ratio
 
 
@@ -14,7 +18,7 @@ def gradient(log_ratio: float) -> Gradient:
     return Gradient(float(base), float(2 - base))
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     places, model = scene.places, scene.places.model
     ratio = gradient_ratio(model.mesh, gradient(values[0]), model.support.point, model.support.normal)
     settings.far = settings.far - places.far + far_with_weights(places, 1 / ratio)
@@ -24,12 +28,12 @@ def _change(settings, values, scene):  # type: ignore[no-untyped-def]
     settings.dent_ratio = settings.dent_ratio / softness
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     found = gradient(values[0])
     return {"ratio_base": found.ratio_base, "ratio_top": found.ratio_top}
 
 
-def _apply(model, keys):  # type: ignore[no-untyped-def]
+def _apply(model: Model, keys: Keys) -> Model:
     there = model.material.gradient or Gradient(1.0, 1.0)
     base, top = float(keys["ratio_base"]), float(keys["ratio_top"])
     return model.with_material(gradient=Gradient(base * there.ratio_base, top * there.ratio_top))

@@ -12,14 +12,15 @@ import numpy as np
 from numba import njit
 
 from mechanics.dent import dent_load
-from mechanics.effects.base import Effect, Law, Parameter, Scope, check, unchanged
+from mechanics.effects.base import Effect, Keys, Law, Parameter, Scope, check, unchanged
+from mechanics.effects.settings import Touch
 from mechanics.model import Model
 
 _NONE = 1e-6  # 1 / r that counts as none
 
 
 @njit(cache=True, error_model="numpy")
-def softening(load, most, r, m):  # type: ignore[no-untyped-def]
+def softening(load, most, r, m):
     """Factor on the force, 1 while loading afresh; load, most and m in the measure of `dent_load`."""
     if most <= load:
         return 1.0
@@ -27,7 +28,7 @@ def softening(load, most, r, m):  # type: ignore[no-untyped-def]
 
 
 @njit(cache=True, error_model="numpy")
-def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     factor = softening(load, most, numbers[0], numbers[1])
     for k in range(3):
         force[k] *= factor
@@ -42,7 +43,7 @@ def greatest_load(model: Model) -> float:
     return float(dent_load(max(depths, default=model.tool.tip_radius_m)))
 
 
-def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     r, m_rel = float(keys["r"]), float(keys["m_rel"])
     check(r >= 1 and m_rel > 0, "mullins_softening", "r at least 1, m_rel greater than 0")
     touch.numbers[LAW] = np.array([r, m_rel * greatest_load(model)])

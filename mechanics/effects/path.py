@@ -52,7 +52,7 @@ def new_memory(numbers: PathNumbers, touches: int) -> np.ndarray:
 
 
 @njit(error_model="numpy")
-def _nothing(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+def _nothing(numbers, memory, depth, deepest, load, most, dt, normal, force):
     pass
 
 
@@ -63,7 +63,7 @@ def _woven(laws: Sequence[tuple[int, Any]]) -> Any:
     (row, own), rest = laws[0], _woven(laws[1:])
 
     @njit(error_model="numpy")
-    def step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+    def step(numbers, memory, depth, deepest, load, most, dt, normal, force):
         if numbers[row, 0] != 0.0:
             own(numbers[row, 1:], memory[row], depth, deepest, load, most, dt, normal, force)
         rest(numbers, memory, depth, deepest, load, most, dt, normal, force)

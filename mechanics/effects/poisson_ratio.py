@@ -1,15 +1,19 @@
 """Poisson's ratio: not what was stated. Thin places against thick ones, normal against tangential."""
 
-from mechanics.effects.base import Effect, Parameter, Scope
+import numpy as np
+
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import far_at_poisson
+from mechanics.model import Model
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.nu = float(values[0])
     settings.far = settings.far - scene.places.far + far_at_poisson(scene.places, settings.nu)
 
 
-def _apply(model, keys):  # type: ignore[no-untyped-def]
+def _apply(model: Model, keys: Keys) -> Model:
     return model.with_material(poisson_ratio=keys["poisson_ratio"])
 
 

@@ -7,12 +7,16 @@ object together is in the far field, by mechanics.moduli.skin_ratio.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from mechanics.dent import grid
-from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import Skin
+from mechanics.model import Model
 
 
 def film_weight(thickness_over_contact: np.ndarray, poisson_ratio: float) -> np.ndarray:
@@ -35,7 +39,7 @@ _FAR_SHARE = 0.3
 """Of the change that the elements' energies say: what lies within the dent's own reach is no far field."""
 
 
-def _set(touch, skin, model):  # type: ignore[no-untyped-def]
+def _set(touch: Touch, skin: Skin, model: Model) -> None:
     contact = model.tool.tip_radius_m * np.sqrt(np.maximum(grid(), 1e-6))
 
     def factors(poisson_ratio: float) -> tuple[np.ndarray, np.ndarray]:
@@ -45,16 +49,16 @@ def _set(touch, skin, model):  # type: ignore[no-untyped-def]
     touch.factors.append(factors)
 
 
-def _of_material(touch, model):  # type: ignore[no-untyped-def]
+def _of_material(touch: Touch, model: Model) -> None:
     if model.material.skin is not None:
         _set(touch, model.material.skin, model)
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     return {"thickness_m": float(values[0]), "modulus_ratio": float(np.exp(values[1]))}
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     places, skin = scene.places, Skin(**_report(values, scene, settings.modulus))
     _set(settings.touch, skin, places.model)
     thickness, depth = skin.thickness_m, energy_fields(places).depth
@@ -63,7 +67,7 @@ def _change(settings, values, scene):  # type: ignore[no-untyped-def]
     settings.far = settings.far + _FAR_SHARE * (changed - places.far)
 
 
-def _apply(model, keys):  # type: ignore[no-untyped-def]
+def _apply(model: Model, keys: Keys) -> Model:
     return model.with_material(skin=Skin(**keys))
 
 

@@ -11,7 +11,9 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.dent import grid
-from mechanics.effects.base import Effect, Parameter, Scope, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.settings import Touch
+from mechanics.model import Model
 
 FORCE_PER_C20, FORCE_POWER = 0.197, 1.25
 SIDEWAYS_PER_C20, SIDEWAYS_POWER = 0.129, 1.7
@@ -26,7 +28,7 @@ def stiffening(c20_over_c10: float) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     ratio = float(keys["c20_over_c10"])
     touch.factors.append(lambda poisson_ratio: stiffening(ratio))
 

@@ -6,9 +6,10 @@ The model's surface is wrong then, and this says where it was, not what it shoul
 import numpy as np
 
 from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     point, normal = scene.places.point, scene.places.normal
     move = values[:3] + np.cross(values[3:], point - point.mean(axis=0))
     settings.onset = settings.onset + np.einsum("pi,pi->p", normal, move)

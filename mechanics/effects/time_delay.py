@@ -6,12 +6,13 @@ import dataclasses
 import numpy as np
 from numba import njit
 
-from mechanics.effects.base import Effect, Parameter, Scope
-from mechanics.effects.settings import LATE
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.settings import LATE, Scene, Settings
+from mechanics.recording import Recording
 
 
 @njit(cache=True)
-def late(start, t, force, delay, out):  # type: ignore[no-untyped-def]
+def late(start, t, force, delay, out):
     """Write the force (n, 3) of `delay` s before; start (p + 1,) rows of presses, whose ends are held."""
     for p in range(start.shape[0] - 1):
         a, b = start[p], start[p + 1]
@@ -41,11 +42,11 @@ def delayed(start: np.ndarray, t: np.ndarray, force: np.ndarray, delay_s: float)
     return out
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.read(LATE, lambda force: delayed(scene.start, scene.t, force, values[0]))
 
 
-def _correct(recording, keys):  # type: ignore[no-untyped-def]
+def _correct(recording: Recording, keys: Keys) -> Recording:
     whole = np.array([0, len(recording.t)])
     force = delayed(whole, recording.t, recording.force_on_tool, -float(keys["delay_s"]))
     return dataclasses.replace(recording, force_on_tool=force)

@@ -1,9 +1,11 @@
 """Tip radius: the sphere is not as large as stated; the dent's force goes with its square root."""
 
-from mechanics.effects.base import Effect, Parameter, Scope, check, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.settings import Touch
+from mechanics.model import Model
 
 
-def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     radius = float(keys["tip_radius_m"])
     check(radius > 0, "tip_radius", "tip_radius_m greater than 0")
     touch.tip_ratio = radius / model.tool.tip_radius_m

@@ -4,14 +4,16 @@ import dataclasses
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.settings import Scene, Settings
+from mechanics.recording import Recording
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.tool_compliance = values[0]
 
 
-def _correct(recording, keys):  # type: ignore[no-untyped-def]
+def _correct(recording: Recording, keys: Keys) -> Recording:
     moved = recording.force_on_tool / keys["stiffness_n_per_m"]
     return dataclasses.replace(recording, position=recording.position + moved)
 

@@ -5,9 +5,10 @@ import dataclasses
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.effects.base import Effect, Parameter, Role, Scope
-from mechanics.effects.settings import WEIGHED
+from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from mechanics.effects.settings import WEIGHED, Scene, Settings
 from mechanics.kinematics import acceleration
+from mechanics.recording import Recording
 
 STANDARD_GRAVITY = 9.80665
 
@@ -24,14 +25,14 @@ def left_by_tare(weight_n: np.ndarray, quaternion: np.ndarray | None, share: flo
     return weight_n - (1 - share) * turn.apply(turn[0].inv().apply(weight_n))
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     mass, share = values
     weight = -mass * STANDARD_GRAVITY * scene.places.model.support.normal
     added = left_by_tare(weight, scene.quaternion, share) - mass * scene.acceleration
     settings.read(WEIGHED, lambda force: force + added)
 
 
-def _correct(recording, keys):  # type: ignore[no-untyped-def]
+def _correct(recording: Recording, keys: Keys) -> Recording:
     force = recording.force_on_tool + keys["mass_kg"] * acceleration(recording.t, recording.position)
     if "weight_n" in keys and recording.quaternion is not None:
         force = force - left_by_tare(np.asarray(keys["weight_n"], dtype=float), recording.quaternion, 0.0)

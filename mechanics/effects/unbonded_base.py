@@ -1,27 +1,30 @@
 """Unbonded base: part of the base is free to lift and slip; what presses on the support is still carried."""
 
+from typing import Any
+
 import numpy as np
 
-from mechanics.effects.base import Effect, Parameter, Scope, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.settings import Scene, Settings
 from mechanics.support_motion import ANGLES, far_partly_bonded, support_axes
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     settings.far = settings.far - scene.places.far + far_partly_bonded(scene.places, *values)
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     across, along = support_axes(scene.places.model)
     direction = np.cos(values[1]) * across + np.sin(values[1]) * along
     return {"bonded_fraction": float(1 - values[0]), "direction": [float(v) for v in direction]}
 
 
-def _hold(keys, young_modulus_pa):  # type: ignore[no-untyped-def]
+def _hold(keys: Keys, young_modulus_pa: float) -> dict[str, Any]:
     direction = np.asarray(keys["direction"], dtype=float)
     return {"bonded_fraction": float(keys["bonded_fraction"]), "direction": direction}
 
 
-def _starts():  # type: ignore[no-untyped-def]
+def _starts() -> list[np.ndarray]:
     return [np.array([0.4, k * 2 * np.pi / ANGLES, floor]) for floor in (0.95, 0.05) for k in range(ANGLES)]
 
 

@@ -7,15 +7,19 @@ comes back more slowly than the tip leaves lets go of it: it cannot pull.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
 
-from mechanics.effects.base import Effect, Law, Parameter, Scope, unchanged
+from mechanics.effects.base import Effect, Keys, Law, Parameter, Scope, unchanged
+from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
+from mechanics.model import Model
 
 
 @njit(cache=True, error_model="numpy")
-def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):  # type: ignore[no-untyped-def]
+def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     """Add the memory of the force. numbers: (2 k,) pairs of g and tau, s; memory: (3 + 3 k,) the last force,
     then each branch."""
     push = 0.0
@@ -39,7 +43,7 @@ def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force): 
 LAW = Law(prony_step, order=1, memory=lambda numbers: 3 + 3 * (len(numbers) // 2))
 
 
-def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
+def _touch(touch: Touch, keys: Keys, model: Model) -> None:
     g = np.atleast_1d(np.asarray(keys["g"], dtype=float))
     tau = np.atleast_1d(np.asarray(keys["tau_s"], dtype=float))
     if g.shape != tau.shape or not (tau > 0).all() or not (g >= 0).all():
@@ -50,23 +54,23 @@ def _touch(touch, keys, model):  # type: ignore[no-untyped-def]
     touch.numbers[LAW] = np.column_stack([g, tau]).ravel()
 
 
-def _change(settings, values, scene):  # type: ignore[no-untyped-def]
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     # a term too weak to be told is not reported, but a fit must see it grow
     _touch(settings.touch, {"g": values[[0, 2]], "tau_s": np.exp(values[[1, 3]])}, scene.places.model)
 
 
-def _report(values, scene, modulus_pa):  # type: ignore[no-untyped-def]
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     pairs = sorted((float(np.exp(values[i + 1])), float(values[i])) for i in (0, 2) if values[i] > 0.005)
     return {"g": [g for _, g in pairs], "tau_s": [tau for tau, _ in pairs]}
 
 
-def _in_words(keys):  # type: ignore[no-untyped-def]
+def _in_words(keys: Keys) -> str:
     pairs = zip(keys["g"], keys["tau_s"], strict=True)
     terms = [f"{g:.0%} that fades within {tau:.2g} s" for g, tau in pairs]
     return f"extra force right after a fast press: {' and '.join(terms)}"
 
 
-def _starts():  # type: ignore[no-untyped-def]
+def _starts() -> list[np.ndarray]:
     return [
         np.array([fast, np.log(tau_fast), slow, np.log(tau_slow)])
         for fast, tau_fast, slow, tau_slow in (

@@ -44,10 +44,8 @@ def read_compression(path: Path | str) -> Compression:
         raise RecordingError(f"'{path}' does not state the cylinder's diameter and height")
     separator = ";" if lines[start].count(";") > lines[start].count(",") else ","
     names = [name.strip().lower() for name in lines[start].split(separator)]
-    wanted = [
-        next((i for i, n in enumerate(names) if n.startswith(w)), None) for w in ("compression", "load")
-    ]
-    if None in wanted:
+    wanted = [next((i for i, n in enumerate(names) if n.startswith(w)), -1) for w in ("compression", "load")]
+    if min(wanted) < 0:
         raise RecordingError(
             f"'{path}' needs the columns Compression (mm) and Load (N); it has {', '.join(names)}"
         )

@@ -68,10 +68,10 @@ def _search(
 ) -> tuple[np.ndarray, np.ndarray, float]:
     """(times, weights with the end first, rms) of the best combination of `terms` times of the grid."""
     decay = np.exp(-t[:, None] / grid)
-    best = None
-    for pick in combinations(range(len(grid)), terms):
-        columns = np.column_stack([np.ones_like(t), decay[:, pick]])
-        weights, norm = nnls(columns, share)
-        if best is None or norm < best[2]:
-            best = (grid[list(pick)], weights, norm)
-    return best[0], best[1], float(best[2] / np.sqrt(len(t)))
+
+    def fitted(pick: tuple[int, ...]) -> tuple[float, tuple[int, ...], np.ndarray]:
+        weights, norm = nnls(np.column_stack([np.ones_like(t), decay[:, pick]]), share)
+        return norm, pick, weights
+
+    norm, pick, weights = min(map(fitted, combinations(range(len(grid)), terms)), key=lambda each: each[0])
+    return grid[list(pick)], weights, float(norm / np.sqrt(len(t)))

@@ -3,6 +3,7 @@ triangles."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Protocol, runtime_checkable
 
@@ -29,10 +30,14 @@ class Shape(Protocol):
     alike the simpler is taken. faceted: side and top are separate faces that may err differently.
     """
 
-    name: str
-    complexity: int
-    faceted: bool
-    parameters: tuple[Parameter, ...]
+    @property
+    def name(self) -> str: ...
+    @property
+    def complexity(self) -> int: ...
+    @property
+    def faceted(self) -> bool: ...
+    @property
+    def parameters(self) -> tuple[Parameter, ...]: ...
 
     def with_values(self, values: np.ndarray) -> Shape:
         """The same shape with other parameter values."""
@@ -97,7 +102,7 @@ def rings_to_mesh(rings: np.ndarray, apex: np.ndarray) -> tuple[np.ndarray, np.n
     return np.vstack([stack.reshape(-1, 3), middle, apex]), np.vstack(faces)
 
 
-def project(implicit: object, points: np.ndarray, rounds: int = 4) -> np.ndarray:
+def project(implicit: Callable[[np.ndarray], np.ndarray], points: np.ndarray, rounds: int = 4) -> np.ndarray:
     """Signed distance (k,) of points (k, 3) from the zero set of `implicit(points) -> (k,)`, by Newton steps.
 
     The foot is sought along the gradient and then, so that it is the closest one, along the normal found

@@ -164,7 +164,8 @@ def _planes(centres: np.ndarray, normals: np.ndarray, tip_radius_m: float) -> li
     """(height, slope_x, slope_y) of planes on which several touches lie and as which they face (seeded
     RANSAC)."""
     rng = np.random.default_rng(0)
-    left, found = np.arange(len(centres)), []
+    left = np.arange(len(centres))
+    found: list[np.ndarray] = []
     while len(left) >= 3 and len(found) < _TOPS_AT_MOST:
         best = left[:0]
         for _ in range(250):

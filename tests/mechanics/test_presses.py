@@ -67,9 +67,9 @@ def test_a_table_knows_touch_depth_site_and_noise():
 
 def test_rows_are_seen_from_the_place_that_was_touched():
     presses = table(recording(noise=0.0))
-    assert presses.y[:, 0] == pytest.approx(presses.depth, abs=1e-12)
-    assert presses.f[:, 0] == pytest.approx(STIFF * np.clip(presses.depth, 0, None), abs=1e-9)
-    assert np.abs(presses.f[:, 1:]).max() < 1e-12
+    assert presses.travel[:, 0] == pytest.approx(presses.depth, abs=1e-12)
+    assert presses.local_force[:, 0] == pytest.approx(STIFF * np.clip(presses.depth, 0, None), abs=1e-9)
+    assert np.abs(presses.local_force[:, 1:]).max() < 1e-12
     counted = presses.touching(presses.t)
     assert (counted[presses.counted]).all()
 
