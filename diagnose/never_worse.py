@@ -59,12 +59,3 @@ def _grows(before: np.ndarray, after: np.ndarray, beyond_chance: bool, resamples
         return bool(growth.sum() > 0)
     drawn = resampled((growth,), np.sum, resamples, np.random.default_rng(seed))
     return bool(np.quantile(drawn, 0.025) > 0)
-
-
-def verdict_kind(names: Sequence[str], candidates: Sequence[str], remainder: bool) -> str:
-    """The contract's word for a verdict; remainder: something is left that nothing named explains."""
-    if remainder:
-        return "effect+unknown" if names else "unknown"
-    if not names:
-        return "none"
-    return "ambiguous" if candidates else "effect"

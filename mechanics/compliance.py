@@ -46,15 +46,6 @@ class Compliance:
     nodes: np.ndarray
     matrix: np.ndarray
 
-    @property
-    def float32_error(self) -> float:
-        """Greatest relative rounding of a block's norm where the matrix is stored as float32 (about 6e-8)."""
-        rounded = self.matrix.astype(np.float32)
-        t = len(self.nodes)
-        error = np.abs(rounded - self.matrix).reshape(t, 3, t, 3).max(axis=(1, 3))
-        size = np.abs(self.matrix).reshape(t, 3, t, 3).max(axis=(1, 3))
-        return float((error / size).max())
-
 
 def condense(
     mesh: TetMesh,

@@ -138,12 +138,6 @@ class Region:
         basis, middle = self.change(factor)
         return compliance - (basis @ middle.astype(np.float32)) @ basis.T
 
-    def updated_own(self, own: np.ndarray, factor: np.ndarray) -> np.ndarray:
-        """The diagonal blocks (q, 3, 3) of the outputs after the change."""
-        basis, middle = self.change(factor)
-        mixed = (basis @ middle.astype(np.float32)).reshape(len(own), 3, -1)
-        return own - mixed @ basis.reshape(len(own), 3, -1).transpose(0, 2, 1)
-
 
 def _split(seen: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(Q (p, k) float32, R (k, d)) with seen = Q R but for what is negligible."""

@@ -21,19 +21,16 @@ _STEPS = 250
 
 @dataclass(frozen=True)
 class LinearRange:
-    """depth_m: (k,) indentation at each site where the linear force is off by `share`; inf where it never is.
-
-    force_error: (k, n) linear over finite-strain force less 1, at depths_m (n,).
-    """
+    """depth_m: (k,) indentation at each site where the linear force is off by `share`; inf where it is not by
+    deepest_m."""
 
     share: float
     depth_m: np.ndarray
-    depths_m: np.ndarray
-    force_error: np.ndarray
+    deepest_m: float
 
     def table(self) -> dict[str, float]:
         """For model.toml: the share, and the least, median and greatest depth among the sites."""
-        finite = np.where(np.isfinite(self.depth_m), self.depth_m, self.depths_m[-1])
+        finite = np.where(np.isfinite(self.depth_m), self.depth_m, self.deepest_m)
         return {
             "force_error": self.share,
             "depth_least_m": float(finite.min()),
@@ -64,4 +61,4 @@ def linear_range(sites: TouchSites, tip_radius_m: float, share: float = 0.1) -> 
     beyond = np.abs(error) > share
     first = beyond.argmax(axis=1)
     depth = np.where(beyond.any(axis=1), depths[first], np.inf)
-    return LinearRange(share, depth, depths, error)
+    return LinearRange(share, depth, float(depths[-1]))

@@ -1,4 +1,4 @@
-"""Kernels of the 1 kHz loop: how a touch at one place moves another, from either form of the table.
+"""Kernels of the 1 kHz loop: how a touch at one place moves another, from the low-rank table.
 
 A place is three corners of the surface, negative where held (they do not move), with three weights.
 """
@@ -6,22 +6,6 @@ A place is three corners of the surface, negative where held (they do not move),
 from __future__ import annotations
 
 from numba import njit
-
-
-@njit(cache=True, error_model="numpy")
-def between_block(blocks, corners_p, weights_p, corners_q, weights_q, out):
-    """out (3, 3) 1/m: displacement at p for a unit force at q, from the dense table (t, t, 3, 3)."""
-    out[:] = 0.0
-    for i in range(3):
-        if corners_p[i] < 0:
-            continue
-        for j in range(3):
-            if corners_q[j] < 0:
-                continue
-            w = weights_p[i] * weights_q[j]
-            for a in range(3):
-                for b in range(3):
-                    out[a, b] += w * blocks[corners_p[i], corners_q[j], a, b]
 
 
 @njit(cache=True, error_model="numpy")

@@ -50,7 +50,6 @@ STEP_S = 0.01
 """The averaging for which the noise is measured."""
 USUAL_NOISE_N = 0.012
 LOADING, HOLDING, UNLOADING, OUTSIDE = 0, 1, 2, 3
-PHASES = ("loading", "hold", "unloading", "outside")
 _SAME_FACE = 0.7
 _REPEAT_M = 0.001
 _TOUCHING_M = 1e-9

@@ -1,4 +1,4 @@
-"""What passes between a device, a renderer and the servo: the tip's state and the force on the tool."""
+"""What a device tells a renderer and the servo: the state of the tip."""
 
 from __future__ import annotations
 
@@ -28,18 +28,3 @@ class TipState:
     calibrated: bool = True
     force_enabled: bool = False
     fault: str = ""
-
-
-@dataclass(frozen=True)
-class ForceState:
-    """The force commanded to the tool at one tick: (3,) N on the tool, device frame, and why it is what it
-    is.
-
-    limited: the safety filter changed it; reason: in plain words ('' where nothing was changed).
-    """
-
-    time_s: float
-    sequence: int
-    force_on_tool_n: np.ndarray
-    limited: bool = False
-    reason: str = ""

@@ -18,7 +18,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
-from mechanics.sites import TouchSites, tangents
+from mechanics.sites import TouchSites
 
 _STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
 _RINGS = 128  # memory of the stick; rings thinner than R/64 are merged
@@ -183,14 +183,8 @@ def _touch_paths(d, starts, frames, fars, table, radii, plane_strain_modulus, st
         touch_path(d[part], frames[k], fars[k], table, radii[k], plane_strain_modulus, stick, out[part])
 
 
-def site_frame(normal: np.ndarray) -> np.ndarray:
-    """(3, 3) rows u, v, n: turns a global vector into the local frame of a site."""
-    u, v = tangents(normal)
-    return np.stack([u, v, normal])
-
-
 def site_frames(normals: np.ndarray) -> np.ndarray:
-    """(k, 3, 3) of `site_frame` for normals (k, 3)."""
+    """(k, 3, 3) rows u, v, n: turns a global vector into the frame of a site with outward normal (k, 3)."""
     helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
     u = np.cross(helper, normals)
     u /= np.linalg.norm(u, axis=1, keepdims=True)

@@ -12,11 +12,10 @@ from mechanics.tetmesh import vertex_normals
 
 @dataclass(frozen=True)
 class CastPoints:
-    """Nearest surface points (k, 3) m, outward unit normals there (k, 3), distance (k,) m, triangle (k,)."""
+    """Nearest surface points (k, 3) m, outward unit normals there (k, 3), triangle (k,)."""
 
     points: np.ndarray
     normals: np.ndarray
-    distance_m: np.ndarray
     triangle: np.ndarray
 
 
@@ -54,4 +53,4 @@ def cast(
         normal = (np.where(near, share, 0.0)[:, None] * smooth[triangles[chosen[i]]]).sum(axis=0)
         normal = facing[chosen[i]] if np.linalg.norm(normal) < 0.2 else normal
         normals[i] = normal / np.linalg.norm(normal)
-    return CastPoints(where, normals, np.linalg.norm(where - points, axis=1), chosen)
+    return CastPoints(where, normals, chosen)

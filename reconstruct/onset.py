@@ -19,13 +19,12 @@ _SOFT = 3.0  # standard deviations
 
 @dataclass(frozen=True)
 class Rise:
-    """The fitted law of one press: u0_m, its standard error, h (N/m^1.5), c (m/N), rms misfit in N."""
+    """The fitted law of one press: u0_m, its standard error, h (N/m^1.5), c (m/N)."""
 
     u0_m: float
     u0_error_m: float
     hertz: float
     compliance: float
-    misfit_n: float
 
 
 def contact_law(u: np.ndarray, hertz: float, compliance: float) -> np.ndarray:
@@ -84,7 +83,7 @@ def fit_rise(travel: np.ndarray, force: np.ndarray, noise_n: float, *, guess_m: 
     rms = float(np.sqrt(np.mean(residual**2)))
     normal = (slopes * _soft(residual)[1][:, None]).T @ slopes
     error = float(np.sqrt(np.linalg.pinv(normal)[0, 0])) * max(rms, 1.0)
-    return Rise(float(p[0]), error, float(np.exp(p[2])), float(np.exp(p[1])), rms * noise_n)
+    return Rise(float(p[0]), error, float(np.exp(p[2])), float(np.exp(p[1])))
 
 
 def _residual(

@@ -3,11 +3,16 @@
 import numpy as np
 import pytest
 
-from diagnose.never_worse import never_worse, verdict_kind
+from diagnose.never_worse import never_worse
+from diagnose.verdict import Answer
 
 COUNTS = np.full(20, 100.0)
 BEFORE = np.random.default_rng(0).uniform(8.0, 12.0, 20)
 NOISE = 0.02
+
+
+def said(names: tuple[str, ...], candidates: tuple[str, ...], remainder: bool) -> str:
+    return Answer([*names], [*candidates], remainder=remainder).kind
 
 
 def kept(factors: dict[tuple[str, ...], float], names: tuple[str, ...], **options):  # type: ignore[no-untyped-def]
@@ -34,7 +39,7 @@ def test_the_weakest_go_until_the_gap_does_not_grow() -> None:
     assert result.names == ("a",) and result.dropped == ("c", "b")
     assert result.after.sum() < BEFORE.sum()
     assert result.unexplained  # 0.6 of 0.1 N^2 a sample is left where 0.02 is explained
-    assert verdict_kind(result.names, (), result.unexplained) == "effect+unknown"
+    assert said(result.names, (), result.unexplained) == "effect+unknown"
 
 
 def test_where_all_make_it_worse_nothing_is_named_and_the_gap_stays_unknown() -> None:
@@ -42,13 +47,13 @@ def test_where_all_make_it_worse_nothing_is_named_and_the_gap_stays_unknown() ->
     result, _ = kept(factors, ("bias", "drift"))
     assert result.names == () and result.dropped == ("drift", "bias")
     assert np.array_equal(result.after, BEFORE)
-    assert verdict_kind(result.names, ("slip",), result.unexplained) == "unknown"
+    assert said(result.names, ("slip",), result.unexplained) == "unknown"
 
 
 def test_nothing_is_unknown_where_noise_explains_what_is_left() -> None:
     result = never_worse(("a",), BEFORE, lambda names: 2 * BEFORE, COUNTS, 0.2)
     assert result.names == () and not result.unexplained
-    assert verdict_kind(result.names, (), result.unexplained) == "none"
+    assert said(result.names, (), result.unexplained) == "none"
 
 
 def test_growth_within_chance_counts_only_where_it_is_asked_to() -> None:
@@ -69,8 +74,8 @@ def test_whatever_the_sites_say_the_gap_of_what_is_kept_is_not_larger(seed: int)
 
 
 def test_the_words_are_the_contracts() -> None:
-    assert verdict_kind((), (), False) == "none"
-    assert verdict_kind(("a",), (), False) == "effect"
-    assert verdict_kind(("a",), ("b",), False) == "ambiguous"
-    assert verdict_kind(("a",), ("b",), True) == "effect+unknown"
-    assert verdict_kind((), ("b",), True) == "unknown"
+    assert said((), (), False) == "none"
+    assert said(("a",), (), False) == "effect"
+    assert said(("a",), ("b",), False) == "ambiguous"
+    assert said(("a",), ("b",), True) == "effect+unknown"
+    assert said((), ("b",), True) == "unknown"

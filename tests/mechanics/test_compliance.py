@@ -7,7 +7,6 @@ import pytest
 
 from mechanics.compliance import ComplianceOptions, condense
 from mechanics.errors import MeshError, OptionError
-from mechanics.mutual import between_block
 from mechanics.nearest import closest
 from mechanics.pardiso import available
 from mechanics.sites import touch_sites
@@ -36,7 +35,6 @@ def test_condensed_equals_full_solves(box, monkeypatch, method, backend, small):
         force[compliance.nodes[column // 3], column % 3] = 1
         u = solver.solve(force)[compliance.nodes].ravel()
         assert np.abs(u - c[:, column]).max() < 1e-8 * np.abs(u).max()
-    assert compliance.float32_error < 1e-7
 
 
 def test_unknown_ways_are_refused(box):
@@ -99,11 +97,8 @@ def test_blocks_are_symmetric_positive_and_continuous(tables):
     assert np.abs(dense - dense.T).max() < 1e-6 * np.abs(dense).max()
     assert np.linalg.eigvalsh(dense).min() > -1e-6 * np.abs(dense).max()
     one, other = surface.triangles[0], surface.triangles[7]
-    out, back = np.empty((3, 3)), np.empty((3, 3))
     w, v = np.array([0.2, 0.3, 0.5]), np.array([0.6, 0.4, 0.0])
-    between_block(surface.blocks, one, w, other, v, out)
-    between_block(surface.blocks, other, v, one, w, back)
-    assert out == pytest.approx(back.T, rel=1e-5)
+    out = np.einsum("i,ijab,j->ab", w, surface.blocks[np.ix_(one, other)], v)
     moved = sum(v[c] * surface.displacement(other[c], np.array([0.0, 0.0, 1.0])) for c in range(3))
     assert w @ moved[one] == pytest.approx(out[:, 2], rel=1e-4)
 
@@ -116,13 +111,6 @@ def test_a_large_surface_is_compressed_by_itself(box):
     assert ComplianceOptions("low-rank", low_rank_error=0.02).error_of(mesh) == 0.02
     with pytest.raises(OptionError, match="dense, low-rank"):
         ComplianceOptions("sparse")
-
-
-def test_a_held_corner_does_not_move(tables):
-    _, surface = tables
-    rim, out = np.array([-1, -1, -1]), np.ones((3, 3))
-    between_block(surface.blocks, rim, np.ones(3), surface.triangles[0], np.ones(3), out)
-    assert (out == 0).all()
 
 
 def test_low_rank_tables_serve_the_same_compliance(box):

@@ -7,7 +7,7 @@ import pytest
 
 from mechanics.dent import dent_law
 from mechanics.reference import bonded_punch_sideways_force, hertz_force
-from mechanics.touch import STATE_SIZE, moduli, site_frame, touch_force, touch_forces, touch_step
+from mechanics.touch import STATE_SIZE, moduli, site_frames, touch_force, touch_forces, touch_step
 
 E, NU, R = 29e3, 0.49, 5e-3
 UP = np.array([0.0, 0.0, 1.0])
@@ -129,6 +129,6 @@ def test_any_displacement_gives_a_finite_force(radius):
 
 
 def test_local_frame_is_right_handed():
-    frame = site_frame(np.array([0.0, 0.6, 0.8]))
+    frame = site_frames(np.array([[0.0, 0.6, 0.8]]))[0]
     assert frame @ frame.T == pytest.approx(np.eye(3), abs=1e-15)
     assert np.linalg.det(frame) == pytest.approx(1.0)
