@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms import boussinesq_displacement, cerruti_displacement
 
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError
 from mechanics.pardiso import Pardiso, available
 from mechanics.patch import PatchSampler, half_space_compliance
-from mechanics.reference import boussinesq_displacement, cerruti_displacement
 from mechanics.sites import patch_compliance, patch_width
 from mechanics.solver import Solver
 

@@ -2,10 +2,9 @@
 
 from __future__ import annotations
 
+import closed_forms as reference
 import numpy as np
 import pytest
-
-from mechanics import reference
 
 E, NU = 30e3, 0.45
 

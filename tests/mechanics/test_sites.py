@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms import hertz_force
 
 from mechanics.errors import MeshError
 from mechanics.pardiso import available
-from mechanics.reference import hertz_force
 from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.sites import mean_curvature, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver

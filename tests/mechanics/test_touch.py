@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from closed_forms import bonded_punch_sideways_force, hertz_force
 
 from mechanics.dent import dent_law
-from mechanics.reference import bonded_punch_sideways_force, hertz_force
 from mechanics.touch import STATE_SIZE, moduli, site_frames, touch_force, touch_forces, touch_step
 
 E, NU, R = 29e3, 0.49, 5e-3

@@ -1,4 +1,4 @@
-"""Closed-form solutions of linear elasticity, as small functions: the oracles of tests and benchmarks.
+"""Closed-form solutions of linear elasticity, as small functions.
 
 A half-space fills z <= 0 in the formulas below; forces act on its surface at the origin, into it (-z)
 where they are called normal. SI units. Sources: Johnson, Contact Mechanics (1985), chapters 3 and 4.
