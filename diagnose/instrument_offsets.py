@@ -36,7 +36,6 @@ class InstrumentOffsets:
 
     names: tuple[str, ...]
     parameters: dict[str, dict]
-    parts: dict[str, np.ndarray]
     residual: np.ndarray
     reasons: tuple[str, ...]
     intervals: dict[str, dict] = field(default_factory=dict)
@@ -78,7 +77,7 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
     t = forward.touches
     nothing = np.zeros_like(t.local_force)
     if free is None:
-        return InstrumentOffsets((), {}, {}, nothing, ())
+        return InstrumentOffsets((), {}, nothing, ())
     duration = np.ptp(t.t) + 1e-9
     parts: dict[str, np.ndarray] = {}
     parameters: dict[str, dict] = {}
@@ -135,7 +134,7 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
         parameters[BIAS.name] = {"bias_n": level.tolist()}
         reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
     if not parts:
-        return InstrumentOffsets((), {}, {}, nothing, ())
+        return InstrumentOffsets((), {}, nothing, ())
     mass_se = free.mass_se_kg if turning is None else turning.se_n / STANDARD_GRAVITY
     mass_kg = parameters.get(INERTIA.name, {}).get("mass_kg", 0.0)
     error = {
@@ -151,7 +150,7 @@ def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: se
     intervals = {
         n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters
     }
-    return InstrumentOffsets(tuple(order), parameters, local, taken, tuple(reasons), intervals)
+    return InstrumentOffsets(tuple(order), parameters, taken, tuple(reasons), intervals)
 
 
 def _around(value: ArrayLike, error: float) -> list:

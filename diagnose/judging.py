@@ -101,8 +101,7 @@ class Score:
     added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit. z: gain
     over its standard error across sites.
     per_group: (g,) the gain of each site, deflated likewise.
-    size_n: rms change of the predicted force, N. closes: plain held-out mean square it takes away, N^2.
-    share: of the old excess over the noise.
+    size_n: rms change of the predicted force, N. share: of the old held-out excess over the noise.
     toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
     scatter_n: N rms by which repeats at one place still differ.
     """
@@ -111,7 +110,6 @@ class Score:
     gain: float
     z: float
     size_n: float
-    closes: float
     share: float
     toward: float
     per_group: np.ndarray
@@ -221,15 +219,14 @@ class Search:
         counted = self.forward.touches.counted
         before, after = old.residual[counted], new.residual[counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
-        closes = float((old.plain.sum() - new.plain.sum()) / counted.sum())
         squares = [(r**2).sum(axis=1).mean() for r in (before, after)]
         toward = float((squares[0] - squares[1]) / max(size**2, 1e-12))
         noise = 3 * self.forward.touches.noise_n**2
         excess = max(float(old.plain.sum() / counted.sum()) - noise, 0.02 * noise)
-        share = closes / excess
+        share = float((old.plain.sum() - new.plain.sum()) / counted.sum()) / excess
         scatter = np.nan_to_num(repeat_scatter(new.residual, self.forward.touches))
         return Score(
-            tuple(added), float(gain / over), float(z), size, closes, share, toward, per_group / over, new,
+            tuple(added), float(gain / over), float(z), size, share, toward, per_group / over, new,
             scatter,
         )  # fmt: skip
 

@@ -41,11 +41,6 @@ class DentLaw:
         depth = np.atleast_1d(np.asarray(depth_m, dtype=float))
         return np.array([dent_force(self.table, d, tip_radius_m, plane_strain)[0] for d in depth])
 
-    def contact_radius(self, depth_m: np.ndarray, tip_radius_m: float) -> np.ndarray:
-        """Radius of the contact circle (k,) m."""
-        x = np.maximum(np.atleast_1d(np.asarray(depth_m, dtype=float)), 0.0) / tip_radius_m
-        return tip_radius_m * np.sqrt(x) * np.interp(x, grid(), self.table[:, 1])
-
     def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
         """The law with c and tau multiplied by factors, one or one a row of `grid()`."""
         table = self.table.copy()

@@ -38,15 +38,14 @@ class Boundary:
 
     support_point, support_normal: (3,), the plane of the support's surface, its normal into the object.
     outline: (k, 3) dense points of the base's rim on the plane, in order along the path; the tip's radius is
-    taken off. outward: (k, 3) unit normals of the rim within the plane, out of the object. centres: (k, 3)
-    where the tip's centre was. points: (j, 3) P_B of the paper, farthest-point sample of the outline.
-    interval: sample indices (first, last) of phase I; flatness_m: rms of the path off the plane.
+    taken off. centres: (k, 3) where the tip's centre was. points: (j, 3) P_B of the paper, farthest-point
+    sample of the outline. interval: sample indices (first, last) of phase I; flatness_m: rms of the path off
+    the plane.
     """
 
     support_point: np.ndarray
     support_normal: np.ndarray
     outline: np.ndarray
-    outward: np.ndarray
     centres: np.ndarray
     points: np.ndarray
     interval: tuple[int, int]
@@ -196,7 +195,6 @@ def find_boundary(
         support_point=outline.mean(axis=0),
         support_normal=normal,
         outline=outline,
-        outward=outward,
         centres=smooth + tip_radius_m * normal,
         points=outline[chosen],
         interval=interval,

@@ -30,7 +30,6 @@ def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
         support_point=model.support.point,
         support_normal=n,
         outline=rim,
-        outward=outward,
         centres=rim + tip_radius_m * (outward + n),
         points=rim,
         interval=(0, 0),

@@ -31,8 +31,6 @@ if TYPE_CHECKING:
 
 SURFACES = ("auto", "hull", "tangent", "implicit", *FITTED)
 
-_IMPLICIT_CELL_M = 0.005
-
 _CORRECTED = 6
 """So many of the best shapes are tried with a free residual field as well."""
 

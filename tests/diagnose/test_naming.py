@@ -14,7 +14,7 @@ from mechanics.effects.registry import effect
 def score(name, per_group, **changes):
     gains = np.asarray(per_group, float)
     z = gains.sum() / (gains.std() * np.sqrt(len(gains)))
-    values = {"gain": gains.sum(), "z": z, "size_n": 0.014, "closes": 1e-4, "share": 0.7, "toward": 0.9}
+    values = {"gain": gains.sum(), "z": z, "size_n": 0.014, "share": 0.7, "toward": 0.9}
     return Score(
         (effect(name),), **{**values, **changes}, per_group=gains, candidate=SimpleNamespace(chi=0.85)
     )
