@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechanics.errors import DeviceError
 
@@ -82,10 +83,10 @@ class FreeExploration:
 
     def __init__(
         self,
-        centre_m: np.ndarray,
+        centre_m: ArrayLike,
         radius_m: float,
         *,
-        up: np.ndarray = (0.0, 0.0, 1.0),
+        up: ArrayLike = (0.0, 0.0, 1.0),
         spread: float = 0.2,
         target_force_n: float = 1.0,
         speed_m_per_s: float = 0.02,
@@ -96,7 +97,8 @@ class FreeExploration:
         self.centre_m = np.asarray(centre_m, dtype=float)
         self.radius_m = radius_m
         self.least_radius_m = least_radius_m
-        self.up = np.asarray(up, dtype=float) / np.linalg.norm(up)
+        axis = np.asarray(up, dtype=float)
+        self.up = axis / np.linalg.norm(axis)
         self.spread = spread
         self.target_force_n = target_force_n
         self.speed_m_per_s = speed_m_per_s

@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mechanics.errors import OptionError
@@ -64,7 +65,7 @@ class Mapping:
 
     @classmethod
     def from_options(
-        cls, options: MapperOptions, *, centre_m: np.ndarray = (0.0, 0.0, 0.0), rate: bool = False
+        cls, options: MapperOptions, *, centre_m: ArrayLike = (0.0, 0.0, 0.0), rate: bool = False
     ) -> Mapping:
         """Checked options about a scene's centre; `rate` for a device whose control is 'rate'."""
         if not (options.scale > 0 and options.force_scale >= 0):

@@ -72,12 +72,16 @@ class ReplayDevice:
         i = int(np.clip(np.searchsorted(r.t, self._at() + 1e-9, side="right") - 1, 0, len(r.t) - 1))
         elapsed = self._clock() - self._start_s
         turns = int((elapsed + self.options.start_s) // (r.t[-1] - r.t[0])) if self.options.loop else 0
+        quaternion = IDENTITY_QUATERNION
+        if r.quaternion is not None:
+            w, x, y, z = map(float, r.quaternion[i])
+            quaternion = (w, x, y, z)
         return TipState(
             time_s=self._clock(),
             sequence=turns * len(r.t) + i,
             position_m=r.position[i],
             velocity_m_per_s=self._velocity[i],
-            quaternion=IDENTITY_QUATERNION if r.quaternion is None else tuple(map(float, r.quaternion[i])),
+            quaternion=quaternion,
         )
 
     def close(self) -> None:

@@ -174,7 +174,9 @@ class PidLayout:
     @property
     def longest_input(self) -> int:
         """Bytes of the longest input report, its id included."""
-        lengths = [self.descriptor.report_bytes(k, i) for k, i in self.descriptor.report_bits if k == "input"]
+        lengths = [
+            self.descriptor.report_bytes("input", i) for k, i in self.descriptor.report_bits if k == "input"
+        ]
         return 1 + max(lengths, default=0)
 
     def axes(self, report: bytes) -> Axes | None:
@@ -208,11 +210,10 @@ class PidLayout:
 
     def _axis(self, report_id: int, body: bytes, usage: int) -> float | None:
         for place in self.descriptor.fields:
-            if place.kind == "input" and place.report_id == report_id and usage in place.usages:
+            index = place.index(usage)
+            if place.kind == "input" and place.report_id == report_id and index is not None:
                 low, high = place.logical_min, place.logical_max
-                return min(
-                    max(2.0 * (place.get(body, place.index(usage)) - low) / (high - low) - 1.0, -1.0), 1.0
-                )
+                return min(max(2.0 * (place.get(body, index) - low) / (high - low) - 1.0, -1.0), 1.0)
         return None
 
     def _buttons(self, report_id: int, body: bytes) -> int:
