@@ -194,7 +194,7 @@ class Problem:
                 continue
             face_f, face_k, force, grip = contact.evaluate(u, centre, held, True, arrivals)
             r = self._residual(cell_f, face_f, u)
-            norm = np.linalg.norm(r)
+            norm = float(np.linalg.norm(r))
             scale = max(np.abs(face_f).sum(), 1e-3)
             if arrivals and iteration > 0 and norm < 0.02 * scale:
                 if held.let_go(grip):
