@@ -6,7 +6,6 @@ that do not decrease.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
@@ -26,17 +25,6 @@ def minimum_jerk(fraction: float) -> float:
     """The share of a reach done at a share of its time: 10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985)."""
     s = min(max(fraction, 0.0), 1.0)
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
-
-
-@dataclass(frozen=True)
-class Rest:
-    """Stays where it is told."""
-
-    at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def place(self, time_s: float, position_m: np.ndarray, force_on_tool_n: np.ndarray) -> np.ndarray:
-        """The one place."""
-        return np.array(self.at_m)
 
 
 class Path:

@@ -148,6 +148,6 @@ def _turned(
     return (float(w), float(x), float(y), float(z))
 
 
-def force_to_device(mapping: Mapping, force_on_tool_n: np.ndarray) -> np.ndarray:
-    """(3,) N on the tool in the device's frame, from the scene's; to be filtered for safety, then sent."""
-    return mapping.force_scale * (mapping.rotation.T @ force_on_tool_n)
+def force_map(mapping: Mapping) -> np.ndarray:
+    """(3, 3): times a force on the tool (N) in the scene's frame it is the one in the device's."""
+    return mapping.force_scale * mapping.rotation.T

@@ -111,7 +111,7 @@ class DeviceThread:
         pose[IN_TIP : IN_TIP + 3] = tip.position_m
         pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3] = tip.velocity_m_per_s
         pose[IN_QUATERNION : IN_QUATERNION + 4] = tip.quaternion
-        pose[IN_FORCE_MAP : IN_FORCE_MAP + 9] = (self.mapping.force_scale * self.mapping.rotation.T).ravel()
+        pose[IN_FORCE_MAP : IN_FORCE_MAP + 9] = mapper.force_map(self.mapping).ravel()
         put_pose(self._arrays, pose)
 
     def send_command(self, *, fresh: bool = True) -> None:
