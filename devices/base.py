@@ -45,7 +45,6 @@ class DeviceSpec:
     workspace_radius_m: float = 0.1
     rate_hz: float = 1000.0
     buttons: int = 0
-    gripper: bool = False
 
     @property
     def has_force(self) -> bool:
@@ -87,14 +86,6 @@ class ForceSink(Protocol):
 
     def send_force(self, force_on_tool_n: np.ndarray) -> None:
         """(3,) N on the tool, the device's frame; handed over at once, sent by the device's thread."""
-
-
-@runtime_checkable
-class Buttons(Protocol):
-    """Has buttons; `TipState.buttons` holds the same bits."""
-
-    def pressed(self, button: int) -> bool:
-        """Whether button 0, 1, … is down."""
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import time
+from collections.abc import Callable
 from ctypes import POINTER, byref, c_byte, c_char_p, c_double, c_int, c_ubyte, c_uint
 from dataclasses import dataclass, replace
 
@@ -31,7 +32,7 @@ SPEC = DeviceSpec(
     workspace_radius_m=0.08,
     buttons=4,
 )
-FALCON = {"max_force_n": 8.0, "max_stiffness_n_per_m": 3000.0, "workspace_radius_m": 0.04}
+FALCON = replace(SPEC, max_force_n=8.0, max_stiffness_n_per_m=3000.0, workspace_radius_m=0.04)
 INSTALL = (
     "install the Force Dimension SDK (forcedimension.com, software) and set FDSDK to its folder, or put "
     "libdhd into ~/.local/lib"
@@ -71,18 +72,23 @@ class ForceDimensionWire:
     def __init__(self, options: ForceDimensionOptions) -> None:
         self.options = options
         self.spec = SPEC
-        self._library: ctypes.CDLL | None = None
+        self._loaded: ctypes.CDLL | None = None
         self._id: int | None = None
         self._forcing = False
 
-    def connect(self) -> None:
-        """Load the library, open the first device, set its watchdog; force stays off."""
-        if self._library is None:
+    @property
+    def _library(self) -> ctypes.CDLL:
+        """The maker's library, loaded when first asked for; raises DeviceError where there is none."""
+        if self._loaded is None:
             own = self.options.forcedimension_folder
             folders = (own, *FOLDERS) if own else FOLDERS
             library = load(("dhd", "drd", "dhd64", "drd64"), folders, INSTALL)
             need(library, FUNCTIONS)
-            self._library = library
+            self._loaded = library
+        return self._loaded
+
+    def connect(self) -> None:
+        """Load the library, open the first device, set its watchdog; force stays off."""
         number = self._library.dhdOpen()
         if number < 0:
             raise DeviceError(
@@ -91,8 +97,8 @@ class ForceDimensionWire:
             )
         self._id = number
         name = (self._library.dhdGetSystemName(number) or b"").decode(errors="replace")
-        falcon = FALCON if "falcon" in name.lower() else {}
-        self.spec = replace(SPEC, title=name or SPEC.title, **falcon)
+        limits = FALCON if "falcon" in name.lower() else SPEC
+        self.spec = replace(limits, title=name or SPEC.title)
         self._check(self._library.dhdSetWatchdog(WATCHDOG_TICKS, number), "set its watchdog")
         self._check(self._library.dhdEnableForce(0, number), "switch force off")
         self._forcing = False
@@ -133,7 +139,7 @@ class ForceDimensionWire:
             fault="" if status[STATUS_POWER] else "the device has no power",
         )
 
-    def _read(self, function: ctypes._CFuncPtr, into: ctypes.Array, what: str) -> None:
+    def _read(self, function: Callable[..., int], into: ctypes.Array, what: str) -> None:
         pointers = (ctypes.cast(byref(into, 8 * i), _P) for i in range(3))
         self._check(function(*pointers, self._id), what)
 

@@ -102,6 +102,13 @@ class HidPort:
         self._device.close()
 
 
+def opened(port: HidPort | None) -> HidPort:
+    """The port, where it is open; raises DeviceError where `connect` has not been called."""
+    if port is None:
+        raise DeviceError("the device is not open: call open() or use it in a with statement")
+    return port
+
+
 def enumerate_devices(
     wanted: Callable[[dict[str, Any]], bool], *, module: Any = None
 ) -> list[dict[str, Any]]:

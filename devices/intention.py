@@ -6,10 +6,10 @@ that do not decrease.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from mechanics.errors import DeviceError
 
@@ -25,17 +25,6 @@ def minimum_jerk(fraction: float) -> float:
     """The share of a reach done at a share of its time: 10 s^3 - 15 s^4 + 6 s^5 (Flash and Hogan 1985)."""
     s = min(max(fraction, 0.0), 1.0)
     return s * s * s * (10.0 + s * (6.0 * s - 15.0))
-
-
-@dataclass(frozen=True)
-class Rest:
-    """Stays where it is told."""
-
-    at_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
-
-    def place(self, time_s: float, position_m: np.ndarray, force_on_tool_n: np.ndarray) -> np.ndarray:
-        """The one place."""
-        return np.array(self.at_m)
 
 
 class Path:
@@ -82,10 +71,10 @@ class FreeExploration:
 
     def __init__(
         self,
-        centre_m: np.ndarray,
+        centre_m: ArrayLike,
         radius_m: float,
         *,
-        up: np.ndarray = (0.0, 0.0, 1.0),
+        up: ArrayLike = (0.0, 0.0, 1.0),
         spread: float = 0.2,
         target_force_n: float = 1.0,
         speed_m_per_s: float = 0.02,
@@ -96,7 +85,8 @@ class FreeExploration:
         self.centre_m = np.asarray(centre_m, dtype=float)
         self.radius_m = radius_m
         self.least_radius_m = least_radius_m
-        self.up = np.asarray(up, dtype=float) / np.linalg.norm(up)
+        axis = np.asarray(up, dtype=float)
+        self.up = axis / np.linalg.norm(axis)
         self.spread = spread
         self.target_force_n = target_force_n
         self.speed_m_per_s = speed_m_per_s

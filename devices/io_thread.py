@@ -101,7 +101,13 @@ class ThreadedDevice:
         self._thread.start()
         # daemon threads die silently at exit: zero the force and release the hardware first
         reference = weakref.ref(self)
-        self._at_exit = lambda: (device := reference()) and device.close()
+
+        def at_exit() -> None:
+            device = reference()
+            if device is not None:
+                device.close()
+
+        self._at_exit = at_exit
         atexit.register(self._at_exit)
 
     def read(self) -> TipState:

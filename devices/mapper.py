@@ -12,6 +12,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
 from mechanics.errors import OptionError
@@ -64,7 +65,7 @@ class Mapping:
 
     @classmethod
     def from_options(
-        cls, options: MapperOptions, *, centre_m: np.ndarray = (0.0, 0.0, 0.0), rate: bool = False
+        cls, options: MapperOptions, *, centre_m: ArrayLike = (0.0, 0.0, 0.0), rate: bool = False
     ) -> Mapping:
         """Checked options about a scene's centre; `rate` for a device whose control is 'rate'."""
         if not (options.scale > 0 and options.force_scale >= 0):
@@ -147,6 +148,6 @@ def _turned(
     return (float(w), float(x), float(y), float(z))
 
 
-def force_to_device(mapping: Mapping, force_on_tool_n: np.ndarray) -> np.ndarray:
-    """(3,) N on the tool in the device's frame, from the scene's; to be filtered for safety, then sent."""
-    return mapping.force_scale * (mapping.rotation.T @ force_on_tool_n)
+def force_map(mapping: Mapping) -> np.ndarray:
+    """(3, 3): times a force on the tool (N) in the scene's frame it is the one in the device's."""
+    return mapping.force_scale * mapping.rotation.T

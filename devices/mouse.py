@@ -87,7 +87,6 @@ class MouseDevice:
             return TipState(self._time, self._sequence, _NOWHERE, connected=False, fault=fault)
         if self._position is None:
             self._position, self._velocity = np.array(pose.position_m), _ZERO
-            self._target = self._position
             self._sequence += 1
         target = np.array(pose.position_m)
         steps = int((now - self._time) / self._hand.step_s)

@@ -100,7 +100,7 @@ class OpenHapticsWire:
 
     def __init__(self, options: OpenHapticsOptions) -> None:
         self.options = options
-        self._library: ctypes.CDLL | None = None
+        self._loaded: ctypes.CDLL | None = None
         self._handle: int | None = None
         self._arrived = threading.Event()
         self._reading: Reading | None = None
@@ -108,14 +108,19 @@ class OpenHapticsWire:
         self._order: tuple[float, np.ndarray | None] = (float("-inf"), None)
         self._callback = CALLBACK(self._turn)
 
-    def connect(self) -> None:
-        """Load the library, initialise the device, start its scheduler; forces are zero."""
-        if self._library is None:
+    @property
+    def _library(self) -> ctypes.CDLL:
+        """The maker's library, loaded when first asked for; raises DeviceError where there is none."""
+        if self._loaded is None:
             own = self.options.openhaptics_folder
             folders = (own, *FOLDERS) if own else FOLDERS
             library = load(("HD", "hd"), folders, INSTALL)
             need(library, FUNCTIONS)
-            self._library = library
+            self._loaded = library
+        return self._loaded
+
+    def connect(self) -> None:
+        """Load the library, initialise the device, start its scheduler; forces are zero."""
         library = self._library
         handle = library.hdInitDevice(self.options.device_name.encode() or None)
         error = library.hdGetError().code

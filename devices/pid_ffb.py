@@ -16,7 +16,7 @@ import numpy as np
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.codecs import pid
 from devices.codecs.pid import PidLayout
-from devices.hid_port import HidPort, enumerate_devices, load, may_open, udev_rule
+from devices.hid_port import HidPort, enumerate_devices, load, may_open, opened, udev_rule
 from devices.io_thread import ForcefulDevice, Reading
 from devices.velocity import VelocityEstimate
 from mechanics.errors import DeviceError
@@ -72,28 +72,29 @@ class PidWire:
             raise DeviceError(
                 "no force-feedback stick or wheel is plugged in: plug one in, or choose another --device"
             )
-        layout, entry, why = None, None, ""
+        port, self._layout = self._first_with_force(entries)
+        try:
+            self._create_effects(port)
+        except BaseException:
+            port.close()
+            raise
+        self._port = port
+
+    def _first_with_force(self, entries: list[dict[str, Any]]) -> tuple[HidPort, PidLayout]:
+        """The first device whose descriptor takes constant forces, open; raises DeviceError for none."""
+        why = ""
         for entry in entries:
             port = HidPort(entry["path"].decode(), entry["vendor_id"], module=self._hid)
             try:
-                layout = PidLayout.from_bytes(port.descriptor())
-                break
+                return port, PidLayout.from_bytes(port.descriptor())
             except DeviceError as error:
                 port.close()
-                why = str(error)
-        if layout is None:
-            raise DeviceError(f"{entry.get('product_string') or 'the joystick'} has no force feedback: {why}")
-        self._port, self._layout = port, layout
-        try:
-            self._create_effects()
-        except BaseException:
-            port.close()
-            self._port = None
-            raise
+                why = f"{entry.get('product_string') or 'the joystick'} has no force feedback: {error}"
+        raise DeviceError(why)
 
-    def _create_effects(self) -> None:
-        port, layout = self._port, self._layout
-        self._blocks = {}
+    def _create_effects(self, port: HidPort) -> None:
+        layout = self._layout
+        self._blocks: dict[str, int] = {}
         for axis in layout.force_axes:
             port.set_feature(layout.create_constant())
             self._blocks[axis] = layout.loaded_block(port.get_feature(*layout.block_load()))
@@ -117,7 +118,7 @@ class PidWire:
             self._stop()
         else:
             self._push(force_on_tool_n)
-        reports = self._port.drain(self._layout.longest_input, max(1, round(timeout_s * 1000)))
+        reports = opened(self._port).drain(self._layout.longest_input, max(1, round(timeout_s * 1000)))
         now = self._clock()
         fresh = False
         for report in reports:
@@ -136,22 +137,24 @@ class PidWire:
         return Reading(self._position, velocity, buttons=self._buttons, fault=self._fault)
 
     def _push(self, force_on_tool_n: np.ndarray) -> None:
+        port = opened(self._port)
         components = {"x": force_on_tool_n[0], "y": -force_on_tool_n[1]}
         for axis, block in self._blocks.items():
             share = min(max(components[axis] / self.options.full_scale_n, -1.0), 1.0)
-            self._port.write(self._layout.magnitude(block, float(share)))
+            port.write(self._layout.magnitude(block, float(share)))
         now = self._clock()
         if now - self._started_s >= RESTART_S:
             for block in self._blocks.values():
-                self._port.write(self._layout.operate(block, pid.START))
+                port.write(self._layout.operate(block, pid.START))
             self._started_s, self._running = now, True
 
     def _stop(self) -> None:
         if not self._running:
             return
+        port = opened(self._port)
         for block in self._blocks.values():
-            self._port.write(self._layout.magnitude(block, 0.0))
-            self._port.write(self._layout.operate(block, pid.STOP))
+            port.write(self._layout.magnitude(block, 0.0))
+            port.write(self._layout.operate(block, pid.STOP))
         self._running, self._started_s = False, float("-inf")
 
     def disconnect(self) -> None:

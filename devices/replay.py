@@ -54,30 +54,25 @@ class ReplayDevice:
         """Start its clock."""
         self._start_s = self._clock()
 
-    @property
-    def finished(self) -> bool:
-        """Whether the last sample has been reached."""
-        return self._start_s is not None and not self.options.loop and self._at() >= self.recording.t[-1]
-
-    def _at(self) -> float:
-        t = self.recording.t
-        at = t[0] + self.options.start_s + self._clock() - self._start_s
-        return t[0] + (at - t[0]) % (t[-1] - t[0]) if self.options.loop else at
-
     def read(self) -> TipState:
         """The sample of this instant."""
         if self._start_s is None:
             raise DeviceError("the replay is not open: call open() or use it in a with statement")
         r = self.recording
-        i = int(np.clip(np.searchsorted(r.t, self._at() + 1e-9, side="right") - 1, 0, len(r.t) - 1))
-        elapsed = self._clock() - self._start_s
-        turns = int((elapsed + self.options.start_s) // (r.t[-1] - r.t[0])) if self.options.loop else 0
+        since, length = self.options.start_s + self._clock() - self._start_s, r.t[-1] - r.t[0]
+        turns = int(since // length) if self.options.loop else 0
+        at = r.t[0] + since - turns * length
+        i = int(np.clip(np.searchsorted(r.t, at + 1e-9, side="right") - 1, 0, len(r.t) - 1))
+        quaternion = IDENTITY_QUATERNION
+        if r.quaternion is not None:
+            w, x, y, z = map(float, r.quaternion[i])
+            quaternion = (w, x, y, z)
         return TipState(
             time_s=self._clock(),
             sequence=turns * len(r.t) + i,
             position_m=r.position[i],
             velocity_m_per_s=self._velocity[i],
-            quaternion=IDENTITY_QUATERNION if r.quaternion is None else tuple(map(float, r.quaternion[i])),
+            quaternion=quaternion,
         )
 
     def close(self) -> None:

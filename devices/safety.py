@@ -288,22 +288,3 @@ def _limit(parameters, state, wanted, gain, dt_s):
     for i in range(3):
         state.force[i] = share * state.force[i] + part * (scale * wanted[i] - share * state.force[i])
     return reasons
-
-
-class SafetyFilter:
-    """The same filter as an object, for tests, tools and a loop written in Python."""
-
-    def __init__(
-        self, options: SafetyOptions, spec: DeviceSpec, workspace_centre_m: np.ndarray | None = None
-    ) -> None:
-        self.parameters = safety_parameters(options, spec)
-        self.state = safety_state(workspace_centre_m)
-
-    def step(
-        self, wanted_n: np.ndarray, reading: Reading, enable: int, dt_s: float
-    ) -> tuple[np.ndarray, str]:
-        """(3,) N that may be sent, and why it differs from what was wanted."""
-        reasons = safety_step(
-            self.parameters, self.state, np.asarray(wanted_n, dtype=float), reading, enable, dt_s
-        )
-        return self.state.force.copy(), reason_words(reasons)

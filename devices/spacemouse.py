@@ -12,7 +12,7 @@ import numpy as np
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.codecs import spacemouse as codec
-from devices.hid_port import HidPort, enumerate_devices, load, may_open, udev_rule
+from devices.hid_port import HidPort, enumerate_devices, load, may_open, opened, udev_rule
 from devices.io_thread import Reading, ThreadedDevice
 from mechanics.errors import DeviceError
 from mechanics.options import option
@@ -65,13 +65,13 @@ class SpacemouseWire:
 
     def _set_led(self, on: bool) -> None:
         try:
-            self._port.write(codec.led(on))
+            opened(self._port).write(codec.led(on))
         except OSError:
             pass  # several models have no ring to light
 
     def exchange(self, force_on_tool_n: np.ndarray | None, timeout_s: float) -> Reading | None:
         """The newest deflection as a velocity; a device that is silent and still attached is at rest."""
-        reports = self._port.drain(REPORT_BYTES, max(1, round(timeout_s * 1000)))
+        reports = opened(self._port).drain(REPORT_BYTES, max(1, round(timeout_s * 1000)))
         now = self._clock()
         for report in reports:
             self._deflection = codec.decode(report, self._deflection)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from mechanics.errors import DeviceError
@@ -43,7 +43,7 @@ def load(stems: Sequence[str], folders: Sequence[str], install: str) -> ctypes.C
     raise DeviceError(f"the library {' or '.join('lib' + s for s in stems)} was not found{broken}: {install}")
 
 
-def need(library: ctypes.CDLL, functions: dict[str, tuple[type | None, tuple[type, ...]]]) -> None:
+def need(library: ctypes.CDLL, functions: Mapping[str, tuple[type | None, tuple[type, ...]]]) -> None:
     """Declare C functions; raises DeviceError where the library lacks one."""
     for name, (result, arguments) in functions.items():
         try:

@@ -11,7 +11,7 @@ import types
 import typing
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -19,7 +19,14 @@ from mechanics.errors import OptionError
 from mechanics.files import atomic_file
 from palpate.keywords import kinds, options
 
-T = TypeVar("T")
+
+class Options(Protocol):
+    """Any options dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+
+T = TypeVar("T", bound=Options)
 
 
 def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[str] = ()) -> None:
@@ -135,12 +142,14 @@ def say(arguments: argparse.Namespace, *lines: str) -> None:
         print(*lines, sep="\n")
 
 
-def progress_bar(label: str) -> Any:
+def progress_bar(label: str) -> Bar:
     """A `mechanics.progress.Progress` that draws a bar on stderr when that is a terminal; call `.close()`."""
-    return _Bar(label)
+    return Bar(label)
 
 
-class _Bar:
+class Bar:
+    """See `progress_bar`; also a context manager, which closes it."""
+
     def __init__(self, label: str) -> None:
         from tqdm import tqdm
 
@@ -162,7 +171,7 @@ class _Bar:
         """Finish the bar's line."""
         self._bar.close()
 
-    def __enter__(self) -> _Bar:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,6 +18,9 @@ from mechanics.recording import Recording, read_recording
 from palpate.servo.report import ServoReport
 from palpate.warm_up import warming_up
 from reconstruct.pipeline import Reconstruction
+
+if TYPE_CHECKING:
+    from diagnose.result import Diagnosis
 
 
 @dataclass(frozen=True)
@@ -42,7 +46,7 @@ class DemoResult:
     replay_rmse_n: float
     contact_force_rms_n: float
     servo: ServoReport
-    diagnosis: object | None
+    diagnosis: Diagnosis | None
     seconds: dict[str, float]
 
     @property
@@ -55,7 +59,7 @@ def run_demo(
     source: Path | str,
     folder: Path,
     options: DemoOptions,
-    bar: Callable[[str], Progress],
+    bar: Callable[[str], AbstractContextManager[Progress]],
     seed: int = 0,
 ) -> DemoResult:
     """Do all of it; the model goes to `folder/model`. `bar(label)` makes a progress bar for a stage."""

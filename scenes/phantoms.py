@@ -265,7 +265,10 @@ def _read(path: Path) -> Phantom:
         shell = pyvista.read(path).extract_surface().triangulate()
         surface = trimesh.Trimesh(np.asarray(shell.points), shell.faces.reshape(-1, 4)[:, 1:])
     else:
-        surface = trimesh.load(path, force="mesh")
+        loaded = trimesh.load(path, force="mesh")
+        if not isinstance(loaded, trimesh.Trimesh):
+            raise SceneError(f"'{path}' holds no surface: a closed one of triangles is needed")
+        surface = loaded
     surface.merge_vertices()
     if not surface.is_watertight:
         raise SceneError(

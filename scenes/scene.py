@@ -166,8 +166,10 @@ def _source(kind: str, value: str, path: Path) -> str:
 
 
 def _positive(table: Mapping[str, Any], key: str) -> float | None:
-    if key not in table:
-        return None
+    return None if key not in table else _required(table, key)
+
+
+def _required(table: Mapping[str, Any], key: str) -> float:
     value = float(table[key])
     if not value > 0:
         raise ValueError(f"{key} is {value}; it must be greater than 0")
@@ -190,6 +192,6 @@ def _inclusions(path: Path, tables: Any) -> tuple[Region, ...] | None:
         if missing:
             raise SceneError(f"'{path}': inclusion {number + 1} lacks {', '.join(missing)}")
         x, y, z = (float(v) for v in table["centre_m"])
-        radius, ratio = _positive(table, "radius_m"), _positive(table, "modulus_ratio")
+        radius, ratio = _required(table, "radius_m"), _required(table, "modulus_ratio")
         regions.append(Region(str(table.get("name", f"inclusion {number + 1}")), (x, y, z), radius, ratio))
     return tuple(regions)

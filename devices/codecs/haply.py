@@ -83,9 +83,9 @@ def _grip(message: Mapping[str, Any]) -> tuple[tuple[float, float, float, float]
         for grip in message.get(kind) or []:
             state = grip.get("state") or {}
             q = state.get("orientation") or {}
-            quaternion = tuple(float(q.get(k, d)) for k, d in zip("wxyz", IDENTITY_QUATERNION, strict=True))
+            w, x, y, z = (float(q.get(k, d)) for k, d in zip("wxyz", IDENTITY_QUATERNION, strict=True))
             pressed = state.get("buttons") or {}
-            return quaternion, sum(bool(pressed.get(b)) << i for i, b in enumerate(GRIP_BUTTONS))
+            return (w, x, y, z), sum(bool(pressed.get(b)) << i for i, b in enumerate(GRIP_BUTTONS))
     return IDENTITY_QUATERNION, 0
 
 
@@ -137,7 +137,8 @@ def event_fault(text: str | bytes, device_id: str = "") -> str:
         return ""
     if not isinstance(message, dict):
         return ""
-    data = message.get("data") if isinstance(message.get("data"), dict) else message
+    inner = message.get("data")
+    data = inner if isinstance(inner, dict) else message
     about = str(data.get("device_id") or "")
     if device_id and about and about != device_id:
         return ""

@@ -108,7 +108,8 @@ def _signed(data: bytes) -> int:
 
 def parse(descriptor: bytes) -> Descriptor:
     """Every field of a report descriptor; raises DeviceError where it is cut off or unbalanced."""
-    state, stack, local = _Globals(), [], _Locals()
+    state, local = _Globals(), _Locals()
+    stack: list[_Globals] = []
     path: list[int] = []
     fields: list[Field] = []
     bits: dict[tuple[str, int], int] = {}

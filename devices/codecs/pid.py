@@ -28,7 +28,7 @@ DURATION, GAIN, AXES, DIRECTION_ENABLE, DIRECTION = (
 )
 TRIGGER_BUTTON, MAGNITUDE, LOOPS, DEVICE_GAIN = PAGE | 0x53, PAGE | 0x70, PAGE | 0x7C, PAGE | 0x7E
 OPERATION_KIND, START, STOP = PAGE | 0x78, PAGE | 0x79, PAGE | 0x7B
-CONTROL_KIND, ENABLE_ACTUATORS, STOP_ALL, RESET = PAGE | 0x96, PAGE | 0x97, PAGE | 0x99, PAGE | 0x9A
+CONTROL_KIND, ENABLE_ACTUATORS, STOP_ALL = PAGE | 0x96, PAGE | 0x97, PAGE | 0x99
 LOAD_STATUS, LOADED, POOL_FULL = PAGE | 0x8B, PAGE | 0x8C, PAGE | 0x8D
 ACTUATORS_ENABLED, SAFETY_SWITCH, ACTUATOR_POWER = PAGE | 0xA0, PAGE | 0xA4, PAGE | 0xA6
 NO_TRIGGER_BUTTON = 255
@@ -126,7 +126,7 @@ class PidLayout:
         return self._find("feature", BLOCK_LOAD, BLOCK_INDEX).get(report[1:])
 
     def control(self, usage: int) -> bytes:
-        """Output report: ENABLE_ACTUATORS, STOP_ALL or RESET."""
+        """Output report: ENABLE_ACTUATORS or STOP_ALL."""
         return self._report("output", CONTROL, [self._choice("output", CONTROL, CONTROL_KIND, usage)])
 
     def device_gain(self) -> bytes | None:
@@ -174,7 +174,9 @@ class PidLayout:
     @property
     def longest_input(self) -> int:
         """Bytes of the longest input report, its id included."""
-        lengths = [self.descriptor.report_bytes(k, i) for k, i in self.descriptor.report_bits if k == "input"]
+        lengths = [
+            self.descriptor.report_bytes("input", i) for k, i in self.descriptor.report_bits if k == "input"
+        ]
         return 1 + max(lengths, default=0)
 
     def axes(self, report: bytes) -> Axes | None:
@@ -208,11 +210,10 @@ class PidLayout:
 
     def _axis(self, report_id: int, body: bytes, usage: int) -> float | None:
         for place in self.descriptor.fields:
-            if place.kind == "input" and place.report_id == report_id and usage in place.usages:
+            index = place.index(usage)
+            if place.kind == "input" and place.report_id == report_id and index is not None:
                 low, high = place.logical_min, place.logical_max
-                return min(
-                    max(2.0 * (place.get(body, place.index(usage)) - low) / (high - low) - 1.0, -1.0), 1.0
-                )
+                return min(max(2.0 * (place.get(body, index) - low) / (high - low) - 1.0, -1.0), 1.0)
         return None
 
     def _buttons(self, report_id: int, body: bytes) -> int:

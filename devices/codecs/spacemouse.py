@@ -38,8 +38,7 @@ class Deflection:
 def decode(report: bytes, last: Deflection) -> Deflection:
     """`last` updated by one input report; a report that is not known, or too short, changes nothing."""
     if len(report) >= 13 and report[0] == 1:
-        values = _axes(report[1:13])
-        return replace(last, translation=values[:3], rotation=values[3:])
+        return replace(last, translation=_axes(report[1:7]), rotation=_axes(report[7:13]))
     if len(report) >= 7 and report[0] == 1:
         return replace(last, translation=_axes(report[1:7]))
     if len(report) >= 7 and report[0] == 2:
@@ -51,12 +50,13 @@ def decode(report: bytes, last: Deflection) -> Deflection:
     return last
 
 
-def _axes(data: bytes) -> tuple[float, ...]:
-    raw = struct.unpack(f"<{len(data) // 2}h", data)
-    signs = (1.0, -1.0, -1.0) * (len(raw) // 3)
-    return tuple(
-        min(max(sign * value / FULL_SCALE, -1.0), 1.0) + 0.0 for sign, value in zip(signs, raw, strict=True)
-    )
+def _axes(data: bytes) -> tuple[float, float, float]:
+    x, y, z = struct.unpack("<3h", data)
+    return _share(x), _share(-y), _share(-z)
+
+
+def _share(value: int) -> float:
+    return min(max(value / FULL_SCALE, -1.0), 1.0)
 
 
 def led(on: bool) -> bytes:

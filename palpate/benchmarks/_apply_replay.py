@@ -64,7 +64,7 @@ def one(path: Path, share: float, work: Path) -> dict[str, Any]:
     true = {n: k for n, k in truth_effects(recording).items() if effect(n).rendered}
     if true:
         law = "neo-hookean" if "finite_strain" in true else "linear"
-        stated = plain.with_modulus(recording.truth["young_modulus_pa"]).with_material(dent_law=law)
+        stated = plain.with_modulus((recording.truth or {})["young_modulus_pa"]).with_material(dent_law=law)
         stated = stated.replaced(effects={})
         model = with_effects(stated, true).replaced(path=folder)
         row["truth_n"] = replayed(model, recording, after, fit=before)

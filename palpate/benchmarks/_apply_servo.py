@@ -96,7 +96,7 @@ def show(rows: list[dict[str, Any]]) -> None:
             row["effect"],
             row.get("felt_as", "-"),
             row.get("value", "-"),
-            {True: "yes", False: "NO"}.get(row.get("right"), "-"),
+            ("yes" if row["right"] else "NO") if "right" in row else "-",
             row["median_us"],
             row["p99_us"],
             row["max_us"],

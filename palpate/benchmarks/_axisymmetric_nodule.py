@@ -14,7 +14,7 @@ from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri
 
 
 @BilinearForm
-def _elasticity(u, v, w):  # type: ignore[no-untyped-def]
+def _elasticity(u, v, w):
     r = w.x[0]
     nu = w.poisson_ratio
     lam, mu = w.modulus * nu / ((1 + nu) * (1 - 2 * nu)), w.modulus / (2 * (1 + nu))

@@ -77,6 +77,7 @@ def judge(case: Case, work: Path, *, fast: bool) -> dict[str, Any]:
     from mechanics.model import read_model
     from mechanics.recording import read_recording
 
+    answer: dict[str, Any]
     try:
         if _failure(case, work).exists():
             raise PalpateError(_failure(case, work).read_text(encoding="utf-8").strip())

@@ -133,7 +133,7 @@ def _round(
     strengths: tuple[float, ...],
     base: dict[str, float] | None = None,
 ) -> list[Case]:
-    found = []
+    found: list[Case] = []
     base = base or {}
     for shape in shapes:
         for _ in range(controls):
@@ -147,7 +147,7 @@ def _round(
 
 def _hard(shape: str, seed: int) -> list[Case]:
     """Left out of the library, absent from it, and two at a time."""
-    found = []
+    found: list[Case] = []
     for name in CHEAP:
         if name != "surface_offset":
             found.append(Case("left-out", shape, seed + len(found), (name,), {name: 2.0}, name))
@@ -164,7 +164,7 @@ def _hard(shape: str, seed: int) -> list[Case]:
 
 def _solid(shape: str, seed: int, strengths: tuple[float, ...], *, neo_hookean: bool) -> list[Case]:
     """Effects that are solved in the solid, on the linear object and, if asked for, on the neo-Hookean."""
-    found = []
+    found: list[Case] = []
     for name in SOLID:
         for strength in strengths:
             for base in ({}, {"finite_strain": 1.0}) if neo_hookean else ({},):

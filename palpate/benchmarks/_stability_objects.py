@@ -18,6 +18,7 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.tetmesh import TetMesh
 from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
+from render.base import Renderer
 from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.passivity import PassivityOptions
@@ -67,7 +68,7 @@ def press_and_drag(rate_hz: float = 1000.0, *, times: int = 2) -> np.ndarray:
 
 
 def one(
-    renderer: FemRenderer, hand: tuple[float, float, float], loop: Loop, tips: int, *, active: bool
+    renderer: Renderer, hand: tuple[float, float, float], loop: Loop, tips: int, *, active: bool
 ) -> ClosedLoopResult:
     """One combination; the two tips stand side by side, across the drag."""
     offsets = np.zeros((tips, 3))

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import multiprocessing
+from multiprocessing.queues import Queue
 from pathlib import Path
 
 import numpy as np
@@ -66,7 +67,7 @@ def memory_of(touchable: int, order: int) -> tuple[float, float]:
     return peak, need
 
 
-def _worker(touchable: int, order: int, queue) -> None:  # type: ignore[no-untyped-def]
+def _worker(touchable: int, order: int, queue: Queue[tuple[float, float]]) -> None:
     queue.put(memory_of(touchable, order))
 
 

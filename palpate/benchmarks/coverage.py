@@ -70,6 +70,7 @@ def _explored(name: str, presses: int, hand: int, protocol: str, effects: dict[s
         phantom(name), effects, options, hand=cohort_hand(hand), seed=seed, sizes=False, workers=1
     )
     result = reconstruct_fully(simulated.recording)
+    assert result.modulus is not None, "the finite-tip method fits a modulus"
     low, high = result.model.material.young_modulus_ci95_pa
     turned = np.array(simulated.truth["device_from_object_rotation"])
     shift = np.array(simulated.truth["device_from_object_shift_mm"]) / 1e3

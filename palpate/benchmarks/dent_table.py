@@ -171,11 +171,11 @@ class HalfSpace:
             even[:, :, 0, 0:2], even[:, :, 2, 2:4], even[:, :, 1, 4] = gradient, gradient, hoop
             odd[:, :, 1, 0], odd[:, :, 2, 1] = -hoop, -hoop
             odd[:, :, 1, 2:4], odd[:, :, 0, 2:4] = gradient, -gradient
-            even, odd = even.reshape(m, 27, 5), odd.reshape(m, 27, 4)
+            cosines, sines = even.reshape(m, 27, 5), odd.reshape(m, 27, 4)
             stiffness = self._stress(h, part)[1]
             half = 0.5 * weight[:, None, None]  # the mean of cos^2 and of sin^2
-            tangent += even @ (stiffness * half) @ even.transpose(0, 2, 1)
-            tangent += odd @ (self._sideways(h, part) * half) @ odd.transpose(0, 2, 1)
+            tangent += cosines @ (stiffness * half) @ cosines.transpose(0, 2, 1)
+            tangent += sines @ (self._sideways(h, part) * half) @ sines.transpose(0, 2, 1)
         dof = (3 * self.cells[:, :, None] + np.arange(3)).reshape(m, 27)
         rows, columns = np.repeat(dof, 27, axis=1).ravel(), np.tile(dof, (1, 27)).ravel()
         matrix = sp.csr_matrix((tangent.ravel(), (rows, columns)), shape=(3 * n, 3 * n))
@@ -183,9 +183,9 @@ class HalfSpace:
         held[self.points[:, 0] == 0, 1:] = True
         held[self.fixed[:, 1]] = True
         held[stuck] = True
-        motion = np.zeros((n, 3))
-        motion[stuck, 0] = 1.0
-        motion = motion.ravel()
+        given = np.zeros((n, 3))
+        given[stuck, 0] = 1.0
+        motion = given.ravel()
         free = np.flatnonzero(~held.ravel())
         motion[free] = PyPardisoSolver().solve(matrix[free][:, free].tocsr(), -(matrix @ motion)[free])
         return float(motion @ (matrix @ motion))

@@ -136,7 +136,8 @@ def _first_beyond(depths: np.ndarray, error: np.ndarray) -> float | None:
 
 
 def _recordings(models: Path, recordings: Path) -> dict[str, Any]:
-    figures, rows = {}, []
+    figures: dict[str, Any] = {}
+    rows: list[list[Any]] = []
     for folder in sorted(path for path in models.iterdir() if (path / "model.toml").exists()):
         source = recordings / f"{folder.name}.csv.gz"
         if not source.exists():

@@ -9,6 +9,7 @@ paper's way beside it: a unit force on the nearest node of linear tetrahedra.
 from __future__ import annotations
 
 import argparse
+from functools import partial
 
 import numpy as np
 
@@ -37,9 +38,11 @@ def press(
     """(k,) N: force along the normal of a press at each place."""
     sites = touch_sites(mesh, points, normals, NU, solver=touch_solver(mesh, NU), curvature=bent)
     path = np.linspace(0, -depth, 60)[:, None]
-    known = {"young_modulus_pa": MODULUS, "poisson_ratio": NU, "tip_radius_m": RADIUS, "law": "neo-hookean"}
+    force = partial(
+        touch_force, young_modulus_pa=MODULUS, poisson_ratio=NU, tip_radius_m=RADIUS, law="neo-hookean"
+    )
     forces = [
-        touch_force(path * n, n, far, curvature=b, **known)[-1] @ n
+        force(path * n, n, far, curvature=b)[-1] @ n
         for n, far, b in zip(normals, sites.far, bent, strict=True)
     ]
     return np.array(forces)
@@ -79,7 +82,14 @@ def run(arguments: argparse.Namespace) -> dict:
     return result
 
 
-def _report(sample, arguments, nodes, points, forces, way) -> dict:  # type: ignore[no-untyped-def]
+def _report(
+    sample: str,
+    arguments: argparse.Namespace,
+    nodes: list[int],
+    points: np.ndarray,
+    forces: np.ndarray,
+    way: str,
+) -> dict:
     change = (forces.max(axis=0) - forces.min(axis=0)) / forces.mean(axis=0)
     head = ["place (mm)"] + [
         f"{1e3 * s:g} mm ({n} nodes), N" for s, n in zip(arguments.mesh_size, nodes, strict=True)

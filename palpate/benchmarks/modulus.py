@@ -29,6 +29,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     papers = reconstruct_fully(recording, ReconstructOptions(method="paper", paper=options))
     own = reconstruct_fully(recording)
     mesh, nu, where = own.meshing.mesh, own.model.material.poisson_ratio, own.cast
+    sites = own.sites
+    assert sites is not None, "the finite-tip method fits to sites"
     solver = touch_solver(mesh, nu)
     curves = profiles(papers.model.presses)
     work = {
@@ -38,7 +40,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         "finite tip: refined mesh, factorisation": lambda: touch_solver(mesh, nu),
         "finite tip: sites": lambda: touch_sites(mesh, where.points, where.normals, nu, solver=solver),
         "finite tip: fit and interval": lambda: fit_modulus(
-            own.model.presses, own.sites, own.exploration.noise_n
+            own.model.presses, sites, own.exploration.noise_n
         ),
     }
     nodes = {

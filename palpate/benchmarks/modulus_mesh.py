@@ -33,7 +33,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Print a row a mesh and the change a recording; return the figures."""
-    rows, result = [], {}
+    rows: list[list[Any]] = []
+    result: dict[str, Any] = {}
     for path in arguments.recordings or [embedded_recording()]:
         recording = read_recording(path)
         for method in arguments.method:

@@ -54,8 +54,8 @@ def press_on_axis(solver: Solver, height_m: float, depth_m: float) -> float:
     point = np.array([[0.0, 0.0, height_m]])
     far = touch_sites(solver.mesh, point, UP[None], NU, solver=solver, curvature=0.0).far[0]
     path = -np.linspace(0, depth_m, 80)[:, None] * UP
-    known = {"young_modulus_pa": 1.0, "poisson_ratio": NU, "tip_radius_m": TIP, "law": "linear"}
-    return float(touch_force(path, UP, far, **known)[-1, 2])
+    force = touch_force(path, UP, far, young_modulus_pa=1.0, poisson_ratio=NU, tip_radius_m=TIP, law="linear")
+    return float(force[-1, 2])
 
 
 def felt(arguments: argparse.Namespace) -> list[dict[str, float]]:

@@ -21,7 +21,6 @@ from palpate.servo.report import ring_rows, snapshot
 
 SUMMARY = "the 1 kHz tick: compute time by contacts and nodes, late ticks against an empty loop"
 AIMS_US = {1: 100.0, 16: 300.0}
-AIM_LATE_RATIO = 1.1
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

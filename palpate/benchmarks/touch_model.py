@@ -51,7 +51,7 @@ def sample_of(recording: Recording) -> str | None:
     return next((name for name, begin in names.items() if shape.startswith(begin)), None)
 
 
-def gap(sample: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float | np.ndarray]:
+def gap(sample: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(signed distance (n,), outward normal (n, 3), mean curvature (n,)) of points in the object's frame."""
     x, y, z = points.T
     if sample == "half-sphere":
@@ -77,7 +77,7 @@ def gap(sample: str, points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float 
 
 def touches(recording: Recording, sample: str) -> tuple[np.ndarray, ...]:
     """(paths, forces (n, 3), starts (k + 1,), points, normals (k, 3), curvature), object's frame."""
-    truth = recording.truth
+    truth = recording.truth or {}
     turn = np.array(truth.get("device_from_object_rotation", np.eye(3)))
     shift = 1e-3 * np.array(truth.get("device_from_object_shift_mm", np.zeros(3)))
     centre = (recording.position - shift) @ turn
@@ -106,7 +106,8 @@ def run(arguments: argparse.Namespace) -> dict:
     for path in sorted(Path(arguments.recordings).glob("*.toml")):
         recording = read_recording(path)
         sample = sample_of(recording)
-        if sample is None or recording.truth.get("dominant_effect") != "finite_strain":
+        truth = recording.truth or {}
+        if sample is None or truth.get("dominant_effect") != "finite_strain":
             continue
         nu = recording.poisson_ratio or 0.49
         displacement, measured, starts, points, normals, bent = touches(recording, sample)
@@ -123,7 +124,7 @@ def run(arguments: argparse.Namespace) -> dict:
                 sites[refined],
                 displacement,
                 starts,
-                young_modulus_pa=float(recording.truth["young_modulus_pa"]),
+                young_modulus_pa=float(truth["young_modulus_pa"]),
                 tip_radius_m=recording.tip_radius_m,
                 law=law,
             )

@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Look, and tell."""
     if arguments.measure is not None and not arguments.measure >= LEAST_MEASURE_S:
         raise OptionError(f"--measure is {arguments.measure}; it must be at least {LEAST_MEASURE_S:g} s")
-    options = {name: options_from(arguments, options_of(name)) for name in HARDWARE}
+    options: dict[str, Any] = {name: options_from(arguments, options_of(name)) for name in HARDWARE}
     found = find_devices(arguments.names or None, options)
     there = [device for device in found if device.present]
     rates = {}

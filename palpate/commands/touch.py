@@ -13,6 +13,7 @@ import sys
 import time
 from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -167,8 +168,8 @@ def device_choice(
     arguments: argparse.Namespace, name: str, model: Model, channel: PoseChannel | None
 ) -> tuple[DeviceChoice, float | None]:
     """The device for the servo process to make, and when it will have done (s), None for never."""
-    options = options_from(arguments, options_of(name))
-    if name == "mouse":
+    options: Any = options_from(arguments, options_of(name))
+    if channel is not None:
         return DeviceChoice(name, {"channel": str(channel.path), "options": options}), None
     if name == "replay":
         recording = str(Path(arguments.replay).resolve())

@@ -55,22 +55,28 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
     return page.write(path)
 
 
-def by_press(result: Comparison, ax: Axes | None = None) -> Figure:
+def by_press(result: Comparison) -> Figure:
     """Error of each press for each model."""
-    ax = ax or Figure(figsize=(8, 3.2)).subplots()
+    figure = Figure(figsize=(8, 3.2))
+    draw_by_press(result, figure.subplots())
+    return figure
+
+
+def draw_by_press(result: Comparison, ax: Axes) -> None:
+    """The same on axes that are there."""
     order = np.argsort(result.press_rmse_n["fem"])
     for name in MODELS:
         ax.plot(result.press_rmse_n[name][order], "o-", ms=4, lw=1, color=COLOURS[name], label=name)
     ax.axhline(result.noise_n, color="0.5", ls="--", lw=1, label="sensor noise")
     ax.set(xlabel="held-out press", ylabel="rms force error [N]", yscale="log")
     ax.legend(frameon=False, ncol=4, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
-    return ax.figure
 
 
 def scatter(result: Comparison) -> Figure:
     """Predicted against measured normal force."""
     presses = result.presses
-    axes = Figure(figsize=(9, 3.2)).subplots(1, len(MODELS), sharex=True, sharey=True)
+    figure = Figure(figsize=(9, 3.2))
+    axes = figure.subplots(1, len(MODELS), sharex=True, sharey=True)
     press = presses.press
     normal = presses.normal[press]
     measured = (presses.force * normal).sum(axis=1)
@@ -81,7 +87,7 @@ def scatter(result: Comparison) -> Figure:
         ax.plot([0, top], [0, top], color="0.3", lw=0.8)
         ax.set(title=name, xlabel="measured, N", aspect="equal")
     axes[0].set_ylabel("predicted, N")
-    return axes[0].figure
+    return figure
 
 
 def across_region(result: Comparison, members: np.ndarray) -> Figure:
@@ -100,24 +106,30 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     forces = stiffness_along(
         result.prepared, np.flatnonzero(~members), places, presses.normal[family], model, DEPTH_M
     )
-    ax = Figure(figsize=(7, 3.4)).subplots()
+    figure = Figure(figsize=(7, 3.4))
+    ax = figure.subplots()
     x = coordinate[family][order] * 1e3
     for name in MODELS:
         ax.plot(x, forces[name][order], "o-", ms=4, lw=1, color=COLOURS[name], label=name)
     measured = _at_depth(result)
-    for inside, style in (
-        (False, {"mfc": "none", "label": "measured, seen"}),
-        (True, {"label": "measured, left out"}),
-    ):
+    for inside, face, label in ((False, "none", "measured, seen"), (True, None, "measured, left out")):
         chosen = family & (members == inside) & np.isfinite(measured)
-        ax.plot(coordinate[chosen] * 1e3, measured[chosen], "s", ms=6, color=COLOURS["measured"], **style)
+        ax.plot(
+            coordinate[chosen] * 1e3,
+            measured[chosen],
+            "s",
+            ms=6,
+            color=COLOURS["measured"],
+            mfc=face,
+            label=label,
+        )
     ax.set(
         xlabel="height above the support, mm" if sideways else "distance from the middle, mm",
         ylabel=f"normal force at {DEPTH_M * 1e3:g} mm, N",
     )
     ax.set_ylim(bottom=0)
     ax.legend(frameon=False, fontsize=8, ncol=2)
-    return ax.figure
+    return figure
 
 
 def _at_depth(result: Comparison) -> np.ndarray:

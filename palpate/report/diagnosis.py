@@ -9,7 +9,7 @@ import numpy as np
 from diagnose.result import Diagnosis
 from mechanics.model import Model
 from mechanics.recording import Recording
-from palpate.report.diagnosis_figures import curves_picture, first_picture, presses_picture
+from palpate.report.diagnosis_figures import curves_picture, first_picture, gap_of, presses_picture
 from palpate.report.diagnosis_words import (
     AXIS_WORDS,
     ERROR_WORDS,
@@ -29,7 +29,7 @@ MOST_EFFECTS = 8
 
 def write_report(path: Path | str, recording: Recording, model: Model, result: Diagnosis) -> Path:
     """Write one self-contained HTML page; returns its path."""
-    t = result.forward.touches
+    t, _, _ = gap_of(result)
     typical = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
     page = Page(f"Simulated touch against measured touch: {recording.name}")
     page.lead(verdict(result))

@@ -9,6 +9,7 @@ from scipy.spatial.distance import cdist
 
 from diagnose.result import Diagnosis
 from mechanics.model import Model
+from mechanics.presses import Presses
 from palpate.report.object3d import draw_object, view_axes
 from render.felt import felt_surface
 
@@ -32,15 +33,21 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
 
 def _ranked(result: Diagnosis) -> np.ndarray:
     """Presses, the one with the largest gap first."""
-    t = result.forward.touches
-    each = np.bincount(t.press, weights=(result.residual_before**2).sum(axis=1) * t.counted, minlength=len(t))
+    t, before, _ = gap_of(result)
+    each = np.bincount(t.press, weights=(before**2).sum(axis=1) * t.counted, minlength=len(t))
     return np.argsort(-each)
 
 
 def sites_of(result: Diagnosis) -> np.ndarray:
     """(k, 3) m, the places that were touched."""
-    assert result.forward is not None, "a diagnosis that `diagnose` made holds its forward model"
-    return result.forward.touches.site_point
+    return gap_of(result)[0].site_point
+
+
+def gap_of(result: Diagnosis) -> tuple[Presses, np.ndarray, np.ndarray]:
+    """(touches, gap (n, 3) N without any effect, gap with those found), of a diagnosis `diagnose` made."""
+    assert result.forward is not None, "only what `diagnose` returned holds its touches"
+    assert result.residual_before is not None and result.residual_after is not None
+    return result.forward.touches, result.residual_before, result.residual_after
 
 
 def gap_at(result: Diagnosis, points: np.ndarray) -> np.ndarray:
@@ -63,15 +70,15 @@ def _object(ax: Any, model: Model, result: Diagnosis) -> None:
 
 
 def _press(ax: Any, result: Diagnosis, press: int) -> None:
-    t = result.forward.touches
+    t, before, after = gap_of(result)
     rows = (t.press == press) & t.counted
     clock = t.t[rows] - t.onset_s[press]
     force = t.local_force[rows, 0]
     ax.plot(clock, force, color=MEASURED, lw=1.8, label="measured")
-    ax.plot(clock, force - result.residual_before[rows, 0], color=IDEAL, lw=1.2, label="simulated")
+    ax.plot(clock, force - before[rows, 0], color=IDEAL, lw=1.2, label="simulated")
     if result.effects:
         ax.plot(
-            clock, force - result.residual_after[rows, 0], color=IMPROVED, lw=1.2, ls="--",
+            clock, force - after[rows, 0], color=IMPROVED, lw=1.2, ls="--",
             label="simulated with what was found",
         )  # fmt: skip
     ax.set(xlabel="time since first touch (s)", ylabel="force into the surface (N)")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from palpate.report.modulus_figures import height_trends
+from reconstruct.modulus import ModulusFit
 from reconstruct.pipeline import Reconstruction
 from reconstruct.uniaxial import low_passed
 
@@ -16,7 +17,7 @@ def differences(result: Reconstruction) -> list[str]:
     told = [_touches(result), _surface(result), _load(result)]
     if result.modulus:
         told[1:1] = [_first_touch(result)]
-        told += [_law(result)]
+        told += [_law(result.modulus)]
     return [words for words in [*told, _trend(result)] if words]
 
 
@@ -83,8 +84,7 @@ def _load(result: Reconstruction) -> str:
     )
 
 
-def _law(result: Reconstruction) -> str:
-    fit = result.modulus
+def _law(fit: ModulusFit) -> str:
     low, high = (100 * (e / fit.modulus_pa - 1) for e in fit.ci95_pa)
     return (
         "Law and interval. The paper is linear and gives no interval. Here the dent follows the "

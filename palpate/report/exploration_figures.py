@@ -70,8 +70,9 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
     facing = model.presses.normal @ view[2] > 0
     first = np.unique(node, return_index=True)[1]
     for i in first[facing[first]]:
-        ax.plot(*seen[i, :2], "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
-        ax.text(*seen[i, :2], str(i + 1), ha="center", va="center", fontsize=5.5)
+        x, y = seen[i, :2]
+        ax.plot(x, y, "o", ms=9, mfc="white", mec=PEAK_COLOUR, mew=1)
+        ax.text(x, y, str(i + 1), ha="center", va="center", fontsize=5.5)
     return ax
 
 

@@ -70,9 +70,9 @@ class Comparison(Result, room.Comparison):
         }
 
     def _draw(self, ax: Axes) -> None:
-        from palpate.report.comparison import by_press
+        from palpate.report.comparison import draw_by_press
 
-        by_press(self, ax)
+        draw_by_press(self, ax)
 
     def _place(self, plotter: Plotter) -> None:
         from palpate.results.scenery import add_dots, add_object

@@ -8,17 +8,25 @@ from __future__ import annotations
 
 import sys
 import time
+from collections.abc import Callable
+from typing import Any, cast
 
 from numba import njit, types
 
 COMPILED = sys.platform.startswith("linux")
 SPIN_S = 0.002
 
+
+def c_function(name: str, signature: Any) -> Callable[..., int]:
+    """A function of the C library for compiled code; numba's own type for it is not that of a callable."""
+    return cast(Callable[..., int], types.ExternalFunction(name, signature))
+
+
 _MONOTONIC = 1
 _THREAD_CPU = 3
 _ABSOLUTE = 1
-_gettime = types.ExternalFunction("clock_gettime", types.int32(types.int32, types.voidptr))
-_nanosleep = types.ExternalFunction(
+_gettime = c_function("clock_gettime", types.int32(types.int32, types.voidptr))
+_nanosleep = c_function(
     "clock_nanosleep", types.int32(types.int32, types.int32, types.voidptr, types.voidptr)
 )
 

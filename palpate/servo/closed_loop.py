@@ -44,7 +44,7 @@ from render.coupling import (
     stiffest_n_per_m,
     stiffness_distortion,
 )
-from render.passivity import DISSIPATED, PassivityOptions, passivity_parameters
+from render.passivity import PassivityOptions, passivity_parameters
 from render.scene import in_the_air
 
 SUBSTEPS = 20
@@ -69,7 +69,7 @@ class Loop:
 class ClosedLoopResult:
     """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given so far.
 
-    damped_j: what the controller took; compliance_m_per_n: the coupling's at each tip, and stiffness_lost the
+    compliance_m_per_n: the coupling's at each tip, and stiffness_lost the
     share that it takes of the stiffness of the object's stiffest place.
     """
 
@@ -77,7 +77,6 @@ class ClosedLoopResult:
     command: np.ndarray
     rendered: np.ndarray
     work_j: np.ndarray
-    damped_j: float
     compliance_m_per_n: float
     stiffness_lost: float
     contact_share: float
@@ -240,7 +239,6 @@ def closed_loop(
         out[:, 3:6],
         out[:, 6:9],
         out[:, 9],
-        float(arrays.passivity.energies[DISSIPATED]),
         compliance,
         stiffness_distortion(stiffest, compliance),
         float(arrays.shared.counts[CONTACT_TICKS]) / n,

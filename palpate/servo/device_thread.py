@@ -111,14 +111,14 @@ class DeviceThread:
         pose[IN_TIP : IN_TIP + 3] = tip.position_m
         pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3] = tip.velocity_m_per_s
         pose[IN_QUATERNION : IN_QUATERNION + 4] = tip.quaternion
-        pose[IN_FORCE_MAP : IN_FORCE_MAP + 9] = (self.mapping.force_scale * self.mapping.rotation.T).ravel()
+        pose[IN_FORCE_MAP : IN_FORCE_MAP + 9] = mapper.force_map(self.mapping).ravel()
         put_pose(self._arrays, pose)
 
     def send_command(self, *, fresh: bool = True) -> None:
         """Send the newest command, or zero where it is not fresh; follow enabling and disabling."""
         if self._sink is None:
             return
-        self._follow_enable()
+        self._follow_enable(self._sink)
         if fresh and take_command(self._arrays, self._command) >= 0:
             age = time.perf_counter() - self._command[OUT_TIME]
             if age <= STALE_COMMAND_S:
@@ -132,7 +132,7 @@ class DeviceThread:
         settled = time.perf_counter() - self._enabled_s > ENABLING_S
         return wanted and settled and not raw.force_enabled
 
-    def _follow_enable(self) -> None:
+    def _follow_enable(self, sink: ForceSink) -> None:
         wanted = int(self._arrays.shared.control[ENABLE])
         if wanted == self._enabled:
             return
@@ -140,9 +140,9 @@ class DeviceThread:
         self._enabled_s = time.perf_counter()
         try:
             if wanted:
-                self._sink.enable_force()
+                sink.enable_force()
             else:
-                self._sink.disable_force()
+                sink.disable_force()
         except PalpateError as error:
             self.words.append(str(error))
 

@@ -49,8 +49,9 @@ class ElasticPlane(FreeAir):
 
     def __init__(self, stiffness_n_per_m: float = 500.0, compliance_m_per_n: float = 0.0) -> None:
         super().__init__()
+        self.stiffness_n_per_m, self.compliance_m_per_n = float(stiffness_n_per_m), float(compliance_m_per_n)
         self.parameters = PlaneParameters(
-            np.array([float(stiffness_n_per_m)]), np.full(1, np.inf), np.array([float(compliance_m_per_n)])
+            np.array([self.stiffness_n_per_m]), np.full(1, np.inf), np.array([self.compliance_m_per_n])
         )
 
     @property
@@ -66,11 +67,11 @@ class ElasticPlane(FreeAir):
 
     def with_modulus(self, young_modulus_pa: float) -> ElasticPlane:
         """The stiffness of a 1 cm square, 1 cm thick: E times 1 cm."""
-        return ElasticPlane(0.01 * young_modulus_pa, float(self.parameters.series_compliance[0]))
+        return ElasticPlane(0.01 * young_modulus_pa, self.compliance_m_per_n)
 
     def with_series_compliance(self, compliance_m_per_n: float) -> ElasticPlane:
         """The same plane felt through a spring."""
-        return ElasticPlane(float(self.parameters.stiffness[0]), compliance_m_per_n)
+        return ElasticPlane(self.stiffness_n_per_m, compliance_m_per_n)
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ class FreeAir:
 
     def __init__(self, tip_radius_m: float = 0.005) -> None:
         self.tip_radius_m = tip_radius_m
-        self.parameters = FreeAirParameters(np.full(1, np.inf), np.zeros(1))
+        self.parameters: tuple[np.ndarray, ...] = FreeAirParameters(np.full(1, np.inf), np.zeros(1))
 
     @property
     def surface(self) -> tuple[np.ndarray, np.ndarray]:

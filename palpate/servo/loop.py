@@ -15,12 +15,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import cfunc, njit, typeof, types
 
-from palpate.servo.clock import COMPILED, compiled_now_ns, compiled_sleep_until, sleep_until
+from palpate.servo.clock import COMPILED, c_function, compiled_now_ns, compiled_sleep_until, sleep_until
 from palpate.servo.layout import DEADLINE, STATUS, STOP
 from palpate.servo.tick import TickArrays, TickParameters, account, after, before
 from render.scene import TouchScene
 
-_write = types.ExternalFunction("write", types.intp(types.int32, types.voidptr, types.uintp))
+_write = c_function("write", types.intp(types.int32, types.voidptr, types.uintp))
 
 SWAP = 7
 """Cell of `control` by which this process's own threads ask the loop to come back."""

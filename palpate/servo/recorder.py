@@ -9,6 +9,7 @@ import numpy as np
 from mechanics.errors import RecordingError
 from mechanics.recording import Recording, write_recording
 from palpate.servo.client import Servo
+from palpate.servo.layout import ROW
 
 
 class Recorder:
@@ -31,8 +32,8 @@ class Recorder:
 
     def recording(self, tip_radius_m: float, object_name: str = "object") -> Recording:
         """What was collected; raises RecordingError where there is nothing."""
-        rows = np.concatenate(self._rows) if self._rows else np.zeros(0)
-        rows = rows[np.isfinite(rows["tip"]).all(axis=1)] if len(rows) else rows
+        rows = np.concatenate(self._rows) if self._rows else np.zeros(0, dtype=ROW)
+        rows = rows[np.isfinite(rows["tip"]).all(axis=1)]
         if len(rows) < 2:
             raise RecordingError("nothing was recorded: the servo ran for less than two ticks")
         period_s = self._servo.options.period_ns * 1e-9

@@ -134,14 +134,13 @@ def _histogram(bins: np.ndarray, extremes: np.ndarray) -> Histogram:
 
 @dataclass(frozen=True)
 class ServoSnapshot:
-    """The newest tick, for a window. m tips; scene frame but for `device_position_m` and `command_n`.
+    """The newest tick, for a window. m tips; scene frame but for `command_n`.
 
     forces_n: (m, 3) rendered, on the tool; command_n: (3,) sent to the device. reason: '' or plain words.
     """
 
     tick: int
     time_s: float
-    device_position_m: np.ndarray
     command_n: np.ndarray
     quaternion: np.ndarray
     buttons: int
@@ -167,7 +166,6 @@ def snapshot(arrays: SharedArrays) -> ServoSnapshot | None:
     return ServoSnapshot(
         tick=int(row["tick"]),
         time_s=float(row["time_s"]),
-        device_position_m=row["position"].copy(),
         command_n=row["command"].copy(),
         quaternion=row["quaternion"].copy(),
         buttons=int(row["buttons"]),

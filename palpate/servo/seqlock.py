@@ -6,6 +6,9 @@ and the same before and after. Fences keep compiler and processor from reorderin
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import cast
+
 import numpy as np
 from numba import njit, types
 from numba.extending import intrinsic
@@ -13,15 +16,16 @@ from numba.extending import intrinsic
 TRIES = 1000
 
 
-@intrinsic
-def fence(typing_context):
-    """A full memory fence."""
-
+def _fence(typing_context):
     def generate(context, builder, signature, arguments):
         builder.fence("seq_cst")
         return context.get_dummy_value()
 
     return types.void(), generate
+
+
+fence = cast(Callable[[], None], intrinsic(_fence))
+"""A full memory fence; compiled code calls it without the typing context that numba passes."""
 
 
 @njit(cache=True, nogil=True)

@@ -14,7 +14,9 @@ from mechanics.progress import Progress
 class RendererSource(Protocol):
     """Makes a renderer in the servo process."""
 
-    name: str
+    @property
+    def name(self) -> str:
+        """The renderer's."""
 
     def make(self, progress: Progress) -> tuple[Any, Model | None]:
         """The renderer, and the model behind it where there is one."""

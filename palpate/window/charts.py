@@ -41,11 +41,6 @@ class LiveCharts:
         plotter.add_chart(chart)
         return chart
 
-    def rename(self, names: tuple[str, ...]) -> None:
-        """Other renderers' names in the legend."""
-        for line, name in zip(self._lines, names, strict=False):
-            line.label = name
-
     def update(self, trace: Trace) -> None:
         """Redraw from the trace; the range grows with the greatest value shown."""
         curves = trace.curves()

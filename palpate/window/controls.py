@@ -65,13 +65,15 @@ class Controls:
         self._dragged: tuple[np.ndarray, np.ndarray] | None = None
         self._turning = False
         plotter = window.plotter
-        self.interactor = plotter.iren.interactor
+        iren = plotter.iren
+        assert iren is not None, "pyvista makes an interactor with its plotter"
+        self.interactor = iren.interactor
         self._style = vtk.vtkInteractorStyleTrackballCamera()
         # two quick presses would give the mouse to a chart, and pyvista's keys change the picture
-        plotter.iren.untrack_click_position("left")
-        plotter.iren.clear_key_event_callbacks()
+        iren.untrack_click_position("left")
+        iren.clear_key_event_callbacks()
         # through pyvista, which sets what it knows of again when the window is shown
-        plotter.iren.style = self._style
+        iren.style = self._style
         # an observer on the style replaces what the style would do with that event
         for event, action in (
             ("LeftButtonPressEvent", lambda *_: self._left(True)),
@@ -158,11 +160,11 @@ class Controls:
     def _drag(self, x: int, y: int) -> None:
         renderer = self._under(x, y)
         region = self._session.inclusion
-        if renderer is None or region is None:
+        if renderer is None or region is None or self._dragged is None:
             return
         centre, start = self._dragged
         moved = centre + self._in_plane(renderer, centre, x, y) - start
-        self._window.set_inclusion(replace(region, centre_m=tuple(map(float, moved))))
+        self._window.set_inclusion(replace(region, centre_m=_triple(moved)))
 
     def key(self, symbol: str) -> None:
         """A key by VTK's symbol; see palpate.window.keys."""
@@ -171,7 +173,7 @@ class Controls:
             action()
         elif symbol in MOVES and self._session.inclusion is not None:
             centre = np.array(self._session.inclusion.centre_m) + STEP_M * np.array(MOVES[symbol])
-            moved = replace(self._session.inclusion, centre_m=tuple(map(float, centre)))
+            moved = replace(self._session.inclusion, centre_m=_triple(centre))
             self._window.set_inclusion(moved)
 
     def _actions(self) -> dict[str, Callable[[], object]]:
@@ -217,7 +219,7 @@ class Controls:
         normal = self._session.model.support.normal if target is None else target.normal
         point = pointer.tip_m if target is None else target.point
         centre = point - 2.0 * INCLUSION_RADIUS_M * normal
-        region = Region("inclusion", tuple(map(float, centre)), INCLUSION_RADIUS_M, INCLUSION_RATIO)
+        region = Region("inclusion", _triple(centre), INCLUSION_RADIUS_M, INCLUSION_RATIO)
         self._window.set_inclusion(region)
 
     def _toggle_recording(self) -> None:
@@ -242,3 +244,8 @@ def unproject(renderer: vtk.vtkRenderer, x: int, y: int, depth: float) -> np.nda
     renderer.DisplayToWorld()
     point = np.array(renderer.GetWorldPoint())
     return point[:3] / point[3]
+
+
+def _triple(point: np.ndarray) -> tuple[float, float, float]:
+    x, y, z = map(float, point)
+    return x, y, z

@@ -38,8 +38,10 @@ class FieldChange:
 
     def changed(self, renderer: Renderer) -> Renderer:
         """The renderer on the changed object; one-dimensional ones know nothing of what is inside."""
-        if not isinstance(renderer, FemRenderer):
-            return renderer
+        return self.laid_on(renderer) if isinstance(renderer, FemRenderer) else renderer
+
+    def laid_on(self, renderer: FemRenderer) -> FemRenderer:
+        """The renderer on the changed object."""
         with np.load(self.path) as arrays:
             return renderer.with_field(arrays["far"], arrays["blocks"] if len(arrays["blocks"]) else None)
 
@@ -137,7 +139,7 @@ class InclusionMover:
         if before is not None:
             before.path.unlink()
         self._placed = wanted
-        return self._change.changed(drawing)
+        return self._change.laid_on(drawing)
 
     def apply(self, servo: Servo) -> None:
         """To a renderer that the servo has got anew."""

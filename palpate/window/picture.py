@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 import pyvista
 
@@ -17,6 +19,8 @@ ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
+
+Colours = Literal["viridis", "YlOrRd"]
 
 
 class ObjectPicture:
@@ -45,6 +49,7 @@ class ObjectPicture:
         self._smooth = renderer.contact.arrays.normals
         self._shade()
         self._actor: pyvista.Actor | None = None
+        self._bar = ""
         self._title = f"{label}  " if label else ""
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
@@ -80,13 +85,13 @@ class ObjectPicture:
         self._surface[name] = stiffness_n_per_m
         self._colour_by(name, "viridis", tuple(np.percentile(shown, [2, 98])))
 
-    def _colour_by(self, name: str, colours: str, limits: tuple[float, float]) -> None:
+    def _colour_by(self, name: str, colours: Colours, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
         opacity = 1.0
         if self._actor is not None:
             opacity = self._actor.prop.opacity
             self._plotter.remove_actor(self._actor, render=False)
-            self._plotter.remove_scalar_bar(self._bar, render=False)
+            self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
         self._bar = f"{self._title}{name}"
         self._actor = self._plotter.add_mesh(
             self._surface,
@@ -120,7 +125,8 @@ class ObjectPicture:
 
     def see_through(self, on: bool) -> None:
         """Show what is inside."""
-        self._actor.prop.opacity = 0.45 if on else 1.0
+        if self._actor is not None:
+            self._actor.prop.opacity = 0.45 if on else 1.0
 
     def show_inclusion(self, region: Region | None) -> None:
         """A ball where the inclusion is, or nothing."""
@@ -159,7 +165,7 @@ def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> ob
 
 
 def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> None:
-    size = 2 * BESIDE * np.linalg.norm(np.ptp(points, axis=0))
+    size = 2 * BESIDE * float(np.linalg.norm(np.ptp(points, axis=0)))
     support = support_plane(model)
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
     middle = middle - ((middle - support.point) @ support.normal) * support.normal

@@ -60,8 +60,9 @@ class SessionRecording:
         self.collect()
         recording = self._recorder.recording(self._servo.tip_radius_m, title)
         base, phase = self._model.path, None
-        if self._tracing.done:
-            start, end = (self._seconds(tick) for tick in (self._tracing.first, self._tracing.last))
+        first, last = self._tracing.first, self._tracing.last
+        if self._tracing.done and first is not None and last is not None:
+            start, end = self._seconds(first), self._seconds(last)
             base, phase = None, (round(max(0.0, start - MARGIN_S), 3), round(end + MARGIN_S, 3))
         recording = replace(
             recording,

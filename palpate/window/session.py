@@ -29,6 +29,7 @@ from palpate.window.worker import Worker
 from render.base import Renderer
 from render.effects import rendered_touch
 from render.felt import with_own_stiffness
+from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.registry import create, names
 from render.scene import scene_of
@@ -288,7 +289,9 @@ class TouchSession:
         if "fem" not in self._renderers:
             self._renderers["fem"] = self._create("fem").with_modulus(self.young_modulus_pa)
         while not self._inclusion.settled:
-            self._renderers["fem"] = self._inclusion.follow(self._servo, self._renderers["fem"])
+            drawing = self._renderers["fem"]
+            assert isinstance(drawing, FemRenderer), "'fem' is made by render.fem"
+            self._renderers["fem"] = self._inclusion.follow(self._servo, drawing)
 
     def report(self) -> ServoReport:
         """What the servo did so far."""

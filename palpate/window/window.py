@@ -55,18 +55,22 @@ class TouchWindow:
         self._end_s = float("inf")
         self._map = StiffnessMap(session.worker, session.servo.tip_radius_m)
         self._coloured = scene.colour == "stiffness"
+        halves = [(0, slice(None)), (1, slice(None))]
         self.plotter = pyvista.Plotter(
             off_screen=off_screen,
             window_size=list(size),
             shape=(2, 2),
-            row_weights=[1.0 - CHARTS_SHARE, CHARTS_SHARE],
-            groups=[(1, slice(None))] if self.sides == 2 else [(0, slice(None)), (1, slice(None))],
+            row_weights=[100 - round(100 * CHARTS_SHARE), round(100 * CHARTS_SHARE)],
+            groups=halves[1:] if self.sides == 2 else halves,  # type: ignore[arg-type]  # it takes slices too
             title=f"Palpate: {scene.title}",
             border=False,
         )
-        self.plotter.set_background("#f4f6f8", all_renderers=True)
+        for renderer in self.plotter.renderers:
+            renderer.set_background("#f4f6f8")
         # smoothing edges costs more than all the rest where there is no graphics card
-        self.plotter.render_window.SetMultiSamples(0)
+        window = self.plotter.render_window
+        assert window is not None, "a plotter has one until it is closed"
+        window.SetMultiSamples(0)
         self._headings: list[pyvista.Text] = []
         self.pictures = [self._picture(side) for side in range(self.sides)]
         self.plotter.subplot(1, 0)

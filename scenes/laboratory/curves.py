@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
 from types import ModuleType
+from typing import TypedDict
 
 import numpy as np
 
@@ -71,6 +72,16 @@ class PathJob:
             if array is not None:
                 digest.update(np.round(np.asarray(array) * 1e4).astype(np.int64).tobytes())
         return digest.hexdigest()[:32]
+
+
+class Solving(TypedDict, total=False):
+    """Keywords of `curves`."""
+
+    fineness: Fineness | None
+    workers: int | None
+    cache: Path | None
+    progress: Progress
+    label: str
 
 
 def solve(
@@ -169,8 +180,7 @@ def curves(
     cache = cache or laboratory_cache()
     shape = phantom_key(phantom)
     paths = [cache / "curves" / shape / f"{job.key(shape, specimen, fineness)}.npz" for job in jobs]
-    found = [_load(path) for path in paths]
-    missing = [k for k, curve in enumerate(found) if curve is None]
+    missing = [k for k, path in enumerate(paths) if _load(path) is None]
     if missing:
         coarse_mesh(phantom, cache)
         failures = []
@@ -199,7 +209,9 @@ def curves(
             raise LabError(
                 f"{len(failures)} of {len(groups)} places could not be solved; the first: {failures[0]}"
             )
-        found = [_load(path) for path in paths]
+    found = [curve for curve in map(_load, paths) if curve is not None]
+    if len(found) < len(paths):
+        raise LabError(f"solved touches in '{cache}' vanished while they were read: solve them again")
     return found
 
 

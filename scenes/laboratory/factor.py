@@ -5,6 +5,7 @@ there is none.
 from __future__ import annotations
 
 import weakref
+from collections.abc import Callable
 
 import numpy as np
 import scipy.sparse as sp
@@ -24,8 +25,7 @@ class Factor:
 
     def __init__(self) -> None:
         self._solvers: dict[int, PyPardisoSolver] = {}
-        self._solver = None
-        self._matrix: sp.csr_matrix | None = None
+        self._back: Callable[[np.ndarray], np.ndarray] | None = None
 
     def refresh(self, upper: sp.csr_matrix) -> None:
         """Factorise; the fill-reducing ordering of the first matrix serves all later ones.
@@ -35,9 +35,8 @@ class Factor:
         """
         if PyPardisoSolver is None:
             full = upper + sp.triu(upper, 1).T
-            self._solver = sp.linalg.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A")
+            self._back = sp.linalg.splu(full.tocsc(), permc_spec="MMD_AT_PLUS_A").solve
             return
-        self._matrix = upper
         try:
             self._factorise(upper, DEFINITE)
         except PyPardisoError:
@@ -54,12 +53,15 @@ class Factor:
             solver._call_pardiso(upper, nothing)
         solver.set_phase(22)
         solver._call_pardiso(upper, nothing)
-        self._solver = solver
+
+        def back(b: np.ndarray) -> np.ndarray:
+            solver.set_phase(33)
+            right = np.asfortranarray(b.reshape(len(b), -1))
+            return solver._call_pardiso(upper, right).reshape(b.shape)
+
+        self._back = back
 
     def solve(self, b: np.ndarray) -> np.ndarray:
-        """x with (matrix) x = b, b (n,) or (n, k)."""
-        if PyPardisoSolver is None:
-            return self._solver.solve(b)
-        right = np.asfortranarray(b.reshape(len(b), -1))
-        self._solver.set_phase(33)
-        return self._solver._call_pardiso(self._matrix, right).reshape(b.shape)
+        """x with (matrix) x = b, b (n,) or (n, k); after `refresh`."""
+        assert self._back is not None, "refresh comes first"
+        return self._back(b)

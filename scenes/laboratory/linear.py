@@ -120,13 +120,14 @@ class LinearProblem:
         arrivals = not held.active.any()
         if arrivals:
             self._contact.expect(u, centre, held)
-        step, last, cut, least = np.zeros_like(u), u, 1.0, np.inf
+        step, last, cut, least = np.zeros_like(u), u, 1.0, float("inf")
         for iteration in range(90):
             forces, face_k, force, grip = self._contact.evaluate(u, centre, held, True, arrivals)
             load = np.bincount(self._dofs.ravel(), forces.ravel(), minlength=u.size)
             given = self._compliance @ load
             r = gain * u.ravel() + past.ravel() + given
-            if np.linalg.norm(r) < 1e-7 * max(np.linalg.norm(given), 1e-3) and arrivals and iteration:
+            load_size = float(np.linalg.norm(given))
+            if np.linalg.norm(r) < 1e-7 * max(load_size, 1e-3) and arrivals and iteration:
                 if held.let_go(grip):
                     continue
                 change = u - state.displacement
@@ -134,7 +135,7 @@ class LinearProblem:
                 return LinearState(u, centre, force, grip, 0.5 * float(load @ given), memory)
             if iteration > 20:
                 held.settle(grip)
-            size = np.linalg.norm(r)
+            size = float(np.linalg.norm(r))
             if size > 1.5 * least and cut > 0.1 and arrivals:
                 # sticking and sliding in turn: go back along the last step
                 cut *= 0.5
@@ -148,7 +149,7 @@ class LinearProblem:
             # points that arrive and leave in turn are calmed by shorter steps
             calm = 1.0 if iteration < 25 else 0.5
             step = -r.reshape(-1, 3) / gain
-            step *= min(calm, 5.0 / max(np.abs(step).max(), 1e-12))
+            step *= min(calm, 5.0 / max(float(np.abs(step).max()), 1e-12))
             last, cut = u, 1.0
             u = u + step
             if not arrivals:

@@ -19,8 +19,6 @@ from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
 
 _EDGES = np.array([[0, 1], [0, 2], [0, 3], [1, 2], [1, 3], [2, 3]])
-EDGE_NODE = {tuple(e): 4 + k for k, e in enumerate(_EDGES.tolist())}
-"""Local number of the mid-edge node between two local corners."""
 
 COARSE_MM = 18.0
 """Edge length of the coarse mesh."""

@@ -234,12 +234,10 @@ def _lean(axis: np.ndarray, hand: HandOptions, rng: np.random.Generator) -> np.n
 
 def _axes(knots: list[tuple[int, np.ndarray | None]], count: int) -> np.ndarray:
     """(count, 3) unit vectors that turn smoothly from knot to knot."""
-    at, values, last = [], [], None
-    for sample, axis in knots:
-        last = axis if axis is not None else last
-        at.append(sample)
-        values.append(last)
-    values, at = np.array(values), np.array(at, float)
+    turns: list[np.ndarray] = []
+    for _, axis in knots:
+        turns.append(axis if axis is not None else turns[-1])
+    at, values = np.array([sample for sample, _ in knots], float), np.array(turns)
     k = np.clip(np.searchsorted(at, np.arange(count), side="right") - 1, 0, len(at) - 2)
     x = np.clip((np.arange(count) - at[k]) / np.maximum(at[k + 1] - at[k], 1), 0, 1)
     x = x**3 * (10 - 15 * x + 6 * x * x)

@@ -12,7 +12,7 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from mechanics.progress import Progress, silent
-from scenes.laboratory.curves import LOADING, Curve, PathJob, curves
+from scenes.laboratory.curves import LOADING, Curve, PathJob, Solving, curves
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.phantoms import Phantom
@@ -101,20 +101,18 @@ def _in_and_out(touch: Touch) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def _touch_force(curve: Curve, rows: np.ndarray, leg: np.ndarray, s: np.ndarray, depth: float) -> TouchForce:
     force, stiffness = curve.force[rows], curve.stiffness[rows]
-    parts: list[Leg | None] = []
-    for number in (WAY_IN, SIDEWAYS, WAY_OUT):
+
+    def part(number: int) -> Leg:
         use = leg == number
-        if number == SIDEWAYS and not use.any():
-            parts.append(None)
-            continue
         at, f, k = s[use], force[use], stiffness[use]
         if number != WAY_IN:
             # the leg begins where the one before it ended
             first = np.flatnonzero(use)[0] - 1
             at = np.concatenate([[0.0 if number == SIDEWAYS else depth], at])
             f, k = np.vstack([force[first : first + 1], f]), np.concatenate([stiffness[first : first + 1], k])
-        parts.append(Leg(at, f, k, from_touch=number == WAY_IN))
-    return TouchForce((parts[0], parts[1], parts[2]))
+        return Leg(at, f, k, from_touch=number == WAY_IN)
+
+    return TouchForce((part(WAY_IN), part(SIDEWAYS) if (leg == SIDEWAYS).any() else None, part(WAY_OUT)))
 
 
 def touch_forces(
@@ -133,7 +131,7 @@ def touch_forces(
     A reversible specimen's straight presses of one site share one curve; a specimen that remembers is
     driven through all touches of a site in their order.
     """
-    keywords = {
+    keywords: Solving = {
         "fineness": fineness, "workers": workers, "cache": cache, "progress": progress, "label": label
     }  # fmt: skip
     if specimen.remembers:
@@ -172,7 +170,7 @@ def touch_forces(
 
 
 def _by_site(
-    phantom: Phantom, specimen: Specimen, touches: Sequence[Touch], keywords: dict
+    phantom: Phantom, specimen: Specimen, touches: Sequence[Touch], keywords: Solving
 ) -> list[TouchForce]:
     jobs, members = [], []
     for site in sorted({t.site for t in touches}):

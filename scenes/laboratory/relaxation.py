@@ -8,11 +8,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
-from scenes.laboratory.curves import PathJob, curves
+from scenes.laboratory.curves import PathJob, Solving, curves
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
 from scenes.laboratory.presses import Touch
@@ -66,7 +65,7 @@ def beyond_quasilinear(
     motion: Motion,
     quasilinear: np.ndarray,
     modulus_pa: float,
-    keywords: dict[str, Any],
+    keywords: Solving,
 ) -> np.ndarray:
     """(n, 3) N: the solid's force on the tip minus `quasilinear` (n, 3), both without straying.
 

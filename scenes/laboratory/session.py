@@ -13,6 +13,7 @@ import numpy as np
 from mechanics.options import option
 from mechanics.progress import Progress
 from mechanics.recording import Recording
+from scenes.laboratory.curves import Solving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.effects.solid import scaled
 from scenes.laboratory.force import elastic_force
@@ -22,7 +23,7 @@ from scenes.laboratory.motion import Motion, motion
 from scenes.laboratory.paths import SIDEWAYS, TouchForce, touch_forces
 from scenes.laboratory.presses import PROTOCOLS, Touch
 from scenes.laboratory.relaxation import beyond_quasilinear
-from scenes.laboratory.specimen import Fineness, Specimen
+from scenes.laboratory.specimen import Fineness, Specimen, ball
 from scenes.laboratory.tracing import RATE_HZ, trace
 from scenes.phantoms import Phantom
 
@@ -67,7 +68,10 @@ class Session:
     ) -> None:
         self.phantom, self.modulus, self.options, self.hand = phantom, modulus, options, hand
         self.touches, self.parameters, self.seed = touches, parameters, seed
-        self._keywords = {"workers": workers, "cache": cache, "progress": progress}
+        fineness = Fineness(finest=options.finest_mm)
+        self._solving: Solving = {
+            "fineness": fineness, "workers": workers, "cache": cache, "progress": progress
+        }  # fmt: skip
         self.rotation, self.shift = np.eye(3), np.zeros(3)
         if options.frame:
             self.rotation, self.shift = random_frame(seed, 1e3 * phantom.height_m)
@@ -77,9 +81,7 @@ class Session:
 
     def specimen(self, present: Sequence[str], regions: bool) -> Specimen:
         """The solid with the effects `present`, and with the phantom's own regions or without."""
-        balls = tuple(
-            (*(1e3 * x for x in r.centre_m), 1e3 * r.radius_m, r.modulus_ratio) for r in self.phantom.regions
-        )
+        balls = tuple(ball(r.centre_m, r.radius_m, r.modulus_ratio) for r in self.phantom.regions)
         specimen = Specimen(
             poisson_ratio=self.phantom.poisson_ratio,
             tip_radius=round(1e3 * self.options.tip_radius_m, 6),
@@ -95,11 +97,8 @@ class Session:
         """Solved touches with the effects `present`."""
         inside = [name for name in present if effect(name).in_solid or effect(name).on_shape]
         label = "solving " + (" + ".join(inside) if inside else "the ideal object")
-        fineness = Fineness(finest=self.options.finest_mm)
-        specimen = self.specimen(present, regions)
-        return touch_forces(
-            self._shape(present), specimen, self.touches, fineness=fineness, label=label, **self._keywords
-        )
+        keywords: Solving = {**self._solving, "label": label}
+        return touch_forces(self._shape(present), self.specimen(present, regions), self.touches, **keywords)
 
     def motion(self, radius: float) -> Motion:
         """The same hand's way every time."""
@@ -138,9 +137,9 @@ class Session:
             way.t > way.phase[1] + 0.05,
         )
         for name in present:
-            act = effect(name).on_readings
-            if act is not None:
-                readings = act(readings, self.parameters[name])
+            read = effect(name).on_readings
+            if read is not None:
+                readings = read(readings, self.parameters[name])
         self.way = way
         return readings, readings.force
 
@@ -151,10 +150,12 @@ class Session:
         p = self.parameters["viscoelasticity"]
         straight = replace(way, stray=np.zeros_like(way.stray))
         elastic = elastic_force(straight, self.forces(present, regions), self.modulus)
-        law = effect("viscoelasticity").on_force(elastic, way, normals, p)
-        relaxing = self.specimen(present, regions).without(prony=tuple(zip(p["g"], p["tau_s"], strict=True)))
-        keywords = {**self._keywords, "fineness": Fineness(finest=self.options.finest_mm)}
-        keywords["label"] = "solving the relaxing solid"
+        quasilinear = effect("viscoelasticity").on_force
+        assert quasilinear is not None, "viscoelasticity acts on the elastic force"
+        law = quasilinear(elastic, way, normals, p)
+        prony = tuple(zip(p["g"], p["tau_s"], strict=True))
+        relaxing = replace(self.specimen(present, regions), prony=prony)
+        keywords: Solving = {**self._solving, "label": "solving the relaxing solid"}
         return beyond_quasilinear(
             self._shape(present), relaxing, self.touches, way, law, self.modulus, keywords
         )

@@ -4,7 +4,7 @@ mm^2.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -49,7 +49,6 @@ class Problem:
     floor: np.ndarray | None = None
     linear: bool = False
     tolerance: float = 1e-4
-    factorisations: int = field(default=0, init=False)
 
     def __post_init__(self) -> None:
         mesh = self.solid.mesh
@@ -194,7 +193,7 @@ class Problem:
                 continue
             face_f, face_k, force, grip = contact.evaluate(u, centre, held, True, arrivals)
             r = self._residual(cell_f, face_f, u)
-            norm = np.linalg.norm(r)
+            norm = float(np.linalg.norm(r))
             scale = max(np.abs(face_f).sum(), 1e-3)
             if arrivals and iteration > 0 and norm < 0.02 * scale:
                 if held.let_go(grip):
@@ -210,7 +209,6 @@ class Problem:
                 if not len(cell_k):
                     cell_k = self._evaluate(u, state.history, step_s)[1]
                 self._factor.refresh(self._assemble(cell_k, face_k, u))
-                self.factorisations += 1
             close = arrivals and norm < 0.02 * scale
             step = np.zeros(self.free.size)
             step[self.free] = self._factor.solve(-r)

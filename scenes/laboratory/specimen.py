@@ -8,8 +8,10 @@ from __future__ import annotations
 
 import hashlib
 import json
-from dataclasses import asdict, dataclass, field, replace
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -23,6 +25,10 @@ from scenes.phantoms import Phantom
 
 VERSION = 5
 """Raised whenever solved curves would change."""
+
+
+Ball = tuple[float, float, float, float, float]
+"""x, y, z, radius (mm), modulus ratio."""
 
 
 @dataclass(frozen=True)
@@ -41,7 +47,7 @@ class Specimen:
     tip_radius: float = 5.0
     finite: bool = False
     stiffening: float = 0.0
-    balls: tuple[tuple[float, float, float, float, float], ...] = ()
+    balls: tuple[Ball, ...] = ()
     gradient: tuple[float, float] | None = None
     skin: tuple[float, float] | None = None
     base: tuple | None = None
@@ -66,9 +72,11 @@ class Specimen:
         text = json.dumps([VERSION, asdict(self)], sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
-    def without(self, **fields: object) -> Specimen:
-        """The same specimen with some fields replaced."""
-        return replace(self, **fields)
+
+def ball(centre_m: Sequence[float], radius_m: float, ratio: float) -> Ball:
+    """A specimen's ball from SI units."""
+    x, y, z = (1e3 * v for v in centre_m)
+    return (x, y, z, 1e3 * radius_m, ratio)
 
 
 @dataclass(frozen=True)
@@ -80,6 +88,31 @@ class Fineness:
     growth: float = 0.7
 
 
+class Equilibrium(Protocol):
+    """What every solver's state tells: the force on the tip (3,) and the stored energy, modulus 1, mm."""
+
+    @property
+    def force(self) -> np.ndarray:
+        """(3,)."""
+
+    @property
+    def energy(self) -> float:
+        """Of the whole solid."""
+
+
+class Driven(Protocol):
+    """A discrete problem whose tip is driven along a path; its states are its own kind, nobody else's."""
+
+    def rest(self, centre: np.ndarray) -> Equilibrium:
+        """The untouched object with the tip's centre at `centre` (3,) mm."""
+
+    def advance(self, state: Any, centre: np.ndarray, step_s: float = 0.0) -> Equilibrium:
+        """Move the tip's centre within `step_s` seconds, 0 for infinitely slow."""
+
+    def tip_stiffness(self, state: Any) -> np.ndarray:
+        """(3, 3) d(force on the tip) / d(tip position)."""
+
+
 def build(
     phantom: Phantom,
     specimen: Specimen,
@@ -88,7 +121,7 @@ def build(
     travel: float,
     fineness: Fineness | None = None,
     cache: Path | None = None,
-) -> Problem | LinearProblem:
+) -> Driven:
     """The discrete problem for touches at `point` (mm, object frame) whose tip strays up to `travel` mm
     sideways.
     """

@@ -66,17 +66,14 @@ def _nearest_on_triangles(p: np.ndarray, corners: np.ndarray) -> np.ndarray:
     three edges.
     """
     a, b, c = corners[..., 0, :], corners[..., 1, :], corners[..., 2, :]
-    best, least = None, None
+    best, least = np.zeros_like(a + p), np.full((a + p).shape[:-1], np.inf)
     for start, end in ((a, b), (b, c), (c, a)):
         along = end - start
         share = ((p - start) * along).sum(-1) / np.maximum((along * along).sum(-1), 1e-300)
         candidate = start + np.clip(share, 0, 1)[..., None] * along
         distance = ((candidate - p) ** 2).sum(-1)
-        if best is None:
-            best, least = candidate, distance
-        else:
-            nearer = distance < least
-            best, least = np.where(nearer[..., None], candidate, best), np.where(nearer, distance, least)
+        nearer = distance < least
+        best, least = np.where(nearer[..., None], candidate, best), np.where(nearer, distance, least)
     u, v, w = b - a, c - a, p - a
     uu, uv, vv = (u * u).sum(-1), (u * v).sum(-1), (v * v).sum(-1)
     wu, wv = (w * u).sum(-1), (w * v).sum(-1)

@@ -24,13 +24,12 @@ class Trace:
     contact: np.ndarray
 
 
-def foot_path(surface: Surface, radius: float, lean: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def foot_path(surface: Surface, radius: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """(positions (k, 3), outward horizontal directions (k, 3), arc length (k,)) once around the foot.
 
-    The tip's centre runs at the height of its radius, `lean` mm (per point, or one value) into the wall.
+    The tip's centre runs at the height of its radius and touches the wall.
     """
     outline, outward = _outline(surface)
-    lean = np.broadcast_to(lean, len(outline))
     low, high = np.full(len(outline), -3.0 * radius), np.full(len(outline), 2.0 * radius)
     for _ in range(26):
         middle = (low + high) / 2
@@ -40,7 +39,7 @@ def foot_path(surface: Surface, radius: float, lean: np.ndarray) -> tuple[np.nda
         # the base itself lies one radius below: only the wall counts
         on_base = near[:, 2] < 1e-6
         gap = np.where(inside & ~on_base, -distance, distance)
-        closer = (gap < radius - lean - 1e-9) | (inside & on_base)
+        closer = (gap < radius - 1e-9) | (inside & on_base)
         low, high = np.where(closer, middle, low), np.where(closer, high, middle)
     centres = outline + high[:, None] * outward + [0, 0, radius]
     loop = np.vstack([centres, centres[:1]])
@@ -81,7 +80,7 @@ def _outline(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     tangent = np.roll(points, -4, axis=0) - np.roll(points, 4, axis=0)
     normal = np.column_stack([tangent[:, 1], -tangent[:, 0], np.zeros(len(points))])
     kernel = 13
-    normal = sum(np.roll(normal, k, axis=0) for k in range(-kernel, kernel + 1))
+    normal = np.sum([np.roll(normal, k, axis=0) for k in range(-kernel, kernel + 1)], axis=0)
     return points, normal / np.linalg.norm(normal, axis=1)[:, None]
 
 
@@ -92,7 +91,7 @@ def trace(
     up.
     """
     surface = Surface(phantom.vertices * 1e3, phantom.faces)
-    path, outward, arc = foot_path(surface, radius, 0.0)
+    path, outward, arc = foot_path(surface, radius)
     total = arc[-1]
     turns = 1.0 + rng.uniform(0.08, 0.22)
     duration = turns * total / (1e3 * hand.trace_speed_m_per_s)

@@ -13,10 +13,11 @@ import numpy as np
 import pytest
 
 from devices.base import DeviceSpec, ForceSink, PositionSource, host_clock
-from devices.safety import Reading, SafetyFilter, SafetyOptions
+from devices.safety import Reading, SafetyOptions
 from mechanics.errors import DeviceError
 
 from .benches import FORCEFUL, MAKERS, Bench, eventually
+from .filtering import SafetyFilter
 
 PLACE = np.array([0.02, 0.01, 0.03])
 PUSH = np.array([1.0, -0.5, 2.0])

@@ -38,7 +38,7 @@ def test_work_is_the_same_on_both_sides(axes: str) -> None:
     a, b = run(mapping, [state(0, (0, 0, 0)), state(0.001, (0.001, -0.002, 0.003))])
     force = np.array([1.0, 2.0, -0.5])
     in_scene = force @ (b.position_m - a.position_m)
-    at_hand = mapper.force_to_device(mapping, force) @ np.array([0.001, -0.002, 0.003])
+    at_hand = mapper.force_map(mapping) @ force @ np.array([0.001, -0.002, 0.003])
     assert at_hand == pytest.approx(in_scene)
     assert a.position_m == pytest.approx([0.1, 0.2, 0.3])
 

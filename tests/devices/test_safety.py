@@ -6,8 +6,10 @@ import numpy as np
 import pytest
 
 from devices.base import DeviceSpec
-from devices.safety import Reading, SafetyFilter, SafetyOptions
+from devices.safety import Reading, SafetyOptions
 from mechanics.errors import OptionError
+
+from .filtering import SafetyFilter
 
 SPEC = DeviceSpec(
     name="test",

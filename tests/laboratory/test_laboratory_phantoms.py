@@ -90,7 +90,7 @@ def test_deep_exploration_passes_ten_millimetres_at_every_place(name: str) -> No
 def test_traced_foot_keeps_the_tip_one_radius_from_the_wall(name: str) -> None:
     thing = phantom(name)
     surface = Surface(thing.vertices * 1e3, thing.faces)
-    centres, _, _ = foot_path(surface, 5.0, np.array(0.0))
+    centres, _, _ = foot_path(surface, 5.0)
     near, distance, _ = surface.nearest(centres)
     wall = near[:, 2] > 0.01
     assert distance[wall] == pytest.approx(5.0, abs=0.05)

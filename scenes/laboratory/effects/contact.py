@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -103,13 +104,13 @@ EFFECTS = (
         "tip_radius",
         "contact",
         lambda strength, bench: {"tip_radius_m": bench.tip_radius_m * (1 + 0.3 * strength)},
-        lambda s, p: s.without(tip_radius=1e3 * p["tip_radius_m"]),
+        lambda s, p: replace(s, tip_radius=1e3 * p["tip_radius_m"]),
     ),
     Effect(
         "friction_slip",
         "contact",
         lambda strength, bench: {"mu": 0.1 / strength},
-        lambda s, p: s.without(friction=p["mu"]),
+        lambda s, p: replace(s, friction=p["mu"]),
     ),
     Effect(
         "adhesion",
@@ -125,14 +126,14 @@ UNNAMED = (
         "plasticity",
         "object",
         lambda strength, bench: {"share": 0.8 * strength, "yield_over_shear": 0.12},
-        lambda s, p: s.without(plastic=(p["share"], p["yield_over_shear"])),
+        lambda s, p: replace(s, plastic=(p["share"], p["yield_over_shear"])),
         needs_finite=True,
     ),
     Effect(
         "anisotropy",
         "object",
         _fibres,
-        lambda s, p: s.without(fibre=(p["fibre_over_shear"], *p["direction"])),
+        lambda s, p: replace(s, fibre=(p["fibre_over_shear"], *p["direction"])),
         needs_finite=True,
     ),
     Effect("poroelasticity", "object", _seeping, on_force=_poroelastic),

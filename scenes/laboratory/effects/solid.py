@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from mechanics.errors import OptionError
 from scenes.laboratory.effects.base import Bench, Effect, Parameters
-from scenes.laboratory.specimen import Specimen
+from scenes.laboratory.specimen import Specimen, ball
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
 
@@ -22,7 +23,7 @@ def _inclusion(strength: float, bench: Bench) -> dict[str, Any]:
     radius = bench.phantom.height_m / 5
     surface = Surface(bench.phantom.vertices * 1e3, bench.phantom.faces)
     order = bench.rng.permutation(len(bench.touches))
-    best, most = None, -np.inf
+    best, most = np.zeros(3), -np.inf
     for k in order:
         touch = bench.touches[k]
         centre = touch.point - 2e3 * radius * touch.normal
@@ -42,8 +43,8 @@ def _inclusion(strength: float, bench: Bench) -> dict[str, Any]:
 
 
 def _with_ball(specimen: Specimen, p: Parameters) -> Specimen:
-    ball = (*(1e3 * x for x in p["centre_m"]), 1e3 * p["radius_m"], p["modulus_ratio"])
-    return specimen.without(balls=(*specimen.balls, ball))
+    added = ball(p["centre_m"], p["radius_m"], p["modulus_ratio"])
+    return replace(specimen, balls=(*specimen.balls, added))
 
 
 def _base_modulus(strength: float, bench: Bench) -> dict[str, Any]:
@@ -66,7 +67,7 @@ def _unbonded(strength: float, bench: Bench) -> dict[str, Any]:
 
 def _loosen(specimen: Specimen, p: Parameters) -> Specimen:
     angle = float(np.arctan2(p["direction"][1], p["direction"][0]))
-    return specimen.without(base=("unbonded", p["bonded_fraction"], round(angle, 3)))
+    return replace(specimen, base=("unbonded", p["bonded_fraction"], round(angle, 3)))
 
 
 def _springs(strength: float, bench: Bench) -> dict[str, Any]:
@@ -119,39 +120,39 @@ def _bite(phantom: Phantom, p: Parameters) -> Phantom:
 
 
 EFFECTS = (
-    Effect("finite_strain", "object", _finite, lambda s, p: s.without(finite=True)),
+    Effect("finite_strain", "object", _finite, lambda s, p: replace(s, finite=True)),
     Effect(
         "strain_stiffening",
         "object",
         lambda strength, bench: {"c20_over_c10": 0.35 * strength},
-        lambda s, p: s.without(stiffening=p["c20_over_c10"]),
+        lambda s, p: replace(s, stiffening=p["c20_over_c10"]),
         needs_finite=True,
     ),
     Effect(
         "mullins_softening",
         "object",
         _mullins,
-        lambda s, p: s.without(mullins=(p["r"], p["m_rel"])),
+        lambda s, p: replace(s, mullins=(p["r"], p["m_rel"])),
         needs_finite=True,
     ),
     Effect(
         "poisson_ratio",
         "object",
         lambda strength, bench: {"poisson_ratio": max(0.0, 0.49 - 0.14 * strength)},
-        lambda s, p: s.without(poisson_ratio=p["poisson_ratio"]),
+        lambda s, p: replace(s, poisson_ratio=p["poisson_ratio"]),
     ),
     Effect("inclusion", "object", _inclusion, _with_ball),
     Effect(
         "modulus_gradient",
         "object",
         _base_modulus,
-        lambda s, p: s.without(gradient=(p["ratio_base"], p["ratio_top"])),
+        lambda s, p: replace(s, gradient=(p["ratio_base"], p["ratio_top"])),
     ),
     Effect(
         "skin_layer",
         "object",
         lambda strength, bench: {"thickness_m": 0.003, "modulus_ratio": 1 + 2 * strength},
-        lambda s, p: s.without(skin=(1e3 * p["thickness_m"], p["modulus_ratio"])),
+        lambda s, p: replace(s, skin=(1e3 * p["thickness_m"], p["modulus_ratio"])),
     ),
     Effect("surface_shape", "object", _shape, on_shape=_bite),
     Effect("unbonded_base", "boundary", _unbonded, _loosen),
@@ -159,7 +160,7 @@ EFFECTS = (
         "compliant_base",
         "boundary",
         _springs,
-        lambda s, p: s.without(base=("springs", p["k_normal_pa_per_m"], p["k_tangential_pa_per_m"])),
+        lambda s, p: replace(s, base=("springs", p["k_normal_pa_per_m"], p["k_tangential_pa_per_m"])),
     ),
 )
 """Effects of the object and its boundary that change what is solved."""
