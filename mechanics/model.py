@@ -25,7 +25,9 @@ from mechanics.errors import MeshError, ModelError
 from mechanics.files import atomic_folder
 from mechanics.material import UNKNOWN, Ball, Gradient, Material, Skin, finite, positive
 from mechanics.moduli import balls_ratio, gradient_ratio, skin_ratio, with_balls, within_limits
-from mechanics.presses import Presses, no_presses, read_csv, read_presses, write_csv, write_presses
+from mechanics.press_files import read_csv, read_presses, write_csv, write_presses
+from mechanics.press_making import no_presses
+from mechanics.presses import Presses
 from mechanics.recording import dump_toml
 from mechanics.tetmesh import TetMesh, vertex_normals
 

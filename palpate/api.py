@@ -398,7 +398,7 @@ def _with_scene(model: ModelLike, options: RenderOptions) -> RenderOptions:
 def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Model) -> Presses:
     """The recording's presses on the model; none where it holds none."""
     from mechanics.errors import ContactError
-    from mechanics.presses import no_presses
+    from mechanics.press_making import no_presses
     from reconstruct.placing import presses_on
 
     try:

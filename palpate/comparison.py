@@ -19,7 +19,8 @@ import numpy as np
 from mechanics.errors import ContactError
 from mechanics.model import Model
 from mechanics.options import option
-from mechanics.presses import MARGIN_S, Presses, sites_of
+from mechanics.press_sites import sites_of
+from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites

@@ -13,7 +13,9 @@ import numpy as np
 
 from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
-from mechanics.presses import SITE_M, Presses, cut
+from mechanics.press_cutting import cut
+from mechanics.press_sites import SITE_M
+from mechanics.presses import Presses
 from mechanics.recording import Recording
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval, runs

@@ -12,7 +12,7 @@ import numpy as np
 
 from mechanics.errors import SceneError
 from mechanics.model import Model
-from mechanics.presses import of_paths
+from mechanics.press_making import of_paths
 from mechanics.progress import Progress, silent
 from mechanics.sites import touch_sites
 from mechanics.touch import forces_at

@@ -18,7 +18,7 @@ from mechanics.box_mesh import box_mesh
 from mechanics.errors import RecordingError
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.presses import cut
+from mechanics.press_cutting import cut
 from mechanics.recording import Recording
 
 SUMMARY = "diagnosis of measured meat indentations (ramp and hold)"

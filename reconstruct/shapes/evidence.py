@@ -13,7 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.errors import SurfaceError
-from mechanics.presses import sites_of
+from mechanics.press_sites import sites_of
 
 
 @dataclass(frozen=True)

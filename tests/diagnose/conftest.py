@@ -9,7 +9,8 @@ import pytest
 
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.presses import Presses, cut
+from mechanics.press_cutting import cut
+from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh

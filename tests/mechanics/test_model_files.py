@@ -9,7 +9,7 @@ from mechanics.errors import MeshError, ModelError
 from mechanics.material import Ball, Gradient, Material, Skin
 from mechanics.model import Model, Support, Tool, read_model, write_model
 from mechanics.moduli import MODULUS_LIMITS, gradient_ratio, inclusion_ratio, skin_ratio
-from mechanics.presses import of_places
+from mechanics.press_making import of_places
 from mechanics.tetmesh import TetMesh
 
 

@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from mechanics.errors import ModelError
-from mechanics.presses import (
-    FITS,
-    cut,
-    free_segments,
-    of_places,
-    read_csv,
-    read_presses,
-    sites_of,
-    write_csv,
-    write_presses,
-)
+from mechanics.press_cutting import cut, free_segments
+from mechanics.press_files import read_csv, read_presses, write_csv, write_presses
+from mechanics.press_making import of_places
+from mechanics.press_sites import sites_of
+from mechanics.presses import FITS
 from mechanics.recording import Recording
 
 UP = np.array([0.0, 0.0, 1.0])

@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from boxes import box
 
-from mechanics.presses import Presses, of_paths, sites_of
+from mechanics.press_making import of_paths
+from mechanics.press_sites import sites_of
+from mechanics.presses import Presses
 from mechanics.sites import TouchSites, touch_sites
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh

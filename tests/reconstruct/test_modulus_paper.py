@@ -5,7 +5,8 @@ import pytest
 from boxes import box
 
 from mechanics.errors import ContactError
-from mechanics.presses import Presses, of_paths
+from mechanics.press_making import of_paths
+from mechanics.presses import Presses
 from mechanics.solver import Solver
 from reconstruct.modulus_paper import (
     PaperOptions,

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from mechanics.presses import Presses, of_paths
+from mechanics.press_making import of_paths
+from mechanics.presses import Presses
 from reconstruct.one_d import fit_paper, fit_robust
 
 RATE = 800.0

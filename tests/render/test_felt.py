@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mechanics.model import Model, read_model, write_model
-from mechanics.presses import no_presses, of_places
+from mechanics.press_making import no_presses, of_places
 from mechanics.sites import TouchSites
 from palpate.cli import main
 from render.felt import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness

@@ -7,7 +7,7 @@ import pytest
 
 import render
 from mechanics.errors import ModelError, OptionError
-from mechanics.presses import no_presses
+from mechanics.press_making import no_presses
 from render.one_d import Law, spread_law
 
 TIP = 0.005

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import OptionError, RecordingError
-from mechanics.presses import cut
+from mechanics.press_cutting import cut
 from mechanics.recording import Recording
 from palpate.cli import main
 from render.press import greatest_difference, press, read_curve, write_curve

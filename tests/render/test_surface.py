@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.presses import of_places
+from mechanics.press_making import of_places
 from render.bvh import STACK, closest_triangle
 from render.options import RenderOptions
 from render.snapping import touch_gaps, touched_surface
