@@ -53,7 +53,7 @@ class Bench:
         self.normals = np.array([[0, 0, 1.0]] * len(top) + [[1.0, 0, 0]] * len(side))
         self.sites = touch_sites(self.mesh, self.points, self.normals, NU)
 
-    def record(self, alter=None, *, law: str = "neo-hookean", seed: int = 0) -> tuple[Recording, Model]:  # type: ignore[no-untyped-def]
+    def record(self, alter=None, *, law: str = "neo-hookean", seed: int = 0) -> tuple[Recording, Model]:
         """(recording, model). alter(t, position, force) -> (position, force) acts before the noise."""
         rng = np.random.default_rng(seed)
         clock = 0.0

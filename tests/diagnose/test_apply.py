@@ -25,7 +25,7 @@ COARSE_M = 0.05
 
 
 @pytest.fixture(scope="module", autouse=True)
-def coarse():  # type: ignore[no-untyped-def]
+def coarse():
     """Compliances on the block's own mesh: what is asked here needs no finer one."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
@@ -35,18 +35,18 @@ def coarse():  # type: ignore[no-untyped-def]
 
 
 @pytest.fixture(scope="module")
-def model(bench):  # type: ignore[no-untyped-def]
+def model(bench):
     """The block's model, as the ideal: linear dent, nothing left out."""
     return bench.record()[1]
 
 
 @pytest.fixture(scope="module")
-def folder(model, tmp_path_factory):  # type: ignore[no-untyped-def]
+def folder(model, tmp_path_factory):
     """Written once: compliances of every variant are kept in it."""
     return write_model(tmp_path_factory.mktemp("models") / "block", model)
 
 
-def made_once(model, folder, effects, known={}):  # type: ignore[no-untyped-def]  # noqa: B006
+def made_once(model, folder, effects, known={}):  # noqa: B006
     """A renderer of the model with effects, its compliance kept in the folder."""
     key = json.dumps(effects, sort_keys=True)
     if key not in known:
@@ -55,7 +55,7 @@ def made_once(model, folder, effects, known={}):  # type: ignore[no-untyped-def]
     return known[key]
 
 
-def felt(model, folder, effects, points=((0.0, 0.0, 0.04),), normal=UP, drag=0.0):  # type: ignore[no-untyped-def]
+def felt(model, folder, effects, points=((0.0, 0.0, 0.04),), normal=UP, drag=0.0):
     """(k, n, 3) N on the tool: pressed, held for 0.5 s, dragged, let go, at points of the surface."""
     renderer = made_once(model, folder, effects)
     down, up = np.linspace(-1e-3, DEPTH, 200), np.linspace(DEPTH, -2e-3, 240)
@@ -184,7 +184,7 @@ def test_only_what_belongs_into_a_model_is_put_there(model):
 def test_the_improved_model_is_what_was_fitted(bench, tmp_path):
     g, tau = 0.3, 0.3
 
-    def alter(t, x, f):  # type: ignore[no-untyped-def]
+    def alter(t, x, f):
         out, branch, last = f.copy(), np.zeros(3), f[0]
         step = np.diff(t, prepend=t[0] - 0.002)
         for i in range(len(t)):

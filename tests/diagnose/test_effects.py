@@ -38,7 +38,7 @@ CONTRACT = {
 
 
 @pytest.fixture(scope="module")
-def forward(bench):  # type: ignore[no-untyped-def]
+def forward(bench):
     recording, model = bench.record()
     return build_forward(touches_of(model.presses), model)
 

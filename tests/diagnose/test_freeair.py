@@ -17,7 +17,7 @@ from ..reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 @pytest.fixture(scope="module")
-def heavy(bench):  # type: ignore[no-untyped-def]
+def heavy(bench):
     """(recording, model) whose 60 g tool turns by some 20 degrees and was tared as it began."""
     recording, model = bench.record()
     t = recording.t

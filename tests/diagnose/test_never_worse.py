@@ -15,7 +15,7 @@ def said(names: tuple[str, ...], candidates: tuple[str, ...], remainder: bool) -
     return Answer([*names], [*candidates], remainder=remainder).kind
 
 
-def kept(factors: dict[tuple[str, ...], float], names: tuple[str, ...], **options):  # type: ignore[no-untyped-def]
+def kept(factors: dict[tuple[str, ...], float], names: tuple[str, ...], **options):
     """The outcome where naming a set multiplies the gap's squares by its factor, with a scatter of sites."""
     scatter = np.random.default_rng(1).uniform(0.8, 1.2, 20)
     asked = []

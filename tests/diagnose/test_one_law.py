@@ -67,12 +67,12 @@ def _path(seed: int) -> np.ndarray:
 
 
 @pytest.fixture(scope="module")
-def model(bench):  # type: ignore[no-untyped-def]
+def model(bench):
     return bench.record()[1]
 
 
 @pytest.fixture(scope="module")
-def compliance(model):  # type: ignore[no-untyped-def]
+def compliance(model):
     """Of the block's own mesh: only its form is used."""
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(made, "SURFACE_EDGE_M", COARSE_M)
@@ -82,12 +82,12 @@ def compliance(model):  # type: ignore[no-untyped-def]
 
 
 @pytest.fixture(scope="module")
-def places(model):  # type: ignore[no-untyped-def]
+def places(model):
     frame = np.stack([UP, *tangents(UP)])
     return solve_places(model, POINT[None], UP[None], frame[None])
 
 
-def _forward(places, y) -> Forward:  # type: ignore[no-untyped-def]
+def _forward(places, y) -> Forward:
     tip = places.model.tool.tip_radius_m
     centre = POINT + tip * UP
     position = centre - y @ places.frame[0]
@@ -98,7 +98,7 @@ def _forward(places, y) -> Forward:  # type: ignore[no-untyped-def]
     return Forward(replace(presses, columns={"lead": np.zeros_like(y)}), places)
 
 
-def predicted_and_rendered(names, model, places, compliance, seed=0):  # type: ignore[no-untyped-def]
+def predicted_and_rendered(names, model, places, compliance, seed=0):
     """(n, 3) N each, place's frame, along the same path under the same far field."""
     forward = _forward(places, _path(seed))
     settings = forward.ideal(model.material.young_modulus_pa)

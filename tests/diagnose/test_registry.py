@@ -56,7 +56,7 @@ STRENGTH = 3.0
 
 
 @pytest.fixture
-def toy(tmp_path, monkeypatch):  # type: ignore[no-untyped-def]
+def toy(tmp_path, monkeypatch):
     """The name of an effect that is one file and one line of the registry."""
     name = "brittle_shell"
     path = tmp_path / f"{name}.py"

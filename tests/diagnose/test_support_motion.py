@@ -16,12 +16,12 @@ from mechanics.support_motion import far_on_springs, far_partly_bonded, loosened
 
 
 @pytest.fixture(scope="module")
-def places(bench):  # type: ignore[no-untyped-def]
+def places(bench):
     recording, model = bench.record()
     return build_forward(touches_of(model.presses), model).places
 
 
-def _compliance(places, hold):  # type: ignore[no-untyped-def]
+def _compliance(places, hold):
     """(q, 3, 3) added by a support, by factorising it."""
     fields = energy_fields(places)
     mesh = fields.solver.mesh

@@ -20,10 +20,10 @@ MODULUS = 20e3
 
 
 @pytest.fixture(scope="module")
-def late(bench):  # type: ignore[no-untyped-def]
+def late(bench):
     """(search, fit without effect, fit with a delay) of presses whose force reads 10 ms late."""
 
-    def alter(t, x, f):  # type: ignore[no-untyped-def]
+    def alter(t, x, f):
         return x, np.stack([np.interp(t - 0.01, t, c) for c in f.T], axis=1)
 
     recording, model = bench.record(alter)

@@ -18,11 +18,11 @@ from reconstruct.placing import presses_on
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
 
 
-def _late(t, x, f):  # type: ignore[no-untyped-def]
+def _late(t, x, f):
     return x, np.stack([np.interp(t - 0.02, t, c) for c in f.T], axis=1)
 
 
-def _relaxing(t, x, f):  # type: ignore[no-untyped-def]
+def _relaxing(t, x, f):
     """A Zener force, integrated by small implicit steps of its own (not the recursion under test)."""
     memory = np.zeros(3)
     out = np.empty_like(f)
@@ -36,7 +36,7 @@ def _relaxing(t, x, f):  # type: ignore[no-untyped-def]
 
 
 @pytest.fixture(scope="module")
-def delayed(bench):  # type: ignore[no-untyped-def]
+def delayed(bench):
     """(recording, model, diagnosis) of presses whose force reads 20 ms late."""
     recording, model = bench.record(_late)
     return recording, model, diagnose(recording, model, FAST)
@@ -80,7 +80,7 @@ def test_bias_is_settled_in_free_air(bench):
 
 
 def test_a_play_whose_reading_follows_the_tip_is_no_delay(bench):
-    def follow(t, x, f):  # type: ignore[no-untyped-def]
+    def follow(t, x, f):
         read = x.copy()
         for i in range(1, len(x)):
             read[i] = np.clip(read[i - 1], x[i] - 0.15e-3, x[i] + 0.15e-3)

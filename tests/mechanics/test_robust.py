@@ -14,7 +14,7 @@ def test_scales_are_those_of_gaussian_values_whatever_a_tenth_of_them_does() -> 
     assert spread(values, axis=0) == pytest.approx(0.2, rel=0.2)
 
 
-def line(x: np.ndarray, y: np.ndarray):  # type: ignore[no-untyped-def]
+def line(x: np.ndarray, y: np.ndarray):
     system = np.column_stack([np.ones_like(x), x])
 
     def fit(weight: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
