@@ -8,6 +8,7 @@ safety filter (devices.safety) is applied by the caller, last, before `send_forc
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, Protocol, Self, runtime_checkable
@@ -86,6 +87,25 @@ class ForceSink(Protocol):
 
     def send_force(self, force_on_tool_n: np.ndarray) -> None:
         """(3,) N on the tool, the device's frame; handed over at once, sent by the device's thread."""
+
+
+class OpenInWith(ABC):
+    """Base of the devices: a `with` statement opens and closes them."""
+
+    @abstractmethod
+    def open(self) -> None:
+        """As `PositionSource.open`."""
+
+    @abstractmethod
+    def close(self) -> None:
+        """As `PositionSource.close`."""
+
+    def __enter__(self) -> Self:
+        self.open()
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
-from devices.io_thread import ForcefulDevice, Reading
+from devices.io_thread import ForcefulDevice, Reading, found
 from devices.vendor_library import load, need
 from mechanics.errors import DeviceError
 from mechanics.options import option
@@ -160,11 +160,4 @@ def make(options: ForceDimensionOptions | None = None, *, clock: Clock = host_cl
 def find(options: ForceDimensionOptions | None = None) -> list[Availability]:
     """Whether the library is there and a device opens."""
     wire = ForceDimensionWire(options or ForceDimensionOptions())
-    try:
-        wire.connect()
-    except (DeviceError, OSError) as error:
-        why, _, remedy = str(error).partition(": ")
-        return [Availability(SPEC.name, SPEC.title, False, SPEC, why_not=why, remedy=remedy)]
-    spec = wire.spec
-    wire.disconnect()
-    return [Availability(SPEC.name, spec.title, True, spec, where="USB")]
+    return found(wire, lambda: "USB")

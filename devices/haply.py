@@ -14,7 +14,7 @@ import numpy as np
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.codecs import haply as codec
-from devices.io_thread import ForcefulDevice, Reading
+from devices.io_thread import ForcefulDevice, Reading, found
 from mechanics.errors import DeviceError
 from mechanics.options import option
 
@@ -187,13 +187,5 @@ def make(options: HaplyOptions | None = None, *, clock: Clock = host_clock) -> F
 
 def find(options: HaplyOptions | None = None) -> list[Availability]:
     """Whether the service answers and has an Inverse3."""
-    options = options or HaplyOptions()
-    wire = HaplyWire(options, host_clock)
-    try:
-        wire.connect()
-    except DeviceError as error:
-        why, _, remedy = str(error).partition(": ")
-        return [Availability(SPEC.name, SPEC.title, False, SPEC, options.uri, why, remedy)]
-    where = f"{wire.device_id} at {options.uri}"
-    wire.disconnect()
-    return [Availability(SPEC.name, SPEC.title, True, SPEC, where)]
+    wire = HaplyWire(options or HaplyOptions(), host_clock)
+    return found(wire, lambda: f"{wire.device_id} at {wire.options.uri}", wire.options.uri)

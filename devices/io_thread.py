@@ -16,12 +16,13 @@ from __future__ import annotations
 import atexit
 import threading
 import weakref
+from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Protocol, Self
+from typing import Protocol
 
 import numpy as np
 
-from devices.base import Clock, DeviceSpec, finite_vector, host_clock
+from devices.base import Availability, Clock, DeviceSpec, OpenInWith, finite_vector, host_clock
 from mechanics.errors import DeviceError
 from mechanics.state import IDENTITY_QUATERNION, TipState
 
@@ -63,6 +64,22 @@ class Wire(Protocol):
         """Zero the force if that is still possible, release everything; never raises."""
 
 
+def found(wire: Wire, where: Callable[[], str], sought: str = "") -> list[Availability]:
+    """Whether a wire connects, as `palpate devices` lists it.
+
+    where: asked while it is connected; sought: the place that is told where nothing is there.
+    """
+    name, title = wire.spec.name, wire.spec.title
+    try:
+        wire.connect()
+    except (DeviceError, OSError) as error:
+        why, _, remedy = str(error).partition(": ")
+        return [Availability(name, title, False, wire.spec, sought, why, remedy)]
+    entry = Availability(name, wire.spec.title, True, wire.spec, where=where())
+    wire.disconnect()
+    return [entry]
+
+
 @dataclass
 class Rate:
     """Readings counted by the thread: `hz` and the spread of their spacing, over the last whole second."""
@@ -71,7 +88,7 @@ class Rate:
     jitter_s: float = 0.0
 
 
-class ThreadedDevice:
+class ThreadedDevice(OpenInWith):
     """A PositionSource over a Wire; `ForcefulDevice` adds the ForceSink."""
 
     def __init__(self, wire: Wire, *, clock: Clock = host_clock) -> None:
@@ -133,13 +150,6 @@ class ThreadedDevice:
         atexit.unregister(self._at_exit)
         self._connected = False
         self._state = self._flagged(fault="closed")
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
     def _flagged(self, fault: str) -> TipState:
         """The last state with the device's flags of now; its time, sequence and place stay what they were."""

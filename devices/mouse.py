@@ -9,11 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, host_clock
+from devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
 from devices.channel import PoseChannel
 from devices.impedance import HandImpedance
 from mechanics.errors import DeviceError
@@ -39,7 +38,7 @@ class MouseOptions:
     follow_s: float = option(0.04, "time in which the tip follows the mouse", unit="s", flag="--mouse-follow")
 
 
-class MouseDevice:
+class MouseDevice(OpenInWith):
     """A PositionSource over a PoseChannel that the touch window writes at every frame."""
 
     spec = SPEC
@@ -118,13 +117,6 @@ class MouseDevice:
         if self._channel is not None:
             self._channel.close()
             self._channel = None
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def find(options: MouseOptions | None = None) -> list[Availability]:

@@ -17,7 +17,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
-from devices.io_thread import STALE_FORCE_S, ZERO, ForcefulDevice, Reading
+from devices.io_thread import STALE_FORCE_S, ZERO, ForcefulDevice, Reading, found
 from devices.vendor_library import load, need
 from mechanics.errors import DeviceError
 from mechanics.options import option
@@ -212,14 +212,4 @@ def make(options: OpenHapticsOptions | None = None, *, clock: Clock = host_clock
 def find(options: OpenHapticsOptions | None = None) -> list[Availability]:
     """Whether the library is there and a device opens."""
     wire = OpenHapticsWire(options or OpenHapticsOptions())
-    try:
-        wire.connect()
-    except (DeviceError, OSError) as error:
-        why, _, remedy = str(error).partition(": ")
-        return [Availability(SPEC.name, SPEC.title, False, SPEC, why_not=why, remedy=remedy)]
-    wire.disconnect()
-    return [
-        Availability(
-            SPEC.name, SPEC.title, True, SPEC, where=wire.options.device_name or "the default device"
-        )
-    ]
+    return found(wire, lambda: wire.options.device_name or "the default device")

@@ -4,11 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Self
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, host_clock
+from devices.base import Availability, Clock, DeviceSpec, OpenInWith, host_clock
 from mechanics.errors import DeviceError
 from mechanics.options import option
 from mechanics.recording import Recording, read_recording
@@ -27,7 +26,7 @@ class ReplayOptions:
     loop: bool = option(False, "begin again at the end", flag="--replay-loop")
 
 
-class ReplayDevice:
+class ReplayDevice(OpenInWith):
     """A PositionSource; `sequence` is the sample's number. After the end the tip rests at the last sample."""
 
     spec = SPEC
@@ -78,13 +77,6 @@ class ReplayDevice:
     def close(self) -> None:
         """Stop."""
         self._start_s = None
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def _smoothed(position: np.ndarray, samples: int = 21) -> np.ndarray:

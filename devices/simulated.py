@@ -8,11 +8,10 @@ fake clock a session is the same bit for bit.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, finite_vector, host_clock
+from devices.base import Availability, Clock, DeviceSpec, OpenInWith, finite_vector, host_clock
 from devices.impedance import HandImpedance
 from devices.intention import FreeExploration, Intention
 from mechanics.errors import DeviceError
@@ -45,7 +44,7 @@ class SimulatedOptions:
     tremor_m: float = option(2e-5, "tremor, rms an axis", unit="m", flag="--tremor")
 
 
-class SimulatedHand:
+class SimulatedHand(OpenInWith):
     """A PositionSource and ForceSink. `intention` defaults to exploring a 10 cm ball round the origin.
 
     buttons: a function from time (s since open) to the button mask, none by default.
@@ -143,13 +142,6 @@ class SimulatedHand:
         """Let go."""
         self.disable_force()
         self._open = False
-
-    def __enter__(self) -> Self:
-        self.open()
-        return self
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def find(options: SimulatedOptions | None = None) -> list[Availability]:
