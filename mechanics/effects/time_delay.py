@@ -4,41 +4,21 @@ place."""
 import dataclasses
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import LATE, Scene, Settings
 from mechanics.recording import Recording
 
 
-@njit(cache=True)
-def late(start, t, force, delay, out):
-    """Write the force (n, 3) of `delay` s before; start (p + 1,) rows of presses, whose ends are held."""
-    for p in range(start.shape[0] - 1):
-        a, b = start[p], start[p + 1]
-        j = a
-        for i in range(a, b):
-            wanted = t[i] - delay
-            if wanted <= t[a]:
-                out[i] = force[a]
-                continue
-            if wanted >= t[b - 1]:
-                out[i] = force[b - 1]
-                continue
-            while j > a and t[j] > wanted:
-                j -= 1
-            while t[j + 1] < wanted:
-                j += 1
-            w = (wanted - t[j]) / (t[j + 1] - t[j])
-            out[i] = (1 - w) * force[j] + w * force[j + 1]
-
-
 def delayed(start: np.ndarray, t: np.ndarray, force: np.ndarray, delay_s: float) -> np.ndarray:
-    """(n, 3) N, the force as it reads `delay_s` late."""
+    """(n, 3) N, the force (n, 3) as it reads `delay_s` late; start: (p + 1,) rows of presses, whose ends are
+    held."""
     if delay_s == 0:
         return force
     out = np.empty_like(force)
-    late(start, t, np.ascontiguousarray(force), delay_s, out)
+    for a, b in zip(start[:-1], start[1:], strict=True):
+        for axis in range(3):
+            out[a:b, axis] = np.interp(t[a:b] - delay_s, t[a:b], force[a:b, axis])
     return out
 
 
