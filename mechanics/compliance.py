@@ -17,6 +17,7 @@ import scipy.linalg as la
 import scipy.sparse as sp
 
 from mechanics import pardiso
+from mechanics.effects.hold import base_hold
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError, OptionError
 from mechanics.model import Model
@@ -24,7 +25,6 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver, free_dofs
 from mechanics.store import content_key, load_or_build
-from mechanics.support import base_hold
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 

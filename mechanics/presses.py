@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import ModelError
+from mechanics.frames import tangents
 
 KINDS = ("trace", "press", "free", "rigid", "retrace")
 """Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
@@ -185,8 +186,6 @@ class Presses:
     @cached_property
     def frame(self) -> np.ndarray:
         """(p, 3, 3) rows normal, tangent, tangent."""
-        from mechanics.sites import tangents
-
         return np.array([np.stack([n, *tangents(n)]) for n in self.normal]).reshape(-1, 3, 3)
 
     @cached_property

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import MeshError
+from mechanics.frames import tangents
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
 from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
@@ -177,11 +178,3 @@ def mean_curvature(
         fit = np.linalg.lstsq(columns, z, rcond=None)[0]
         result[i] = -(fit[3] + fit[5])
     return result
-
-
-def tangents(normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors that make a right-handed frame (u, v, n) with the unit normal."""
-    helper = np.eye(3)[np.argmin(np.abs(normal))]
-    u = np.cross(helper, normal)
-    u /= np.linalg.norm(u)
-    return u, np.cross(normal, u)

@@ -5,14 +5,11 @@ Which triangles are the base is the mesh's business (TetMesh.fixed); this says w
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
 
-from mechanics.effects.registry import effects as known_effects
 from mechanics.elasticity import triangle_mass
 from mechanics.errors import OptionError
 from mechanics.tetmesh import TetMesh
@@ -91,16 +88,3 @@ def _spread(mesh: TetMesh, triangles: np.ndarray, per_area: np.ndarray) -> sp.cs
 def base_triangles(mesh: TetMesh) -> np.ndarray:
     """(k, 3 or 6): the boundary triangles all of whose corners are fixed."""
     return mesh.surface[mesh.fixed[mesh.surface[:, :3]].all(axis=1)]
-
-
-def base_hold(
-    effects: Mapping[str, Mapping[str, Any]], normal: np.ndarray, young_modulus_pa: float
-) -> BaseHold | None:
-    """The base as effects of a model say that it is held; None where it is bonded. normal: (3,) unit."""
-    said: dict[str, Any] = {}
-    for effect in known_effects():
-        if effect.hold is not None and effect.name in effects:
-            said |= effect.hold(effects[effect.name], young_modulus_pa)
-    if said.get("springs") is None and said.get("bonded_fraction", 1.0) >= 1:
-        return None
-    return BaseHold(np.asarray(normal, dtype=float), **said)

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.errors import ContactError
+from mechanics.frames import tangents
 from mechanics.model import Model
-from mechanics.sites import tangents
 from reconstruct.boundary import Boundary
 
 

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from mechanics.effects.base import Effect, Keys, Law, Parameter, Scope, check, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Touch
 from mechanics.model import Model
 

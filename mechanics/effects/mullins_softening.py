@@ -12,7 +12,8 @@ import numpy as np
 from numba import njit
 
 from mechanics.dent import dent_load
-from mechanics.effects.base import Effect, Keys, Law, Parameter, Scope, check, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.law import Law
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
 

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
-from mechanics.effects.base import Law
+from mechanics.effects.law import Law
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import Touch
 

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from mechanics.dent import DentLaw, dent_law
-from mechanics.effects.base import Law
+from mechanics.effects.law import Law
 from mechanics.places import Places
 
 STICKS = float("inf")

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from numba import njit
 
-from mechanics.effects.base import Effect, Keys, Law, Parameter, Scope, unchanged
+from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
 from mechanics.model import Model

@@ -15,6 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from mechanics import inclusion
+from mechanics.effects.hold import base_hold
 from mechanics.model import Model
 from mechanics.moduli import balls_ratio
 from mechanics.near_field import contact_width
@@ -22,7 +23,6 @@ from mechanics.nearest import closest
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
-from mechanics.support import base_hold
 from palpate.servo import Servo
 from render.base import Renderer
 from render.fem import FemRenderer

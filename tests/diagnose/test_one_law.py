@@ -19,9 +19,10 @@ from diagnose.forward import Forward
 from mechanics.compliance import load_or_condense
 from mechanics.effects.registry import effect, effects
 from mechanics.far_field import energy_fields, far_with_weights
+from mechanics.frames import tangents
 from mechanics.places import solve_places
 from mechanics.press_making import of_paths
-from mechanics.sites import tangents, touch_solver
+from mechanics.sites import touch_solver
 from render.fem import FemRenderer
 from render.options import RenderOptions
 
