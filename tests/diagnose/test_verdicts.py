@@ -12,6 +12,7 @@ from diagnose.apply import corrected, improved
 from diagnose.forward import Forward
 from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.validation import held_out_by_refit
 from diagnose.whiten import NuisanceOptions
 from reconstruct.placing import presses_on
 
@@ -167,3 +168,20 @@ def test_the_same_input_gives_the_same_answer(delayed):
     for data in (one, two):
         data.pop("seconds")
     assert one == two
+
+
+def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, monkeypatch):
+    """As where free air had been read off the tracing: the gap grew by what was named."""
+
+    def grown(search, found, extra, added):
+        honest = held_out_by_refit(search, found, extra, added)
+        worse = 4.0 if "time_delay" in found.names else 1.0
+        return dataclasses.replace(honest, plain=worse * honest.plain + (worse - 1.0))
+
+    monkeypatch.setattr("diagnose.conclusion.held_out_by_refit", grown)
+    dear = "poisson_ratio,unbonded_base,compliant_base,inclusion,skin_layer,modulus_gradient"
+    options = dataclasses.replace(FAST, fast=False, without=dear)
+    result = diagnose(*bench.record(_late), options)
+    assert result.effects == () and "time_delay" in result.candidates
+    assert result.kind == "unknown" and result.gap_after_n == result.gap_before_n
+    assert any("grows" in reason for reason in result.reasons)
