@@ -150,5 +150,4 @@ def build_forward(touches: Presses, model: Model) -> Forward:
 
 def _acceleration(t: Presses) -> np.ndarray:
     """(n, 3) m/s^2, device frame, press by press from the thinned positions."""
-    parts = [slice(a, b) for a, b in zip(t.starts[:-1], t.starts[1:], strict=True)]
-    return np.concatenate([acceleration(t.t[part], t.position[part]) for part in parts])
+    return np.concatenate([acceleration(t.t[part], t.position[part]) for part in t.parts])

@@ -10,6 +10,7 @@ import numpy as np
 from mechanics.kinematics import acceleration
 from mechanics.presses import Presses
 from mechanics.recording import Recording
+from mechanics.samples import runs
 
 BLOCK_S = 0.25
 MIN_BLOCKS = 8
@@ -57,10 +58,9 @@ def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
     if free.sum() < 2 * rate:
         return None
     t, force = recording.t, recording.force_on_tool
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
     size = max(1, round(BLOCK_S * rate))
     centres, levels = [], []
-    for a, b in zip(edges[::2], edges[1::2], strict=True):
+    for a, b in runs(free):
         for i in range(a, b - size + 1, size):
             centres.append(t[i : i + size].mean())
             levels.append(force[i : i + size].mean(axis=0))

@@ -28,8 +28,7 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
         )
     if not presses.sampled:
         raise DiagnosisError("the table of presses has no samples: reconstruct the recording again")
-    edges = zip(presses.starts[:-1], presses.starts[1:], strict=True)
-    lead = np.concatenate([leads(presses.t[a:b], presses.position[a:b]) for a, b in edges])
+    lead = np.concatenate([leads(presses.t[part], presses.position[part]) for part in presses.parts])
     limit = np.append(presses.onset_s[1:] - LEAD_S, np.inf)
     seen = dataclasses.replace(presses, columns={"lead": lead})
     rows = (seen.t >= (seen.onset_s - LEAD_S)[seen.press]) & (

@@ -78,7 +78,7 @@ def deepest(t: Presses) -> np.ndarray:
 
 def fastest(t: Presses) -> np.ndarray:
     """Sites that hold the fastest presses."""
-    speed = np.array([t.speed[a:b].max() for a, b in zip(t.starts[:-1], t.starts[1:], strict=True)])
+    speed = np.array([t.speed[part].max() for part in t.parts])
     return _most(np.array([speed[t.site == s].max() for s in range(t.sites)]))
 
 

@@ -10,6 +10,8 @@ import numpy as np
 from mechanics.press_sites import SITE_M, sites_of
 from mechanics.presses import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses, Segment
 from mechanics.recording import Recording
+from mechanics.robust import spread_about_zero
+from mechanics.samples import runs
 
 AROUND_S = 0.3
 """Samples are kept this long before first and after last touch."""
@@ -59,9 +61,7 @@ def free_segments(
     free = t > begin_s
     for onset, end in zip(onset_s, end_s, strict=True):
         free &= (t < onset - CLEAR_S) | (t > end + CLEAR_S)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], free.astype(np.int8), [0]])))
-    pairs = zip(edges[::2], edges[1::2] - 1, strict=True)
-    return tuple(Segment("free", float(t[a]), float(t[b])) for a, b in pairs if b > a)
+    return tuple(Segment("free", float(t[a]), float(t[b - 1])) for a, b in runs(free) if b > a + 1)
 
 
 def measured_noise(recording: Recording, free: np.ndarray) -> Noise:
@@ -75,14 +75,10 @@ def measured_noise(recording: Recording, free: np.ndarray) -> Noise:
     white = max(_robust_std(steps) / np.sqrt(2), 1e-4)
     line = np.polyfit(recording.t[free], force[free], 1)
     left = force - (recording.t[:, None] * line[0] + line[1])
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], free, [False]]).astype(int)))
+    stretches = runs(free)
 
     def of_means(size: int) -> float:
-        means = [
-            left[k : k + size].mean(axis=0)
-            for a, b in zip(edges[::2], edges[1::2], strict=True)
-            for k in range(a, b - size + 1, size)
-        ]
+        means = [left[k : k + size].mean(axis=0) for a, b in stretches for k in range(a, b - size + 1, size)]
         return _robust_std(np.array(means)) if len(means) > 20 else white / np.sqrt(size)
 
     step = max(of_means(per_step), white / np.sqrt(per_step))
@@ -94,7 +90,7 @@ def measured_noise(recording: Recording, free: np.ndarray) -> Noise:
 
 
 def _robust_std(values: np.ndarray) -> float:
-    return float(1.4826 * np.median(np.abs(values - np.median(values, axis=0))))
+    return spread_about_zero(values - np.median(values, axis=0))
 
 
 def cut(

@@ -20,6 +20,7 @@ import numpy as np
 
 from mechanics.errors import ModelError
 from mechanics.frames import tangents
+from mechanics.samples import delayed
 
 KINDS = ("trace", "press", "free", "rigid", "retrace")
 """Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
@@ -151,6 +152,11 @@ class Presses:
         """(n,) the press of each row."""
         return np.repeat(np.arange(len(self)), np.diff(self.starts))
 
+    @cached_property
+    def parts(self) -> list[slice]:
+        """The rows of each press."""
+        return [slice(int(a), int(b)) for a, b in zip(self.starts[:-1], self.starts[1:], strict=True)]
+
     def rows(self, presses: Iterable[int]) -> np.ndarray:
         """Row numbers of these presses, in order."""
         parts = [np.arange(self.starts[i], self.starts[i + 1]) for i in presses]
@@ -209,9 +215,9 @@ class Presses:
     def rate(self) -> np.ndarray:
         """(n,) m/s, of the depth."""
         out = np.zeros(len(self.t))
-        for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
-            if b - a > 2:
-                out[a:b] = np.gradient(self.depth[a:b], self.t[a:b])
+        for part in self.parts:
+            if part.stop - part.start > 2:
+                out[part] = np.gradient(self.depth[part], self.t[part])
         return out
 
     @cached_property
@@ -223,32 +229,30 @@ class Presses:
     def phase(self) -> np.ndarray:
         """(n,) LOADING, HOLDING (within a tenth of the greatest depth), UNLOADING, or OUTSIDE the touch."""
         out = np.full(len(self.t), HOLDING)
-        for p, (a, b) in enumerate(zip(self.starts[:-1], self.starts[1:], strict=True)):
-            depth, t = self.travel[a:b, 0], self.t[a:b]
+        for p, part in enumerate(self.parts):
+            depth, t, own = self.travel[part, 0], self.t[part], out[part]
             if not len(depth):
                 continue
             deepest = depth.max()
             # a delayed hand may stay out of the surface throughout
             first, last = np.flatnonzero(depth >= deepest - 0.1 * abs(deepest))[[0, -1]]
-            out[a : a + first] = LOADING
-            out[a + last + 1 : b] = UNLOADING
-            out[a:b][(t < self.onset_s[p]) | (t > self.end_s[p])] = OUTSIDE
+            own[:first] = LOADING
+            own[last + 1 :] = UNLOADING
+            own[(t < self.onset_s[p]) | (t > self.end_s[p])] = OUTSIDE
         return out
 
     @cached_property
     def deepest(self) -> np.ndarray:
         """(p,) m, greatest depth below the surface."""
-        return np.array(
-            [self.travel[a:b, 0].max() for a, b in zip(self.starts[:-1], self.starts[1:], strict=True)]
-        )
+        return np.array([self.travel[part, 0].max() for part in self.parts])
 
     @cached_property
     def speed(self) -> np.ndarray:
         """(n,) m/s, rate of the depth below the surface, smoothed over five rows."""
         out = np.zeros(len(self.t))
-        for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
-            smooth = np.convolve(np.pad(self.travel[a:b, 0], 2, mode="edge"), np.full(5, 0.2), mode="valid")
-            out[a:b] = np.gradient(smooth, self.t[a:b])
+        for part in self.parts:
+            smooth = np.convolve(np.pad(self.travel[part, 0], 2, mode="edge"), np.full(5, 0.2), mode="valid")
+            out[part] = np.gradient(smooth, self.t[part])
         return out
 
     # noise
@@ -274,12 +278,7 @@ class Presses:
     @cached_property
     def net(self) -> Presses:
         """Forces less what is read in free air, at the time of the position (the delay undone)."""
-        force = self.force - self.free_air
-        if self.delay_s:
-            force = force.copy()
-            for a, b in zip(self.starts[:-1], self.starts[1:], strict=True):
-                at, own = self.t[a:b] + self.delay_s, force[a:b].copy()
-                force[a:b] = np.stack([np.interp(at, self.t[a:b], c) for c in own.T], axis=1)
+        force = delayed(self.parts, self.t, self.force - self.free_air, -self.delay_s)
         return dataclasses.replace(
             self, force=force, free_air=np.zeros_like(force), delay_s=0.0, delay_error_s=0.0
         )
@@ -291,7 +290,8 @@ class Presses:
         lengths = np.diff(self.starts)[chosen]
         site = np.unique(self.site[chosen], return_inverse=True)[1]
         return dataclasses.replace(
-            self._of_rows(rows),
+            self,
+            **self._of_rows(rows),
             starts=np.concatenate([[0], np.cumsum(lengths)]),
             **{n: getattr(self, n)[chosen] for n in PRESS_COLUMNS if n != "site"},
             site=site,
@@ -310,9 +310,8 @@ class Presses:
     def where(self, rows: np.ndarray) -> Presses:
         """Only some rows, (n,) bool; every press stays, if need be without rows."""
         counts = np.bincount(self.press[rows], minlength=len(self))
-        return dataclasses.replace(
-            self._of_rows(np.flatnonzero(rows)), starts=np.concatenate([[0], np.cumsum(counts)])
-        )
+        starts = np.concatenate([[0], np.cumsum(counts)])
+        return dataclasses.replace(self, **self._of_rows(np.flatnonzero(rows)), starts=starts)
 
     def thinned(self, step_s: float) -> Presses:
         """Means over whole steps, from each press's first row on: keeps white noise white, and turns the
@@ -343,16 +342,11 @@ class Presses:
             block=size,
         )
 
-    def _of_rows(self, rows: np.ndarray) -> Presses:
-        """The row columns cut, while `starts` is put right by the caller (checked there)."""
-        copy = object.__new__(Presses)
-        copy.__dict__.update({f.name: getattr(self, f.name) for f in dataclasses.fields(self)})
-        for n in ROW_COLUMNS:
-            value = getattr(self, n)
-            if n != "starts" and value is not None:
-                object.__setattr__(copy, n, value[rows])
-        object.__setattr__(copy, "columns", {n: v[rows] for n, v in self.columns.items()})
-        return copy
+    def _of_rows(self, rows: np.ndarray) -> dict[str, Any]:
+        """The row columns of some rows, by name."""
+        columns = {n: getattr(self, n) for n in ROW_COLUMNS if n != "starts"}
+        cut = {n: None if v is None else v[rows] for n, v in columns.items()}
+        return cut | {"columns": {n: v[rows] for n, v in self.columns.items()}}
 
     def on_surface(self, point: np.ndarray, normal: np.ndarray) -> Presses:
         """The table with places (p, 3) m and outward unit normals (p, 3) of a surface; depths along them.

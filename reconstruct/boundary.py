@@ -13,6 +13,7 @@ from scipy.ndimage import gaussian_filter1d
 from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.options import option
 from mechanics.robust import biweight
+from mechanics.samples import runs
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
 _GAP_S = 1.0
@@ -54,12 +55,6 @@ class Boundary:
     def height(self, points: np.ndarray) -> np.ndarray:
         """Height of points (..., 3) above the support, m."""
         return (np.asarray(points) - self.support_point) @ self.support_normal
-
-
-def runs(mask: np.ndarray) -> list[tuple[int, int]]:
-    """[start, end) of each run of true values."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    return [(int(a), int(b)) for a, b in zip(edges[::2], edges[1::2], strict=True)]
 
 
 def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:

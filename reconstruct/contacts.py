@@ -17,8 +17,9 @@ from mechanics.press_cutting import cut
 from mechanics.press_sites import SITE_M
 from mechanics.presses import Presses
 from mechanics.recording import Recording
+from mechanics.samples import runs
 from reconstruct.baseline import free_air_force
-from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval, runs
+from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
 from reconstruct.delay import force_delay
 from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact

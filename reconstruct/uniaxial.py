@@ -14,10 +14,10 @@ def low_passed(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> 
     """The presses net of free air, position and force low-passed without phase shift."""
     net = presses.net
     position, force = np.array(net.position), np.array(net.force)
-    for a, b in zip(net.starts[:-1], net.starts[1:], strict=True):
-        if b - a > 3:
-            position[a:b] = low_pass(position[a:b], net.sample_rate_hz, cutoff_hz)
-            force[a:b] = low_pass(force[a:b], net.sample_rate_hz, cutoff_hz)
+    for part in net.parts:
+        if part.stop - part.start > 3:
+            position[part] = low_pass(position[part], net.sample_rate_hz, cutoff_hz)
+            force[part] = low_pass(force[part], net.sample_rate_hz, cutoff_hz)
     return dataclasses.replace(net, position=position, force=force)
 
 

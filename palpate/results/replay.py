@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mechanics.samples import runs
 from palpate.results.base import Result
 from palpate.results.model import Model
 from palpate.results.recording import Recording
@@ -80,10 +81,9 @@ class ReplayResult(Result):
 
     def touches(self) -> tuple[np.ndarray, np.ndarray]:
         """Places (k, 3) m where the tip met the object, and the rms error (k,) N of each touch."""
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], self.contact.astype(int), [0]])))
         size = np.linalg.norm(self.force_n, axis=1)
         places, errors = [], []
-        for first, last in zip(edges[::2], edges[1::2], strict=True):
+        for first, last in runs(self.contact):
             felt = np.flatnonzero(size[first:last] > 0)
             if len(felt):
                 at = first + felt[0]
