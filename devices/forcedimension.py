@@ -2,8 +2,8 @@
 
 The device's own watchdog is set: without a new force for 20 ms its firmware lets go, whatever becomes of this
 program. Its velocity threshold is left as the maker set it. DHD itself acts on a commanded force: it cuts it
-at a limit (dhdSetMaxForce) and adds what carries the arm's weight (gravity compensation, computed on this side
-of the cable, so only while forces are sent). The limit is read, compensation switched on, both declared.
+at a limit (dhdSetMaxForce) and adds what carries the arm's weight (gravity compensation, computed by the
+library, so only while forces are sent). The limit is read, compensation switched on, both declared.
 
 Source: Force Dimension SDK documentation (DHD). DHD's frame is x towards the person, y right, z up. Tested
 against emulators built from published protocols; no hardware tried.

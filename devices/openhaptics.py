@@ -3,8 +3,8 @@
 The library calls us back 1000 times a second in a thread of its own; the callback sends the newest force,
 or zero when none came for 20 ms. The driver acts on a force as well: it refuses or cuts what exceeds its
 nominal greatest force, and may ramp forces in. Both are read at connecting; ramping, which would come on top
-of ours, is switched off. Its units are millimetres and newtons, its frame x right, y up, z towards the person.
-Tested against emulators built from published protocols; no hardware tried.
+of ours, is switched off. Its units are millimetres and newtons, its frame x right, y up, z towards the
+person. Tested against emulators built from published protocols; no hardware tried.
 """
 
 from __future__ import annotations

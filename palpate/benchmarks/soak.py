@@ -163,7 +163,7 @@ def _session(model: Model, seconds: float, frames_per_s: float) -> dict[str, Any
             report = session.report()
             picture.close()
         recorded = read_recording(record)
-    spacing = np.diff(recorded.t) * report.rate_hz
+    spacing = np.diff(recorded.t) * session.servo.options.rate_hz
     gaps = {"rows": len(recorded.t), "missing rows": int(np.round(spacing - 1.0).clip(0).sum())}
     return _summary(health, report.as_dict(), frames, gaps)
 
@@ -204,10 +204,10 @@ def _print_session(seen: dict[str, Any]) -> None:
         f"{report['ticks']} ticks, {report['missed_ticks']} missed, {report['late_ticks']} late "
         f"({seen['late_first_half']:.0f} in the first half, {seen['late_second_half']:.0f} in the second), "
         f"{seen['frames']} pictures, {seen['recorded']['rows']} rows recorded, "
-        f"{seen['recorded']['missing rows']} lost; ticks against deadlines {seen['phase_drift_us']:.3f} us, "
-        f"the next deadline lay {seen['deadline_ahead_ms'][1]:.2f} ms ahead (median of the first half "
-        f"{seen['ahead_first_ms']:.2f}, of the second {seen['ahead_second_ms']:.2f}), the system's wall clock "
-        f"went {seen['utc_drift_ms']:.2f} ms against it"
+        f"{seen['recorded']['missing rows']} missing; ticks against deadlines "
+        f"{seen['phase_drift_us']:.3f} us, the next deadline a median of {seen['ahead_first_ms']:.2f} ms "
+        f"ahead in the first half, {seen['ahead_second_ms']:.2f} in the second; the system's wall clock went "
+        f"{seen['utc_drift_ms']:.2f} ms against the loop's"
     )
 
 
