@@ -104,6 +104,8 @@ class PidWire:
     def _create_effects(self, port: HidPort) -> None:
         layout = self._layout
         self._blocks: dict[str, int] = {}
+        # what a program that was killed left there would in the end leave no room
+        port.write(layout.control(pid.RESET))
         for axis in layout.force_axes:
             port.set_feature(layout.create_constant())
             self._blocks[axis] = layout.loaded_block(port.get_feature(*layout.block_load()))
@@ -173,6 +175,10 @@ class PidWire:
         try:
             self._running = True
             self._stop()
+            for block in self._blocks.values():
+                free = self._layout.free(block)
+                if free is not None:
+                    self._port.write(free)
             self._port.write(self._layout.control(pid.STOP_ALL))
         except (OSError, DeviceError):
             pass  # unplugged: the effects end by themselves within EFFECT_MS

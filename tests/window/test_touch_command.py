@@ -25,10 +25,14 @@ def test_headless_session_with_a_recording(
 ) -> None:
     path = tmp_path / "session.csv.gz"
     words = ["touch", str(block.path), "--headless", "--seconds", "4", "--record", str(path), "--json", "-"]
-    assert main(words) == 0
-    result = json.loads(capsys.readouterr().out)
+    assert main([*words, "--jump-m", "0.01"]) == 0
+    out, err = capsys.readouterr()
+    result = json.loads(out)
+    loosened = "protection loosened: --jump-m is 0.01 (default 0.005)"
+    assert loosened in err and loosened in result["servo"]["words"]
     assert result["device"] == "simulated" and result["servo"]["ticks"] > 1000
     recording = read_recording(path)
+    assert recording.truth["protection_loosened"] == [loosened]
     assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
 
 
