@@ -22,10 +22,14 @@ from devices.intention import Intention
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
 from mechanics.errors import DeviceError, OptionError
+from mechanics.files import PNG
 from mechanics.model import Model
+from mechanics.recording import SAMPLES
 from palpate.arguments import (
+    add_input,
     add_json,
     add_options,
+    add_output,
     add_seed,
     emit_json,
     finite,
@@ -50,7 +54,8 @@ POLL_S = 0.1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The scene, the device, the window, and every option of the parts."""
-    parser.add_argument(
+    add_input(
+        parser,
         "scene",
         nargs="?",
         default=DEFAULT_SCENE,
@@ -66,16 +71,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=finite, help="stop after this time [s] (default: when the window closes)"
     )
-    parser.add_argument(
-        "--record", metavar="REC", type=Path, help="write the session as a recording (NAME.csv.gz)"
-    )
-    parser.add_argument("--replay", metavar="REC", help="the recording that the device 'replay' plays")
+    add_output(
+        parser, "--record", kind=SAMPLES, metavar="REC", type=Path,
+        help="write the session as a recording (NAME.csv.gz)",
+    )  # fmt: skip
+    add_input(parser, "--replay", metavar="REC", help="the recording that the device 'replay' plays")
     parser.add_argument(
         "--renderer", metavar="NAME", help=f"one of {', '.join(names())} (default: the scene's)"
     )
     parser.add_argument("--beside", metavar="NAME", help="a second renderer, driven by the same tip; 'none'")
-    parser.add_argument(
-        "--screenshot", metavar="PNG", type=Path, help="save a picture of the window at its end"
+    add_output(
+        parser,
+        "--screenshot",
+        kind=PNG,
+        metavar="PNG",
+        type=Path,
+        help="save the window at its end",
     )
     add_options(parser, MapperOptions)
     add_options(parser, RenderOptions)
