@@ -56,7 +56,7 @@ class Child:
                     stderr=self._errors,
                     text=True,
                     encoding="utf-8",
-                    env=module_environment(**dict.fromkeys(THREADS, "1")),
+                    env=module_environment(**dict.fromkeys(THREADS, "1"), MPLBACKEND="Agg"),
                     start_new_session=True,  # Ctrl-C is the parent's; and the group is killed as one
                 )
             return self._process

@@ -76,14 +76,18 @@ class DaskExecutor:
                     words = f"no Dask scheduler answers at '{self.address}' ({error}): start one there"
                     raise OptionError(" ".join(words.split())) from error
 
-    def slots(self) -> int:
-        """Twice the threads of all workers; a few where none has come yet."""
+    def at_once(self) -> int:
+        """Threads of all workers; 1 where none has come yet."""
         now = time.monotonic()
         if now > self._counted_at + _COUNT_S and self._client.status == "running":
             with contextlib.suppress(OSError, TimeoutError):
                 self._threads = sum(self._client.nthreads().values())
             self._counted_at = now
-        return _AHEAD * max(1, self._threads)
+        return max(1, self._threads)
+
+    def slots(self) -> int:
+        """That, and as many that wait with the scheduler."""
+        return _AHEAD * self.at_once()
 
     def submit(self, jobs: Sequence[tuple[str, dict[str, Any]]]) -> None:
         """Take on jobs, by name."""

@@ -24,12 +24,17 @@ Answer = dict[str, Any]
 
 
 class Executor(Protocol):
-    """What does jobs. slots: how many are wanted at once, now; memory_bytes: what these share, None where it
-    is not ours to count."""
+    """What does jobs. memory_bytes: what these share, None where it is not ours to count."""
 
     memory_bytes: int | None
 
-    def slots(self) -> int: ...
+    def at_once(self) -> int:
+        """How many it can do at once, now."""
+        ...
+
+    def slots(self) -> int:
+        """How many it wants to hold, now: those, and what should wait beside them."""
+        ...
 
     def submit(self, jobs: Sequence[tuple[str, dict[str, Any]]]) -> None:
         """Take on jobs, by name."""
@@ -60,13 +65,15 @@ def run(
     *,
     force: bool = False,
     tell: Callable[[Status], None] = lambda status: None,
+    outcomes: dict[str, Outcome] | None = None,
 ) -> dict[str, Outcome]:
     """Do what is not finished; name -> outcome, of every task.
 
     root: the folder that all records lie in, which every worker must see. force: finished tasks too. tell: is
-    told after every change. One task that fails stops only what needs it.
+    told after every change. outcomes: filled as they come, for whoever is interrupted. One task that fails
+    stops only what needs it.
     """
-    return _Run(graph, executor, root, force, tell).whole()
+    return _Run(graph, executor, root, force, tell, {} if outcomes is None else outcomes).whole()
 
 
 def job_of(task: Task, needs: Mapping[str, str], root: Path) -> dict[str, Any]:
@@ -85,16 +92,22 @@ def job_of(task: Task, needs: Mapping[str, str], root: Path) -> dict[str, Any]:
 
 class _Run:
     def __init__(
-        self, graph: Graph, executor: Executor, root: Path, force: bool, tell: Callable[[Status], None]
+        self,
+        graph: Graph,
+        executor: Executor,
+        root: Path,
+        force: bool,
+        tell: Callable[[Status], None],
+        outcomes: dict[str, Outcome],
     ) -> None:
         self.graph, self.executor, self.root, self.force, self.tell = graph, executor, root, force, tell
-        self.outcomes: dict[str, Outcome] = {}
+        self.outcomes = outcomes
         self.order = {name: k for k, name in enumerate(graph.tasks)}
         self.missing = {name: len(task.needs) for name, task in graph.tasks.items()}
         self.ready = [self.order[name] for name, count in self.missing.items() if not count]
         heapq.heapify(self.ready)
         self.names = list(graph.tasks)
-        self.running: dict[str, int] = {}
+        self.running: set[str] = set()
         self.crashes: dict[str, int] = {}
         self.peaks: dict[str, int] = {}
         self.status = Status.of(graph)
@@ -102,6 +115,7 @@ class _Run:
     def whole(self) -> dict[str, Outcome]:
         while self.ready or self.running:
             self._begin()
+            self.status.at_once = self.executor.at_once()
             self.tell(self.status)
             if self.running:
                 for name, answer in self.executor.collect(_WAIT_S):
@@ -120,7 +134,7 @@ class _Run:
             if record is None:
                 if len(self.running) >= max(1, self.executor.slots()) or not self._fits(name):
                     break
-                self.running[name] = self._memory(name)
+                self.running.add(name)
                 self.status.began(task)
                 jobs.append((name, job_of(task, needs, self.root)))
             heapq.heappop(self.ready)
@@ -143,14 +157,17 @@ class _Run:
 
     def _fits(self, name: str) -> bool:
         whole = self.executor.memory_bytes
-        return whole is None or not self.running or sum(self.running.values()) + self._memory(name) <= whole
+        if whole is None or not self.running:
+            return True
+        return sum(map(self._memory, self.running)) + self._memory(name) <= whole
 
     def _learn(self, task: Task, record: Record) -> None:
         self.peaks[task.stage] = max(self.peaks.get(task.stage, 0), record.peak_bytes)
 
     def _take(self, name: str, answer: Answer) -> None:
-        if self.running.pop(name, None) is None:
+        if name not in self.running:
             return  # an answer that was given twice
+        self.running.remove(name)
         task = self.graph.tasks[name]
         state, reason = answer["state"], answer.get("reason", "")
         if state == "crashed":

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import OptionError
+from mechanics.progress import Progress
 from palpate.tasks.driver import Outcome, run
 from palpate.tasks.graph import Graph
 from palpate.tasks.words import Status
@@ -66,11 +67,19 @@ def run_with_bar(
     scheduler: str | None = None,
     memory_bytes: int | None = None,
     force: bool = False,
-    bar: bool = True,
+    progress: bool | Progress = True,
+    outcomes: dict[str, Outcome] | None = None,
 ) -> dict[str, Outcome]:
-    """`driver.run` on the executor that is wanted; with a bar where standard error is a terminal."""
-    with executor(workers, scheduler, memory_bytes) as chosen, Bar(bar) as told:
-        return run(graph, chosen, root, force=force, tell=told)
+    """`driver.run` on the executor that is wanted; progress: a bar where standard error is a terminal, or who
+    is told words and the share that is done."""
+    with executor(workers, scheduler, memory_bytes) as chosen, Bar(progress is True) as bar:
+
+        def tell(status: Status) -> None:
+            bar(status)
+            if callable(progress):
+                progress(status.words(), status.fraction)
+
+        return run(graph, chosen, root, force=force, tell=tell, outcomes=outcomes)
 
 
 class Bar:

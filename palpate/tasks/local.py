@@ -36,8 +36,12 @@ class LocalExecutor:
         for _child in self._children:
             self._jobs.put(None)
 
-    def slots(self) -> int:
+    def at_once(self) -> int:
         """How many at once."""
+        return self.workers
+
+    def slots(self) -> int:
+        """None waits beside those: which comes next is decided when there is room."""
         return self.workers
 
     def submit(self, jobs: Sequence[tuple[str, dict[str, Any]]]) -> None:

@@ -11,7 +11,7 @@ from palpate.tasks.record import Record
 
 @dataclass
 class Status:
-    """Counts by stage; names of running tasks in the order of their beginning."""
+    """Counts by stage; names of running tasks in the order of their beginning; at_once: how many can run."""
 
     total: Counter[str]
     ended_of: Counter[str] = field(default_factory=Counter)
@@ -27,7 +27,6 @@ class Status:
     def began(self, task: Task) -> None:
         """A task was handed on."""
         self.running[task.name] = task
-        self.at_once = max(self.at_once, len(self.running))
 
     def gave_back(self, task: Task) -> None:
         """It will have to be done again."""
@@ -65,7 +64,7 @@ class Status:
         return sum(weight[s] * n for s, n in self.ended_of.items()) / whole if whole else 1.0
 
     def left_s(self) -> float | None:
-        """Seconds that the rest takes, as many tasks at once as were running so far; None before every stage has been timed."""
+        """Seconds that the rest takes; None before every stage has been timed."""
         means = {stage: self._mean_s(stage) for stage in self.total}
         rest = {stage: self.total[stage] - self.ended_of[stage] for stage in self.total}
         if any(rest[stage] and means[stage] is None for stage in rest):
@@ -78,7 +77,7 @@ class Status:
         text = f"{self.done} of {self.whole}"
         if left is not None and self.done < self.whole:
             text += f", about {_duration(left)} left"
-        names = [f"{task.stage} {task.label}".strip() for task in self.running.values()]
+        names = [f"{task.stage} {task.label}".strip() for task in self.running.values()][: self.at_once]
         more = f" and {len(names) - most} more" if len(names) > most else ""
         return text + (f": {', '.join(names[:most])}{more}" if names else "")
 
