@@ -1,4 +1,4 @@
-"""Which task next: needs, what is finished, what failed and crashed, memory. Jobs are done in this process."""
+"""Which task next: needs, what is finished, what failed, memory. Jobs are done in this process."""
 
 from __future__ import annotations
 
