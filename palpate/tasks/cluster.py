@@ -19,8 +19,9 @@ from mechanics.errors import OptionError
 from palpate.tasks.child import Child
 from palpate.tasks.driver import Answer
 
-_AHEAD = 2
-"""Jobs a thread of a Dask worker that the scheduler is given at once, so that none waits for the driver."""
+_AHEAD = 2, 32
+"""Jobs that the scheduler is given at once, so many a thread of its workers and so many more: none of them
+waits for the driver, also where they are short."""
 
 _CONNECT_S = 10.0
 _COUNT_S = 2.0
@@ -86,13 +87,15 @@ class DaskExecutor:
         return max(1, self._threads)
 
     def slots(self) -> int:
-        """That, and as many that wait with the scheduler."""
-        return _AHEAD * self.at_once()
+        """Some that wait with the scheduler beside those."""
+        return _AHEAD[0] * self.at_once() + _AHEAD[1]
 
     def submit(self, jobs: Sequence[tuple[str, dict[str, Any]]]) -> None:
         """Take on jobs, by name."""
         keys = [f"palpate-{job['key'][:16]}-{next(self._number)}" for _, job in jobs]
-        futures = self._client.map(do, [job for _, job in jobs], key=keys, pure=False)
+        given = [job for _, job in jobs]
+        # what finishes a recording goes before what begins one
+        futures = self._client.map(do, given, key=keys, pure=False, priority=-given[0]["order"])
         for (name, _), key, future in zip(jobs, keys, futures, strict=True):
             self._given[key] = name, future
             future.add_done_callback(lambda f: self._ended.put(f.key))
@@ -109,8 +112,15 @@ class DaskExecutor:
             self._given.clear()
             self._client = self._connected(self.patience_s)
             return [(name, {"state": "lost"}) for name in lost]
-        ended = [self._given.pop(key) for key in keys if key in self._given]
-        return [(name, self._answer(future)) for name, future in ended]
+        ended = {key: self._given.pop(key) for key in keys if key in self._given}
+        good = [future for _, future in ended.values() if future.status == "finished"]
+        with contextlib.suppress(Exception):  # whatever it was, it is asked for one by one
+            answers = dict(zip((f.key for f in good), self._client.gather(good), strict=True))
+            return [
+                (name, answers[key] if key in answers else self._answer(future))
+                for key, (name, future) in ended.items()
+            ]
+        return [(name, self._answer(future)) for name, future in ended.values()]
 
     def _answer(self, future: Any) -> Answer:
         from distributed import CancelledError, KilledWorker

@@ -76,8 +76,8 @@ def run(
     return _Run(graph, executor, root, force, tell, {} if outcomes is None else outcomes).whole()
 
 
-def job_of(task: Task, needs: Mapping[str, str], root: Path) -> dict[str, Any]:
-    """What a worker is told of a task, as JSON can hold it."""
+def job_of(task: Task, needs: Mapping[str, str], root: Path, order: int = 0) -> dict[str, Any]:
+    """What a worker is told of a task, as JSON can hold it. order: the lower, the sooner it is wanted."""
     return {
         "function": task.function,
         "keywords": {**task.content, **task.places},
@@ -87,6 +87,7 @@ def job_of(task: Task, needs: Mapping[str, str], root: Path) -> dict[str, Any]:
         "products": list(map(str, task.products)),
         "root": str(root),
         "version": __version__,
+        "order": order,
     }
 
 
@@ -136,7 +137,7 @@ class _Run:
                     break
                 self.running.add(name)
                 self.status.began(task)
-                jobs.append((name, job_of(task, needs, self.root)))
+                jobs.append((name, job_of(task, needs, self.root, self.order[name])))
             heapq.heappop(self.ready)
             if record is not None:
                 self._learn(task, record)

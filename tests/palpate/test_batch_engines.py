@@ -19,6 +19,7 @@ from pathlib import Path
 import pytest
 
 import palpate as pp
+from mechanics.recording import recording_files
 from palpate.child import module_environment
 from palpate.tasks.cluster import DaskExecutor
 from palpate.tasks.driver import run
@@ -168,12 +169,11 @@ def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, c
 
 def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_model_on(tmp_path, cluster):
     """Two recordings of one name, in two folders; the third is broken. Replay, compare and diagnose."""
-    source = embedded_recording("silicone-1-cylinder")
+    source, description = recording_files(embedded_recording("silicone-1-cylinder"))
     for day in ("day1", "day2"):
         (tmp_path / "in" / day).mkdir(parents=True)
         shutil.copy(source, tmp_path / "in" / day / "cylinder.csv.gz")
-        text = source.with_name(source.name.replace(".csv.gz", ".toml")).read_text()
-        (tmp_path / "in" / day / "cylinder.toml").write_text(f"# {day}\n{text}")
+        (tmp_path / "in" / day / "cylinder.toml").write_text(f"# {day}\n{description.read_text()}")
     (tmp_path / "in" / "broken.csv").write_text("t,x\n0,1\n")
     shutil.copy(tmp_path / "in" / "day1" / "cylinder.toml", tmp_path / "in" / "broken.toml")
     options = {"diagnose": {"fast": True, "bootstrap": 50}}
