@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.files import memory_folder, temporary_prefix
 from palpate.servo.histogram import BINS
 
 RING_ROWS = 8192
@@ -110,10 +111,7 @@ class SharedBlock:
     def __init__(self, path: str | None = None) -> None:
         self._owner = path is None
         if path is None:
-            memory = "/dev/shm"
-            descriptor, path = tempfile.mkstemp(
-                prefix="palpate-servo-", dir=memory if os.access(memory, os.W_OK) else None
-            )
+            descriptor, path = tempfile.mkstemp(prefix=temporary_prefix("servo-"), dir=memory_folder())
             os.ftruncate(descriptor, total_bytes())
         else:
             descriptor = os.open(path, os.O_RDWR)
