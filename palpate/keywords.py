@@ -21,6 +21,7 @@ _RENDER = ("render.options:RenderOptions",)
 _KINDS: dict[str, tuple[str, ...]] = {
     "reconstruct": (
         "reconstruct.pipeline:ReconstructOptions",
+        "reconstruct.known_shape:GeometryOptions",
         "reconstruct.filtering:FilterOptions",
         "reconstruct.boundary:BoundaryOptions",
         "reconstruct.contacts:ContactOptions",

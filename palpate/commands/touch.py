@@ -105,6 +105,14 @@ def run(arguments: argparse.Namespace) -> int:
     scene = load_scene(arguments.scene)
     name = arguments.device or ("simulated" if arguments.headless else "mouse")
     _check(arguments, name)
+    servo_options = options_from(
+        arguments,
+        ServoOptions,
+        safety=options_from(arguments, SafetyOptions),
+        support_plane=options_from(arguments, SupportOptions),
+    )
+    for word in servo_options.loosened:
+        print(f"palpate touch: {word}", file=sys.stderr)
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar("touch"))
         model = model_of(scene, lambda stage, share: bar(stage, 0.5 * share))
@@ -123,12 +131,7 @@ def run(arguments: argparse.Namespace) -> int:
                 beside=_beside(arguments, scene),
                 render_options=with_friction(options_from(arguments, RenderOptions), scene),
                 mapping=_mapping(arguments, name, scene, model),
-                options=options_from(
-                    arguments,
-                    ServoOptions,
-                    safety=options_from(arguments, SafetyOptions),
-                    support_plane=options_from(arguments, SupportOptions),
-                ),
+                options=servo_options,
                 recording=arguments.record,
                 pictures=not arguments.headless,
             )
@@ -148,6 +151,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.record is not None:
         say(arguments, f"recorded {arguments.record}")
     emit_json({"scene": scene.name, "device": name, "servo": report.as_dict()}, arguments.json)
+    if session.servo.failure:
+        raise DeviceError(session.servo.failure)
     return 0
 
 
