@@ -106,9 +106,7 @@ def stated_geometry(recording: Recording, options: GeometryOptions) -> GeometryO
     try:
         return dataclasses.replace(options, **keys)
     except TypeError as error:
-        raise OptionError(
-            f"[object] of '{recording.name}' holds a value of the wrong kind: {error}"
-        ) from error
+        raise OptionError(f"[object] of '{recording.name}' holds a value of the wrong kind: {error}") from error
 
 
 @dataclass(frozen=True)
@@ -401,3 +399,4 @@ def _shell(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
     """The mesh's boundary as a surface of its own: vertices and triangles."""
     used, index = np.unique(mesh.surface[:, :3], return_inverse=True)
     return mesh.points[used], index.reshape(-1, 3)
+

@@ -196,9 +196,7 @@ class _Solver:
         away = inside - foot
         length = np.linalg.norm(away, axis=1)
         side = np.where(np.einsum("ki,ki->k", away, facing) < 0, -1.0, 1.0)
-        along = np.where(
-            length[:, None] > 1e-9, side[:, None] * away / np.maximum(length, 1e-12)[:, None], facing
-        )
+        along = np.where(length[:, None] > 1e-9, side[:, None] * away / np.maximum(length, 1e-12)[:, None], facing)
         normal, spot = along @ pose.rotation.T, foot @ pose.rotation.T + pose.shift
         residual = side * length - touched.tip_radius_m
         lever = np.cross(spot - self.pivot, normal)
@@ -252,7 +250,9 @@ class _Solver:
         _, foot = self.shell.find_closest_cell(back, return_closest_point=True)
         return bool(np.sqrt(np.mean((back - foot) ** 2) * 3) > _ALIKE_M * self.size)
 
-    def result(self, pose: _Pose, fit: _Fit, covariance: np.ndarray, rival_m: float = np.inf) -> Registration:
+    def result(
+        self, pose: _Pose, fit: _Fit, covariance: np.ndarray, rival_m: float = np.inf
+    ) -> Registration:
         """Its pose, errors and residuals."""
         return Registration(
             rotation=pose.rotation,

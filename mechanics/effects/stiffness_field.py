@@ -50,7 +50,9 @@ class Basis:
 def _basis(scene: Scene) -> Basis:
     places = scene.places
     p = len(places.point)
-    return places.stage(_BASIS, lambda: _made(places, _USUAL, np.full(p, _USUAL_ANSWER_M), np.full(p, 1e3)))
+    return places.stage(
+        _BASIS, lambda: _made(places, _USUAL, np.full(p, _USUAL_ANSWER_M), np.full(p, 1e3))
+    )
 
 
 def _made(places: Places, prior: Prior, answer: np.ndarray, weight: np.ndarray) -> Basis:

@@ -47,9 +47,7 @@ def _dead(sight: Sight) -> Iterator[Finding]:
         signal = np.sqrt(np.mean(sight.net[touching] ** 2, axis=0)) / noise
         expected = np.sqrt(np.mean((sight.touches.travel**2), axis=0)) if len(sight.touches) else np.zeros(3)
         expected = expected / max(float(np.linalg.norm(expected)), 1e-12) * np.linalg.norm(signal)
-        dead += [
-            3 + k for k in range(3) if signal[k] < 1.5 and expected[k] > 2 * _SIGNAL and 3 + k not in dead
-        ]
+        dead += [3 + k for k in range(3) if signal[k] < 1.5 and expected[k] > 2 * _SIGNAL and 3 + k not in dead]
     if not dead:
         return
     names = tuple(CHANNELS[k] for k in dead)
@@ -155,15 +153,7 @@ def _limited(sight: Sight) -> Iterator[Finding]:
         if not step and same > 3:
             decades = max(decades, 2.0 * same)
         if sure(decades) and (worst is None or decades > worst[0]):
-            worst = (
-                decades,
-                words,
-                int(at[: len(sight.spans)].sum()),
-                len(sight.spans),
-                top,
-                int(np.argmax(tops)),
-                names,
-            )
+            worst = (decades, words, int(at[: len(sight.spans)].sum()), len(sight.spans), top, int(np.argmax(tops)), names)
     if worst is None:
         return
     decades, words, count, among, top, touch, names = worst

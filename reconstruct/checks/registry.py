@@ -66,7 +66,9 @@ def refuse(found: Iterable[Finding], force: bool) -> None:
         raise RecordingError(f"{first.name}: {first.saw}; {first.todo}{more}; --force goes on despite it")
 
 
-def widened(modulus_pa: float, ci95_pa: tuple[float, float], found: Iterable[Finding]) -> tuple[float, float]:
+def widened(
+    modulus_pa: float, ci95_pa: tuple[float, float], found: Iterable[Finding]
+) -> tuple[float, float]:
     """The 95 % interval, Pa, with what the findings add to the error of ln modulus; grave ones add none, as
     their error is not known."""
     added = 1.96 * float(np.sqrt(sum(f.error**2 for f in found if not f.grave)))
