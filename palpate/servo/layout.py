@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.files import memory_folder, temporary_prefix
+from mechanics.files import memory_folder, temporary_prefix, writing
 from palpate.servo.histogram import BINS
 
 RING_ROWS = 8192
@@ -102,6 +102,20 @@ def views(buffer: mmap.mmap | bytearray) -> SharedArrays:
     return SharedArrays(**arrays)
 
 
+def _take(descriptor: int, path: str) -> None:
+    """Give the file its room now: where there is none, writing through the map would kill the process."""
+    with writing(path):
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(descriptor, 0, total_bytes())
+            else:
+                os.ftruncate(descriptor, total_bytes())
+        except OSError:
+            os.close(descriptor)
+            os.unlink(path)
+            raise
+
+
 class SharedBlock:
     """The block: a file in memory, made by the parent, mapped by its path in the servo.
 
@@ -113,7 +127,7 @@ class SharedBlock:
         self._owner = path is None
         if path is None:
             descriptor, path = tempfile.mkstemp(prefix=temporary_prefix("servo-"), dir=memory_folder())
-            os.ftruncate(descriptor, total_bytes())
+            _take(descriptor, path)
         else:
             descriptor = os.open(path, os.O_RDWR)
         try:
