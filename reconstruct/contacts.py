@@ -244,6 +244,11 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
         hint = "lower --contact-threshold or press harder" if method == "paper" else "press at more places"
+        if touches and np.median([boundary.height(signals.position[a]) for a, _ in touches]) < 0:
+            hint = (
+                "they lie below the support, so forces have the wrong sign; state the other force_on in the "
+                "recording's TOML"
+            )
         raise ContactError(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
