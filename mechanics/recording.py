@@ -270,6 +270,17 @@ def write_recording(
             np.savetxt(
                 file, np.hstack(columns), fmt=formats, delimiter=",", header=",".join(names), comments=""
             )
+    table = description_table(recording)
+    if truth is not None:
+        table["truth"] = dict(truth)
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    with atomic_file(path.with_name(stem + ".toml")) as temporary:
+        temporary.write_text(dump_toml(table), encoding="utf-8")
+    return path
+
+
+def description_table(recording: Recording) -> dict[str, Any]:
+    """What NAME.toml says of a recording whose samples hold the force on the tool."""
     table: dict[str, Any] = {
         "recording": {"sample_rate_hz": recording.sample_rate_hz, "force_on": "tool"},
         "tool": {"tip_radius_m": recording.tip_radius_m, "mass_kg": recording.tool_mass_kg},
@@ -285,13 +296,9 @@ def write_recording(
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
-    truth = truth if truth is not None else recording.truth
-    if truth is not None:
-        table["truth"] = dict(truth)
-    stem = path.name.removesuffix(".gz").removesuffix(".csv")
-    with atomic_file(path.with_name(stem + ".toml")) as temporary:
-        temporary.write_text(dump_toml(table), encoding="utf-8")
-    return path
+    if recording.truth is not None:
+        table["truth"] = dict(recording.truth)
+    return table
 
 
 def dump_toml(table: Mapping[str, Any]) -> str:

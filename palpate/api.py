@@ -8,7 +8,7 @@ tool. What a room needs is imported when its function is called.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import mechanics.model
     import mechanics.recording
     from mechanics.presses import Presses
+    from palpate.results.batch import Batch
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
@@ -353,6 +354,48 @@ def simulate(
         )
     result = simulation_of(plain, Path(thing.name).name)
     return result if save is None else result.save(save)
+
+
+def batch(
+    recordings: str | Path | Iterable[str | Path],
+    out: str | Path,
+    *,
+    do: str | Sequence[str] = ("reconstruct", "compare", "diagnose"),
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+    reports: bool = True,
+    workers: int | None = None,
+    memory_gb: float | None = None,
+    scheduler: str | None = None,
+    force: bool = False,
+    seed: int = 0,
+    progress: bool | Progress = True,
+) -> Batch:
+    """Many recordings at once, in processes of one thread each or by a Dask cluster: a folder each in `out`.
+
+    recordings: folders (and all below), patterns, files. do: steps; the others need "reconstruct". options:
+    step -> keywords of its function, {"diagnose": {"fast": True}}; lengths m, forces N. reports: HTML pages
+    of every step. workers: processes, one a core by default; memory_gb: that they may take together, 90 % of
+    what is free by default; scheduler: "tcp://HOST:8786" of a cluster, in their place. What is finished is
+    recognised by the recording's bytes, options and version, unless force. One bad recording stops no other:
+    its row has the reason. Raises OptionError.
+    """
+    from palpate.batching.plan import Choice
+    from palpate.batching.run import batch as run
+    from palpate.results.base import dressed
+    from palpate.results.batch import Batch
+
+    steps = tuple(do.split(",")) if isinstance(do, str) else tuple(do)
+    plain = run(
+        [recordings] if isinstance(recordings, str | Path) else recordings,
+        out,
+        Choice(steps, options, seed, reports),
+        workers=workers,
+        memory_bytes=None if memory_gb is None else int(1e9 * memory_gb),
+        scheduler=scheduler,
+        force=force,
+        progress=progress,
+    )
+    return dressed(Batch, plain)
 
 
 def _renderer(

@@ -71,6 +71,10 @@ class Page:
         )
         self._parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
+    def part(self, text: str) -> None:
+        """HTML as it is."""
+        self._parts.append(text)
+
     def figure(self, picture: Any, caption: str) -> None:
         """A picture: a matplotlib figure, a PNG's path, or an (h, w, 3) uint8 image."""
         data = base64.b64encode(png_bytes(picture)).decode()
