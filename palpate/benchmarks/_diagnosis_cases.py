@@ -1,7 +1,7 @@
 """The cases of the blind benchmark: what is sealed, at which strengths, on which objects, in whose hand.
 
-Everything that is no question is drawn by the case's seed from `scenes.variety`: frame, hand, presses, sampling,
-noise, what the file states and how it is written.
+Everything that is no question is drawn by the case's seed from `scenes.variety`: frame, hand, presses,
+sampling, noise, what the file states and how it is written.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ WEIGHT = ("tool_gravity_inertia", "force_bias")
 """What a tool's own weight is: the one where its orientation is known, a constant force where it is not."""
 FINITE = "finite_strain"
 POOLS = {"quick": (0, 3), "medium": (0, 1, 2, 3, 4, 5), "full": tuple(range(len(FAMILIES)))}
-"""Objects of `scenes.variety` that the cases of a size choose from, each solved once when it is linear, ..."""
+"""Objects of `scenes.variety` that the cases of a size choose from, each solved once as it is, ..."""
 NEO_HOOKEAN = {"quick": (), "medium": (0, 2), "full": (0, 1, 2, 3)}
 """... and those that are solved once more as neo-Hookean solids."""
 FEWER_PRESSES = 14
@@ -98,8 +98,8 @@ class Case:
 
     @property
     def nuisances(self) -> Draw:
-        """What the seed draws. A tool whose weight or bias is the question has no mass of its own beside, and a
-        solid that remembers is pressed less often.
+        """What the seed draws. A tool whose weight or bias is the question has no mass of its own beside, and
+        a solid that remembers is pressed less often.
         """
         drawn = replace(draw(self.seed), number=self.number)
         if any(name in WEIGHT for name in self.tested):
@@ -125,16 +125,15 @@ def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
     """All cases of a size, shuffled, so that a run that stops early is a fair sample of it.
 
     quick: a few instrument effects. medium: controls, every cheap effect at four strengths, left out, absent,
-    pairs; every cheap effect on two neo-Hookean objects; solid effects on linear ones. full: more controls and
-    strengths, all families, and solid effects on neo-Hookean objects. families: of shapes, by default all of
+    pairs; every cheap effect on two neo-Hookean objects; solid effects on linear ones. full: more controls
+    and strengths, all families, solid effects on neo-Hookean objects. families: of shapes, by default all of
     the size's pool. Raises OptionError for a family that no shape of the pool has.
     """
     pool, finite = (_of_families(which[size], families) for which in (POOLS, NEO_HOOKEAN))
     if not pool:
         known = ", ".join(list(FAMILIES)[number] for number in POOLS[size])
-        raise OptionError(
-            f"no object of the {size} size is a {' or '.join(families or ())}: there are {known}"
-        )
+        asked = " or ".join(families or ())
+        raise OptionError(f"no object of the {size} size is a {asked}: there are {known}")
     if size == "quick":
         return _round(pool, seed, controls=2, named=CHEAP[:6], strengths=(1.0,))
     many = size == "full"
@@ -142,8 +141,9 @@ def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
     found = _round(pool, seed, controls=150 if many else 36, named=CHEAP, strengths=strengths)
     found += _hard(pool, finite, seed + 2000)
     for i, number in enumerate(finite):
+        levels = (1.0, 2.0, 4.0) if many else (1.0 + i % 2,)
         found += _round((number,), seed + 3000 + 500 * i, controls=12 if many else 3, named=CHEAP,
-                        strengths=(1.0, 2.0, 4.0) if many else (1.0 + i % 2,), base={FINITE: 1.0})  # fmt: skip
+                        strengths=levels, base={FINITE: 1.0})  # fmt: skip
     for i in range(4 if many else 2):
         found += _solid(pool, finite, seed + 6000 + 500 * i, (0.5, 1.0, 2.0) if many else (1.0,),
                         neo_hookean=many)  # fmt: skip

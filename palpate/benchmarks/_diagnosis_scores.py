@@ -20,9 +20,9 @@ FINITE = "finite_strain"
 
 @dataclass(frozen=True)
 class Answer:
-    """A verdict read against its case. named: effects asserted, but for those that are true of the recording and
-    no question (finite strain of a neo-Hookean object, the weight of the drawn tool). first: the first of
-    them, or 'none', 'unknown', 'failed'."""
+    """A verdict read against its case. named: effects asserted, but for those that are true of the recording
+    and no question (finite strain of a neo-Hookean object, the weight of the drawn tool). first: the first
+    of them, or 'none', 'unknown', 'failed'."""
 
     kind: str
     named: tuple[str, ...]
@@ -98,7 +98,7 @@ class _Tally:
     def _control(self, item: dict[str, Any], answer: Answer) -> bool:
         self.rates["false alarms (controls)"].append(answer.detected)
         self.rates["BIC baseline: false alarms (controls)"].append(
-            item["verdict"].get("bic") not in (None, "none")
+            item["verdict"].get("bic") not in (None, "none", *item["case"]["beside"])
         )
         return not answer.detected
 

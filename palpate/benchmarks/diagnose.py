@@ -1,11 +1,11 @@
 """The blind benchmark: sealed recordings of the virtual laboratory, verdicts first, truths opened after.
 
-Sizes: quick (for CI), medium, full. Everything that is no question is drawn by each case's seed (scenes.variety).
-A graph of tasks, done by processes here or by a Dask cluster: touches are solved once an object, every case is
-simulated with its truth sealed and reconstructed, then diagnosed, and its verdict written to the work folder,
-before the truth is opened; a run that was interrupted goes on where it stopped. Rates carry Wilson's 95 %
-intervals. Baselines on the same recordings: the best in-sample fit by BIC, and for the gap a regression of the
-residual on place, depth, rate and history.
+Sizes: quick (for CI), medium, full. Everything that is no question is drawn by each case's seed
+(scenes.variety). A graph of tasks, done by processes here or by a Dask cluster: touches are solved once an
+object, every case is simulated with its truth sealed and reconstructed, then diagnosed, and its verdict
+written to the work folder, before the truth is opened; a run that was interrupted goes on where it stopped.
+Rates carry Wilson's 95 % intervals. Baselines on the same recordings: the best in-sample fit by BIC, and for
+the gap a regression of the residual on place, depth, rate and history.
 """
 
 from __future__ import annotations
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _chosen(own: list[Case], work: Path, arguments: argparse.Namespace, fast: bool) -> list[Task]:
-    """The tasks of the cases that are to be done, in the order of the cases: a run that stops has verdicts."""
+    """Tasks of the cases that are to be done, in the order of the cases: a run that stops has verdicts."""
     found: dict[str, Task] = {}
     fresh = 0
     for case in own:

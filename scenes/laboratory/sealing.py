@@ -40,7 +40,8 @@ def write_sealed(
     """Write the recording without truth, `NAME.sealed` beside it, and truth with salt to `truth_path`
     (JSON).
 
-    write: writes a recording as `NAME.csv.gz` and `NAME.toml`. Raises RecordingError where the truth would lie beside the recording under its name.
+    write: writes a recording as `NAME.csv.gz` and `NAME.toml`. Raises RecordingError where the truth would
+    lie beside the recording under its name.
     """
     path, truth_path = Path(path), Path(truth_path)
     salt = secrets.token_hex(32)
