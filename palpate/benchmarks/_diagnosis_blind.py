@@ -143,10 +143,10 @@ def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
 
     drawn = case.nuisances
     made = explored(drawn, case.effects, sizes=True, cache=_touches(work), progress=refuse)
-    assert made.recording.truth is not None
+    truth = {**made.simulation.truth, "nuisances": drawn.table()}
     name = made.recording.object_name
     write_sealed(
-        samples, made.recording, made.recording.truth, work / "truth" / f"{case.recording}.json",
+        samples, made.recording, truth, work / "truth" / f"{case.recording}.json",
         lambda path, recording: write(path, replace(recording, object_name=name), drawn),
     )  # fmt: skip
 
