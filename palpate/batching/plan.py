@@ -96,6 +96,19 @@ def _of_source(source: Path, leave: Path) -> Iterable[tuple[Path, Path]]:
                     yield found, absolute(root)
 
 
+def undescribed(sources: Iterable[str | Path], leave: Path) -> list[Path]:
+    """Tables in the folders that no .toml beside them makes a recording."""
+    return sorted(
+        path
+        for source in map(Path, sources)
+        if source.is_dir()
+        for ending in _ENDINGS[:2]
+        for path in source.rglob(f"*{ending}")
+        if not absolute(path).is_relative_to(leave)
+        and not path.with_name(path.name.removesuffix(ending) + ".toml").is_file()
+    )
+
+
 def _is_recording(description: Path) -> bool:
     return any(description.with_suffix(ending).is_file() for ending in _ENDINGS[:2])
 
