@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mechanics.errors import ContactError as ContactError
     from mechanics.errors import DeviceError as DeviceError
     from mechanics.errors import DiagnosisError as DiagnosisError
+    from mechanics.errors import FileError as FileError
     from mechanics.errors import MeshError as MeshError
     from mechanics.errors import ModelError as ModelError
     from mechanics.errors import NoBaseError as NoBaseError
@@ -63,8 +64,8 @@ _DOOR = {
     "palpate.results.batch": "Batch",
     "render.base": "Renderer",
     "mechanics.errors": (
-        "PalpateError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError CacheError "
-        "OptionError DeviceError SceneError DiagnosisError"
+        "PalpateError FileError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError "
+        "CacheError OptionError DeviceError SceneError DiagnosisError"
     ),
 }
 _HOME = {name: module for module, names in _DOOR.items() for name in names.split()}

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechanics.errors import ModelError, OptionError
+from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from palpate.keywords import taken
 
@@ -113,14 +113,15 @@ def reconstruct(
     computed for the model later is kept too. options: see `pp.options("reconstruct")`; lengths m, forces N.
     The result goes wherever a model goes. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
-    from mechanics.model import write_model
+    from mechanics.files import check_target
+    from mechanics.model import MODEL, write_model
     from palpate.results.reconstruction import reconstruction_of
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
     from render.felt import felt_surface
 
     given = taken("reconstruct", {"method": method, **options})
     if save is not None:
-        _check_folder(Path(save))
+        check_target(save, MODEL)
     steps: dict[str, Any] = {
         field.name: kind(**values)
         for field in dataclasses.fields(ReconstructOptions)
@@ -331,6 +332,8 @@ def simulate(
     answer. workers: processes, one a core by default. options: see `pp.options("simulate")`. Solved touches
     are kept in the user's cache. Raises OptionError or SceneError.
     """
+    from mechanics.files import check_target
+    from mechanics.recording import SAMPLES
     from palpate.results.simulation import simulation_of
     from scenes.laboratory.hand import HandOptions, cohort_hand
     from scenes.laboratory.simulate import SimulateOptions
@@ -339,6 +342,11 @@ def simulate(
     from scenes.phantoms import phantom as named
 
     given = taken("simulate", options)
+    for name, value, least in (("seed", seed, 0), ("person", person, 0), ("workers", workers, 1)):
+        if value is not None and not least <= value < 1 << 63:
+            raise OptionError(f"{name} is {value}; it must be a whole number, {least} or greater")
+    if save is not None:
+        check_target(save, SAMPLES)
     thing = phantom if isinstance(phantom, Phantom) else named(phantom)
     with _told("simulate", progress) as tell:
         plain = simulated(
@@ -448,12 +456,6 @@ def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Mo
         return presses_on(recording, model)
     except ContactError:
         return no_presses(recording.tip_radius_m)
-
-
-def _check_folder(path: Path) -> None:
-    """Before a minute's work, what `write_model` would say after it."""
-    if path.exists() and not (path / "model.toml").exists() and (path.is_file() or any(path.iterdir())):
-        raise ModelError(f"'{path}' exists and is no MODEL folder: name another output")
 
 
 @contextmanager
