@@ -20,6 +20,9 @@ from mechanics.recording import Recording
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
+from reconstruct.checks.base import Finding
+from reconstruct.checks.outcome import result_of
+from reconstruct.checks.registry import Checkup
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
@@ -45,6 +48,7 @@ class ReconstructOptions:
     poisson_ratio: float | None = option(
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
+    force: bool = option(False, "go on although the check-up finds something grave")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
     contact: ContactOptions = field(default_factory=ContactOptions)
@@ -60,6 +64,7 @@ class Reconstruction:
     """The model and everything on the way to it (for reports, comparison and diagnosis).
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
+    findings: of the check-up, grave ones first; the interval is as wide as they make it.
     normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
 
@@ -74,13 +79,14 @@ class Reconstruction:
     sites: TouchSites | None = None
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises ContactError, SurfaceError or MeshError where a step cannot be
-    done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless options.force);
+    ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -93,7 +99,9 @@ def reconstruct_fully(
     nu = _poisson_ratio(recording, options)
     clock = _Clock()
     progress("contacts", 0.02)
+    checkup = Checkup(recording, options.force)
     exploration = _explored(recording, options)
+    checkup.presses(exploration)
     clock.lap("contacts")
     surface = reconstruct_surface(
         evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
@@ -130,6 +138,7 @@ def reconstruct_fully(
             seed=options.seed,
         )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
+    interval = checkup.interval(result_of(presses, modulus, interval, fit))
     clock.lap("modulus")
     progress("1D models", 0.95)
     one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
@@ -161,6 +170,7 @@ def reconstruct_fully(
         sites=sites,
         modulus=fit,
         paper_fit=paper_fit,
+        findings=checkup.found,
     )
 
 

@@ -13,6 +13,8 @@ _STEADY = 0.35
 _LATE_S = 0.075
 """A force that reads later than this is not corrected reliably (reconstruct.delay)."""
 _CERTAIN = 5.0
+_ALIKE_S = 0.01
+"""Touches that disagree by more about the delay are none, or drags."""
 
 
 def air(sight: Sight) -> Iterator[Finding]:
@@ -39,7 +41,7 @@ def air(sight: Sight) -> Iterator[Finding]:
 def delay(sight: Sight) -> Iterator[Finding]:
     """A force that reads later (or earlier) than reconstruction can correct."""
     late, error = sight.lag_s
-    if abs(late) < _LATE_S + _CERTAIN * error:
+    if error > _ALIKE_S or abs(late) < _LATE_S + _CERTAIN * error:
         return
     a, b = sight.spans[len(sight.spans) // 2]
     room = round(abs(late) * sight.rate_hz)
