@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from mechanics.errors import RecordingError as RecordingError
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
+    from palpate.api import check as check
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
     from palpate.api import load as load
@@ -35,6 +36,7 @@ if TYPE_CHECKING:
     from palpate.api import replay as replay
     from palpate.api import simulate as simulate
     from palpate.keywords import options as options
+    from palpate.results.check import Checkup as Checkup
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
@@ -48,9 +50,10 @@ if TYPE_CHECKING:
     __version__: str
 
 _DOOR = {
-    "palpate.api": ("read_recording load reconstruct renderer replay press compare diagnose simulate"),
+    "palpate.api": ("read_recording check load reconstruct renderer replay press compare diagnose simulate"),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
+    "palpate.results.check": "Checkup",
     "palpate.results.model": "Model",
     "palpate.results.reconstruction": "Reconstruction",
     "palpate.results.replay": "ReplayResult",

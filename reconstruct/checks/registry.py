@@ -19,12 +19,14 @@ from reconstruct.checks.handedness import handedness
 from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
-from reconstruct.checks.units import settled
+from reconstruct.checks.units import QUANTITIES, measured, settled
 from reconstruct.contacts import Exploration, explore
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
 OF_RESULTS: tuple[Callable[[Result], Iterator[Finding]], ...] = (outcome,)
+REFUSALS = ("no base", "no presses")
+"""Findings that say where reconstruction itself stops, fault or not."""
 _LEAST_SAMPLES = 100
 
 
@@ -60,6 +62,25 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     except ContactError as error:
         return ordered([*found, _refused(recording, "no presses", error)])
     return ordered([*found, *checked_presses(exploration)])
+
+
+def seen(recording: Recording) -> tuple[tuple[str, float, float], ...]:
+    """What the checks measure on the way: words with the unit, value, and what is usual (NaN: anything)."""
+    if len(recording.t) < _LEAST_SAMPLES:
+        return ()
+    sight, _ = settled(recording)
+    rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
+    late, error = sight.lag_s
+    free = np.linalg.norm(sight.air, axis=1)
+    return (
+        *rows,
+        ("rate by the times of the samples [Hz]", sight.rate_hz, np.nan),
+        ("touches after the trace", float(len(sight.spans)), np.nan),
+        ("the force reads late [s]", late if np.isfinite(error) else np.nan, 0.0),
+        ("force in free air, mean [N]", float(free.mean()), np.nan),
+        ("force in free air, change over the recording [N]", float(np.ptp(sight.air, axis=0).max()), np.nan),
+        ("steps of the force [N]", float(sight.step[3:].max()), 0.0),
+    )
 
 
 class Checkup:
