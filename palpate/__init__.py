@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
     from palpate.api import batch as batch
+    from palpate.api import check as check
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
     from palpate.api import load as load
@@ -38,6 +39,7 @@ if TYPE_CHECKING:
     from palpate.api import simulate as simulate
     from palpate.keywords import options as options
     from palpate.results.batch import Batch as Batch
+    from palpate.results.check import Checkup as Checkup
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
@@ -51,9 +53,10 @@ if TYPE_CHECKING:
     __version__: str
 
 _DOOR = {
-    "palpate.api": ("read_recording load reconstruct renderer replay press compare diagnose simulate batch"),
+    "palpate.api": "read_recording check load reconstruct renderer replay press compare diagnose simulate batch",
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
+    "palpate.results.check": "Checkup",
     "palpate.results.model": "Model",
     "palpate.results.reconstruction": "Reconstruction",
     "palpate.results.replay": "ReplayResult",

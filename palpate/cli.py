@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "demo": "the main job on the embedded example; prints the report's path",
+    "check": "what may be wrong with a recording, before it is believed",
     "reconstruct": "a recording becomes a model",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",

@@ -20,6 +20,9 @@ from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
+from reconstruct.checks.base import Finding
+from reconstruct.checks.outcome import result_of
+from reconstruct.checks.registry import Checkup
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
@@ -48,6 +51,7 @@ class ReconstructOptions:
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    force: bool = option(False, "go on although the check-up finds something grave")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
     contact: ContactOptions = field(default_factory=ContactOptions)
@@ -64,6 +68,8 @@ class Reconstruction:
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
+    findings: of the check-up, grave ones first; the interval is as wide as they make it.
+    normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
 
     model: Model
@@ -78,13 +84,14 @@ class Reconstruction:
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises ContactError, SurfaceError or MeshError where a step cannot be
-    done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless options.force);
+    ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -97,14 +104,17 @@ def reconstruct_fully(
     nu = _poisson_ratio(recording, options)
     clock = _Clock()
     progress("contacts", 0.02)
+    checkup = Checkup(recording, options.force)
     geometry = stated_geometry(recording, options.geometry)
     placed = None
     if geometry.known:
         exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
         exploration = _explored(recording, options)
+        checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
             evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
@@ -147,6 +157,7 @@ def reconstruct_fully(
             seed=options.seed,
         )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
+    interval = checkup.interval(result_of(presses, modulus, interval, fit))
     clock.lap("modulus")
     progress("1D models", 0.95)
     one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
@@ -181,6 +192,7 @@ def reconstruct_fully(
         modulus=fit,
         paper_fit=paper_fit,
         placed=placed,
+        findings=checkup.found,
     )
 
 
