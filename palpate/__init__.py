@@ -27,7 +27,9 @@ if TYPE_CHECKING:
     from mechanics.errors import SurfaceError as SurfaceError
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
+    from palpate.api import export as export
     from palpate.api import load as load
+    from palpate.api import model_of as model_of
     from palpate.api import press as press
     from palpate.api import read_recording as read_recording
     from palpate.api import reconstruct as reconstruct
@@ -48,7 +50,7 @@ if TYPE_CHECKING:
     __version__: str
 
 _DOOR = {
-    "palpate.api": ("read_recording load reconstruct renderer replay press compare diagnose simulate"),
+    "palpate.api": ("read_recording load model_of reconstruct renderer replay press compare diagnose simulate export"),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.model": "Model",

@@ -97,6 +97,48 @@ def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
         return model_of(scene_model(source, tell))
 
 
+def model_of(
+    shape: Any,
+    young_modulus_pa: float | None = None,
+    *,
+    unit: str = "m",
+    up: str = "+z",
+    sink_m: float = 0.0,
+    poisson_ratio: float | None = None,
+    tip_radius_m: float | None = None,
+    mesh_size_m: float | None = None,
+    save: str | Path | None = None,
+    progress: bool | Progress = True,
+) -> Model:
+    """The model of an object whose shape is known, in the frame of its file.
+
+    shape: an STL, OBJ, PLY, glTF, VTP, VTU, MSH or INP file with lengths in `unit` ("m", "cm", "mm", "um", "in"),
+    or a triangle mesh with `vertices` and `faces` (trimesh's). young_modulus_pa: None takes 20 kPa. up: out of
+    the support, "+z", "-x", ... or "X,Y,Z" in the file's frame; sink_m: cut off flat at the bottom.
+    poisson_ratio: None takes 0.49; tip_radius_m: 5 mm; mesh_size_m: 10 mm, or an eighth of the object. save:
+    MODEL folder to write. Raises SurfaceError where the surface is open or has no flat foot.
+    """
+    from dataclasses import replace as changed
+
+    from palpate.results.model import model_of as dressed_model
+    from scenes.build import model_of_mesh
+    from scenes.scene import Scene
+
+    if save is not None:
+        _check_folder(Path(save))
+    scene = Scene("mesh", "mesh", "", unit=unit, up=up, sink_m=sink_m, mesh_size_m=mesh_size_m)
+    scene = changed(
+        scene, young_modulus_pa=young_modulus_pa, poisson_ratio=poisson_ratio, tip_radius_m=tip_radius_m
+    )
+    for name in ("young_modulus_pa", "tip_radius_m", "mesh_size_m"):
+        value = getattr(scene, name)
+        if value is not None and not value > 0:
+            raise OptionError(f"{name} is {value}; it must be greater than 0")
+    with _told("model", progress) as tell:
+        made = dressed_model(model_of_mesh(shape, scene, tell))
+    return made if save is None else made.save(save)
+
+
 def reconstruct(
     recording: RecordingLike,
     *,
@@ -353,6 +395,30 @@ def simulate(
         )
     result = simulation_of(plain, Path(thing.name).name)
     return result if save is None else result.save(save)
+
+
+def export(
+    model: ModelLike,
+    to: str,
+    path: str | Path,
+    *,
+    at: Sequence[float] | None = None,
+    depth_m: float | None = None,
+    unit: str = "m",
+    progress: bool | Progress = True,
+) -> tuple[str, ...]:
+    """Write a model for another program: a minimal scene that runs there, or its mesh.
+
+    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl". at: (3,) m, where the scene's tip
+    presses, None is the middle of the top; depth_m: how deep, None is half the tip's radius. unit: of an STL's
+    lengths; all else is in SI units and the model's frame. Returns what the format cannot say, one line each.
+    """
+    import numpy as np
+
+    from palpate.exporting.registry import write
+
+    plain = load(model, progress=progress)
+    return write(plain, to, path, at=None if at is None else np.asarray(at), depth_m=depth_m, unit=unit)
 
 
 def _renderer(

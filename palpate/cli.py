@@ -17,6 +17,9 @@ from palpate import __version__
 COMMANDS = {
     "demo": "the main job on the embedded example; prints the report's path",
     "reconstruct": "a recording becomes a model",
+    "model": "a MODEL from a surface's file and a modulus",
+    "import": "other programs' files become a recording",
+    "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",
@@ -28,6 +31,8 @@ COMMANDS = {
     "batch": "many recordings at once",
 }
 """Every sub-command, one line each; its module is `palpate.commands.NAME`."""
+MODULES = {"import": "palpate.commands.import_"}
+"""Where a command's name is a word of Python's own."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -42,7 +47,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     if name not in COMMANDS:
         parser.error(f"'{name}' is no command; allowed are {', '.join(COMMANDS)}")
     try:
-        module = importlib.import_module(f"palpate.commands.{name}")
+        module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
     except ModuleNotFoundError as error:
         if error.name != f"palpate.commands.{name}":
             raise

@@ -11,6 +11,7 @@ import argparse
 
 from palpate import api
 from palpate.arguments import add_json, add_options_of, add_seed, emit_json, given_for, say
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "FEM against interpolated 1D models on held-out palpations"
 
@@ -20,6 +21,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
     parser.add_argument("--model", metavar="MODEL", help="take the geometry from it (default: reconstruct)")
     parser.add_argument("-o", "--report", metavar="REPORT.html", help="write tables and pictures as one page")
+    add_mesh_arguments(parser)
     add_options_of(parser, "compare")
     add_json(parser)
     add_seed(parser)
@@ -28,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print, report."""
     options = given_for(arguments, "compare")
-    result = api.compare(arguments.recording, arguments.model, seed=arguments.seed, **options)
+    result = api.compare(arguments.recording, given_model(arguments, arguments.model), seed=arguments.seed, **options)
     say(arguments, *result.lines())
     if arguments.report:
         say(arguments, f"report: {result.report(arguments.report)}")

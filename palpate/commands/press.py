@@ -12,6 +12,7 @@ import argparse
 
 from palpate import api
 from palpate.arguments import add_json, add_options_of, emit_json, finite, given_for, say, vector
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "one scripted press on a model, headless"
 
@@ -20,7 +21,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """MODEL_OR_SCENE, where and how to press, what to expect."""
     from render.registry import names
 
-    parser.add_argument("model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
+    parser.add_argument("model", metavar="MODEL_OR_SCENE", help="folder of a model, a scene, or a surface's file")
+    add_mesh_arguments(parser)
     parser.add_argument("--at", type=vector, required=True, metavar="X,Y,Z", help="point aimed at [m]")
     parser.add_argument(
         "--direction", type=vector, required=True, metavar="X,Y,Z", help="of the motion; any length"
@@ -45,7 +47,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     expected = read_curve(arguments.expect) if arguments.expect else None
     curve = api.press(
-        arguments.model,
+        given_model(arguments, arguments.model) or arguments.model,
         arguments.at,
         arguments.direction,
         arguments.depth,
