@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
+    from palpate.results.imported import Imported
     from palpate.results.model import Model
     from palpate.results.reconstruction import Reconstruction
     from palpate.results.recording import Recording
@@ -66,6 +67,43 @@ def read_recording(source: RecordingLike) -> Recording:
         if Path(source).exists() or "." in Path(source).name:
             raise
         raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
+
+
+def import_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Imported:
+    """What other programs' files hold, as a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS bag, MCAP.
+
+    mapping: a TOML file that says what the columns are (docs/import-export.md); said: the same by keyword, which
+    count before it: columns {role: name}, units {kind: unit}, tip_radius_m, force_on ("tool", "object"), frame
+    ("device", "tool"), rotation (3, 3), flange_to_tip_m (3,), mass_kg, tare_s (start, end), offset_s, rate_hz,
+    thing (what [object] of the recording is to say). Raises RecordingError where something needed is missing.
+    """
+    import dataclasses as classes
+
+    from palpate.importing.convert import understand
+    from palpate.importing.mapping import Said, read_mapping
+    from palpate.importing.tables import read_tables
+    from palpate.results.imported import Imported
+
+    held = {} if mapping is None else read_mapping(mapping)
+    for key, value in said.items():
+        merged = isinstance(value, Mapping) and isinstance(held.get(key), Mapping)
+        held[key] = {**held[key], **value} if merged else value
+    allowed = [field.name for field in classes.fields(Said)]
+    strange = sorted(set(held) - set(allowed))
+    if strange:
+        raise OptionError(f"pp.import_table has no option '{strange[0]}': allowed are {', '.join(allowed)}")
+    if not files:
+        raise OptionError("pp.import_table needs a file")
+    chosen = Said(**held)
+    tables = [table for file in files for table in read_tables(file)]
+    understood = understand(tables, chosen, Path(files[0]).name.split(".")[0])
+    return Imported(understood, chosen.thing, tuple(Path(file).name for file in files))
+
+
+def read_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Recording:
+    """The recording in other programs' files; what may be said is as for `import_table`, which also tells and draws
+    what it understood."""
+    return import_table(*files, mapping=mapping, **said).recording
 
 
 def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:

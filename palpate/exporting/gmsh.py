@@ -20,7 +20,7 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
     base = mesh.fixed[mesh.surface].all(axis=1)
     cells = [(solid, mesh.tetrahedra), (flat, mesh.surface[base]), (flat, mesh.surface[~base])]
     tags = [np.full(len(block), k + 1) for k, (_, block) in enumerate(cells)]
-    moduli = [subject.element_modulus_pa, *(np.full(len(block), np.nan) for _, block in cells[1:])]
+    moduli = [subject.element_modulus_pa, *(np.zeros(len(block)) for _, block in cells[1:])]
     out = meshio.Mesh(
         mesh.points,
         cells,
