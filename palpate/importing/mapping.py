@@ -244,7 +244,11 @@ def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
 def _ends(name: str, role: str, wanted: set[str]) -> bool:
     """Whether the end of a dotted name says the role: msg.wrench.force.x."""
     parts = re.split(r"[./]", name)
-    return len(parts) > 1 and any(_key("".join(parts[-k:])) in wanted for k in (2, 3))
+    last = _key(parts[-1])
+    # an axis alone is anything's
+    return len(parts) > 1 and (
+        (len(last) > 1 and last in wanted) or any(_key("".join(parts[-k:])) in wanted for k in (2, 3))
+    )
 
 
 def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> None:

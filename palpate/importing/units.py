@@ -13,7 +13,7 @@ SI: dict[str, dict[str, float]] = {
     },
 }  # fmt: skip
 """Kind of quantity -> unit -> what one is in SI."""
-_BRACKETS = re.compile(r"[\[({]\s*([^\])}]*?)\s*[\])}]\s*(?:#\d+)?$")
+_BRACKETS = re.compile(r"[\[({]\s*([^\])}\d][^\])}]*?)\s*[\])}]\s*(?:#\d+)?$")
 _TAIL = re.compile(r"_([A-Za-zµμ]+)$")
 
 
@@ -24,7 +24,11 @@ def plain(unit: str) -> str:
 
 def is_unit(text: str) -> bool:
     """Whether a word is a unit of anything."""
-    return any(plain(text) in units for units in SI.values()) or plain(text) in ("-", "%", "kPa", "MPa", "Pa", "deg")
+    word = plain(text).lower()
+    return word in _OTHER or any(word == unit.lower() for units in SI.values() for unit in units)
+
+
+_OTHER = ("-", "%", "pa", "kpa", "mpa", "deg", "rad", "nm", "n/mm^2")
 
 
 def unit_in(name: str, kind: str) -> str | None:
