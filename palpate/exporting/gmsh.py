@@ -12,7 +12,7 @@ from palpate.exporting.subject import Subject
 
 
 def write(path: Path, subject: Subject) -> tuple[str, ...]:
-    """Write the mesh (MSH 2.2, which every Gmsh reads); what it cannot say."""
+    """Write the mesh (binary MSH 2.2, which every Gmsh reads); what it cannot say."""
     import meshio
 
     mesh = subject.mesh
@@ -32,5 +32,5 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
         },
     )
     with contextlib.redirect_stdout(io.StringIO()), contextlib.redirect_stderr(io.StringIO()):
-        out.write(path, file_format="gmsh22", binary=False)
+        out.write(path, file_format="gmsh22", binary=True)
     return ("a mesh and its moduli: no material law, support or tip",)

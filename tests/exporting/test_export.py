@@ -47,9 +47,8 @@ def test_gmsh_holds_mesh_groups_and_moduli(tmp_path, order):
     assert np.allclose(np.ravel(moduli), 15e3 * model.element_ratio) and np.ptp(moduli) > 1e4
 
 
-@pytest.mark.parametrize("order", [1, 2])
-def test_abaqus_holds_mesh_base_and_a_step(tmp_path, order):
-    model = block(order=order)
+def test_abaqus_holds_mesh_base_and_a_step(tmp_path):
+    model = block()
     pp.export(model, "abaqus", tmp_path / "m.inp", progress=False)
     text = (tmp_path / "m.inp").read_text()
     keywords = [line.split(",")[0].lower() for line in text.splitlines() if line.startswith("*")]
@@ -119,8 +118,7 @@ def test_mujoco_runs_the_scene_and_presses_back_alike(tmp_path):
         theirs = flex_force(tmp_path / "m.xml")
     ours = pp.press(model, (0, 0, 0.03), (0, 0, -1), depth, progress=False)
     peak = float(np.abs(ours.force[:, 2]).max())
-    print(theirs, peak)
-    assert 0.7 < theirs / peak < 2.0
+    assert 0.8 < theirs / peak < 1.5
 
 
 def test_the_command_says_what_is_lost_and_refuses_in_one_line(tmp_path, capsys):
