@@ -21,6 +21,7 @@ from devices.io_thread import ForcefulDevice, Reading
 from devices.velocity import VelocityEstimate
 from mechanics.errors import DeviceError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 
 SPEC = DeviceSpec(
     name="pid-ffb",
@@ -50,6 +51,9 @@ class PidOptions:
         0.05, "travel of the handle from the middle to an end", unit="m", flag="--ffb-stroke"
     )
     device_path: str = option("", "which device, as 'palpate devices' lists it", flag="--ffb-path")
+
+    def __post_init__(self) -> None:
+        check_ranges(self, {"full_scale_n": Range(0.01, 200.0), "stroke_m": Range(0.001, 1.0)})
 
 
 class PidWire:

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from mechanics.errors import ContactError as ContactError
     from mechanics.errors import DeviceError as DeviceError
     from mechanics.errors import DiagnosisError as DiagnosisError
+    from mechanics.errors import FileError as FileError
     from mechanics.errors import MeshError as MeshError
     from mechanics.errors import ModelError as ModelError
     from mechanics.errors import NoBaseError as NoBaseError
@@ -25,6 +26,7 @@ if TYPE_CHECKING:
     from mechanics.errors import RecordingError as RecordingError
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
+    from palpate.api import batch as batch
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
     from palpate.api import export as export
@@ -39,6 +41,7 @@ if TYPE_CHECKING:
     from palpate.api import replay as replay
     from palpate.api import simulate as simulate
     from palpate.keywords import options as options
+    from palpate.results.batch import Batch as Batch
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
@@ -55,7 +58,7 @@ if TYPE_CHECKING:
 _DOOR = {
     "palpate.api": (
         "read_recording read_table import_table load model_of reconstruct renderer replay press compare diagnose "
-        "simulate export"
+        "simulate export batch"
     ),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
@@ -67,10 +70,11 @@ _DOOR = {
     "palpate.results.comparison": "Comparison",
     "palpate.results.diagnosis": "Diagnosis",
     "palpate.results.simulation": "Simulation",
+    "palpate.results.batch": "Batch",
     "render.base": "Renderer",
     "mechanics.errors": (
-        "PalpateError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError CacheError "
-        "OptionError DeviceError SceneError DiagnosisError"
+        "PalpateError FileError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError "
+        "CacheError OptionError DeviceError SceneError DiagnosisError"
     ),
 }
 _HOME = {name: module for module, names in _DOOR.items() for name in names.split()}

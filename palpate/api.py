@@ -8,12 +8,12 @@ tool. What a room needs is imported when its function is called.
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechanics.errors import ModelError, OptionError
+from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from palpate.keywords import taken
 
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     import mechanics.model
     import mechanics.recording
     from mechanics.presses import Presses
+    from palpate.results.batch import Batch
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
@@ -158,12 +159,14 @@ def model_of(
     """
     from dataclasses import replace as changed
 
+    from mechanics.files import check_target
+    from mechanics.model import MODEL
     from palpate.results.model import model_of as dressed_model
     from scenes.build import model_of_mesh
     from scenes.scene import Scene
 
     if save is not None:
-        _check_folder(Path(save))
+        check_target(save, MODEL)
     scene = Scene("mesh", "mesh", "", unit=unit, up=up, sink_m=sink_m, mesh_size_m=mesh_size_m)
     scene = changed(
         scene, young_modulus_pa=young_modulus_pa, poisson_ratio=poisson_ratio, tip_radius_m=tip_radius_m
@@ -192,14 +195,15 @@ def reconstruct(
     computed for the model later is kept too. options: see `pp.options("reconstruct")`; lengths m, forces N.
     The result goes wherever a model goes. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
-    from mechanics.model import write_model
+    from mechanics.files import check_target
+    from mechanics.model import MODEL, write_model
     from palpate.results.reconstruction import reconstruction_of
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
     from render.felt import felt_surface
 
     given = taken("reconstruct", {"method": method, **options})
     if save is not None:
-        _check_folder(Path(save))
+        check_target(save, MODEL)
     steps: dict[str, Any] = {
         field.name: kind(**values)
         for field in dataclasses.fields(ReconstructOptions)
@@ -410,6 +414,8 @@ def simulate(
     answer. workers: processes, one a core by default. options: see `pp.options("simulate")`. Solved touches
     are kept in the user's cache. Raises OptionError or SceneError.
     """
+    from mechanics.files import check_target
+    from mechanics.recording import SAMPLES
     from palpate.results.simulation import simulation_of
     from scenes.laboratory.hand import HandOptions, cohort_hand
     from scenes.laboratory.simulate import SimulateOptions
@@ -418,6 +424,11 @@ def simulate(
     from scenes.phantoms import phantom as named
 
     given = taken("simulate", options)
+    for name, value, least in (("seed", seed, 0), ("person", person, 0), ("workers", workers, 1)):
+        if value is not None and not least <= value < 1 << 63:
+            raise OptionError(f"{name} is {value}; it must be a whole number, {least} or greater")
+    if save is not None:
+        check_target(save, SAMPLES)
     thing = phantom if isinstance(phantom, Phantom) else named(phantom)
     with _told("simulate", progress) as tell:
         plain = simulated(
@@ -457,6 +468,48 @@ def export(
 
     plain = load(model, progress=progress)
     return write(plain, to, path, at=None if at is None else np.asarray(at), depth_m=depth_m, unit=unit)
+
+
+def batch(
+    recordings: str | Path | Iterable[str | Path],
+    out: str | Path,
+    *,
+    do: str | Sequence[str] = ("reconstruct", "compare", "diagnose"),
+    options: Mapping[str, Mapping[str, Any]] | None = None,
+    reports: bool = True,
+    workers: int | None = None,
+    memory_gb: float | None = None,
+    scheduler: str | None = None,
+    force: bool = False,
+    seed: int = 0,
+    progress: bool | Progress = True,
+) -> Batch:
+    """Many recordings at once, in processes of one thread each or by a Dask cluster: a folder each in `out`.
+
+    recordings: folders (and all below), patterns, files. do: steps; the others need "reconstruct". options:
+    step -> keywords of its function, {"diagnose": {"fast": True}}; lengths m, forces N. reports: HTML pages
+    of every step. workers: processes, one a core by default; memory_gb: that they may take together, 90 % of
+    what is free by default; scheduler: "tcp://HOST:8786" of a cluster, in their place. What is finished is
+    recognised by the recording's bytes, options and version, unless force. One bad recording stops no other:
+    its row has the reason. Raises OptionError.
+    """
+    from palpate.batching.plan import Choice
+    from palpate.batching.run import batch as run
+    from palpate.results.base import dressed
+    from palpate.results.batch import Batch
+
+    steps = tuple(do.split(",")) if isinstance(do, str) else tuple(do)
+    plain = run(
+        [recordings] if isinstance(recordings, str | Path) else recordings,
+        out,
+        Choice(steps, options, seed, reports),
+        workers=workers,
+        memory_bytes=None if memory_gb is None else int(1e9 * memory_gb),
+        scheduler=scheduler,
+        force=force,
+        progress=progress,
+    )
+    return dressed(Batch, plain)
 
 
 def _renderer(
@@ -509,12 +562,6 @@ def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Mo
         return presses_on(recording, model)
     except ContactError:
         return no_presses(recording.tip_radius_m)
-
-
-def _check_folder(path: Path) -> None:
-    """Before a minute's work, what `write_model` would say after it."""
-    if path.exists() and not (path / "model.toml").exists() and (path.is_file() or any(path.iterdir())):
-        raise ModelError(f"'{path}' exists and is no MODEL folder: name another output")
 
 
 @contextmanager

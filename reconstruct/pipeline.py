@@ -16,7 +16,7 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.recording import Recording
+from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
@@ -223,7 +223,8 @@ def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
     except NoBaseError:
         if recording.base_model is None:
             raise
-    return _touches(recording, options, base_of_model(read_model(recording.base_model), recording.tip_radius_m))
+    base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
+    return _touches(recording, options, base)
 
 
 def _on_known(

@@ -7,6 +7,7 @@ folder keeps all three away from the caller.
 from __future__ import annotations
 
 import contextlib
+import os
 import subprocess
 import sys
 import tempfile
@@ -34,7 +35,7 @@ def tetrahedralize(
     simplify: bool = True,
     energy: float = 10.0,
     passes: int = 80,
-    threads: int = 0,
+    threads: int | None = None,
     timeout_s: float = 300.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
@@ -42,9 +43,11 @@ def tetrahedralize(
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
     and comes out better in half the time. energy: the optimisation stops at this AMIPS energy (3 is ideal).
-    timeout_s: for the second try, with one thread; the first has a third of it. Raises MeshError where
-    nothing comes back.
+    threads: None takes OMP_NUM_THREADS, without it all cores. timeout_s: for the second try, with one thread;
+    the first has a third of it. Raises MeshError where nothing comes back.
     """
+    if threads is None:
+        threads = int(os.environ.get("OMP_NUM_THREADS", "").split(",")[0] or 0)
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
         done = None

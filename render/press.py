@@ -7,13 +7,14 @@ hold, and comes back the same way. Sampled at the rate of the servo; no clock, n
 from __future__ import annotations
 
 import csv
+import io
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mechanics.errors import OptionError, RecordingError
-from mechanics.files import atomic_file
+from mechanics.files import Kind, atomic_file, read_text
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
 from render.scene import TouchScene, scene_of
@@ -21,6 +22,7 @@ from render.surface import SurfaceArrays
 from render.walking import foot
 
 COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
+CURVE = Kind("a curve of palpate press", (",".join(COLUMNS).encode(),))
 _MARCH = 400
 _GRAZING = float(np.cos(np.radians(80)))
 BESIDE = 1.1
@@ -173,23 +175,20 @@ def _on_object(
 def write_curve(path: Path | str, curve: Curve) -> None:
     """Write `t,x,y,z,depth,fx,fy,fz` (s, m, m, N)."""
     table = np.column_stack([curve.t, curve.position, curve.depth, curve.force])
-    with atomic_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+    with atomic_file(path, CURVE) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         np.savetxt(file, table, fmt="%.10g", delimiter=",", header=",".join(COLUMNS), comments="")
 
 
 def read_curve(path: Path | str) -> Curve:
     """Read what `write_curve` wrote; raises RecordingError where a column is missing or no number."""
     try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
+        rows = list(csv.DictReader(io.StringIO(read_text(path, RecordingError))))
         missing = [c for c in COLUMNS if not rows or c not in rows[0]]
         if missing:
             raise RecordingError(
                 f"'{path}' lacks the columns {', '.join(missing)}: needed are {', '.join(COLUMNS)}"
             )
         table = np.array([[float(row[c]) for c in COLUMNS] for row in rows])
-    except OSError as error:
-        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
     except (TypeError, ValueError) as error:
         raise RecordingError(f"'{path}' has a value that is no number: {error}") from error
     return Curve(table[:, 0], table[:, 1:4], table[:, 4], table[:, 5:8])

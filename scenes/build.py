@@ -17,9 +17,9 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import ModelError, SceneError
-from mechanics.files import atomic_folder, cache_folder
+from mechanics.files import atomic_folder, cache_folder, reading
 from mechanics.material import Ball, Material
-from mechanics.model import Model, Support, Tool, read_model, write_model
+from mechanics.model import MODEL, Model, Support, Tool, read_model, write_model
 from mechanics.progress import Progress, silent
 from mechanics.recording import read_recording, recording_files
 from mechanics.standing import Standing, standing
@@ -66,7 +66,7 @@ def keep(scene: Scene, model: Path, *, cache: Path | None = None) -> None:
     A scene that is touched next then opens at once. Raises SceneError where the cache cannot be written.
     """
     try:
-        with atomic_folder(_folder(scene, cache)) as folder:
+        with atomic_folder(_folder(scene, cache), MODEL) as folder:
             shutil.copytree(model, folder, dirs_exist_ok=True)
     except OSError as error:
         raise SceneError(
@@ -90,7 +90,8 @@ def _key(scene: Scene) -> str:
         content.pop(name)
     digest = hashlib.sha256(json.dumps([VERSION, content], sort_keys=True).encode())
     for file in _files(scene):
-        digest.update(file.read_bytes())
+        with reading(file, SceneError):
+            digest.update(file.read_bytes())
     return digest.hexdigest()[:12]
 
 

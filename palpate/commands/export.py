@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 
 from palpate import api
-from palpate.arguments import add_json, emit_json, finite, say, vector
+from palpate.arguments import add_input, add_json, emit_json, finite, say, vector
 from palpate.exporting.registry import FORMATS
 
 SUMMARY = "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL"
@@ -18,7 +18,7 @@ SUMMARY = "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """MODEL, --to, -o, the press of the scene, --json."""
-    parser.add_argument("model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
+    add_input(parser, "model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
     parser.add_argument("--to", choices=tuple(FORMATS), required=True, help="the program")
     parser.add_argument("-o", "--output", metavar="PATH", required=True, help="file to write")
     parser.add_argument(

@@ -14,18 +14,21 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import OptionError
+from mechanics.recording import SAMPLES
 from palpate import api
-from palpate.arguments import add_json, emit_json, finite, say, vector
+from palpate.arguments import add_input, add_json, add_output, emit_json, finite, say, vector
 
 SUMMARY = "other programs' files become a recording"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILEs, -o REC, what their columns are, --picture, --dry-run, --json."""
-    parser.add_argument("files", metavar="FILE", nargs="+", help="file, or folder of a ROS 2 bag")
-    parser.add_argument("-o", "--output", metavar="REC", help="recording to write: .csv.gz or .csv")
+    add_input(parser, "files", metavar="FILE", nargs="+", help="file, or folder of a ROS 2 bag")
+    add_output(
+        parser, "-o", "--output", kind=SAMPLES, metavar="REC", help="recording to write: .csv.gz or .csv"
+    )
     parser.add_argument("--column", metavar="ROLE=NAME", action="append", default=[], help="repeatable")
-    parser.add_argument("--mapping", metavar="TOML", help="all of this as a file (docs/import-export.md)")
+    add_input(parser, "--mapping", metavar="TOML", help="all of this as a file (docs/import-export.md)")
     parser.add_argument("--units", metavar="KIND=UNIT,...", help="kinds: position, force, time")
     parser.add_argument("--tip-radius", type=finite, metavar="M", help="of the tool's spherical tip [m]")
     parser.add_argument("--force-on", choices=("tool", "object"), help="whose force it is (default: tool)")

@@ -22,6 +22,8 @@ from palpate.importing.tables import Table
 GRAVITY_M_PER_S2 = 9.80665
 _SEARCH_S, _SURE = 3.0, 0.5
 _MOST_HZ = 2000.0
+POINTS_HZ = 100.0
+"""Rows without a time are numbered by this clock; a recording needs one."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +62,8 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     if timed:
         t, position, force, quaternion, rate = _one_clock(streams, said, notes)
     else:
-        notes.append("no column of time: quasi-static points, which tell no rates and no delay (or give --rate)")
-        t, rate = np.arange(rows.pop(), dtype=float), 1.0
+        notes.append("no column of time: quasi-static points, which tell no rates and no delay (else give --rate)")
+        t, rate = np.arange(rows.pop()) / POINTS_HZ, POINTS_HZ
         position, force = streams["position"].values, streams["force"].values
         quaternion = streams["orientation"].values if "orientation" in streams else None
     position, force = _framed(position, force, quaternion, said, notes)

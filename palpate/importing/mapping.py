@@ -15,7 +15,6 @@ A mapping file is TOML:
 from __future__ import annotations
 
 import re
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -24,6 +23,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import RecordingError
+from mechanics.files import read_toml
 from palpate.importing.tables import Table
 from palpate.importing.units import SI, plain, unit_in, without_unit
 
@@ -80,12 +80,7 @@ class Said:
 def read_mapping(path: Path | str) -> dict[str, Any]:
     """The fields of a mapping file; raises RecordingError for one that is no TOML or has another key."""
     path = Path(path)
-    try:
-        held = tomllib.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RecordingError(f"'{path}' is no valid TOML: {error}") from error
+    held = read_toml(path, RecordingError)
     for table, keys in held.items():
         allowed = _TABLES.get(table)
         if allowed is None or not isinstance(keys, dict):

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file
-from mechanics.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, dump_toml
+from mechanics.recording import DESCRIPTION, QUATERNION_COLUMNS, REQUIRED_COLUMNS, SAMPLES, dump_toml
 from palpate.importing.convert import Understood
 
 
@@ -30,7 +30,7 @@ def write_imported(path: Path | str, understood: Understood, thing: Mapping[str,
     if recording.quaternion is not None:
         columns.append(recording.quaternion)
         names += QUATERNION_COLUMNS
-    with atomic_file(path) as temporary:
+    with atomic_file(path, SAMPLES) as temporary:
         opener = gzip.open if path.suffix == ".gz" else open
         with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
             np.savetxt(file, np.hstack(columns), fmt="%.9g", delimiter=",", header=",".join(names), comments="")
@@ -48,7 +48,7 @@ def write_imported(path: Path | str, understood: Understood, thing: Mapping[str,
         },
     }
     stem = path.name.removesuffix(".gz").removesuffix(".csv")
-    with atomic_file(path.with_name(stem + ".toml")) as temporary:
+    with atomic_file(path.with_name(stem + ".toml"), DESCRIPTION) as temporary:
         temporary.write_text(dump_toml(table), encoding="utf-8")
     return path
 

@@ -19,8 +19,9 @@ from palpate.servo.histogram import BINS
 RING_ROWS = 8192
 MOST_TIPS = 32
 
-STOP, ENABLE = range(2)
-"""Cells of `control`: STOP not 0 ends the loop; ENABLE: 0 for force off, else the number of the enabling."""
+STOP, ENABLE, BEAT = range(3)
+"""Cells of `control`: STOP not 0 ends the loop; ENABLE: 0 for force off, else the number of the enabling;
+BEAT: the parent's heartbeat, counted up for as long as it lives and runs."""
 
 TICKS, MISSED, LATE, CONTACT_TICKS, DEADLINE, STARTED, STATUS = range(7)
 """Cells of `counts` (int64): ticks run, deadlines skipped, ticks started late, ticks in contact, the next

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import RecordingError
-from mechanics.files import atomic_file, sha256_of_file
+from mechanics.files import JSON, atomic_file, sha256_of_file
 from mechanics.recording import Recording, write_recording
 
 
@@ -50,9 +50,9 @@ def write_sealed(
         )
     table = {"algorithm": "sha256(salt + canonical json)", "sha256": digest(plain, salt)}
     table["recording_sha256"] = sha256_of_file(samples)
-    with atomic_file(seal) as temporary:
+    with atomic_file(seal, JSON) as temporary:
         temporary.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
-    with atomic_file(truth_path) as temporary:
+    with atomic_file(truth_path, JSON) as temporary:
         temporary.write_text(json.dumps({"salt": salt, "truth": plain}, indent=1) + "\n", encoding="utf-8")
     return samples
 

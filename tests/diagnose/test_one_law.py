@@ -38,6 +38,7 @@ VALUES = {
     "inclusion": (0.0, 0.0, 0.02, 0.009, np.log(4.0)),
     "modulus_gradient": (-0.8,),
     "skin_layer": (2e-3, np.log(2.5)),
+    "stiffness_field": (1.0, -0.7, *[0.0] * 8),
     "unbonded_base": (0.4, 0.3, 0.9),
     "compliant_base": (np.log(0.3), np.log(0.5)),
     "tip_radius": (1.3,),

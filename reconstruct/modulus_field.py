@@ -1,0 +1,103 @@
+"""A field of Young's modulus from presses: each press's own modulus, and how it answers to the elements'.
+
+Every press is fitted by itself, its first touch a nuisance (reconstruct.press_fit); what its modulus says of
+which element follows from the compliance's sensitivities (mechanics.field_response); the likeliest smooth
+field of all presses follows from there (mechanics.smooth_field). The object stays of one modulus where the
+evidence asks for no more: a field must be likelier than places that scatter at random, and predict places
+that were left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.field_response import changed, shares_of
+from mechanics.places import Places, solve_places
+from mechanics.presses import Presses
+from mechanics.sites import TouchSites
+from mechanics.smooth_field import Estimate, Shares, SmoothField, estimate, lengths_of, places_of
+from mechanics.touch import forces_at
+from reconstruct.press_fit import LawFit, far_sensitivity, fit_law, press_data
+
+LEAST_GAIN = 4.0
+"""Log likelihood by which a field must be likelier than places that scatter at random ..."""
+LEAST_EXPLAINED = 0.2
+"""... and the share of the places' scatter that it must predict where they were left out."""
+LEAST_SITES = 6
+LAW_ERROR = 0.03
+
+
+@dataclass(frozen=True)
+class PressModuli:
+    """Each press's own modulus and what it tells of. fit: by the law. answer: (p,) m. shares: of the field.
+
+    usable: (p,) bool, presses whose fit says anything.
+    """
+
+    fit: LawFit
+    answer: np.ndarray
+    shares: Shares
+    site: np.ndarray
+    places: Places
+
+    @property
+    def usable(self) -> np.ndarray:
+        e, error = self.fit.modulus_pa, self.fit.relative_error
+        return np.isfinite(e) & (e > 0) & np.isfinite(error) & (error < 1) & (self.fit.rows > 10)
+
+
+def press_moduli(
+    presses: Presses, sites: TouchSites, places: Places, law: str, noise_n: float
+) -> PressModuli:
+    """Of presses that touch at `sites` and `places` (one a press, in order). noise_n: N, of a raw sample."""
+    data, radius = press_data(presses), presses.tip_radius_m
+    fit = fit_law(data, sites, radius, law, float(presses.depth_m.max()) + 1e-3, LAW_ERROR, noise_n)
+    answer = far_sensitivity(data, sites, fit, radius, LAW_ERROR, noise_n)
+    return PressModuli(fit, answer, shares_of(places, answer), presses.site, places)
+
+
+def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
+    """The likeliest field of the presses `seen` (numbers); None where too few places tell."""
+    seen = seen[own.usable[seen]]
+    sites, first = np.unique(own.site[seen], return_index=True)
+    if len(sites) < LEAST_SITES:
+        return None
+    touched = own.places.point[seen[first]]
+    nodes = own.shares.nodes
+    elements = nodes[: own.shares.weight.shape[1] - len(own.site)]
+    shares = Shares(nodes, own.shares.weight[seen])
+    return estimate(
+        np.log(own.fit.modulus_pa[seen]), own.fit.relative_error[seen], own.site[seen], shares,
+        places_of(touched, elements), lengths_of(touched, elements),
+    )  # fmt: skip
+
+
+def asked_for(found: Estimate | None) -> bool:
+    """Whether the evidence asks for a field."""
+    return found is not None and found.gain > LEAST_GAIN and found.explained > LEAST_EXPLAINED
+
+
+def unit_forces(
+    sites: TouchSites, places: Places, presses: Presses, law: str, field: SmoothField | None
+) -> np.ndarray:
+    """(n, 3) N, device frame, for unit modulus of the object, with a field or without."""
+    frame = places.frame
+    far, ratio = sites.far, np.ones(len(sites))
+    if field is not None:
+        local, ratio = changed(places, field)
+        far = far + np.einsum("pji,pjk,pkl->pil", frame, local - places.far, frame)
+    # a dent of `ratio` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
+    scaled = TouchSites(
+        sites.points, sites.normals, sites.curvature, far * ratio[:, None, None],
+        sites.patch_width_m, sites.poisson_ratio,
+    )  # fmt: skip
+    force = forces_at(
+        scaled, presses.displacement, presses.starts, young_modulus_pa=1.0,
+        tip_radius_m=presses.tip_radius_m, law=law,
+    )  # fmt: skip
+    return force * ratio[presses.press][:, None]
+
+
+__all__ = ["PressModuli", "asked_for", "fit_field", "press_moduli", "solve_places", "unit_forces"]
