@@ -40,7 +40,7 @@ class Tissue:
 def tissue(
     seed: int, *, log_sd: float = 0.35, raster: int = 8, touch_error_m: float = 0.0, law: str = "neo-hookean"
 ) -> Tissue:
-    """One slab. raster: presses along each side. touch_error_m: standard deviation of first touches as read."""
+    """One slab. raster: presses along each side. touch_error_m: standard error of first touches as read."""
     rng = np.random.default_rng([13, seed])
     spacing = rng.uniform(0.005, 0.009)
     height, tip = rng.uniform(0.020, 0.040), rng.uniform(0.004, 0.006)
