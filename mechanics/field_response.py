@@ -52,6 +52,7 @@ def far_of(
     places: Places, fields: EnergyFields, ratio: np.ndarray, softness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same of elements' ratios (m,) and the softness under each tip (p,)."""
-    # the half-space that the far field takes off is of the modulus under the tip
-    far = far_with_weights(places, 1 / ratio) + (1 - softness)[:, None, None] * fields.half_space
-    return far, 1 / softness
+    # what the far field takes off is of the modulus under the tip: the half-space, and what the energies'
+    # elements are too wide for, so that the same ratio everywhere is another modulus
+    taken = fields.energy.sum(axis=1)[places.place] - places.far
+    return far_with_weights(places, 1 / ratio) + (1 - softness)[:, None, None] * taken, 1 / softness
