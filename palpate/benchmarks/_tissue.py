@@ -45,7 +45,7 @@ def tissue(
     spacing = rng.uniform(0.005, 0.009)
     height, tip = rng.uniform(0.020, 0.040), rng.uniform(0.004, 0.006)
     side = (raster - 1) * spacing + 0.030
-    length = rng.uniform(1.5, 6.0) * spacing
+    length = rng.uniform(0.8, 4.0) * spacing
     modulus, noise = np.exp(rng.uniform(np.log(8e3), np.log(40e3))), rng.uniform(0.002, 0.008)
     log_ratio = _field(rng, length, log_sd, height)
     size = (side, side, height)
