@@ -33,6 +33,9 @@ LEAST_FELT = 0.05
 and mesh bring about as well."""
 LEAST_SITES = 6
 LAW_ERROR = 0.03
+LEVEL_BIAS = 0.02
+"""Standard error of the level that no press tells: law and mesh, as of a global modulus
+(reconstruct.modulus.ModulusOptions.law_bias)."""
 
 
 @dataclass(frozen=True)
@@ -156,7 +159,7 @@ def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Model:
     if found is None:
         return model
     modulus = float(np.exp(found.level))
-    share = float(np.exp(1.96 * found.level_sd))
+    share = float(np.exp(1.96 * np.hypot(found.level_sd, LEVEL_BIAS)))
     levelled = model.with_material(
         young_modulus_pa=modulus, young_modulus_ci95_pa=(modulus / share, modulus * share)
     )

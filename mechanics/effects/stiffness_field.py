@@ -151,5 +151,6 @@ EFFECT = Effect(
     apply=_apply,
     seek=_seek,
     shape_rival=True,
+    any_form=True,
     costly=True,
 )

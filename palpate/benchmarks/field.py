@@ -31,7 +31,7 @@ from palpate.comparison import (
     as_touched,
     compare_presses,
 )
-from reconstruct.modulus_field import asked_for, fit_field, with_field
+from reconstruct.modulus_field import LEVEL_BIAS, asked_for, fit_field, with_field
 
 SUMMARY = "held-out presses of tissue: FEM with a field against one modulus, 1D models and moduli by place"
 PER_PLACE = "modulus-by-place"
@@ -86,6 +86,8 @@ def map_of(slab: Tissue, result: Comparison) -> dict[str, float]:
     found = fit_field(own, np.arange(len(slab.presses)))
     if found is None:
         return {}
+    if not asked_for(found):
+        return {"asked_for": 0.0, "gain": found.gain, "explained": found.explained}
     touched = len(np.unique(own.site))
     places = found.field.places[:touched]
     true = slab.log_ratio(places) + np.log(slab.modulus_pa)
@@ -98,7 +100,7 @@ def map_of(slab: Tissue, result: Comparison) -> dict[str, float]:
         "rms_error": float(np.sqrt(np.mean((told - true) ** 2))),
         "correlation": float(np.corrcoef(told, true)[0, 1]) if true.std() > 0 else float("nan"),
         "contrast": float(np.polyfit(true, told, 1)[0]) if true.std() > 0 else float("nan"),
-        "coverage": float(np.mean(np.abs(told - true) < 1.96 * found.sd[:touched])),
+        "coverage": float(np.mean(np.abs(told - true) < 1.96 * np.hypot(found.sd[:touched], LEVEL_BIAS))),
     }
 
 
