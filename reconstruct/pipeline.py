@@ -29,6 +29,7 @@ from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
 from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
@@ -58,6 +59,7 @@ class ReconstructOptions:
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     meshing: MeshingOptions = field(default_factory=MeshingOptions)
     modulus: ModulusOptions = field(default_factory=ModulusOptions)
+    modulus_field: FieldOptions = field(default_factory=FieldOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
     seed: int = 0
 
@@ -178,6 +180,9 @@ def reconstruct_fully(
         provenance=_provenance(exploration, options, surface, fit),
         about=tables,
     )
+    if sites is not None and options.modulus_field.field != "homogeneous":
+        model = with_fitted_field(model, sites, exploration.noise_n)
+        clock.lap("modulus field")
     progress("done", 1.0)
     return Reconstruction(
         model=model,
