@@ -214,9 +214,9 @@ def _print_session(seen: dict[str, Any]) -> None:
         f"{report['ticks']} ticks, {report['missed_ticks']} missed, {report['late_ticks']} late "
         f"({seen['late_first_half']:.0f} in the first half, {seen['late_second_half']:.0f} in the second), "
         f"{seen['frames']} pictures, {seen['recorded']['rows']} rows recorded, "
-        f"{seen['recorded']['missing rows']} missing, enabled {seen['recorded']['enablings']} times; ticks against deadlines "
-        f"{seen['phase_drift_us']:.3f} us, the next deadline a median of {seen['ahead_first_ms']:.2f} ms "
-        f"ahead in the first half, {seen['ahead_second_ms']:.2f} in the second; the system's wall clock went "
+        f"{seen['recorded']['missing rows']} missing, enabled {seen['recorded']['enablings']} times; "
+        f"ticks against deadlines {seen['phase_drift_us']:.3f} us, the next deadline a median of "
+        f"{seen['ahead_first_ms']:.2f} ms ahead in the first half, {seen['ahead_second_ms']:.2f} in the second; the system's wall clock went "
         f"{seen['utc_drift_ms']:.2f} ms against the loop's"
     )
 
