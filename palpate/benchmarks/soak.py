@@ -216,8 +216,8 @@ def _print_session(seen: dict[str, Any]) -> None:
         f"{seen['frames']} pictures, {seen['recorded']['rows']} rows recorded, "
         f"{seen['recorded']['missing rows']} missing, enabled {seen['recorded']['enablings']} times; "
         f"ticks against deadlines {seen['phase_drift_us']:.3f} us, the next deadline a median of "
-        f"{seen['ahead_first_ms']:.2f} ms ahead in the first half, {seen['ahead_second_ms']:.2f} in the second; the system's wall clock went "
-        f"{seen['utc_drift_ms']:.2f} ms against the loop's"
+        f"{seen['ahead_first_ms']:.2f} ms ahead in the first half, {seen['ahead_second_ms']:.2f} in the "
+        f"second; the system's wall clock went {seen['utc_drift_ms']:.2f} ms against the loop's"
     )
 
 
