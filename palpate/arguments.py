@@ -21,7 +21,6 @@ from mechanics.errors import OptionError, PalpateError
 from mechanics.files import JSON, FolderKind, Kind, atomic_file, check_target
 from mechanics.options import check_range
 from mechanics.recording import recording_files
-from mechanics.schema import span
 from palpate.keywords import kinds, options
 
 
@@ -115,18 +114,6 @@ def natural(text: str) -> int:
     if not 0 <= value < 1 << 63:
         raise argparse.ArgumentTypeError(f"'{text}' must be a whole number, 0 or greater")
     return value
-
-
-def between(low: float, high: float) -> Callable[[str], float]:
-    """argparse type: a number of that range, ends included."""
-
-    def number(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"'{text}' must be a number{span(low, high, '')}")
-        return value
-
-    return number
 
 
 def vector(text: str) -> np.ndarray:
@@ -286,10 +273,3 @@ class Bar:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def positive(value: float, name: str) -> float:
-    """`value`, or OptionError where it is not greater than 0."""
-    if not value > 0:
-        raise OptionError(f"{name} is {value}; it must be greater than 0")
-    return value
