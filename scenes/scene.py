@@ -3,9 +3,11 @@
 A TOML file whose keys carry their units. Allowed tables and keys:
 
     title, about
-    [object]     one of phantom (a name, or a closed surface as STL, PLY or VTU), model (a MODEL folder) or
-                 recording; young_modulus_pa, poisson_ratio, mesh_size_m, finite_strain
-    [[inclusion]] name, centre_m, radius_m, modulus_ratio       (object frame: base's centre, z up)
+    [object]     one of phantom (a name, or a closed surface, put with its base's centre on the origin), mesh (a
+                 surface or mesh file in its own frame; unit, up, sink_m), model (a MODEL folder) or recording;
+                 young_modulus_pa, poisson_ratio, mesh_size_m, finite_strain
+    [[inclusion]] name, centre_m, radius_m, modulus_ratio       (object frame: base's centre, z up; the file's
+                 frame for a mesh)
     [tool]       tip_radius_m
     [device]     axes, motion_scale, force_scale, clutch_button, reach_m
     [render]     renderer, beside, colour, friction
@@ -26,24 +28,29 @@ from mechanics.errors import OptionError, SceneError
 from mechanics.files import named_in, read_toml
 from mechanics.recording import POISSON, TIP_RADIUS
 from mechanics.schema import Key, Listed, Schema, check_table
+from mechanics.surface_files import SUFFIXES, is_surface_file
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import PHANTOMS, Region
 
 FOLDER = Path(__file__).parent
 COLOURS = ("displacement", "stiffness")
-OBJECT_KINDS = ("phantom", "model", "recording")
+OBJECT_KINDS = ("phantom", "mesh", "model", "recording")
 _OPTIONAL_TIP = replace(TIP_RADIUS, required=False)
 SCHEMA: Schema = {
     "title": Key(str),
     "about": Key(str),
     "object": {
         "phantom": Key(str),
+        "mesh": Key(str),
         "model": Key(str),
         "recording": Key(str),
         "young_modulus_pa": Key(low=1.0, high=1e9, unit="Pa"),
         "poisson_ratio": POISSON,
         "mesh_size_m": Key(low=5e-4, high=0.2, unit="m"),
         "finite_strain": Key(bool),
+        "unit": Key(str),
+        "up": Key(str),
+        "sink_m": Key(low=0.0, high=0.1, unit="m"),
     },
     "inclusion": Listed({**BALL, "name": Key(str)}),
     "tool": {"tip_radius_m": _OPTIONAL_TIP},
@@ -70,7 +77,8 @@ class Scene:
 
     young_modulus_pa, poisson_ratio: None keeps the object's own. inclusions: None keeps the phantom's own.
     beside: a second renderer that the same tip drives, '' for none. friction: Coulomb coefficient, None
-    sticks.
+    sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.standing). mesh_size_m: None takes 10 mm,
+    less for a small object.
     """
 
     name: str
@@ -80,7 +88,7 @@ class Scene:
     about: str = ""
     young_modulus_pa: float | None = None
     poisson_ratio: float | None = None
-    mesh_size_m: float = 0.010
+    mesh_size_m: float | None = None
     finite_strain: bool = True
     inclusions: tuple[Region, ...] | None = None
     tip_radius_m: float | None = None
@@ -89,6 +97,9 @@ class Scene:
     beside: str = ""
     colour: str = "displacement"
     friction: float | None = None
+    unit: str = "m"
+    up: str = "+z"
+    sink_m: float = 0.0
 
 
 def scene_names() -> list[str]:
@@ -116,11 +127,14 @@ def load_scene(name: str | Path) -> Scene:
         return _scene(table, path)
     if str(name) in embedded_names():
         return Scene(str(name), "recording", str(embedded_recording(str(name))), title=str(name))
-    if str(name) in PHANTOMS or path.suffix.lower() in (".stl", ".ply", ".vtu"):
+    if is_surface_file(path):
+        return Scene(path.stem, "mesh", str(path.resolve()), title=path.stem)
+    if str(name) in PHANTOMS:
         return Scene(path.stem, "phantom", str(name), title=path.stem)
     raise SceneError(
         f"'{name}' is no scene: allowed are {', '.join(scene_names())}, a scene's .toml, a MODEL folder, a "
-        f"recording ({', '.join(embedded_names())} or a file), or a phantom ({', '.join(PHANTOMS)} or a file)"
+        f"recording ({', '.join(embedded_names())} or a file), a phantom ({', '.join(PHANTOMS)}), or a file of "
+        f"a surface or mesh ({', '.join(SUFFIXES)})"
     )
 
 
@@ -153,7 +167,10 @@ def _scene(table: Mapping[str, Any], path: Path) -> Scene:
             about=str(table.get("about", "")),
             young_modulus_pa=thing.get("young_modulus_pa"),
             poisson_ratio=thing.get("poisson_ratio"),
-            mesh_size_m=thing.get("mesh_size_m", 0.010),
+            mesh_size_m=thing.get("mesh_size_m"),
+            unit=str(thing.get("unit", "m")),
+            up=str(thing.get("up", "+z")),
+            sink_m=float(thing.get("sink_m", 0.0)),
             finite_strain=bool(thing.get("finite_strain", True)),
             inclusions=_inclusions(table.get("inclusion")),
             tip_radius_m=table.get("tool", {}).get("tip_radius_m"),
