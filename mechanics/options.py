@@ -97,7 +97,8 @@ def check_range(field: dataclasses.Field[Any], value: Any, name: str | None = No
     """Raise OptionError for a number outside what the option takes; other values pass."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return
+    number: Any = value
     low, high = span_of(field)
-    if not low <= value <= high:
+    if not low <= number <= high:
         words = span(low, high, field.metadata["unit"])
-        raise OptionError(f"{name or field.name} is {value:g}; allowed are numbers{words}")
+        raise OptionError(f"{name or field.name} is {str(number)[:30]}; allowed are numbers{words}")

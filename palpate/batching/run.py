@@ -7,10 +7,20 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mechanics.errors import OptionError, RecordingError
-from mechanics.files import atomic_file
+from mechanics.files import atomic_file, check_target
 from mechanics.progress import Progress
 from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
-from palpate.batching.summary import Agreement, Entry, agreements, entry_of, write_csv, write_parquet
+from palpate.batching.summary import (
+    CSV,
+    PARQUET,
+    Agreement,
+    Entry,
+    agreements,
+    entry_of,
+    write_csv,
+    write_parquet,
+)
+from palpate.report.page import PAGE
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
 from palpate.tasks.graph import Graph, Task
@@ -50,6 +60,8 @@ def batch(
     if folder.is_file():
         raise OptionError(f"'{out}' is a file: name a folder for the output")
     sources = list(sources)
+    for name, kind in (("summary.csv", CSV), ("summary.parquet", PARQUET), ("index.html", PAGE)):
+        check_target(folder / name, kind)
     found = find(sources, folder)
     folder.mkdir(parents=True, exist_ok=True)
     bad: dict[str, str] = {}
