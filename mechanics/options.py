@@ -31,7 +31,7 @@ _BY_NAME = {
     "coloured_share": (0.0, 1.0),
     "hold_share": (0.0, 1.0),
     "folds": (2, 1000),
-    "bootstraps": (10, 100_000),
+    "bootstraps": (20, 100_000),
     "bootstrap": (10, 100_000),
     "sites": (1, 1000),
     "repeats": (1, 1000),

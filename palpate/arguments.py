@@ -13,7 +13,7 @@ import types
 import typing
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, NoReturn, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -31,6 +31,14 @@ class Options(Protocol):
 
 
 T = TypeVar("T", bound=Options)
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Wrong words are an OptionError, which the command line prints in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise it."""
+        raise OptionError(f"{message}; '{self.prog} --help' tells all options")
 
 
 def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[str] = ()) -> None:
