@@ -140,7 +140,8 @@ def _listen(handler: Any) -> dict[int, Any]:
     names = ("SIGINT", "SIGTERM", "SIGHUP")
     try:
         numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-        return {n: signal.signal(n, handler) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
+        ours = [n for n in numbers if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+        return {n: signal.signal(n, handler) for n in ours}
     except ValueError:  # in a thread: signals are the main one's business
         return {}
 
