@@ -119,7 +119,7 @@ class Sight:
     @cached_property
     def _air(self) -> tuple[np.ndarray, float]:
         filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
-        weight = tool_weight(self.recording, filtered, self.cutoff_hz, self.spread_n)
+        weight, _ = tool_weight(self.recording, filtered, self.cutoff_hz)
         air, share = free_air_force(self.t, filtered - weight, self.spread_n)
         return weight + air, share
 
