@@ -164,7 +164,7 @@ def empty_graph(count: int, root: Path) -> Graph:
             Task(
                 "palpate.benchmarks.batch:nothing",
                 {"number": k},
-                root / f"{k // 3000}" / f"{k}.json",
+                root / f"{k // 300}" / f"{k}.json",
                 needs=() if first else (made[k - k % 3].name,),
                 stage=("reconstruct", "compare", "diagnose")[k % 3],
             )
