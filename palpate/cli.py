@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "demo": "the main job on the embedded example; prints the report's path",
+    "check": "what may be wrong with a recording, before it is believed",
     "reconstruct": "a recording becomes a model",
+    "model": "a MODEL from a surface's file and a modulus",
+    "import": "other programs' files become a recording",
+    "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",
@@ -29,6 +33,8 @@ COMMANDS = {
     "batch": "many recordings at once",
 }
 """Every sub-command, one line each; its module is `palpate.commands.NAME`."""
+MODULES = {"import": "palpate.commands.import_"}
+"""Where a command's name is a word of Python's own."""
 
 
 class Ended(KeyboardInterrupt):
@@ -70,7 +76,7 @@ def _parsed(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, Any]:
     if name not in COMMANDS:
         parser.error(f"'{name}' is no command; allowed are {', '.join(COMMANDS)}")
     try:
-        module = importlib.import_module(f"palpate.commands.{name}")
+        module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
     except ModuleNotFoundError as error:
         if error.name != f"palpate.commands.{name}":
             raise

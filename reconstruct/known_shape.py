@@ -36,6 +36,7 @@ from reconstruct.registration import (
     register,
 )
 from reconstruct.shape_error import PoseError
+from reconstruct.shapes.decimation import decimated
 from reconstruct.shapes.evidence import support_axes
 from reconstruct.shapes.polyhedron import refine
 from reconstruct.surface import Surface
@@ -247,6 +248,11 @@ def _placed(
             f"the touches leave the place of {given.name} open by up to {1e3 * open_m:.0f} mm (standard "
             "deviation): touch its other faces, or give --pose given"
         )
+
+    def redraw(edge_m: float) -> tuple[np.ndarray, np.ndarray]:
+        coarse, faces = decimated(stood, edge_m)
+        return found.to_device(coarse), faces
+
     surface = Surface(
         vertices=vertices,
         triangles=triangles,
@@ -255,6 +261,7 @@ def _placed(
         support_normal=up,
         method="known shape",
         reason=f"{given.name}, {how}; first touches lie {1e3 * found.rms_m:.2f} mm rms off it",
+        redraw=redraw,
     )
     about = {
         "kind": "shape",
