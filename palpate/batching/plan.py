@@ -49,6 +49,8 @@ class Choice:
         for step, values in (self.options or {}).items():
             if step not in STEPS:
                 raise OptionError(f"options of '{step}': allowed are those of {', '.join(STEPS)}")
+            if "seed" in values:
+                raise OptionError(f"{step}.seed: one seed is for all steps; give --seed, or seed=")
             taken(step, values)
 
     def of(self, step: str) -> dict[str, Any]:

@@ -233,6 +233,7 @@ def test_an_interruption_leaves_a_summary_that_says_what_waits(tmp_path, quick, 
     [
         (["--do", "judge"], "allowed are reconstruct, compare, diagnose"),
         (["--set", "diagnose.quick=true"], "pp.diagnose has no option 'quick'"),
+        (["--set", "diagnose.seed=1"], "give --seed"),
         (["--set", "fast=true"], "must be STEP.OPTION=VALUE"),
         (["--set", "judge.fast=true"], "options of 'judge'"),
         (["--workers", "0"], "allowed are 1 and more"),
