@@ -38,6 +38,7 @@ class Row:
 
 
 COLUMNS = tuple(field.name for field in fields(Row))
+SUMMARY = Kind("a batch's summary", (",".join(COLUMNS[:3]).encode(),))
 
 
 @dataclass(frozen=True)
@@ -133,13 +134,9 @@ def agreement(name: str, rows: Sequence[Row]) -> Agreement:
     )
 
 
-CSV = Kind("a summary of palpate batch", (COLUMNS[0].encode(),))
-PARQUET = Kind("a Parquet file", (b"PAR1",))
-
-
 def write_csv(path: Path, rows: Sequence[Row]) -> None:
     """summary.csv: COLUMNS; empty where nothing is known."""
-    with atomic_file(path, CSV) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with atomic_file(path, SUMMARY) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
@@ -158,6 +155,6 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> bool:
         [(name, pyarrow.string() if name in words else pyarrow.float64()) for name in COLUMNS]
     )
     table = pyarrow.Table.from_pylist([asdict(row) for row in rows], schema)
-    with atomic_file(path, PARQUET) as temporary:
+    with atomic_file(path, Kind("Parquet", (b"PAR1",))) as temporary:
         parquet.write_table(table, temporary)
     return True
