@@ -51,7 +51,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     false = {name: found for name, found in warned.items() if found}
     print(
         f"{len(recordings)} sound recordings: {len(false)} with a warning "
-        f"({100 * len(false) / max(len(recordings), 1):.1f} %); {len(refused)} that reconstruction refuses too"
+        f"({100 * len(false) / max(len(recordings), 1):.1f} %); {len(refused)} that reconstruction refuses"
     )
     for name, found in false.items():
         print(f"- {name}: " + "; ".join(f.line() for f in found))

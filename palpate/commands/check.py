@@ -17,9 +17,7 @@ SUMMARY = "what may be wrong with a recording, before it is believed"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, --full, --report, --json."""
     parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument(
-        "--full", action="store_true", help="reconstruct too, and check the modulus (some 20 s)"
-    )
+    parser.add_argument("--full", action="store_true", help="reconstruct too, and check the modulus")
     parser.add_argument("--report", metavar="HTML", help="write the findings with pictures as one HTML page")
     add_json(parser)
 

@@ -6,10 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reconstruct.checks.base import Finding
+from reconstruct.checks.base import GRAVE, Finding
 from reconstruct.checks.sight import Sight
 
-_STEADY = 0.35
+_STEADY, _NEVER = 0.35, 0.05
 _LATE_S = 0.075
 """A force that reads later than this is not corrected reliably (reconstruct.delay)."""
 _CERTAIN = 5.0
@@ -32,7 +32,7 @@ def air(sight: Sight) -> Iterator[Finding]:
         f"{step / sight.spread_n:.0f} standard deviations of the filtered force; above {100 * _STEADY:.0f} % "
         "of the stretches is usual",
         "let the sensor warm up, lift the tip for a second between presses, log the tool's orientation",
-        np.inf,
+        np.inf if sight.steady < _NEVER else 0.5 * (1 - sight.steady) * GRAVE,
         np.inf,
         (float(sight.recording.t[0]), float(sight.recording.t[-1])),
         ("fx", "fy", "fz"),

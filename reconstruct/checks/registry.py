@@ -107,8 +107,8 @@ class Checkup:
         if grave and not self._force:
             first, more = grave[0], f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
             raise RecordingError(
-                f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows where, "
-                "`palpate reconstruct --force` goes on despite it"
+                f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows "
+                "where, `palpate reconstruct --force` goes on despite it"
             )
         return found
 

@@ -125,7 +125,7 @@ class Sight:
 
     @cached_property
     def spread_n(self) -> float:
-        """N an axis, noise of the filtered force, white or slow: that of the stillest fifth of half seconds."""
+        """N an axis, noise of the filtered force, white or slow, in the stillest fifth of half seconds."""
         size = max(4, round(_STILL_S * self.rate_hz))
         filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
         still = filtered[: len(filtered) // size * size].reshape(-1, size, 3).std(axis=1)

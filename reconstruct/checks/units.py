@@ -40,7 +40,8 @@ _ELSE = 1e-3
 @dataclass(frozen=True)
 class Quantity:
     """What a hand's exploration gives: median of what is usual, the factor of one standard deviation, and how
-    the value goes with the units of time, position, force and tip. stated: a ratio to what the recording says."""
+    the value goes with the units of time, position, force and tip. stated: a ratio to what the recording
+    says."""
 
     words: str
     usual: float
