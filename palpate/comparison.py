@@ -4,36 +4,58 @@ regions.
 Every model is fitted to the same training presses and predicts the same held-out paths, measured from the
 same first touches, at the same places with the same normals; of the model only the geometry is used.
 
-- fem: one Young's modulus (least squares; the force of a path is proportional to it) and the dent law, linear
-  or neo-Hookean, that fits the training presses best.
+- fem: the finite-element model with what the training presses ask for: Young's modulus (least squares; the
+  force of a path is proportional to it), the dent law, linear or neo-Hookean, that fits them best, and a
+  smooth field of the modulus where they ask for one (reconstruct.modulus_field).
+- fem-homogeneous: the same with one modulus whatever they ask for.
 - kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
   interpolated to the held-out place by radial basis functions (render.one_d), force along the normal.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
 from mechanics.errors import ContactError
 from mechanics.model import Model
 from mechanics.options import option
+from mechanics.places import Places, solve_places
+from mechanics.press_making import of_paths
 from mechanics.press_sites import sites_of
 from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
-from mechanics.sites import touch_sites
+from mechanics.sites import TouchSites, touch_sites
+from mechanics.smooth_field import SmoothField
 from mechanics.touch import forces_at
 from palpate.regions import Region, regions
+from reconstruct.modulus_field import (
+    LAW_ERROR,
+    FieldSites,
+    PressModuli,
+    asked_for,
+    fit_field,
+    press_moduli,
+    with_field,
+)
 from reconstruct.one_d import columns, fit_robust
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.placing import presses_on
 from reconstruct.uniaxial import low_passed
 from render.one_d import Law, spread_law
 
-MODELS = ("fem", "kelvin-voigt", "hunt-crossley")
+RIVALS = ("kelvin-voigt", "hunt-crossley")
+HOMOGENEOUS = "fem-homogeneous"
+MODELS = ("fem", *RIVALS, HOMOGENEOUS)
 LAWS = ("linear", "neo-hookean")
+MOST_MOVED, MOVES = 2.5, 21
+"""Standard errors by which a held-out first touch may be moved, and places that are tried."""
+LASTING = 10
+"""Rows of a press that a lasting error of a law binds together."""
 
 
 @dataclass(frozen=True)
@@ -45,18 +67,33 @@ class CompareOptions:
         None, "presses closer than this are one site; None: as reconstructed", unit="m", flag="--site-size"
     )
     interpolation: str = option("rbf", "of the 1D parameters", choices=("rbf", "nearest"))
+    field: str = option(
+        "auto",
+        "a field of the modulus in the FEM: where the presses ask for one, or never",
+        choices=("auto", "homogeneous"),
+    )
+    first_touch: str = option(
+        "read",
+        "of held-out presses: as read, or moved by what its stated error allows, for every model alike",
+        choices=("read", "moved"),
+    )
 
 
 @dataclass(frozen=True)
 class Prepared:
     """The contact samples of the presses, net of free air, and what each model needs of them.
 
-    unit: dent law -> (n, 3) m^2, force for unit modulus. laws: 1D name -> Law of each press's own fit.
+    unit: dent law -> (n, 3) m^2, force for unit modulus, the object of one modulus. laws: 1D name -> Law of
+    each press's own fit. sites, places: where the presses are. own: dent law -> each press's own modulus;
+    none: fields are not asked about.
     """
 
     presses: Presses
     unit: dict[str, np.ndarray]
     laws: dict[str, Law]
+    sites: TouchSites
+    places: Places
+    own: dict[str, PressModuli]
 
 
 @dataclass(frozen=True)
@@ -74,7 +111,8 @@ class RegionResult:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Held-out errors. press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM."""
+    """Held-out errors. press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM.
+    fields: of the modulus, in each fold that asked for one, else None."""
 
     prepared: Prepared
     model: Model
@@ -83,6 +121,7 @@ class Comparison:
     press_rmse_n: dict[str, np.ndarray]
     fold: np.ndarray
     moduli_pa: np.ndarray
+    fields: tuple[SmoothField | None, ...]
     noise_n: float
     predicted: dict[str, np.ndarray]
     regions: tuple[RegionResult, ...] = field(default_factory=tuple)
@@ -94,8 +133,9 @@ class Comparison:
 
     def wins(self, name: str) -> int:
         """On how many held-out presses the model errs least."""
-        table = np.array([self.press_rmse_n[m] for m in MODELS])
-        return int((table.argmin(axis=0) == MODELS.index(name)).sum())
+        names = ("fem", *RIVALS)
+        table = np.array([self.press_rmse_n[m] for m in names])
+        return int((table.argmin(axis=0) == names.index(name)).sum())
 
 
 def compare(
@@ -112,7 +152,22 @@ def compare(
     if model is None:
         made = reconstruct_fully(recording, ReconstructOptions(seed=seed), lambda s, f: progress(s, 0.6 * f))
         model = made.model
-    prepared = prepare(recording, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f))
+    return compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
+
+
+def compare_presses(
+    table: Presses,
+    model: Model,
+    options: CompareOptions | None = None,
+    *,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Comparison:
+    """`compare` on a table of presses that touch the model. Raises ContactError for fewer sites than two."""
+    options = options or CompareOptions()
+    prepared = prepare(
+        table, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f), field=options.field
+    )
     presses = prepared.presses
     sites = np.unique(presses.site)
     folds = min(options.folds, len(sites))
@@ -123,19 +178,20 @@ def compare(
     fold_of_site = np.random.default_rng(seed).permutation(np.arange(len(sites)) % folds)
     fold = fold_of_site[np.searchsorted(sites, presses.site)]
     predicted = {name: np.zeros_like(presses.force) for name in MODELS}
-    moduli = np.zeros(folds)
+    fitted: list[Fem] = []
     for k in range(folds):
         progress("folds", 0.8 + 0.1 * k / folds)
         held = np.flatnonzero(fold == k)
         rows = presses.rows(held)
-        forces, moduli[k] = _predict(prepared, np.flatnonzero(fold != k), held, options.interpolation)
+        forces, fem = _predict(prepared, np.flatnonzero(fold != k), held, options)
+        fitted.append(fem)
         for name in MODELS:
             predicted[name][rows] = forces[name]
     found = []
     for region in regions(model, presses.point, presses.normal):
         progress(region.name, 0.95)
         held = np.flatnonzero(region.members)
-        forces, _ = _predict(prepared, np.flatnonzero(~region.members), held, options.interpolation)
+        forces, _ = _predict(prepared, np.flatnonzero(~region.members), held, options)
         measured = presses.force[presses.rows(held)]
         found.append(
             RegionResult(
@@ -157,7 +213,8 @@ def compare(
         relative_rmse={m: _rms(error[m]) / _rms(presses.force) for m in MODELS},
         press_rmse_n=each,
         fold=fold,
-        moduli_pa=moduli,
+        moduli_pa=np.array([fem.modulus_pa for fem in fitted]),
+        fields=tuple(fem.field for fem in fitted),
         noise_n=presses.noise.raw_n * np.sqrt(3.0),
         predicted=predicted,
         regions=tuple(found),
@@ -166,8 +223,7 @@ def compare(
 
 def verdict(result: Comparison) -> str:
     """Who wins where, and by how much."""
-    names = list(result.rmse_n)
-    others = [n for n in names if n != "fem"]
+    others = list(RIVALS)
     best = min(others, key=lambda n: result.rmse_n[n])
     ratio = result.rmse_n[best] / result.rmse_n["fem"]
     words = (
@@ -186,12 +242,22 @@ def verdict(result: Comparison) -> str:
     return words
 
 
+def of_one_modulus(model: Model) -> Model:
+    """Its geometry, base and Poisson's ratio: what varies in it is refitted."""
+    return model.with_material(field=None, gradient=None, skin=None, inclusions={})
+
+
 def prepare(
-    recording: Recording, model: Model, site_m: float | None = None, progress: Progress = silent
+    table: Presses,
+    model: Model,
+    site_m: float | None = None,
+    progress: Progress = silent,
+    *,
+    field: str = "auto",
 ) -> Prepared:
     """Contact samples and what each model needs; the touch sites are solved here. site_m: None keeps the
-    table's sites."""
-    table = presses_on(recording, model)
+    table's sites. field: as in CompareOptions."""
+    model = of_one_modulus(model)
     if site_m is not None:
         table = replace(table, site=sites_of(table.point, table.normal, site_m))
     solved = touch_sites(
@@ -212,6 +278,10 @@ def prepare(
     }
     fitted = columns(fit_robust(smooth.window(0.0, 0.0), table.noise.raw_n), np.zeros(len(table)))
     one, none = np.ones(len(table)), np.zeros(len(table))
+    places = solve_places(model, table.point, table.normal, table.frame)
+    own = {}
+    if field != "homogeneous":
+        own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
     return Prepared(
         presses,
         unit,
@@ -219,33 +289,114 @@ def prepare(
             "kelvin-voigt": Law(fitted["k_kv"], fitted["b_kv"], one, none),
             "hunt-crossley": Law(fitted["k_hc"], fitted["b_hc"], fitted["r_hc"], fitted["r_hc"]),
         },
+        solved,
+        places,
+        own,
     )
 
 
-def _predict(
-    prepared: Prepared, train: np.ndarray, test: np.ndarray, interpolation: str
-) -> tuple[dict[str, np.ndarray], float]:
-    """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM's modulus, Pa."""
-    presses = prepared.presses
-    seen, rows = presses.rows(train), presses.rows(test)
-    measured = presses.force[seen]
+@dataclass(frozen=True)
+class Fem:
+    """The finite-element model of some presses: dent law, modulus Pa, touch sites, and the field in them;
+    None: of one modulus."""
+
+    law: str
+    modulus_pa: float
+    sites: FieldSites
+    field: SmoothField | None = None
+
+    def forces(self, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) N of every path. moved_m: (p,) by how much earlier each press meets the surface."""
+        return self.modulus_pa * self.sites.unit_forces(presses, self.law, moved_m)
+
+
+def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
+    """Of one modulus, and the dent law that fits the presses `train` best."""
+    seen = prepared.presses.rows(train)
+    measured = prepared.presses.force[seen]
     fits = []
     for law, unit in prepared.unit.items():
-        modulus = float((unit[seen] * measured).sum() / (unit[seen] ** 2).sum())
+        modulus = _scale(unit[seen], measured)
         fits.append((_rms(modulus * unit[seen] - measured), modulus, law))
     _, modulus, law = min(fits)
-    forces = {"fem": modulus * prepared.unit[law][rows]}
-    counts = np.diff(presses.starts)[test]
+    return Fem(law, modulus, with_field(prepared.sites, prepared.places, None))
+
+
+def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
+    """With a field where the presses `train` ask for one."""
+    plain = _homogeneous(prepared, train)
+    if not prepared.own:
+        return plain
+    law = min(prepared.own, key=lambda name: prepared.own[name].fit.cost[train].sum())
+    found = fit_field(prepared.own[law], train)
+    if found is None or not asked_for(found):
+        return plain
+    fem = Fem(law, 1.0, with_field(prepared.sites, prepared.places, found.field), found.field)
+    presses = prepared.presses
+    seen = presses.rows(train)
+    # first touches of what is fitted are where that fit has them
+    shift = np.zeros(len(presses))
+    shift[train] = -prepared.own[law].fit.onset_shift_m[train]
+    return replace(fem, modulus_pa=_scale(fem.forces(presses, shift)[seen], presses.force[seen]))
+
+
+def _predict(
+    prepared: Prepared, train: np.ndarray, test: np.ndarray, options: CompareOptions
+) -> tuple[dict[str, np.ndarray], Fem]:
+    """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM."""
+    presses = prepared.presses.of(np.isin(np.arange(len(prepared.presses)), test))
+    plain, fem = _homogeneous(prepared, train), _fem(prepared, train)
+    models: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "fem": lambda moved: _of(fem, test).forces(presses, moved),
+        HOMOGENEOUS: lambda moved: _of(plain, test).forces(presses, moved),
+    }
+    whole = prepared.presses
     for name, fitted in prepared.laws.items():
         own = Law(*(column[train] for column in fitted))
-        at = spread_law(presses.point[train], presses.site[train], own, presses.point[test], interpolation)
-        k, b, r, s = (np.repeat(column, counts) for column in at)
-        u = np.maximum(presses.depth[rows], 0.0)
-        inside = u > 0
-        safe = np.where(inside, u, 1.0)
-        push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate[rows], 0.0), 0.0)
-        forces[name] = push[:, None] * np.repeat(presses.normal[test], counts, axis=0)
-    return forces, modulus
+        at = spread_law(whole.point[train], whole.site[train], own, whole.point[test], options.interpolation)
+        models[name] = partial(_one_d, presses, at)
+    return {name: as_touched(models[name], presses, options.first_touch) for name in MODELS}, fem
+
+
+def _of(fem: Fem, test: np.ndarray) -> Fem:
+    s = fem.sites.sites
+    some = TouchSites(
+        s.points[test], s.normals[test], s.curvature[test], s.far[test], s.patch_width_m, s.poisson_ratio
+    )
+    return replace(fem, sites=FieldSites(some, fem.sites.ratio[test]))
+
+
+def _one_d(presses: Presses, law: Law, moved_m: np.ndarray) -> np.ndarray:
+    """(n, 3) N of a 1D law's parameters (p,) of each press."""
+    k, b, r, s = (column[presses.press] for column in law)
+    u = np.maximum(presses.depth + moved_m[presses.press], 0.0)
+    inside = u > 0
+    safe = np.where(inside, u, 1.0)
+    push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate, 0.0), 0.0)
+    return push[:, None] * presses.normal[presses.press]
+
+
+def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, first_touch: str) -> np.ndarray:
+    """(n, 3) N along the paths as read, or with each first touch where the force then meets what was measured
+    best, at the price of its stated error."""
+    stated = presses.onset_error_m
+    found = force(np.zeros(len(presses)))
+    if first_touch == "read" or not (stated > 0).any():
+        return found
+    variance = presses.noise.raw_n**2 + LAW_ERROR**2 * (presses.force**2).sum(axis=1) / 3
+    least = np.full(len(presses), np.inf)
+    for z in np.linspace(-MOST_MOVED, MOST_MOVED, MOVES):
+        tried = force(z * stated)
+        missed = ((tried - presses.force) ** 2).sum(axis=1) / variance / LASTING
+        cost = np.bincount(presses.press, weights=missed, minlength=len(presses)) + z**2
+        better = cost < least
+        found = np.where(better[presses.press][:, None], tried, found)
+        least = np.minimum(cost, least)
+    return found
+
+
+def _scale(unit: np.ndarray, measured: np.ndarray) -> float:
+    return float((unit * measured).sum() / (unit**2).sum())
 
 
 def _rms(forces: np.ndarray) -> float:
@@ -261,29 +412,25 @@ def stiffness_along(
     depth_m: float,
 ) -> dict[str, np.ndarray]:
     """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
+    model = of_one_modulus(model)
     solved = touch_sites(model.mesh, places, normals, model.material.poisson_ratio)
-    presses = prepared.presses
-    _, modulus = _predict(prepared, train, train[:1], "rbf")
-    seen = presses.rows(train)
-    law = min(LAWS, key=lambda name: _rms(_scaled(prepared.unit[name][seen], presses.force[seen])))
     steps = np.linspace(0.0, depth_m, 60)
     path = (-steps[None, :, None] * solved.normals[:, None, :]).reshape(-1, 3)
-    force = forces_at(
-        solved,
-        path,
-        np.arange(len(places) + 1) * len(steps),
-        young_modulus_pa=modulus,
-        tip_radius_m=model.tool.tip_radius_m,
-        law=law,
-    )
-    deepest = force.reshape(len(places), len(steps), 3)[:, -1]
-    result = {"fem": (deepest * solved.normals).sum(axis=1)}
+    starts = np.arange(len(places) + 1) * len(steps)
+    centres = places + model.tool.tip_radius_m * solved.normals
+    pressed = of_paths(
+        starts, np.repeat(centres, len(steps), axis=0) + path, np.zeros_like(path), centres, solved.normals,
+        tip_radius_m=model.tool.tip_radius_m, sample_rate_hz=prepared.presses.sample_rate_hz,
+    )  # fmt: skip
+    result = {}
+    for name, fem in (("fem", _fem(prepared, train)), (HOMOGENEOUS, _homogeneous(prepared, train))):
+        there = solve_places(model, places, solved.normals, pressed.frame)
+        force = replace(fem, sites=with_field(solved, there, fem.field)).forces(pressed)
+        deepest = force.reshape(len(places), len(steps), 3)[:, -1]
+        result[name] = (deepest * solved.normals).sum(axis=1)
+    presses = prepared.presses
     for name, fitted in prepared.laws.items():
         own = Law(*(c[train] for c in fitted))
         at = spread_law(presses.point[train], presses.site[train], own, places)
         result[name] = at.k * depth_m**at.r
     return result
-
-
-def _scaled(unit: np.ndarray, measured: np.ndarray) -> np.ndarray:
-    return float((unit * measured).sum() / (unit**2).sum()) * unit - measured

@@ -16,7 +16,7 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.recording import Recording
+from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
@@ -26,11 +26,14 @@ from reconstruct.checks.registry import Checkup
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
-from reconstruct.meshing import Meshing, MeshingOptions, mesh_surface, uncertainty_at
+from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
+from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
+from reconstruct.slides import without_slides
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface, shape_table
 from reconstruct.uniaxial import profiles
 
@@ -48,6 +51,7 @@ class ReconstructOptions:
     poisson_ratio: float | None = option(
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
+    geometry: GeometryOptions = field(default_factory=GeometryOptions)
     force: bool = option(False, "go on although the check-up finds something grave")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
@@ -55,6 +59,7 @@ class ReconstructOptions:
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     meshing: MeshingOptions = field(default_factory=MeshingOptions)
     modulus: ModulusOptions = field(default_factory=ModulusOptions)
+    modulus_field: FieldOptions = field(default_factory=FieldOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
     seed: int = 0
 
@@ -64,6 +69,7 @@ class Reconstruction:
     """The model and everything on the way to it (for reports, comparison and diagnosis).
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
+    seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     findings: of the check-up, grave ones first; the interval is as wide as they make it.
     normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
@@ -79,6 +85,7 @@ class Reconstruction:
     sites: TouchSites | None = None
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
+    placed: Placed | None = None
     findings: tuple[Finding, ...] = ()
 
 
@@ -100,14 +107,25 @@ def reconstruct_fully(
     clock = _Clock()
     progress("contacts", 0.02)
     checkup = Checkup(recording, options.force)
-    exploration = _explored(recording, options)
-    checkup.presses(exploration)
-    clock.lap("contacts")
-    surface = reconstruct_surface(
-        evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
-    )
-    clock.lap("surface")
-    meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
+    geometry = stated_geometry(recording, options.geometry)
+    placed = None
+    if geometry.known:
+        exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        checkup.presses(exploration)
+        surface = placed.surface
+        clock.lap("contacts and registration")
+    else:
+        exploration = _explored(recording, options)
+        checkup.presses(exploration)
+        clock.lap("contacts")
+        surface = reconstruct_surface(
+            evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
+        )
+        clock.lap("surface")
+    if placed is not None and placed.mesh is not None:
+        meshing = as_meshed(placed.mesh, surface)
+    else:
+        meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
     clock.lap("mesh")
     touched = exploration.presses
     where = cast(surface.vertices, surface.triangles, touched.point, touched.contact_normal)
@@ -127,7 +145,10 @@ def reconstruct_fully(
         )
         clock.lap("touch sites")
         progress("modulus", 0.8)
-        covariance = compliance_covariance(solver, sites, uncertainty_at(solver.mesh, surface))
+        local = surface if placed is None else placed.by_itself
+        covariance = compliance_covariance(
+            solver, sites, uncertainty_at(solver.mesh, local), pose=None if placed is None else placed.pose
+        )
         clock.lap("shape error")
         fit = fit_modulus(
             presses,
@@ -144,6 +165,8 @@ def reconstruct_fully(
     one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
     clock.lap("1D models")
     tables = {"shape": shape_table(surface)}
+    if placed is not None:
+        tables["geometry"] = placed.about
     if sites is not None:
         tables["linear_range"] = linear_range(sites, recording.tip_radius_m).table()
     model = Model(
@@ -157,6 +180,9 @@ def reconstruct_fully(
         provenance=_provenance(exploration, options, surface, fit),
         about=tables,
     )
+    if sites is not None and options.modulus_field.field != "homogeneous":
+        model = with_fitted_field(model, sites, exploration.noise_n)
+        clock.lap("modulus field")
     progress("done", 1.0)
     return Reconstruction(
         model=model,
@@ -170,6 +196,7 @@ def reconstruct_fully(
         sites=sites,
         modulus=fit,
         paper_fit=paper_fit,
+        placed=placed,
         findings=checkup.found,
     )
 
@@ -195,25 +222,44 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     return float(nu)
 
 
+def _touches(recording: Recording, options: ReconstructOptions, base: Boundary | None = None) -> Exploration:
+    return explore(
+        recording,
+        method="paper" if options.method == "paper" else "noise",
+        contact_options=options.contact,
+        boundary_options=options.boundary,
+        filter_options=options.filter,
+        boundary=base,
+    )
+
+
 def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
     """Where the recording traces no base, that of [object] model = PATH stands in."""
-
-    def explored(base: Boundary | None = None) -> Exploration:
-        return explore(
-            recording,
-            method="paper" if options.method == "paper" else "noise",
-            contact_options=options.contact,
-            boundary_options=options.boundary,
-            filter_options=options.filter,
-            boundary=base,
-        )
-
     try:
-        return explored()
+        return _touches(recording, options)
     except NoBaseError:
         if recording.base_model is None:
             raise
-    return explored(base_of_model(read_model(recording.base_model), recording.tip_radius_m))
+    base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
+    return _touches(recording, options, base)
+
+
+def _on_known(
+    recording: Recording, options: ReconstructOptions, geometry: GeometryOptions, progress: Progress
+) -> tuple[Exploration, Placed]:
+    """Touches told without a support place the geometry; then they are told again, over its base."""
+    first = without_slides(_touches(recording, options, nowhere(recording)), options.contact.least_palpations)
+    progress("contacts", 0.3)
+    placed = place(
+        recording,
+        first,
+        geometry,
+        mesh_size_m=options.meshing.mesh_size_m,
+        spacing_m=options.surface.surface_spacing_m,
+        progress=_part(progress, 0.3, 0.8),
+    )
+    again = _touches(recording, options, placed.base)
+    return without_slides(again, options.contact.least_palpations), placed
 
 
 def _provenance(

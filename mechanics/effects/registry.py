@@ -16,6 +16,7 @@ NAMES = (
     "inclusion",
     "modulus_gradient",
     "skin_layer",
+    "stiffness_field",
     "surface_shape",
     "unbonded_base",
     "compliant_base",

@@ -8,10 +8,11 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from palpate.comparison import MODELS, Comparison, stiffness_along, verdict
+from palpate.comparison import HOMOGENEOUS, MODELS, Comparison, stiffness_along, verdict
 from palpate.report.page import Page
 
-COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f", "measured": "#c1121f"}
+COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f"}
+COLOURS |= {HOMOGENEOUS: "#8d99ae", "measured": "#c1121f"}
 DEPTH_M = 0.004
 
 
@@ -24,7 +25,9 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
         f"paths. Errors are rms force vectors in N; the sensor's noise alone is {result.noise_n:.3f} N. The "
         "1D models are fitted press by press and interpolated over the surface; FEM has one number for the "
-        "whole object, its Young's modulus."
+        f"whole object, its Young's modulus ({HOMOGENEOUS}), or a smooth field of it where the presses that "
+        f"it is fitted to ask for one: they did in {sum(f is not None for f in result.fields)} of "
+        f"{len(result.fields)} folds."
     )
     page.heading("Held-out palpations and regions")
     rows = [

@@ -64,9 +64,10 @@ class Comparison(Result, room.Comparison):
                 }
                 for r in self.regions
             ],
-            "wins": {name: self.wins(name) for name in self.rmse_n},
+            "wins": {name: self.wins(name) for name in room.MODELS if name != room.HOMOGENEOUS},
             "noise_n": self.noise_n,
             "young_modulus_pa": self.moduli_pa,
+            "folds_with_a_field": sum(field is not None for field in self.fields),
         }
 
     def _draw(self, ax: Axes) -> None:

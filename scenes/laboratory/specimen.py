@@ -9,21 +9,22 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
 import numpy as np
 
 from scenes.laboratory.contact import SphereContact
+from scenes.laboratory.field import Field, ratio_at
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import QuadraticMesh, graded_mesh, surface_key
 from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.solver import LabError, Problem
+from scenes.laboratory.solver import Problem
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
 
-VERSION = 5
+VERSION = 6
 """Raised whenever solved curves would change."""
 
 
@@ -37,10 +38,10 @@ class Specimen:
     model.
 
     finite: finite strain (neo-Hookean) instead of linear. balls: (x, y, z, radius, ratio) mm. gradient:
-    modulus ratios (base, top). skin: (thickness mm, ratio). base: None bonded; ("unbonded", bonded
-    fraction, direction angle rad); ("springs", k_normal, k_tangential) in E per mm. friction: None sticks.
-    fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m). plastic: (share, yield strain
-    measure). prony: ((g, tau s), ...).
+    modulus ratios (base, top). skin: (thickness mm, ratio). field: of scenes.laboratory.field.
+    base: None bonded; ("unbonded", bonded fraction, direction angle rad); ("springs", k_normal, k_tangential)
+    in E per mm. friction: None sticks. fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m).
+    plastic: (share, yield strain measure). prony: ((g, tau s), ...).
     """
 
     poisson_ratio: float = 0.49
@@ -50,12 +51,13 @@ class Specimen:
     balls: tuple[Ball, ...] = ()
     gradient: tuple[float, float] | None = None
     skin: tuple[float, float] | None = None
+    field: Field | None = None
     base: tuple | None = None
     friction: float | None = None
     fibre: tuple[float, float, float, float] | None = None
     mullins: tuple[float, float] | None = None
     plastic: tuple[float, float] | None = None
-    prony: tuple[tuple[float, float], ...] = field(default=())
+    prony: tuple[tuple[float, float], ...] = ()
 
     @property
     def remembers(self) -> bool:
@@ -69,7 +71,9 @@ class Specimen:
 
     def key(self) -> str:
         """A content key."""
-        text = json.dumps([VERSION, asdict(self)], sort_keys=True, default=str)
+        # what came later is left out where it is not there: solved curves of before keep their keys
+        told = {name: value for name, value in asdict(self).items() if name != "field" or value is not None}
+        text = json.dumps([VERSION, told], sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 
@@ -147,13 +151,8 @@ def build(
     )
     contact = SphereContact(mesh.points, mesh.faces[near], specimen.tip_radius, specimen.friction)
     free, springs, floor = _support(mesh, specimen)
-    if specimen.prony and floor is not None and not specimen.finite:
-        raise LabError(
-            "a relaxing solid on an unbonded base is solved at finite strain only: add finite_strain"
-        )
-    if specimen.finite or floor is not None:
-        return Problem(solid, contact, free, springs, floor, linear=not specimen.finite)
-    return LinearProblem(solid, contact, free, springs)
+    kind = Problem if specimen.finite else LinearProblem
+    return kind(solid, contact, free, springs, floor)
 
 
 def _place(solid: Solid, specimen: Specimen, phantom: Phantom) -> None:
@@ -173,6 +172,8 @@ def _place(solid: Solid, specimen: Specimen, phantom: Phantom) -> None:
         # an element larger than the skin takes the share of it that the skin fills
         size = np.cbrt(solid.weights.sum(axis=1))[:, None]
         ratio *= 1 + (stiffer - 1) * np.clip((thickness - depth) / size + 0.5, 0, 1)
+    if specimen.field is not None:
+        ratio *= ratio_at(specimen.field, at, phantom.vertices * 1e3, phantom.faces)
     for x, y, z, radius, stiffer in specimen.balls:
         inside = np.linalg.norm(at - [x, y, z], axis=2) < radius
         ratio = np.where(inside, ratio * stiffer, ratio)

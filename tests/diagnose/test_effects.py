@@ -21,6 +21,7 @@ CONTRACT = {
     "inclusion": {"centre_m", "radius_m", "modulus_ratio"},
     "modulus_gradient": {"ratio_base", "ratio_top"},
     "skin_layer": {"thickness_m", "modulus_ratio"},
+    "stiffness_field": {"length_m", "places_m", "ratio"},
     "unbonded_base": {"bonded_fraction", "direction"},
     "compliant_base": {"k_normal_pa_per_m", "k_tangential_pa_per_m"},
     "surface_offset": {"shift_m", "rotation_rad"},
@@ -47,7 +48,7 @@ MODULUS = 20e3
 
 
 def test_every_name_of_the_contract_is_an_effect():
-    assert {*CONTRACT, "finite_strain", "surface_shape"} == set(NAMES) and len(NAMES) == 22
+    assert {*CONTRACT, "finite_strain", "surface_shape"} == set(NAMES) and len(NAMES) == 23
     assert [e.name for e in effects()] == list(NAMES)
     assert all(e.domain in DOMAINS for e in effects())
 

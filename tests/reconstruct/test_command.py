@@ -150,10 +150,12 @@ def test_a_models_base_stands_in_for_a_missing_phase(files, tmp_path, capsys):
     first, second = tmp_path / "FIRST", tmp_path / "SECOND"
     coarse = ["--surface", "hull", "--mesh-size", "0.014"]
     assert cli.main(["reconstruct", str(files[0]), "-o", str(first), *coarse]) == 0
-    samples = write_recording(tmp_path / "later.csv", explore_cylinder(without_phase=True, seed=1)[0])
+    samples = write_recording(tmp_path / "later.csv", explore_cylinder(without_phase=True)[0])
     toml = samples.with_suffix(".toml").read_text()
     samples.with_suffix(".toml").write_text(toml.replace("[object]", '[object]\nmodel = "FIRST"'))
     assert cli.main(["reconstruct", str(samples), "-o", str(second), *coarse]) == 0
     a, b = read_model(first), read_model(second)
     assert np.allclose(a.support.normal, b.support.normal, atol=1e-6)
-    assert b.material.young_modulus_pa == pytest.approx(a.material.young_modulus_pa, rel=0.1)
+    for one, other in ((a.material, b.material), (b.material, a.material)):
+        low, high = one.young_modulus_ci95_pa
+        assert low < other.young_modulus_pa < high  # the same presses: meshes alone move it by some 3 %

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from mechanics.errors import OptionError
-from scenes.laboratory.effects import contact, instrument, solid
+from scenes.laboratory.effects import contact, instrument, solid, stiffness_field
 from scenes.laboratory.effects.base import Bench, Effect, Readings
 
 REGISTRY: dict[str, Effect] = {
     effect.name: effect
-    for effect in (*solid.EFFECTS, *contact.EFFECTS, *instrument.EFFECTS, *contact.UNNAMED)
+    for effect in (
+        *solid.EFFECTS,
+        *stiffness_field.EFFECTS,
+        *contact.EFFECTS,
+        *instrument.EFFECTS,
+        *contact.UNNAMED,
+    )  # fmt: skip
 }
 """Effects by name; the order is the order in which they act."""
 
