@@ -19,7 +19,7 @@ _ALIKE_S = 0.01
 
 
 def air(sight: Sight) -> Iterator[Finding]:
-    """What is left in free air, when weight, inertia and a steady drift are taken off, against the presses."""
+    """What is left in free air, weight, inertia and steady drift taken off, against the presses."""
     pushes = np.linalg.norm(sight.touches.push, axis=1)
     peak = float(np.median(pushes)) if len(pushes) else float(np.percentile(sight.size, 99))
     white = sight.noise_n * noise_gain(sight.rate_hz, sight.cutoff_hz)
