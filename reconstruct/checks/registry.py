@@ -21,6 +21,7 @@ from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
 from reconstruct.contacts import Exploration, explore
+from reconstruct.known_shape import GeometryOptions, stated_geometry
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
@@ -31,7 +32,9 @@ _LEAST_SAMPLES = 100
 
 
 def checked_samples(recording: Recording) -> tuple[Finding, ...]:
-    """What the samples alone show."""
+    """What the samples alone show; nothing of points that have no clock (quasi-static)."""
+    if recording.description.get("recording", {}).get("quasi_static"):
+        return ()
     if len(recording.t) < _LEAST_SAMPLES:
         return (_too_short(recording),)
     sight, found = settled(recording)
@@ -56,7 +59,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     try:
         exploration = explore(recording)
     except NoBaseError as error:
-        if recording.base_model is not None:
+        if recording.base_model is not None or stated_geometry(recording, GeometryOptions()).known:
             return found
         return ordered([*found, _refused(recording, "no base", error)])
     except ContactError as error:
@@ -66,7 +69,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 
 def seen(recording: Recording) -> tuple[tuple[str, float, float], ...]:
     """What the checks measure on the way: words with the unit, value, and what is usual (NaN: anything)."""
-    if len(recording.t) < _LEAST_SAMPLES:
+    if recording.description.get("recording", {}).get("quasi_static") or len(recording.t) < _LEAST_SAMPLES:
         return ()
     sight, _ = settled(recording)
     rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
