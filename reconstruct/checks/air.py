@@ -10,7 +10,7 @@ from reconstruct.checks.base import Finding
 from reconstruct.checks.sight import Sight
 from reconstruct.filtering import noise_gain
 
-_SEEN, _LOUD = 0.1, 10.0
+_SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S = 0.075
 """A force that reads later than this is not corrected reliably (reconstruct.delay)."""
 _CERTAIN = 5.0
@@ -23,16 +23,18 @@ def air(sight: Sight) -> Iterator[Finding]:
     pushes = np.linalg.norm(sight.touches.push, axis=1)
     peak = float(np.median(pushes)) if len(pushes) else float(np.percentile(sight.size, 99))
     white = sight.noise_n * noise_gain(sight.rate_hz, sight.cutoff_hz)
-    share, loud = sight.spread_n / max(peak, 1e-9), sight.spread_n / white
+    # a fifth of the samples at least is of a tip in the air, whatever the rest is
+    wander = float(np.percentile(sight.size, 20))
+    share, loud = wander / max(peak, 1e-9), wander / white
     if share < _SEEN or loud < _LOUD:
         return
     yield Finding(
         "drift",
-        f"in free air the force wanders by {sight.spread_n:.2g} N an axis with weight, inertia and a steady "
-        f"drift taken off, {100 * share:.0f} % of what a press peaks at ({peak:.2g} N)",
+        f"with weight, inertia and a steady drift taken off, the force is above {wander:.2g} N in four fifths "
+        f"of the samples, {100 * share:.0f} % of what a press peaks at ({peak:.2g} N)",
         f"{loud:.0f} times what its white noise makes of it; up to {_LOUD:g} is usual",
         "let the sensor warm up, lift the tip for a second between presses, log the tool's orientation",
-        float(share),
+        float(share) if share < _LOST else np.inf,
         np.inf,
         (float(sight.recording.t[0]), float(sight.recording.t[-1])),
         ("fx", "fy", "fz"),
