@@ -106,8 +106,8 @@ def reconstruct_fully(
     nu = _poisson_ratio(recording, options)
     clock = _Clock()
     progress("contacts", 0.02)
-    checkup = Checkup(recording, options.force)
     geometry = stated_geometry(recording, options.geometry)
+    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
     placed = None
     if geometry.known:
         exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))

@@ -20,7 +20,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
     parser.add_argument("--full", action="store_true", help="reconstruct too, and check the modulus")
     add_output(
-        parser, "--report", kind=PAGE, metavar="HTML", help="write the findings with pictures as one HTML page"
+        parser,
+        "--report",
+        kind=PAGE,
+        metavar="HTML",
+        help="write the findings with pictures as one HTML page",
     )
     add_json(parser)
 

@@ -30,8 +30,8 @@ def air(sight: Sight) -> Iterator[Finding]:
         return
     yield Finding(
         "drift",
-        f"with weight, inertia and a steady drift taken off, the force is above {wander:.2g} N in four fifths "
-        f"of the samples, {100 * share:.0f} % of what a press peaks at ({peak:.2g} N)",
+        f"with weight, inertia and a steady drift taken off, the force is above {wander:.2g} N in four "
+        f"fifths of the samples, {100 * share:.0f} % of what a press peaks at ({peak:.2g} N)",
         f"{loud:.0f} times what its white noise makes of it; up to {_LOUD:g} is usual",
         "let the sensor warm up, lift the tip for a second between presses, log the tool's orientation",
         float(share) if share < _LOST else np.inf,

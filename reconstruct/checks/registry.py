@@ -31,10 +31,16 @@ REFUSALS = ("no base", "no presses")
 _LEAST_SAMPLES = 100
 
 
-def checked_samples(recording: Recording) -> tuple[Finding, ...]:
-    """What the samples alone show; nothing of points that have no clock (quasi-static)."""
+def checked_samples(recording: Recording, by_hand: bool = True) -> tuple[Finding, ...]:
+    """What the samples alone show; nothing of points that have no clock (quasi-static).
+
+    by_hand: a hand explored a whole object. Otherwise (a slab under an indenter) only the force's direction
+    is looked at, as sizes, speeds and channels that stand still may be anything.
+    """
     if recording.description.get("recording", {}).get("quasi_static"):
         return ()
+    if not by_hand:
+        return ordered(handedness(Sight(recording))) if len(recording.t) >= _LEAST_SAMPLES else ()
     if len(recording.t) < _LEAST_SAMPLES:
         return (_too_short(recording),)
     sight, found = settled(recording)
@@ -53,13 +59,14 @@ def checked_results(result: Result) -> tuple[Finding, ...]:
 
 def check(recording: Recording) -> tuple[Finding, ...]:
     """What samples and presses show, the gravest first; the presses are looked for only in sound samples."""
-    found = checked_samples(recording)
-    if any(f.grave for f in found):
+    known = stated_geometry(recording, GeometryOptions()).known
+    found = checked_samples(recording, by_hand=not known)
+    if known or any(f.grave for f in found):
         return found
     try:
         exploration = explore(recording)
     except NoBaseError as error:
-        if recording.base_model is not None or stated_geometry(recording, GeometryOptions()).known:
+        if recording.base_model is not None:
             return found
         return ordered([*found, _refused(recording, "no base", error)])
     except ContactError as error:
@@ -92,9 +99,9 @@ class Checkup:
     found: what the stages so far have found. Every stage raises RecordingError.
     """
 
-    def __init__(self, recording: Recording, force: bool = False) -> None:
+    def __init__(self, recording: Recording, force: bool = False, by_hand: bool = True) -> None:
         self._force = force
-        self.found = self._judged(checked_samples(recording))
+        self.found = self._judged(checked_samples(recording, by_hand))
 
     def presses(self, exploration: Exploration) -> None:
         """Before a surface is made."""
