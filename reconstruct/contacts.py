@@ -209,7 +209,7 @@ def _speed(signals: Signals, contact: Found) -> float:
 
 def _searched(recording: Recording, given: _Given) -> _Found:
     method, options, boundary = given.method, given.contact, given.known_base
-    signals, free_air, spread = _signals(recording, given.cutoff_hz)
+    signals, free_air, spread = signals_of(recording, given.cutoff_hz)
     least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
     high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
     high = options.contact_threshold_n or high
@@ -260,7 +260,7 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
 
 
-def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
+def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
     """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis."""
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)

@@ -18,11 +18,13 @@ SUMMARY = "what may be wrong with a recording, before it is believed"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, --full, --report, --json."""
     add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument(
-        "--full", action="store_true", help="reconstruct too, and check the modulus (some 20 s)"
-    )
+    parser.add_argument("--full", action="store_true", help="reconstruct too, and check the modulus")
     add_output(
-        parser, "--report", kind=PAGE, metavar="HTML", help="write the findings with pictures as one page"
+        parser,
+        "--report",
+        kind=PAGE,
+        metavar="HTML",
+        help="write the findings with pictures as one HTML page",
     )
     add_json(parser)
 
