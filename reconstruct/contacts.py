@@ -214,7 +214,7 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
     high = options.contact_threshold_n or high
     gap = round(0.25 * recording.sample_rate_hz / given.cutoff_hz)
-    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, gap)
+    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, signals.force, gap)
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -280,15 +280,18 @@ def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarra
     return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
 
 
-def hysteresis(magnitude: np.ndarray, low: float, high: float, gap: int = 0) -> np.ndarray:
+def hysteresis(
+    magnitude: np.ndarray, low: float, high: float, force: np.ndarray | None = None, gap: int = 0
+) -> np.ndarray:
     """(n,) bool: the state machine's contacts, each back-tracked: runs above `low` that reach `high`.
 
-    gap: samples; a shorter fall below `low` ends no contact.
+    gap: samples; a shorter fall below `low` ends no contact whose force (n, 3) has not turned round by then.
     """
     state, above = np.zeros(len(magnitude), dtype=bool), magnitude > low
-    for a, b in runs(~above):
-        if 0 < a and b < len(above) and b - a < gap:
-            above[a:b] = True
+    if force is not None:
+        for a, b in runs(~above):
+            if 0 < a and b < len(above) and b - a < gap and force[a - 1] @ force[b] > 0:
+                above[a:b] = True
     for a, b in runs(above):
         if magnitude[a:b].max() > high:
             state[a:b] = True
