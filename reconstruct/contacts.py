@@ -30,8 +30,6 @@ PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
-_PULL_S, _AGAINST = 0.15, -0.5
-"""A force so soon after a press, against it by this cosine, is the surface that holds on to the tip."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -231,18 +229,14 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     contacts: list[Found] = []
     unused: list[tuple[int, int, str]] = []
     touches = runs(touching)
-    left, last = 0, np.zeros(3)
     for a, b in touches:
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
             contact = (paper_contact if method == "paper" else fitted_contact)(signals, a, b)
             reason = "" if contact else "shows no rise of force with depth"
-        if contact and contact.normal @ last < _AGAINST and recording.t[a] - recording.t[left] < _PULL_S:
-            contact, reason = None, "pulls at the surface that it has just left (adhesion)"
         if contact:
             contacts.append(contact)
-            left, last = b - 1, contact.normal
         else:
             unused.append((a, b, reason))
     if len(contacts) < options.least_palpations:
