@@ -206,8 +206,24 @@ def _speed(signals: Signals, contact: Found) -> float:
 
 
 def _searched(recording: Recording, given: _Given) -> _Found:
-    method, options, boundary = given.method, given.contact, given.known_base
     signals, free_air, spread = _signals(recording, given.cutoff_hz)
+    try:
+        return _found(recording, given, signals, free_air, spread)
+    except ContactError as error:
+        if recording.quaternion is not None or spread.min() < signals.noise_n:
+            raise
+        raise type(error)(
+            f"{error}. In free motion the force wanders by {spread.min():.2g} N an axis, louder than its "
+            f"noise ({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation "
+            "(qw, qx, qy, qz), or hold it one way"
+        ) from error
+
+
+def _found(
+    recording: Recording, given: _Given, signals: Signals, free_air: np.ndarray, spread: np.ndarray
+) -> _Found:
+    """spread: (n,) noise of the filtered force, N an axis."""
+    method, options, boundary = given.method, given.contact, given.known_base
     least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
     high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
     high = options.contact_threshold_n or high
@@ -241,7 +257,9 @@ def _searched(recording: Recording, given: _Given) -> _Found:
             unused.append((a, b, reason))
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
-        hint = "lower --contact-threshold or press harder" if method == "paper" else "press at more places"
+        hint = f"press at more places, and until the force is above {high:.2g} N"
+        if method == "paper":
+            hint = "lower --contact-threshold or press harder"
         raise ContactError(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
