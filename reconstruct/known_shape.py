@@ -1,4 +1,5 @@
-"""A geometry that is known: a file's shape, a slab of known thickness, a half-space; registered or as it stands.
+"""A geometry that is known: a file's shape, a slab of known thickness, a half-space; registered or as it
+stands.
 
 No tracing is needed and no more of the surface than was touched. What the registration leaves uncertain goes
 into the modulus's interval (reconstruct.shape_error).
@@ -43,8 +44,8 @@ from reconstruct.surface import Surface
 
 POSES = ("auto", "given")
 _MARGIN, _CELLS, _DEEP = 3.0, 44, 25.0
-"""A slab reaches this many thicknesses beyond the touches, in at most so many cells a side; a half-space is so
-many contact radii deep."""
+"""A slab reaches this many thicknesses beyond the touches, in at most so many cells a side; a half-space is
+so many contact radii deep."""
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be told from it."""
 _FAR = 0.1
@@ -107,7 +108,9 @@ def stated_geometry(recording: Recording, options: GeometryOptions) -> GeometryO
     try:
         return dataclasses.replace(options, **keys)
     except TypeError as error:
-        raise OptionError(f"[object] of '{recording.name}' holds a value of the wrong kind: {error}") from error
+        raise OptionError(
+            f"[object] of '{recording.name}' holds a value of the wrong kind: {error}"
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -115,9 +118,9 @@ class Placed:
     """A known geometry in the device frame.
 
     surface: closed, its uncertainty that of pose and file together. local_sd_m: of the file alone. pose: its
-    error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base: as a
-    tracing would have told it. residual_m: (k,) of the first touches. about: what model.toml keeps, [geometry].
-    notes: what the user should know, one line each.
+    error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base:
+    as a tracing would have told it. residual_m: (k,) of the first touches. about: what model.toml keeps,
+    [geometry]. notes: what the user should know, one line each.
     """
 
     surface: Surface
@@ -406,4 +409,3 @@ def _shell(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
     """The mesh's boundary as a surface of its own: vertices and triangles."""
     used, index = np.unique(mesh.surface[:, :3], return_inverse=True)
     return mesh.points[used], index.reshape(-1, 3)
-
