@@ -22,6 +22,7 @@ from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.robust import biweight
+from mechanics.sites import SURFACE_EDGE_M
 from mechanics.standing import Standing, standing
 from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -327,9 +328,13 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
     reach = _MARGIN * thickness if options.slab_m else thickness
     middle = top + ((low + high) / 2) @ axes[:2]
     size = np.append(high - low + 2 * reach, thickness)
-    edge = max(min(mesh_size_m, thickness / 3), size[:2].max() / _CELLS)
-    cells = [max(3, int(np.ceil(length / edge))) for length in size[:2]]
-    box = box_mesh((cells[0], cells[1], max(3, int(np.ceil(thickness / edge)))), tuple(size))
+    if options.half_space:
+        box = box_mesh(_GRADED, tuple(size), _GRADE)
+    else:
+        # as fine at its surface as touches need, so that nothing is halved again
+        edge = max(min(mesh_size_m, SURFACE_EDGE_M, thickness / 3), size[:2].max() / _CELLS)
+        nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
+        box = box_mesh((nx, ny, nz), tuple(size))
     points = (box.points - [0, 0, thickness]) @ axes + middle
     mesh = TetMesh(points, box.tetrahedra, box.fixed, box.touchable)
     vertices, triangles = _shell(mesh)

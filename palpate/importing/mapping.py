@@ -132,10 +132,12 @@ class Column:
 
 _AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
 _BEFORE = {
-    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose pose"
-    " poseposition poseposeposition translation transformtranslation ee eepos probe probepos end loc location",
+    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose"
+    " pose poseposition poseposeposition translation transformtranslation ee eepos probe probepos"
+    " loc location",
     "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque",
-    "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation transformrotation rot",
+    "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation"
+    " transformrotation rot",
 }
 _TIME = "t time times timestamp timestamps stamp ts sec secs seconds elapsed elapsedtime clock"
 _ALONG = (
