@@ -44,9 +44,10 @@ from reconstruct.shapes.polyhedron import refine
 from reconstruct.surface import Surface
 
 POSES = ("auto", "given")
-_MARGIN, _CELLS, _DEEP = 3.0, 44, 25.0
-"""A slab reaches this many thicknesses beyond the touches, in at most so many cells a side; a half-space is
-so many contact radii deep."""
+_MARGIN, _CELLS = 2.0, 40
+"""A slab reaches this many thicknesses beyond the touches, in at most so many cells a side."""
+_DEEP, _GRADED, _GRADE = 25.0, (14, 14, 7), 1.6
+"""A half-space is so many contact radii deep, in cells that are finer towards the middle of its top."""
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be told from it."""
 _FAR = 0.1

