@@ -15,8 +15,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from mechanics.bounds import FARTHEST_M, FASTEST_M_PER_S
 from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 from mechanics.state import TipState
 
 LONGEST_RATE_STEP_S = 0.05
@@ -32,6 +34,17 @@ class MapperOptions:
     force_scale: float = option(1.0, "device newtons a scene newton")
     clutch_button: int = option(-1, "button that lifts the tool off the mapping; -1: none")
     reach_m: float = option(0.25, "how far from the scene's centre a rate device moves", unit="m")
+
+    def __post_init__(self) -> None:
+        check_ranges(self, RANGES)
+
+
+RANGES = {
+    "scale": Range(1e-3, 1e3),
+    "force_scale": Range(0.0, 100.0),
+    "clutch_button": Range(-1, 62),
+    "reach_m": Range(1e-3, 10.0),
+}
 
 
 def axis_matrix(axes: str) -> np.ndarray:
@@ -67,12 +80,7 @@ class Mapping:
     def from_options(
         cls, options: MapperOptions, *, centre_m: ArrayLike = (0.0, 0.0, 0.0), rate: bool = False
     ) -> Mapping:
-        """Checked options about a scene's centre; `rate` for a device whose control is 'rate'."""
-        if not (options.scale > 0 and options.force_scale >= 0):
-            raise OptionError(
-                f"motion scale {options.scale} must be greater than 0, force scale "
-                f"{options.force_scale} not less"
-            )
+        """Options about a scene's centre; `rate` for a device whose control is 'rate'."""
         return cls(
             axis_matrix(options.axes),
             options.scale,
@@ -99,7 +107,14 @@ def start(mapping: Mapping) -> MapperState:
 
 
 def step(mapping: Mapping, state: MapperState, raw: TipState) -> tuple[MapperState, TipState]:
-    """The tip in the scene's frame. While clutched, `force_enabled` is False: command no force then."""
+    """The tip in the scene's frame. While clutched, `force_enabled` is False: command no force then.
+
+    A reading that can be none (not finite, or far beyond every device) leaves the state and gives no place.
+    """
+    if not (
+        np.abs(raw.position_m).max() <= FARTHEST_M and np.abs(raw.velocity_m_per_s).max() <= FASTEST_M_PER_S
+    ):
+        return state, replace(raw, position_m=np.full(3, np.nan), velocity_m_per_s=np.zeros(3))
     clutched = mapping.clutch_button >= 0 and bool(raw.buttons >> mapping.clutch_button & 1)
     velocity = mapping.scale * (mapping.rotation @ raw.velocity_m_per_s)
     if mapping.rate:

@@ -21,6 +21,7 @@ from devices.io_thread import ForcefulDevice, Reading
 from devices.velocity import VelocityEstimate
 from mechanics.errors import DeviceError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 
 SPEC = DeviceSpec(
     name="pid-ffb",
@@ -34,6 +35,7 @@ SPEC = DeviceSpec(
     workspace_radius_m=0.05,
     buttons=8,
 )
+NOT_MEASURED = "{:g} N at full scale is taken, not measured: give --ffb-full-scale for true newtons"
 EFFECT_MS = 50
 RESTART_S = 0.02
 QUIET_S = 0.01
@@ -51,14 +53,21 @@ class PidOptions:
     )
     device_path: str = option("", "which device, as 'palpate devices' lists it", flag="--ffb-path")
 
+    def __post_init__(self) -> None:
+        check_ranges(self, {"full_scale_n": Range(0.01, 200.0), "stroke_m": Range(0.001, 1.0)})
+
 
 class PidWire:
     """The blocking side. Device frame: x right, y away from the person (HID's +y comes towards), z up."""
 
     def __init__(self, options: PidOptions, clock: Clock, hid: Any = None) -> None:
         self.options = options
+        measured = options.full_scale_n != PidOptions().full_scale_n
         self.spec = replace(
-            SPEC, max_force_n=min(options.full_scale_n, SPEC.max_force_n), workspace_radius_m=options.stroke_m
+            SPEC,
+            max_force_n=min(options.full_scale_n, SPEC.max_force_n),
+            workspace_radius_m=options.stroke_m,
+            conditions=() if measured else (NOT_MEASURED.format(options.full_scale_n),),
         )
         self._clock = clock
         self._hid = hid

@@ -4,9 +4,10 @@
 
 It knows no clock and no device: one compiled step on plain arrays, called once a tick by the servo with the
 device's newest raw state. What is wrong falls in two kinds. *Passing* faults (a force that is not finite, a
-stale or non-finite pose, outside the workspace) give zero at once and a fresh ramp when they are over.
-*Latching* faults (unplugged, calibration lost, device fault, over-speed, a jump of the pose, a clock that
-runs backwards) give zero until force is enabled anew. docs/safety.md lists every fault with its bound.
+stale or non-finite pose, outside the workspace, a silent parent) give zero at once and a fresh ramp when
+they are over. *Latching* faults (unplugged, calibration lost, device fault, over-speed, a jump of the pose, a
+clock that stands still or runs backwards) give zero until force is enabled anew, which starts from clean
+memory: nothing that came before reaches beyond it. docs/safety.md lists every fault with its bound.
 """
 
 from __future__ import annotations
@@ -19,15 +20,18 @@ import numpy as np
 from numba import njit
 
 from devices.base import DeviceSpec
+from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 
 OFF, NOT_FINITE, STALE, OUTSIDE, DISCONNECTED, UNCALIBRATED, FAULT, OVER_SPEED, JUMP, CLOCK = (
     1 << k for k in range(10)
 )
-RAMP, CLAMPED, SLEWED, FADED, PASSIVITY = (1 << k for k in range(10, 15))
-ZEROING = OFF | NOT_FINITE | STALE | OUTSIDE | DISCONNECTED | UNCALIBRATED | FAULT | OVER_SPEED | JUMP | CLOCK
+RAMP, CLAMPED, SLEWED, FADED, PASSIVITY, SILENT = (1 << k for k in range(10, 16))
+PASSING = NOT_FINITE | STALE | OUTSIDE | SILENT
 LATCHING = DISCONNECTED | UNCALIBRATED | FAULT | OVER_SPEED | JUMP | CLOCK
+ZEROING = OFF | PASSING | LATCHING
 
 WORDS = {
     OFF: "force is off",
@@ -39,12 +43,13 @@ WORDS = {
     FAULT: "the device reports a fault",
     OVER_SPEED: "too fast",
     JUMP: "the pose jumped",
-    CLOCK: "the clock went backwards",
+    CLOCK: "the clock stood still or went backwards",
     RAMP: "ramping in",
     CLAMPED: "clamped to the greatest force",
     SLEWED: "limited in its rise",
     FADED: "fading at the workspace's edge",
     PASSIVITY: "damped to stay passive",
+    SILENT: "the program that shows it is silent",
 }
 
 
@@ -66,14 +71,19 @@ class SafetyOptions:
     workspace_radius_m: float | None = option(None, "no force outside this radius", unit="m")
 
     def __post_init__(self) -> None:
-        for name in ("slew_n_per_s", "ramp_s", "stale_s", "jump_m"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
-        for name in ("max_force_n", "max_speed_m_per_s", "workspace_radius_m"):
-            value = getattr(self, name)
-            if value is not None and not (math.isfinite(value) and value > 0):
-                raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
+        check_ranges(self, RANGES)
+
+
+RANGES = {
+    "max_force_n": Range(0.01, 200.0),
+    "slew_n_per_s": Range(1.0, 10_000.0, "higher"),
+    "ramp_s": Range(0.05, 60.0, "lower"),
+    "stale_s": Range(0.002, 2.0, "higher"),
+    "max_speed_m_per_s": Range(0.001, 10.0),
+    "jump_m": Range(1e-4, 0.05, "higher"),
+    "workspace_radius_m": Range(0.001, 10.0),
+}
+"""Of the options; those that default to the device's own limit can only tighten it."""
 
 
 class SafetyParameters(NamedTuple):
@@ -120,21 +130,27 @@ class Reading(NamedTuple):
 
 
 def safety_parameters(options: SafetyOptions, spec: DeviceSpec) -> SafetyParameters:
-    """The tighter of what the user allows and what the device can do."""
+    """The tighter of what the user allows and what the device can do.
 
-    def tighter(mine: float | None, device: float) -> float:
+    Raises OptionError where a device with force states a limit that is none (0, negative, not finite).
+    """
+
+    def tighter(name: str) -> float:
         if not spec.has_force:
             return math.inf  # such a device states 0 for every limit, and its force stays 0
-        return device if mine is None else min(mine, device)
+        mine, device = getattr(options, name), float(getattr(spec, name))
+        if not (math.isfinite(device) and device > 0.0):
+            raise OptionError(f"the {name} of {spec.title} is {device:g}; it must be greater than 0")
+        return device if mine is None else min(float(mine), device)
 
     return SafetyParameters(
-        tighter(options.max_force_n, spec.max_force_n) if spec.has_force else 0.0,
-        options.slew_n_per_s,
-        options.ramp_s,
-        options.stale_s,
-        tighter(options.max_speed_m_per_s, spec.max_speed_m_per_s),
-        options.jump_m,
-        tighter(options.workspace_radius_m, spec.workspace_radius_m),
+        tighter("max_force_n") if spec.has_force else 0.0,
+        float(options.slew_n_per_s),
+        float(options.ramp_s),
+        float(options.stale_s),
+        tighter("max_speed_m_per_s"),
+        float(options.jump_m),
+        tighter("workspace_radius_m"),
     )
 
 
@@ -158,11 +174,9 @@ def safety_state(workspace_centre_m: np.ndarray | None = None) -> SafetyState:
 
 SPEED_TIME_S = 0.005
 """Time constant of the speed estimate: one coarse encoder step in a tick must not look like over-speed."""
-
-
-@njit(cache=True, nogil=True)
-def _finite3(vector):
-    return math.isfinite(vector[0]) and math.isfinite(vector[1]) and math.isfinite(vector[2])
+LONGEST_STEP_S = 0.1
+"""A longer tick raises the force no more than this one: a stall is no licence to skip ramp and slew."""
+LONGEST_GAP_S = 10.0
 
 
 @njit(cache=True, nogil=True)
@@ -171,42 +185,81 @@ def _norm3(vector):
 
 
 @njit(cache=True, nogil=True)
+def _start_clean(state):
+    """As made by `safety_state`, but for the workspace and the counts."""
+    for i in range(3):
+        state.force[i] = 0.0
+        state.position[i] = math.nan
+    state.speed[0] = 0.0
+    state.gain[0] = 0.0
+    state.since[0] = 0.0
+    state.sequence[0] = -1
+    state.latched[0] = 0
+
+
+@njit(cache=True, nogil=True)
+def _clock_faults(state, reading, dt_s):
+    """A sequence that runs backwards, a pose from the future, fresh poses while time stands still."""
+    backwards = reading.sequence < state.sequence[0] or reading.age_s < -0.001
+    stands = dt_s == 0.0 and reading.sequence > state.sequence[0]
+    return CLOCK if backwards or stands else 0
+
+
+@njit(cache=True, nogil=True)
 def _motion_faults(parameters, state, reading, dt_s):
-    """Over-speed, jump and a sequence that runs backwards, from fresh finite poses only."""
+    """Over-speed and jump, from fresh poses that can be ones."""
     faults = 0
-    if reading.sequence < state.sequence[0] or reading.age_s < -0.001:
-        faults |= CLOCK
+    state.since[0] = min(state.since[0] + dt_s, LONGEST_GAP_S)
     if reading.sequence != state.sequence[0]:
-        if _finite3(state.position):
+        state.sequence[0] = reading.sequence
+        if not within(reading.position, FARTHEST_M):
+            return 0
+        if within(state.position, FARTHEST_M):
             moved = 0.0
             for i in range(3):
                 moved += (reading.position[i] - state.position[i]) ** 2
             moved = math.sqrt(moved)
-            # several ticks may pass between two poses of a slow device: the pose's age tells how many
-            between = max(dt_s, state.since[0])
+            # several ticks may pass between two poses of a slow device
+            between = state.since[0]
             if moved > parameters.jump_m + parameters.max_speed_m_per_s * between:
                 faults |= JUMP
-            share = between / (SPEED_TIME_S + between)
-            state.speed[0] += share * (moved / between - state.speed[0])
+            # the low pass of moved / between, without a division that a clock could make infinite
+            state.speed[0] += (moved - between * state.speed[0]) / (SPEED_TIME_S + between)
         for i in range(3):
             state.position[i] = reading.position[i]
-        state.sequence[0] = reading.sequence
         state.since[0] = 0.0
-    state.since[0] += dt_s
-    told = _norm3(reading.velocity) if _finite3(reading.velocity) else 0.0
-    if max(told, state.speed[0]) > parameters.max_speed_m_per_s:
+    fastest = parameters.max_speed_m_per_s
+    if state.speed[0] > fastest or _norm3(reading.velocity) > fastest:
         faults |= OVER_SPEED
     return faults
 
 
 @njit(cache=True, nogil=True)
-def safety_step(parameters, state, wanted, reading, enable, dt_s):
+def _fade(parameters, state, position):
+    """1 inside the workspace, falling to 0 at 1.05 of its radius; negative outside that."""
+    radius, distance = parameters.workspace_radius_m, 0.0
+    for i in range(3):
+        distance += (position[i] - state.workspace_centre[i]) ** 2
+    distance = math.sqrt(distance)
+    if distance <= radius:
+        return 1.0
+    if not distance <= 1.05 * radius:
+        return -1.0
+    return 1.0 - (distance / radius - 1.0) / 0.05
+
+
+@njit(cache=True, nogil=True)
+def safety_step(parameters, state, wanted, reading, enable, dt_s, faults=0):
     """Filter one tick's force; writes `state.force`, returns the reasons (bits; `reason_words` reads them).
 
     wanted: (3,) N on the tool, device frame. enable: 0 for force off, else the number of the user's enabling;
-    a latched fault is left only by a number not seen before. dt_s: s since the last call.
+    a latched fault is left only by a number not seen before, which starts from clean memory. dt_s: s since
+    the last call. faults: reasons that the caller found itself.
     """
-    reasons = 0
+    reasons = faults
+    if enable != state.enable[0]:
+        state.enable[0] = enable
+        _start_clean(state)
     if not (math.isfinite(dt_s) and dt_s >= 0.0):
         reasons |= CLOCK
         dt_s = 0.0
@@ -218,26 +271,18 @@ def safety_step(parameters, state, wanted, reading, enable, dt_s):
         reasons |= FAULT
     if not (reading.age_s <= parameters.stale_s):
         reasons |= STALE
+    reasons |= _clock_faults(state, reading, dt_s)
+    reasons |= _motion_faults(parameters, state, reading, min(dt_s, LONGEST_GAP_S))
     fade = 1.0
-    if _finite3(reading.position):
-        reasons |= _motion_faults(parameters, state, reading, dt_s)
-        distance = 0.0
-        for i in range(3):
-            distance += (reading.position[i] - state.workspace_centre[i]) ** 2
-        excess = math.sqrt(distance) / parameters.workspace_radius_m - 1.0
-        if excess > 0.05:
+    if within(reading.position, FARTHEST_M):
+        fade = _fade(parameters, state, reading.position)
+        if fade < 0.0:
             reasons |= OUTSIDE
-        elif excess > 0.0:
-            fade = 1.0 - excess / 0.05
     else:
         reasons |= NOT_FINITE
-    if not _finite3(wanted):
+    if not within(wanted, LARGEST_N):
         reasons |= NOT_FINITE
 
-    if enable != state.enable[0]:
-        state.enable[0] = enable
-        state.latched[0] = 0
-        state.gain[0] = 0.0
     state.latched[0] |= reasons & LATCHING
     reasons |= state.latched[0]
     if enable == 0:
@@ -248,12 +293,13 @@ def safety_step(parameters, state, wanted, reading, enable, dt_s):
         for i in range(3):
             state.force[i] = 0.0
     else:
+        step_s = min(dt_s, LONGEST_STEP_S)
         if state.gain[0] < 1.0:
-            state.gain[0] = min(1.0, state.gain[0] + dt_s / parameters.ramp_s)
+            state.gain[0] = min(1.0, state.gain[0] + step_s / parameters.ramp_s)
             reasons |= RAMP
         if fade < 1.0:
             reasons |= FADED
-        reasons |= _limit(parameters, state, wanted, fade * state.gain[0], dt_s)
+        reasons |= _limit(parameters, state, wanted, fade * state.gain[0], step_s)
     state.reasons[0] = reasons
     for k in range(state.counts.size):
         if reasons & (1 << k):

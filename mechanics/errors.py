@@ -8,6 +8,10 @@ class PalpateError(Exception):
     """Base of every error that a user can mend; the command line prints it and exits with 2."""
 
 
+class FileError(PalpateError, OSError):
+    """A file or folder cannot be opened or written, or would be replaced by something of another kind."""
+
+
 class RecordingError(PalpateError):
     """A recording is unreadable, incomplete, or physically impossible."""
 

@@ -1,15 +1,102 @@
-"""Files that are either whole or not there (written to a temporary name beside the target, then renamed), and
-the user's folder for what can be made again."""
+"""The one boundary to the disk: what is opened, written or replaced goes through here.
+
+Files and folders are either whole or not there (written to a temporary name beside the target, then
+renamed); an output replaces nothing but its own kind; what the operating system refuses is said in one line
+(FileError). Temporary names carry host and process: what a killed one left is swept by the next.
+"""
 
 from __future__ import annotations
 
+import errno
+import gzip
 import hashlib
 import os
 import shutil
+import socket
 import tempfile
-from collections.abc import Iterator
-from contextlib import contextmanager
+import tomllib
+import zlib
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from fnmatch import fnmatch
 from pathlib import Path
+from typing import Any
+
+from mechanics.errors import FileError, PalpateError
+
+FOLLOW_PATHS = "PALPATE_FOLLOW_PATHS"
+"""Set to 1: paths in a TOML may leave its folder."""
+_HEAD_BYTES = 1 << 16
+_WHOLE_BYTES = 1 << 26
+_TEXT_BYTES = 16 << 20
+_DEEPEST = 32
+_PROBE_BYTES = 1 << 16
+
+_REMEDIES = {
+    errno.ENOSPC: "free some space or write to another disk",
+    errno.EDQUOT: "free some space or write to another disk",
+    errno.EFBIG: "write to a place that allows larger files",
+    errno.EROFS: "name a folder that can be written",
+    errno.EACCES: "change its permissions or name another place",
+    errno.EPERM: "change its permissions or name another place",
+    errno.ENOENT: "check the spelling of the path",
+    errno.ENOTDIR: "a part of the path is a file: name another folder",
+    errno.EISDIR: "it is a folder: name a file",
+    errno.EEXIST: "a file of that name is in the way: name another",
+    errno.ENAMETOOLONG: "use a shorter name",
+    errno.ELOOP: "its links lead in a circle: name the file itself",
+    errno.EMFILE: "close other programs or raise the limit of open files (ulimit -n)",
+    errno.EIO: "the disk is failing or was taken out: write to another",
+}
+
+
+@dataclass(frozen=True)
+class Kind:
+    """A kind of file that this program writes, told by how it begins, so that nothing else is replaced.
+
+    words: for people. starts: what such a file may begin with. holds: bytes that stand somewhere in it.
+    likely_bytes: room that one takes. beside: further files that are written with it, with their kinds.
+    """
+
+    words: str
+    starts: tuple[bytes, ...]
+    holds: bytes = b""
+    likely_bytes: int = 1 << 20
+    beside: Callable[[Path], list[tuple[Path, Kind]]] = lambda path: []
+
+    def replaceable(self, path: Path) -> bool:
+        """Whether `path`, an existing file, is empty or of this kind."""
+        data = _head(path, _WHOLE_BYTES if self.holds else _HEAD_BYTES)
+        begins = any(data.lstrip().startswith(start) for start in self.starts)
+        return not data or (begins and self.holds in data)
+
+
+@dataclass(frozen=True)
+class FolderKind:
+    """A kind of folder that this program writes: the file that marks it, and the names that are its own.
+
+    Whatever else lies in such a folder survives when it is replaced.
+    """
+
+    words: str
+    marker: str
+    mark: Kind
+    own: tuple[str, ...]
+    likely_bytes: int = 1 << 25
+
+    def replaceable(self, path: Path) -> bool:
+        """Whether `path`, an existing folder, is empty or of this kind."""
+        marker = path / self.marker
+        return not any(path.iterdir()) or (marker.is_file() and self.mark.replaceable(marker))
+
+    def owns(self, name: str) -> bool:
+        """Whether a file of that name in the folder was written by this program."""
+        return any(fnmatch(name, pattern) for pattern in self.own)
+
+
+JSON = Kind("JSON", (b"{", b"["))
+PNG = Kind("a PNG picture", (b"\x89PNG",), likely_bytes=1 << 22)
 
 
 def cache_folder() -> Path:
@@ -22,51 +109,353 @@ def cache_folder() -> Path:
     return user_cache_path("palpate", appauthor=False)
 
 
-@contextmanager
-def atomic_file(path: Path | str) -> Iterator[Path]:
-    """Yield a temporary path beside `path`; rename it onto `path` when the block ends without an error."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    # the suffix is kept because writers choose their format (and compression) by it
-    suffix = "".join(path.suffixes[-2:])
-    handle, name = tempfile.mkstemp(prefix=f".{path.stem.split('.')[0]}-", suffix=suffix, dir=path.parent)
-    os.close(handle)
-    temporary = Path(name)
-    try:
-        yield temporary
-        umask = os.umask(0)
-        os.umask(umask)
-        temporary.chmod(0o666 & ~umask)
-        os.replace(temporary, path)
-    finally:
-        temporary.unlink(missing_ok=True)
+def told(error: OSError, path: Path | str | None, doing: str) -> str:
+    """One line for a person: which file, what failed, what to do. doing: 'read' or 'written'."""
+    named = path if path is not None else error.filename
+    what = error.strerror or str(error) or type(error).__name__
+    remedy = _REMEDIES.get(error.errno or 0, "check the path and the disk")
+    where = f"'{named}' cannot be {doing}" if named is not None else "a file cannot be used"
+    return f"{where} ({what}): {remedy}"
 
 
 @contextmanager
-def atomic_folder(path: Path | str) -> Iterator[Path]:
-    """Yield a temporary folder beside `path`; it replaces `path` when the block ends without an error."""
-    path = Path(path)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    temporary = Path(tempfile.mkdtemp(prefix=f".{path.name}-", dir=path.parent))
-    old = None
+def reading(path: Path | str, error: type[PalpateError] = FileError) -> Iterator[None]:
+    """What the operating system refuses inside becomes `error`, in one line that names the file."""
     try:
-        yield temporary
-        temporary.chmod(0o755)
-        if path.exists():
-            old = Path(tempfile.mkdtemp(prefix=f".{path.name}-old-", dir=path.parent))
-            os.replace(path, old / path.name)
-        os.replace(temporary, path)
-    except BaseException:
-        if old is not None and not path.exists():
-            os.replace(old / path.name, path)
+        yield
+    except PalpateError:
         raise
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
-        if old is not None:
-            shutil.rmtree(old, ignore_errors=True)
+    except EOFError as refused:
+        raise error(f"'{path}' is not whole, it was cut off: copy it again") from refused
+    except (gzip.BadGzipFile, zlib.error) as refused:
+        raise error(f"'{path}' cannot be unpacked ({refused}): it is damaged; copy it again") from refused
+    except OSError as refused:
+        raise error(told(refused, path, "read")) from refused
+
+
+@contextmanager
+def writing(path: Path | str) -> Iterator[None]:
+    """What the operating system refuses inside becomes a FileError that names the file."""
+    try:
+        yield
+    except PalpateError:
+        raise
+    except OSError as refused:
+        raise FileError(told(refused, path, "written")) from refused
+
+
+def read_text(path: Path | str, error: type[PalpateError] = FileError) -> str:
+    """A UTF-8 file of at most 16 MB; raises `error` in one line for anything else."""
+    with reading(path, error), open(path, "rb") as file:
+        data = file.read(_TEXT_BYTES + 1)
+    if len(data) > _TEXT_BYTES:
+        raise error(f"'{path}' is larger than {_TEXT_BYTES >> 20} MB: it is no text of this program's")
+    try:
+        return data.decode("utf-8-sig")
+    except UnicodeDecodeError as wrong:
+        raise error(f"'{path}' is no UTF-8 text (byte {wrong.start}): save it as UTF-8") from wrong
+
+
+def read_toml(path: Path | str, error: type[PalpateError] = FileError) -> dict[str, Any]:
+    """The table of a TOML file; raises `error` in one line where it is none, or is nested too deep."""
+    text = read_text(path, error)
+    try:
+        table = tomllib.loads(text)
+    except (ValueError, RecursionError) as wrong:
+        raise error(f"'{path}' is no valid TOML: {str(wrong) or type(wrong).__name__}") from wrong
+    level: list[Any] = [table]
+    for _ in range(_DEEPEST):
+        level = [
+            below
+            for value in level
+            if isinstance(value, dict | list)
+            for below in (value.values() if isinstance(value, dict) else value)
+        ]
+    if level:
+        raise error(f"'{path}' is nested more than {_DEEPEST} deep: no table of this program's is")
+    return table
+
+
+def named_in(path: Path, value: str, error: type[PalpateError]) -> Path:
+    """The file or folder that a TOML at `path` names; raises `error` where that leaves the TOML's folder,
+    unless PALPATE_FOLLOW_PATHS=1 asks for it or it is in the cache."""
+    target = Path(os.path.realpath(path.parent / value))
+    roots = (Path(os.path.realpath(path.parent)), Path(os.path.realpath(cache_folder())))
+    if os.environ.get(FOLLOW_PATHS) == "1" or any(target.is_relative_to(root) for root in roots):
+        return target
+    raise error(
+        f"'{path}' names '{value}', which is outside its folder: copy it there, or set {FOLLOW_PATHS}=1 to "
+        "follow such paths"
+    )
+
+
+def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
+    """Before long work: whether `path` can be written and would replace nothing but its own kind.
+
+    Raises FileError that says what is in the way, or how much room is missing.
+    """
+    path = Path(path)
+    with writing(path):
+        target = _target(path, kind)
+        place = target.parent
+        while not place.exists():
+            if place.is_symlink() or place.parent == place:
+                raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(place))
+            place = place.parent
+        for part in target.relative_to(place).parts:
+            if len(os.fsencode(part)) > _longest_name(place):
+                raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
+        free = shutil.disk_usage(place).free
+        if free < kind.likely_bytes:
+            raise FileError(
+                f"'{path}' needs about {kind.likely_bytes >> 20} MB, and its disk has {free / 1e6:.1f} MB "
+                "free: free some space or write to another disk"
+            )
+        with tempfile.TemporaryFile(prefix=temporary_prefix(), dir=place) as probe:
+            probe.write(bytes(_PROBE_BYTES))
+            probe.flush()
+    if isinstance(kind, Kind):
+        for other, other_kind in kind.beside(path):
+            check_target(other, other_kind)
+
+
+def check_room(folder: Path, least_bytes: int) -> None:
+    """Raises FileError where a folder of the cache cannot be made or has less room than that."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        free = shutil.disk_usage(folder).free
+    if free < least_bytes:
+        raise FileError(
+            f"'{folder}' has {free / 1e6:.1f} MB free, about {least_bytes / 1e6:.0f} MB are needed: free "
+            "some space or set PALPATE_CACHE to a folder on another disk"
+        )
+
+
+@contextmanager
+def atomic_file(path: Path | str, kind: Kind | None = None) -> Iterator[Path]:
+    """Yield a temporary path beside `path`; rename it onto `path` when the block ends without an error.
+
+    kind: what it is; an existing file of another kind is left alone. None: a file of the cache, or inside a
+    folder of this program's. Raises FileError for what the operating system refuses in the block.
+    """
+    path = Path(path)
+    with writing(path):
+        target = _target(path, kind) if kind else path
+        target.parent.mkdir(parents=True, exist_ok=True)
+        sweep(target.parent)
+        # the suffix is kept because writers choose their format (and compression) by it
+        suffix = "".join(path.suffixes[-2:])
+        handle, name = tempfile.mkstemp(
+            prefix=temporary_prefix(), suffix=suffix if len(suffix) < 20 else path.suffix[:20],
+            dir=target.parent,
+        )  # fmt: skip
+        os.close(handle)
+        temporary = Path(name)
+        try:
+            yield temporary
+            if kind is not None:
+                _settle(temporary)
+            umask = os.umask(0)
+            os.umask(umask)
+            temporary.chmod(0o666 & ~umask)
+            os.replace(temporary, target)
+        finally:
+            temporary.unlink(missing_ok=True)
+
+
+@contextmanager
+def atomic_folder(path: Path | str, kind: FolderKind) -> Iterator[Path]:
+    """Yield a temporary folder beside `path`; it replaces `path` when the block ends without an error.
+
+    Only a folder of this kind is replaced, and only its own files: others that lie in it move along. Raises
+    FileError for anything else that is there, and for what the operating system refuses.
+    """
+    path = Path(path)
+    with writing(path):
+        target = _target(path, kind)
+        target.parent.mkdir(parents=True, exist_ok=True)
+        sweep(target.parent)
+        temporary = Path(tempfile.mkdtemp(prefix=temporary_prefix(), dir=target.parent))
+        old = None
+        try:
+            yield temporary
+            for file in temporary.rglob("*"):
+                if file.is_file():
+                    _settle(file)
+            temporary.chmod(0o755)
+            if target.exists():
+                _carry_over(target, temporary, kind)
+                old = Path(tempfile.mkdtemp(prefix=temporary_prefix(_OLD), dir=target.parent))
+                os.replace(target, old / target.name)
+            os.replace(temporary, target)
+        except BaseException:
+            if old is not None and not target.exists():
+                os.replace(old / target.name, target)
+            raise
+        finally:
+            shutil.rmtree(temporary, ignore_errors=True)
+            if old is not None:
+                shutil.rmtree(old, ignore_errors=True)
+
+
+@contextmanager
+def sole_writer(folder: Path | str) -> Iterator[None]:
+    """Make `folder` and keep other processes out of it; raises FileError where one writes there already.
+
+    The lock goes with the process, however that ends. Where the system has none, folders are not shared.
+    """
+    folder = Path(folder)
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        try:
+            import fcntl
+        except ImportError:  # Windows
+            yield
+            return
+        path = folder / ".palpate-lock"
+        with open(path, "a+b") as lock:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                # whoever had it a moment ago may have taken the name away
+                if os.fstat(lock.fileno()).st_ino != path.stat().st_ino:
+                    raise BlockingIOError
+            except (BlockingIOError, FileNotFoundError) as error:
+                raise FileError(
+                    f"another palpate is writing to '{folder}': wait for it, or name another folder"
+                ) from error
+            try:
+                yield
+            finally:
+                path.unlink(missing_ok=True)
+
+
+_OLD = "old-"
+_swept: set[Path] = set()
+
+
+def temporary_prefix(label: str = "") -> str:
+    """How the name of every temporary file or folder of this process begins."""
+    host = zlib.crc32(socket.gethostname().encode(errors="replace")) & 0xFFFF
+    return f".palpate-{host:04x}-{os.getpid()}-{label}"
+
+
+@contextmanager
+def temporary_folder(label: str = "") -> Iterator[Path]:
+    """A folder for scratch files, removed at the end; what killed processes left is swept first."""
+    with writing(tempfile.gettempdir()):
+        sweep(Path(tempfile.gettempdir()))
+        with tempfile.TemporaryDirectory(prefix=temporary_prefix(label), ignore_cleanup_errors=True) as name:
+            yield Path(name)
+
+
+def memory_folder() -> Path | None:
+    """Where files cost no disk, swept; None where the system has no such place."""
+    shared = Path("/dev/shm")
+    if not os.access(shared, os.W_OK):
+        return None
+    sweep(shared)
+    return shared
+
+
+def sweep(folder: Path) -> None:
+    """Remove what processes of this host that are gone left in `folder`; a folder that was being replaced
+    goes back to its place. Once a process and folder."""
+    if folder in _swept or os.name == "nt":
+        return
+    _swept.add(folder)
+    ours = temporary_prefix().rsplit("-", 2)[0] + "-"
+    with suppress(OSError):
+        for left in list(folder.iterdir()):
+            process, _, label = left.name.removeprefix(ours).partition("-")
+            if not left.name.startswith(ours) or not process.isdigit() or _alive(int(process)):
+                continue
+            with suppress(OSError):
+                if label.startswith(_OLD):
+                    for kept in left.iterdir():
+                        if not (folder / kept.name).exists():
+                            os.replace(kept, folder / kept.name)
+                if left.is_dir() and not left.is_symlink():
+                    shutil.rmtree(left, ignore_errors=True)
+                else:
+                    left.unlink()
 
 
 def sha256_of_file(path: Path | str) -> str:
     """Hexadecimal SHA-256 of a file's bytes."""
-    with open(path, "rb") as file:
+    with reading(path), open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
+
+
+def _alive(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except ProcessLookupError:
+        return False
+    except (PermissionError, OverflowError):
+        return True
+    return True
+
+
+def _target(path: Path, kind: Kind | FolderKind) -> Path:
+    """Where `path` leads; raises FileError where what is there would be lost, or cannot be replaced."""
+    target = Path(os.path.realpath(path))
+    other = "name another output"
+    if path.is_symlink() and not target.parent.is_dir():
+        raise FileError(f"'{path}' is a link to '{target}', whose folder does not exist: {other}")
+    if not target.exists():
+        return target
+    if isinstance(kind, FolderKind):
+        if not target.is_dir():
+            raise FileError(f"'{path}' exists and is no folder: {other}")
+        if target in (here := Path.cwd(), *here.parents):
+            raise FileError(f"'{path}' is the current folder or holds it: name a folder to be made")
+    elif target.is_dir():
+        raise FileError(f"'{path}' is a folder: name a file")
+    elif not target.is_file():
+        raise FileError(f"'{path}' is no ordinary file: {other}")
+    if not kind.replaceable(target):
+        raise FileError(f"'{path}' exists and is no {_bare(kind.words)}: {other}")
+    return target
+
+
+def _bare(words: str) -> str:
+    return words.removeprefix("a ").removeprefix("an ")
+
+
+def _head(path: Path, most: int) -> bytes:
+    """The first bytes of a file, unpacked where it is packed."""
+    with open(path, "rb") as file:
+        data = file.read(most)
+    if data[:2] == b"\x1f\x8b":
+        with suppress(zlib.error):
+            return zlib.decompressobj(wbits=31).decompress(data, most)
+    return data
+
+
+def _longest_name(folder: Path) -> int:
+    return os.pathconf(folder, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
+
+
+def _settle(path: Path) -> None:
+    """Wait until the bytes are on the disk, where a full one says so."""
+    with open(path, "rb+") as file:
+        os.fsync(file.fileno())
+
+
+def _carry_over(old: Path, new: Path, kind: FolderKind) -> None:
+    """Put what is not this program's from the old folder into the new one, by links where that can be."""
+    for entry in old.iterdir():
+        if kind.owns(entry.name) or entry.name.startswith(".palpate-"):
+            continue
+        if entry.is_dir() and not entry.is_symlink():
+            shutil.copytree(entry, new / entry.name, symlinks=True, copy_function=_link_or_copy)
+        else:
+            _link_or_copy(str(entry), str(new / entry.name))
+
+
+def _link_or_copy(source: str, target: str) -> str:
+    try:
+        os.link(source, target, follow_symlinks=False)
+    except OSError:
+        shutil.copy2(source, target, follow_symlinks=False)
+    return target

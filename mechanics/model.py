@@ -21,19 +21,63 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.dent import dent_laws
+from mechanics.effect_keys import BALL, EFFECT_KEYS, GRADIENT, PLACE, SKIN
 from mechanics.errors import MeshError, ModelError
-from mechanics.files import atomic_folder
+from mechanics.files import FolderKind, Kind, atomic_folder, read_toml
 from mechanics.material import UNKNOWN, Ball, Gradient, Material, Skin, finite, positive
 from mechanics.moduli import balls_ratio, gradient_ratio, skin_ratio, with_balls, within_limits
 from mechanics.press_files import read_csv, read_presses, write_csv, write_presses
 from mechanics.press_making import no_presses
 from mechanics.presses import Presses
-from mechanics.recording import dump_toml
+from mechanics.recording import POISSON, TIP_RADIUS, dump_toml
+from mechanics.schema import ANY, Key, Named, Schema, check_table
 from mechanics.tetmesh import TetMesh, vertex_normals
+from mechanics.vtk_files import read_vtk, vtk_bytes
 
-FORMAT = 2
+FORMAT = 3
 """Of model.toml. 1, which states none: moduli of elements in mesh.vtu, [inclusions], the dent law in
-[provenance]."""
+[provenance]. 2: no [end], the last table, without which a file of format 3 was cut off."""
+
+_MODULUS = Key(low=1.0, high=1e9, unit="Pa", required=True)
+_COUNT = Key(int, low=1, high=10_000_000)
+SCHEMA: Schema = {
+    "format": Key(int, low=1, high=FORMAT),
+    "material": {
+        "young_modulus_pa": _MODULUS,
+        "young_modulus_ci95_pa": Key(low=0.0, high=1e12, size=2, unit="Pa", unknown=True),
+        "poisson_ratio": Key(low=POISSON.low, high=POISSON.high, required=True),
+        "dent_law": Key(str, choices=dent_laws()),
+        "gradient": GRADIENT,
+        "skin": SKIN,
+        "inclusions": Named(BALL),
+    },
+    "tool": {"tip_radius_m": TIP_RADIUS},
+    "mesh": {
+        "nodes": Key(int, low=1, high=_COUNT.high, required=True),
+        "tetrahedra": _COUNT,
+        "touchable_nodes": _COUNT,
+        "mesh_size_m": Key(low=1e-5, high=1.0, unit="m", required=True),
+        "element_order": Key(int, low=1, high=2),
+    },
+    "frame": {
+        "support_point": PLACE,
+        "support_normal": Key(low=-1e6, high=1e6, size=3, required=True),
+    },
+    "effects": EFFECT_KEYS,
+    "provenance": ANY,
+    "end": {"whole": Key(bool, required=True)},
+}
+"""What model.toml may hold; further tables inform and are left alone."""
+_NEEDED = ("material", "tool", "mesh", "frame")
+
+MODEL = FolderKind(
+    "a MODEL folder",
+    "model.toml",
+    Kind("a model.toml", (b"format = ", b"[material]"), holds=b"[material]"),
+    ("model.toml", "mesh.vtu", "presses.bin", "palpations.csv", "surface.vtp", "*.cache", "compliance-*.bin"),
+)
+"""What `write_model` writes, and what is kept beside it later."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,12 +192,15 @@ class Model:
 
 
 def write_model(path: Path | str, model: Model) -> Path:
-    """Write the MODEL folder whole or not at all; an existing folder is replaced. Returns its path."""
+    """Write the MODEL folder whole or not at all; an existing one is replaced, and what others put into it
+    stays. Returns its path.
+
+    Raises FileError where something else is there or the disk refuses, ModelError for values that no reader
+    would take.
+    """
     import pyvista
 
     path = Path(path)
-    if path.exists() and not (path / "model.toml").exists() and (path.is_file() or any(path.iterdir())):
-        raise ModelError(f"'{path}' exists and is no MODEL folder: name another output")
     mesh, material = model.mesh, model.material
     table = {
         "format": FORMAT,
@@ -170,7 +217,10 @@ def write_model(path: Path | str, model: Model) -> Path:
         "effects": {name: dict(keys) for name, keys in model.effects.items()},
         "provenance": dict(model.provenance),
         **{name: dict(keys) for name, keys in model.about.items()},
+        "end": {"whole": True},
     }
+    text = dump_toml(table)
+    _checked(tomllib.loads(text), path / "model.toml")
     kind = pyvista.CellType.TETRA if mesh.order == 1 else pyvista.CellType.QUADRATIC_TETRA
     grid = pyvista.UnstructuredGrid({kind: mesh.tetrahedra}, mesh.points)
     grid.point_data["fixed"] = mesh.fixed.astype(np.uint8)
@@ -180,9 +230,9 @@ def write_model(path: Path | str, model: Model) -> Path:
     grid.cell_data["young_modulus_pa"] = material.young_modulus_pa * model.element_ratio
     if material.field is not None:
         grid.cell_data["modulus_field"] = material.field
-    with atomic_folder(path) as folder:
-        (folder / "model.toml").write_text(dump_toml(table), encoding="utf-8")
-        grid.save(folder / "mesh.vtu")
+    with atomic_folder(path, MODEL) as folder:
+        (folder / "model.toml").write_text(text, encoding="utf-8")
+        (folder / "mesh.vtu").write_bytes(vtk_bytes(grid))
         write_csv(folder / "palpations.csv", model.presses)
         write_presses(folder / "presses.bin", model.presses)
     return path
@@ -201,7 +251,13 @@ def _material_table(material: Material) -> dict[str, Any]:
     }
 
 
-_KNOWN_TABLES = ("format", "material", "tool", "mesh", "frame", "effects", "provenance")
+def _checked(table: dict[str, Any], file: Path) -> None:
+    """Raise ModelError for what SCHEMA does not allow; tables that it does not know are left alone."""
+    for name in _NEEDED:
+        if name not in table:
+            raise ModelError(f"'{file}' lacks [{name}]: it was cut off or is none; reconstruct it again")
+    known = {name: value for name, value in table.items() if name in SCHEMA}
+    check_table(known, SCHEMA, file, ModelError, strict=True)
 
 
 def read_model(path: Path | str) -> Model:
@@ -210,8 +266,6 @@ def read_model(path: Path | str) -> Model:
     Raises ModelError where a file or key is missing, a value is impossible, the files contradict, or the
     format is newer than this program.
     """
-    import pyvista
-
     path = Path(path)
     for name in ("model.toml", "mesh.vtu", "palpations.csv"):
         if not (path / name).is_file():
@@ -219,20 +273,20 @@ def read_model(path: Path | str) -> Model:
                 f"'{path}' is no MODEL folder: it has no {name}; "
                 "make one with 'palpate reconstruct REC -o MODEL'"
             )
-    try:
-        table = tomllib.loads((path / "model.toml").read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise ModelError(f"'{path / 'model.toml'}' is no valid TOML: {error}") from error
+    table = read_toml(path / "model.toml", ModelError)
     version = table.get("format", 1)
-    if version not in (1, FORMAT):
+    if version not in range(1, FORMAT + 1):
         raise ModelError(
             f"'{path}' has format {version}; this program reads 1 to {FORMAT}: "
             "install the version that wrote it, or make it anew with 'palpate reconstruct REC -o MODEL'"
         )
+    if version == FORMAT and "end" not in table:
+        raise ModelError(f"'{path / 'model.toml'}' was cut off: its last table, [end], is missing")
+    _checked(table, path / "model.toml")
     try:
-        grid = pyvista.read(path / "mesh.vtu")
+        grid = read_vtk(path / "mesh.vtu", ModelError)
         mesh = _mesh_of(grid)
-        if int(table["mesh"]["nodes"]) != len(mesh.points):
+        if table["mesh"]["nodes"] != len(mesh.points):
             raise ModelError(
                 f"model.toml says {table['mesh']['nodes']} nodes, mesh.vtu holds {len(mesh.points)}: "
                 "the files are of different models; reconstruct again"
@@ -254,14 +308,14 @@ def read_model(path: Path | str) -> Model:
             presses=_presses(path, float(table["tool"]["tip_radius_m"])),
             effects=table.get("effects", {}),
             provenance=table.get("provenance", {}),
-            about={k: v for k, v in table.items() if k not in _KNOWN_TABLES},
+            about={k: v for k, v in table.items() if k not in SCHEMA and isinstance(v, dict)},
             path=path,
         )
     except ModelError as error:
         raise ModelError(f"'{path}': {error}") from error
     except KeyError as error:
         raise ModelError(f"'{path}' lacks {error}: reconstruct it again") from error
-    except (MeshError, TypeError, ValueError, AttributeError) as error:
+    except (MeshError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise ModelError(f"'{path}' is damaged: {error}") from error
 
 
@@ -282,11 +336,7 @@ def _mesh_of(grid: Any) -> TetMesh:
 
 
 def _material_of(keys: Mapping[str, Any], ratios: np.ndarray | None = None) -> Material:
-    """From [material] and the field of mesh.vtu; raises ModelError for a key that it does not know."""
-    known = [each.name for each in dataclasses.fields(Material) if each.name != "field"]
-    strange = sorted(set(keys) - set(known))
-    if strange:
-        raise ModelError(f"[material] has {', '.join(strange)}; allowed are {', '.join(known)}")
+    """From [material], checked, and the field of mesh.vtu."""
     parts: dict[str, Any] = dict(keys)
     if "gradient" in keys:
         parts["gradient"] = Gradient(**keys["gradient"])

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mechanics.errors import CacheError, ModelError
-from mechanics.files import atomic_file
+from mechanics.files import atomic_file, read_text
 from mechanics.press_making import of_places
 from mechanics.presses import FITS, KINDS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses, Segment
 from mechanics.store import read_arrays, write_arrays
@@ -35,11 +36,7 @@ def write_csv(path: Path | str, presses: Presses) -> None:
 def read_csv(path: Path | str, tip_radius_m: float) -> Presses:
     """The table that `palpations.csv` holds, without samples; raises ModelError where a column is missing or
     a value is no number."""
-    try:
-        with open(path, newline="", encoding="utf-8") as file:
-            rows = list(csv.DictReader(file))
-    except OSError as error:
-        raise ModelError(f"'{path}' cannot be read: {error.strerror}") from error
+    rows = list(csv.DictReader(io.StringIO(read_text(path, ModelError))))
     missing = [c for c in CSV_COLUMNS if rows and c not in rows[0]]
     if missing:
         raise ModelError(f"'{path}' lacks the columns {', '.join(missing)}")
@@ -74,7 +71,7 @@ def write_presses(path: Path, presses: Presses) -> None:
 def read_presses(path: Path) -> Presses:
     """Read what `write_presses` wrote; raises ModelError where the file is damaged."""
     try:
-        arrays = read_arrays(path, _FORMAT)
+        arrays = read_arrays(path, _FORMAT, before=True)
         named: dict[str, Any] = {
             n: np.array(arrays[n]) for n in (*ROW_COLUMNS, *PRESS_COLUMNS) if n in arrays
         }
@@ -87,5 +84,5 @@ def read_presses(path: Path) -> Presses:
             segments=tuple(Segment(KINDS[int(k)], a, b) for k, a, b in arrays["segments"].tolist()),
             recording=bytes(arrays["recording"]).decode(),
         )
-    except (CacheError, KeyError, ValueError) as error:
+    except (CacheError, KeyError, ValueError, TypeError, IndexError) as error:
         raise ModelError(f"'{path}' is damaged ({error}): reconstruct the model again") from error

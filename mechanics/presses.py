@@ -22,9 +22,9 @@ from mechanics.errors import ModelError
 from mechanics.frames import tangents
 from mechanics.samples import delayed
 
-KINDS = ("trace", "press", "free", "rigid", "retrace")
+KINDS = ("trace", "press", "free", "rigid", "retrace", "slide")
 """Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
-more."""
+more, sliding over a surface."""
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc
 N/m^r, b_hc N s/m^(r+1), r_hc; without damping k_v N/m, eq. (5), k_c N/m^r, r_c, eq. (6), and k_h N/m^r, eq.

@@ -7,8 +7,9 @@ described in docs/recording-format.md. SI units; device frame; forces are kept a
 from __future__ import annotations
 
 import gzip
+import io
 import re
-import tomllib
+import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -20,11 +21,59 @@ import numpy as np
 import tomli_w
 
 from mechanics.errors import RecordingError
-from mechanics.files import atomic_file, sha256_of_file
+from mechanics.files import Kind, atomic_file, check_target, named_in, read_toml, reading, sha256_of_file
+from mechanics.schema import ANY, Key, Schema, check_table
 from mechanics.store import content_key
+from mechanics.surface_files import UNITS
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
+
+POISSON = Key(low=0.0, high=0.4999)
+TIP_RADIUS = Key(low=1e-4, high=0.04, unit="m", required=True)
+SCHEMA: Schema = {
+    "recording": {
+        "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
+        "force_on": Key(str, choices=("tool", "object"), required=True),
+        "boundary_phase": Key(size=2, unit="s"),
+        "quasi_static": Key(bool),
+    },
+    "tool": {"tip_radius_m": TIP_RADIUS, "mass_kg": Key(low=0.0, high=5.0, unit="kg")},
+    "sensor": {
+        "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
+        "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
+    },
+    "object": {
+        "name": Key(str),
+        "poisson_ratio": POISSON,
+        "model": Key(str),
+        "shape": Key(str),
+        "shape_unit": Key(str, choices=tuple(UNITS)),
+        "shape_pose": Key(str, choices=("auto", "given")),
+        "shape_up": Key(str),
+        "shape_sink_m": Key(low=0.0, high=1.0, unit="m"),
+        "slab_m": Key(low=1e-6, high=2.0, unit="m"),
+        "half_space": Key(bool),
+    },
+    "import": ANY,
+    "truth": ANY,
+}
+"""What a recording's TOML may hold; further keys are left alone."""
+
+WIDEST_PATH_M = 1.5
+"""Greatest extent of a recorded path: objects are at most 1 m."""
+MOST_SAMPLES = 10_000_000
+"""Of a recording, also where its clock is filled at the sample rate: 2.7 hours at 1 kHz."""
+_UNITS = {"micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
+_HAND_M = (0.02, 0.6)
+"""Extent of a path that a hand makes round an object, to guess a wrong unit by."""
+_RATE_FACTOR = 1.5
+_MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
+"""Bytes of samples, and of unpacked ones a packed byte (numbers pack to a fifth)."""
+
+
+class MisspeltKey(UserWarning):
+    """A key of a recording's TOML looks like one that is known; it was not read."""
 
 
 @dataclass(frozen=True)
@@ -126,9 +175,39 @@ def _check_samples(recording: Recording) -> None:
         start, end = recording.boundary_phase
         if not start < end:
             raise RecordingError(f"boundary_phase = [{start}, {end}]: the start must come before the end (s)")
-    span = np.abs(position).max()
-    if span > 10.0:
-        raise RecordingError(f"positions reach {span:.4g} m: x, y, z must be metres (are these millimetres?)")
+
+
+def _check_sane(recording: Recording) -> None:
+    """What no exploration of an object of 1 mm to 1 m by hand can be; raises RecordingError."""
+    t, rate = recording.t, recording.sample_rate_hz
+    block = min(100, len(t) - 1)
+    read = block / float(np.median(t[block:] - t[:-block]))
+    if not _near(read, rate):
+        units = {"milliseconds": 1e3, "microseconds": 1e6}
+        like = next((unit for unit, scale in units.items() if _near(read * scale, rate)), "")
+        raise RecordingError(
+            f"t steps by {1 / read:.4g}, in seconds {read:.4g} Hz, where sample_rate_hz is {rate:g}: "
+            + (f"these look like {like}; write t in seconds" if like else "state the true rate")
+        )
+    if (t[-1] - t[0]) * max(rate, read) > MOST_SAMPLES:
+        gap = int(np.argmax(np.diff(t)))
+        raise RecordingError(
+            f"the clock runs from {t[0]:.6g} to {t[-1]:.6g} s (longest gap {t[gap + 1] - t[gap]:.4g} s, "
+            f"after data row {gap + 1}): at most {MOST_SAMPLES / rate:.6g} s at {rate:g} Hz; mend the clock "
+            "or cut the recording"
+        )
+    extent = float(np.ptp(recording.position, axis=0).max())
+    if extent > WIDEST_PATH_M:
+        guesses = [u for u, s in _UNITS.items() if _HAND_M[0] <= extent * s <= _HAND_M[1]]
+        like = f"these look like {' or '.join(guesses)}; " if guesses else ""
+        raise RecordingError(
+            f"the tip's path is {extent:.4g} m across: {like}x, y, z must be metres, at most "
+            f"{WIDEST_PATH_M:g} m across"
+        )
+
+
+def _near(value: float, other: float) -> bool:
+    return other / _RATE_FACTOR < value < other * _RATE_FACTOR
 
 
 def recording_files(path: Path | str) -> tuple[Path, Path]:
@@ -159,27 +238,20 @@ def read_recording(path: Path | str) -> Recording:
     """Read and validate a recording.
 
     Raises RecordingError for missing files or columns, values that are not finite, time that does not
-    increase, impossible radii or ratios; the message names the first place.
+    increase, keys of a wrong type or out of range (SCHEMA), a path, clock or size that no exploration has;
+    the message names the first place. Warns of keys that are probably misspelt.
     """
     samples, description = recording_files(path)
-    try:
-        table = tomllib.loads(description.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise RecordingError(f"'{description}' is no valid TOML: {error}") from error
+    table = read_toml(description, RecordingError)
+    for note in check_table(table, SCHEMA, description, RecordingError, strict=False):
+        warnings.warn(note, MisspeltKey, stacklevel=2)
+    about, sensor = table.get("recording", {}), table.get("sensor", {})
+    thing, tool = table.get("object", {}), table.get("tool", {})
+    for name, part, key in (("recording", about, "force_on"), ("tool", tool, "tip_radius_m")):
+        if key not in part:
+            words = SCHEMA[name][key].words  # type: ignore[index, union-attr]
+            raise RecordingError(f"'{description}': [{name}] {key} is missing: it must be {words}")
     data = _read_table(samples)
-    about = table.get("recording", {})
-    sensor = table.get("sensor", {})
-    thing = table.get("object", {})
-    tool = table.get("tool", {})
-    if "tip_radius_m" not in tool:
-        raise RecordingError(f"'{description}' has no [tool] tip_radius_m: state the tip's radius in metres")
-    force_on = about.get("force_on")
-    if force_on not in ("tool", "object"):
-        raise RecordingError(
-            f"'{description}' says [recording] force_on = {force_on!r}: "
-            'allowed are "tool" (the reaction that '
-            'pushes the tool out) and "object" (its negative)'
-        )
     force = np.column_stack([data[c] for c in ("fx", "fy", "fz")])
     quaternion = None
     if all(c in data for c in QUATERNION_COLUMNS):
@@ -187,14 +259,21 @@ def read_recording(path: Path | str) -> Recording:
     t = data["t"]
     rate = about.get("sample_rate_hz")
     if rate is None:
-        rate = (len(t) - 1) / (t[-1] - t[0]) if len(t) > 1 and t[-1] > t[0] else 1000.0
+        rate = 1 / float(np.median(np.diff(t))) if len(t) > 1 and (np.diff(t) > 0).all() else 1000.0
+        limits = SCHEMA["recording"]["sample_rate_hz"]  # type: ignore[index]
+        if np.isfinite(t).all() and not limits.takes(rate):  # type: ignore[union-attr]
+            raise RecordingError(
+                f"'{samples}': t steps by {1 / rate:.4g} s, which is {rate:.4g} Hz; it must be "
+                f"{limits.words}"  # type: ignore[union-attr]
+                + (": these look like milliseconds; write t in seconds" if rate < 60 <= rate * 1e3 else "")
+            )
     phase = about.get("boundary_phase")
     base = thing.get("model")
     try:
-        return Recording(
+        recording = Recording(
             t=t,
             position=np.column_stack([data[c] for c in ("x", "y", "z")]),
-            force_on_tool=force if force_on == "tool" else -force,
+            force_on_tool=force if about["force_on"] == "tool" else -force,
             quaternion=quaternion,
             sample_rate_hz=float(rate),
             tip_radius_m=float(tool["tip_radius_m"]),
@@ -202,7 +281,7 @@ def read_recording(path: Path | str) -> Recording:
             boundary_phase=None if phase is None else (float(phase[0]), float(phase[1])),
             force_noise_std_n=_optional_float(sensor.get("force_noise_std_n")),
             position_resolution_m=_optional_float(sensor.get("position_resolution_m")),
-            object_name=str(thing.get("name", "object")),
+            object_name=thing.get("name", "object"),
             poisson_ratio=_optional_float(thing.get("poisson_ratio")),
             base_model=None if base is None else (description.parent / base),
             truth=table.get("truth"),
@@ -210,39 +289,112 @@ def read_recording(path: Path | str) -> Recording:
             sha256=sha256_of_file(samples),
             description=table,
         )
+        _check_sane(recording)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
-    except (TypeError, ValueError, IndexError) as error:
-        raise RecordingError(f"'{description}' holds a value of the wrong kind: {error}") from error
+    return recording
+
+
+def base_model_of(recording: Recording) -> Path:
+    """The MODEL folder whose base stands in; raises RecordingError where the recording's TOML names none, or
+    one that is not within its folder (mechanics.files.named_in)."""
+    if recording.base_model is None:
+        raise RecordingError("the recording names no model whose base stands in: [object] model = PATH")
+    if recording.path is None:
+        return recording.base_model
+    return named_in(recording.path, str(recording.base_model.absolute()), RecordingError)
 
 
 def _optional_float(value: Any) -> float | None:
     return None if value is None else float(value)
 
 
+class _Bounded(io.RawIOBase):
+    """A stream that refuses to go on for ever: a small packed file may hold terabytes."""
+
+    def __init__(self, path: Path, most: int) -> None:
+        packed = path.suffix == ".gz"
+        self._file: Any = gzip.open(path) if packed else open(path, "rb")
+        self._left, self._path = most, path
+
+    def readable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        count = self._file.readinto(buffer)
+        self._left -= count
+        if self._left < 0:
+            raise RecordingError(f"'{self._path}' unpacks to more than any recording holds: it is none")
+        return count
+
+    def close(self) -> None:
+        self._file.close()
+        super().close()
+
+
 def _read_table(path: Path) -> dict[str, np.ndarray]:
-    """Columns by name; raises RecordingError where the header or a row does not fit."""
-    opener = gzip.open if path.suffix == ".gz" else open
-    try:
-        with opener(path, "rt", encoding="utf-8-sig") as file:
-            header = [name.strip() for name in file.readline().split(",")]
+    """Columns by name; raises RecordingError where the header or a row does not fit.
+
+    Numbers are ASCII, so that other columns may hold text of any encoding that begins with ASCII.
+    """
+    with reading(path, RecordingError):
+        size = path.stat().st_size
+        most = min(_MOST_TEXT, _MOST_UNPACKED * size + (1 << 20)) if path.suffix == ".gz" else _MOST_TEXT
+        raw = io.BufferedReader(_Bounded(path, most), 1 << 18)
+        with io.TextIOWrapper(raw, encoding="utf-8-sig", errors="surrogateescape") as file:
+            first = file.readline(1 << 16)
+            if "\0" in first or len(first) >= 1 << 16:
+                raise RecordingError(f"'{path}' is no text of comma-separated numbers: save it as UTF-8 CSV")
+            header = [name.strip() for name in first.split(",")]
             missing = [c for c in REQUIRED_COLUMNS if c not in header]
             if missing:
+                shown = ascii(", ".join(header))[1:-1]
                 raise RecordingError(
-                    f"'{path}' lacks the columns {', '.join(missing)} (its header has {', '.join(header)}): "
-                    f"needed are {', '.join(REQUIRED_COLUMNS)}"
+                    f"'{path}' lacks the columns {', '.join(missing)} (its header has "
+                    f"{shown if len(shown) < 200 else shown[:200] + '...'}): needed are "
+                    f"{', '.join(REQUIRED_COLUMNS)}"
                 )
             wanted = [c for c in (*REQUIRED_COLUMNS, *QUATERNION_COLUMNS) if c in header]
-            values = np.loadtxt(
-                file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2, comments=None
-            )
-    except (ValueError, UnicodeDecodeError) as error:
+            twice = [c for c in wanted if header.count(c) > 1]
+            if twice:
+                raise RecordingError(f"'{path}' has the column {twice[0]} twice: leave one of them out")
+            try:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore", UserWarning)  # of empty lines and files
+                    values = np.loadtxt(
+                        file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2,
+                        comments=None, max_rows=MOST_SAMPLES + 1,
+                    )  # fmt: skip
+            except ValueError as error:
+                raise RecordingError(
+                    f"'{path}' has a row that is not {len(header)} decimal numbers: {ascii(str(error))[1:-1]}"
+                ) from error
+    if len(values) > MOST_SAMPLES:
         raise RecordingError(
-            f"'{path}' has a row that is not {len(header)} decimal numbers: {error}"
-        ) from error
-    except (OSError, EOFError) as error:  # gzip raises these on a truncated or corrupt file
-        raise RecordingError(f"'{path}' cannot be read ({error}): is it whole?") from error
+            f"'{path}' has more than {MOST_SAMPLES} samples: cut it, or sample it more slowly"
+        )
     return dict(zip(wanted, values.T, strict=True))
+
+
+def _description_of(path: Path) -> list[tuple[Path, Kind]]:
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    return [(path.with_name(stem + ".toml"), DESCRIPTION)]
+
+
+DESCRIPTION = Kind("a recording's description", (b"[recording]",))
+SAMPLES = Kind(
+    "a recording", (",".join(REQUIRED_COLUMNS).encode(),), likely_bytes=1 << 24, beside=_description_of
+)
+
+
+def samples_path(path: Path | str) -> Path:
+    """Where the samples of a recording to be written go; raises RecordingError for another ending."""
+    path = Path(path)
+    if path.suffix == ".toml":
+        path = path.with_suffix(".csv.gz")
+    if not path.name.endswith((".csv", ".csv.gz")):
+        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
+    return path
 
 
 def write_recording(
@@ -252,11 +404,9 @@ def write_recording(
 
     Times are written to 0.1 ms, positions to 1 nm, forces to 1 uN. Returns the path of the samples.
     """
-    path = Path(path)
-    if path.suffix == ".toml":
-        path = path.with_suffix(".csv.gz")
-    if not path.name.endswith((".csv", ".csv.gz")):
-        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
+    path = samples_path(path)
+    [(description, kind)] = _description_of(path)
+    check_target(description, kind)
     columns = [recording.t[:, None], recording.position, recording.force_on_tool]
     formats = ["%.4f"] + ["%.9f"] * 3 + ["%.6f"] * 3
     names = list(REQUIRED_COLUMNS)
@@ -264,12 +414,22 @@ def write_recording(
         columns.append(recording.quaternion)
         formats += ["%.7f"] * 4
         names += QUATERNION_COLUMNS
-    with atomic_file(path) as temporary:
+    with atomic_file(path, SAMPLES) as temporary:
         opener = gzip.open if path.suffix == ".gz" else open
         with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
             np.savetxt(
                 file, np.hstack(columns), fmt=formats, delimiter=",", header=",".join(names), comments=""
             )
+    table = description_table(recording)
+    if truth is not None:
+        table["truth"] = dict(truth)
+    with atomic_file(description, kind) as temporary:
+        temporary.write_text(dump_toml(table), encoding="utf-8")
+    return path
+
+
+def description_table(recording: Recording) -> dict[str, Any]:
+    """What NAME.toml says of a recording whose samples hold the force on the tool."""
     table: dict[str, Any] = {
         "recording": {"sample_rate_hz": recording.sample_rate_hz, "force_on": "tool"},
         "tool": {"tip_radius_m": recording.tip_radius_m, "mass_kg": recording.tool_mass_kg},
@@ -285,13 +445,9 @@ def write_recording(
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
-    truth = truth if truth is not None else recording.truth
-    if truth is not None:
-        table["truth"] = dict(truth)
-    stem = path.name.removesuffix(".gz").removesuffix(".csv")
-    with atomic_file(path.with_name(stem + ".toml")) as temporary:
-        temporary.write_text(dump_toml(table), encoding="utf-8")
-    return path
+    if recording.truth is not None:
+        table["truth"] = dict(recording.truth)
+    return table
 
 
 def dump_toml(table: Mapping[str, Any]) -> str:

@@ -1,8 +1,8 @@
 """Named arrays in one memory-mapped file: keyed by content, checksummed, written whole or not at all.
 
-Layout: 8 bytes magic, 8 bytes length of the JSON header (little endian), the header, then the arrays,
-each at a multiple of 64 bytes. The header holds the key, each array's type, shape and offset, and the
-SHA-256 of all that follows it.
+Layout: 8 bytes magic, 8 bytes length of the JSON header (little endian), 32 bytes SHA-256 of magic, length
+and header, the header, then the arrays, each at a multiple of 64 bytes. The header holds the key, each
+array's type, shape and offset, and the SHA-256 of all that follows it: no bit can change unnoticed.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ import numpy as np
 from mechanics.errors import CacheError
 from mechanics.files import atomic_file
 
-_MAGIC = b"PALPATE1"
-_ALIGN = 64
+_MAGIC = b"PALPATE2"
+_BEFORE = b"PALPATE1"
+"""Files of before have no checksum of the header."""
+_ALIGN, _START, _DIGEST = 64, 16, 32
 
 
 def content_key(*parts: Any) -> str:
@@ -54,29 +56,38 @@ def write_arrays(path: Path, key: str, arrays: Mapping[str, np.ndarray]) -> None
     header = json.dumps(
         {"key": key, "sha256": digest.hexdigest(), "size": offset, "arrays": entries}
     ).encode()
-    header += b" " * (-(16 + len(header)) % _ALIGN)
+    header += b" " * (-(_START + _DIGEST + len(header)) % _ALIGN)
+    start = _MAGIC + len(header).to_bytes(8, "little")
     with atomic_file(path) as temporary, open(temporary, "wb") as file:
-        file.write(_MAGIC + len(header).to_bytes(8, "little") + header)
+        file.write(start + hashlib.sha256(start + header).digest() + header)
         for padding, data in chunks:
             file.write(padding)
             file.write(data)
         file.flush()
 
 
-def read_arrays(path: Path, key: str) -> dict[str, np.ndarray]:
-    """Map the arrays read-only; raises CacheError where the file is not whole, altered, or of another key."""
+def read_arrays(path: Path, key: str, *, before: bool = False) -> dict[str, np.ndarray]:
+    """Map the arrays read-only; raises CacheError where the file is not whole, altered, or of another key.
+
+    before: files without a checksum of the header are taken too, for what cannot be made again.
+    """
     try:
         with open(path, "rb") as file:
-            start = file.read(16)
-            if len(start) < 16 or start[:8] != _MAGIC:
-                raise CacheError(f"'{path}' is no compliance cache")
+            start = file.read(_START)
+            if len(start) < _START or start[:8] not in ((_MAGIC, _BEFORE) if before else (_MAGIC,)):
+                raise CacheError(f"'{path}' is no file of arrays of this version")
             length = int.from_bytes(start[8:], "little")
             if length > 1 << 20:
                 raise CacheError(f"'{path}' has an impossible header")
-            header = json.loads(file.read(length))
+            sealed = start[:8] == _MAGIC
+            seal = file.read(_DIGEST) if sealed else b""
+            raw = file.read(length)
+            if sealed and hashlib.sha256(start + raw).digest() != seal:
+                raise CacheError(f"'{path}' fails the checksum of its header")
+            header = json.loads(raw)
         if header["key"] != key:
             raise CacheError(f"'{path}' belongs to other content")
-        first = 16 + length
+        first = _START + len(seal) + length
         if path.stat().st_size != first + header["size"]:
             raise CacheError(f"'{path}' is truncated or longer than it was written")
         data = np.memmap(path, dtype=np.uint8, mode="r", offset=first, shape=(header["size"],))
@@ -89,7 +100,7 @@ def read_arrays(path: Path, key: str) -> dict[str, np.ndarray]:
             part = data[entry["offset"] : entry["offset"] + size]
             result[name] = np.asarray(part).view(dtype).reshape(entry["shape"])
         return result
-    except (OSError, ValueError, KeyError, TypeError) as error:
+    except (OSError, ValueError, KeyError, TypeError, OverflowError) as error:
         raise CacheError(f"'{path}' cannot be read as a compliance cache ({error})") from error
 
 

@@ -1,8 +1,17 @@
-"""`python -m palpate`: the same as the command `palpate`."""
+"""`python -m palpate`, and what the command `palpate` runs."""
 
+import signal
 import sys
 
-from palpate.cli import main
+
+def main() -> int:
+    """The command line of this process."""
+    # until it listens itself, Ctrl-C ends it without a word
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+    from palpate.cli import main as command_line
+
+    return command_line()
+
 
 if __name__ == "__main__":
     sys.exit(main())

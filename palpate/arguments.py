@@ -3,20 +3,25 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import dataclasses
 import json
 import math
+import os
 import sys
 import types
 import typing
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, ClassVar, Protocol, Self, TypeVar
 
 import numpy as np
 
-from mechanics.errors import OptionError
-from mechanics.files import atomic_file
+from mechanics.errors import OptionError, PalpateError
+from mechanics.files import JSON, FolderKind, Kind, atomic_file, check_target
+from mechanics.options import check_range
+from mechanics.recording import recording_files
+from mechanics.schema import span
 from palpate.keywords import kinds, options
 
 
@@ -46,12 +51,27 @@ def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[s
         if base is bool:
             keywords["action"] = argparse.BooleanOptionalAction
         else:
-            keywords["type"] = {int: int, str: str, float: finite}.get(base, base)
+            keywords["type"] = _ranged(field, base) if base in (int, float) else base
             if meta["choices"]:
                 keywords["choices"] = meta["choices"]
             else:
                 keywords["metavar"] = (meta["unit"] or base.__name__).upper().replace(" ", "_")
         group.add_argument(flag, **keywords)
+
+
+def _ranged(field: dataclasses.Field[Any], base: type) -> Callable[[str], Any]:
+    """argparse type: a number that the option takes."""
+
+    def number(text: str) -> Any:
+        value = base(text)
+        try:
+            check_range(field, value, f"'{text}'")
+        except OptionError as error:
+            raise argparse.ArgumentTypeError(str(error)) from None
+        return value
+
+    number.__name__ = base.__name__
+    return number
 
 
 def options_from(arguments: argparse.Namespace, kind: type[T], **overrides: Any) -> T:
@@ -89,6 +109,26 @@ def finite(text: str) -> float:
     return value
 
 
+def natural(text: str) -> int:
+    """argparse type: a whole number, 0 or greater."""
+    value = int(text)
+    if not 0 <= value < 1 << 63:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a whole number, 0 or greater")
+    return value
+
+
+def between(low: float, high: float) -> Callable[[str], float]:
+    """argparse type: a number of that range, ends included."""
+
+    def number(text: str) -> float:
+        value = float(text)
+        if not low <= value <= high:
+            raise argparse.ArgumentTypeError(f"'{text}' must be a number{span(low, high, '')}")
+        return value
+
+    return number
+
+
 def vector(text: str) -> np.ndarray:
     """argparse type: three finite numbers, 'X,Y,Z'."""
     parts = text.split(",")
@@ -97,16 +137,86 @@ def vector(text: str) -> np.ndarray:
     return np.array([finite(p) for p in parts])
 
 
+def add_input(parser: argparse.ArgumentParser, *flags: str, **keywords: Any) -> None:
+    """Add an argument that names a file or folder to be read: no output may be the same."""
+    setattr(parser.add_argument(*flags, **keywords), _READS, True)
+
+
+def add_output(
+    parser: argparse.ArgumentParser, *flags: str, kind: Kind | FolderKind, **keywords: Any
+) -> None:
+    """Add an argument that names a file or folder to be written.
+
+    Before the command runs, `check_paths` sees whether it can be, and would replace nothing of another kind.
+    """
+    setattr(parser.add_argument(*flags, **keywords), _WRITES, kind)
+
+
+_READS, _WRITES = "palpate_reads", "palpate_writes"
+
+
+def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:
+    """Before any work: no output is an input or another output, and each can be written (check_target)."""
+    read: dict[str, str] = {}
+    written: dict[str, str] = {}
+    targets: list[tuple[Path, Kind | FolderKind]] = []
+    for action in parser._actions:
+        given = getattr(arguments, action.dest, None)
+        flag = action.option_strings[-1] if action.option_strings else str(action.metavar or action.dest)
+        kind = getattr(action, _WRITES, None)
+        for each in given if isinstance(given, list) else [given]:
+            if each is None or str(each) == "-":
+                continue
+            if hasattr(action, _READS):
+                read |= {_identity(file): flag for file in _files_of(Path(each))}
+            if kind is not None:
+                targets.append((Path(each), kind))
+                for file in _written_at(*targets[-1]):
+                    if _identity(file) in written:
+                        raise OptionError(
+                            f"{flag} and {written[_identity(file)]} both name '{file}': name two"
+                        )
+                    written[_identity(file)] = flag
+    for same in written.keys() & read.keys():
+        raise OptionError(
+            f"{written[same]} would replace what {read[same]} names and is read from: name another output"
+        )
+    for path, kind in targets:
+        check_target(path, kind)
+
+
+def _written_at(path: Path, kind: Kind | FolderKind) -> list[Path]:
+    return [path, *(other for other, _ in kind.beside(path))] if isinstance(kind, Kind) else [path]
+
+
+def _files_of(path: Path) -> list[Path]:
+    """What is read where `path` is named: both files of a recording, a folder with all in it."""
+    with contextlib.suppress(PalpateError, OSError):
+        return list(recording_files(path))
+    with contextlib.suppress(OSError):
+        return [path, *path.iterdir()] if path.is_dir() else [path]
+    return []
+
+
+def _identity(path: Path) -> str:
+    """The same for every name of a file that is there; else its place."""
+    with contextlib.suppress(OSError):
+        about = path.stat()
+        return f"{about.st_dev}:{about.st_ino}"
+    return os.path.realpath(path)
+
+
 def add_json(parser: argparse.ArgumentParser) -> None:
     """Add `--json PATH`."""
-    parser.add_argument(
-        "--json", metavar="PATH", help="write the result as JSON; '-' for standard output alone"
-    )
+    add_output(
+        parser, "--json", kind=JSON, metavar="PATH",
+        help="write the result as JSON; '-' for standard output alone",
+    )  # fmt: skip
 
 
 def add_seed(parser: argparse.ArgumentParser) -> None:
     """Add `--seed N`."""
-    parser.add_argument("--seed", type=int, default=0, help="seed of every random choice (default: 0)")
+    parser.add_argument("--seed", type=natural, default=0, help="seed of every random choice (default: 0)")
 
 
 def plain(value: Any) -> Any:
@@ -132,7 +242,7 @@ def emit_json(value: Any, destination: str | None) -> None:
     if destination == "-":
         print(text)
         return
-    with atomic_file(destination) as temporary:
+    with atomic_file(destination, JSON) as temporary:
         temporary.write_text(text + "\n", encoding="utf-8")
 
 

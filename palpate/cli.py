@@ -1,22 +1,27 @@
 """The `palpate` command: finds the sub-command's module, parses, runs, and turns errors into one line.
 
-Exit codes: 0 success, 1 a check that the user asked for failed, 2 bad arguments or input, 130 interrupted.
+Exit codes: 0 success, 1 a check that the user asked for failed, 2 bad arguments or input, 130 interrupted,
+143 ended by SIGTERM.
 """
 
 from __future__ import annotations
 
-import argparse
-import importlib
 import os
+import signal
 import sys
 from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
 
-from mechanics.errors import PalpateError
-from palpate import __version__
+if TYPE_CHECKING:
+    import argparse
 
 COMMANDS = {
     "demo": "the main job on the embedded example; prints the report's path",
+    "check": "what may be wrong with a recording, before it is believed",
     "reconstruct": "a recording becomes a model",
+    "model": "a MODEL from a surface's file and a modulus",
+    "import": "other programs' files become a recording",
+    "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",
@@ -28,47 +33,136 @@ COMMANDS = {
     "batch": "many recordings at once",
 }
 """Every sub-command, one line each; its module is `palpate.commands.NAME`."""
+MODULES = {"import": "palpate.commands.import_"}
+"""Where a command's name is a word of Python's own."""
+
+
+class Ended(KeyboardInterrupt):
+    """Another process asked this one to end; everything is tidied up as after Ctrl-C."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    argv = list(sys.argv[1:] if argv is None else argv)
+    before = _listen(_leave)
+    try:
+        # nothing is open yet, and libraries that are half loaded do not bear an exception: leave at once
+        command, module, arguments = _parsed(list(sys.argv[1:] if argv is None else argv))
+        if module is None:
+            return arguments
+        _listen(_interrupt)
+        return _run(command, module, arguments)
+    except KeyboardInterrupt as how:
+        print(f"{command.prog}: interrupted", file=sys.stderr)
+        code = 143 if isinstance(how, Ended) else 130
+        if argv is None:
+            _end(code)
+        return code
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _parsed(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, Any]:
+    """(parser, the command's module, its arguments); without a module, the exit code instead of these."""
+    import argparse
+    import importlib
+
     parser = _top_parser()
     if not argv or argv[0].startswith("-"):
         parser.parse_args(argv)
         parser.print_help()
-        return 2 if not argv else 0
+        return parser, None, 2 if not argv else 0
     name = argv[0]
     if name not in COMMANDS:
         parser.error(f"'{name}' is no command; allowed are {', '.join(COMMANDS)}")
     try:
-        module = importlib.import_module(f"palpate.commands.{name}")
+        module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
     except ModuleNotFoundError as error:
         if error.name != f"palpate.commands.{name}":
             raise
         print(f"palpate {name}: not in this version yet; see CHANGELOG.md for what is", file=sys.stderr)
-        return 2
+        return parser, None, 2
     command = argparse.ArgumentParser(
         prog=f"palpate {name}",
         description=module.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_arguments(command)
-    arguments = command.parse_args(argv[1:])
-    try:
-        return int(module.run(arguments) or 0)
-    except PalpateError as error:
-        print(f"palpate {name}: {' '.join(str(error).split())}", file=sys.stderr)
+    return command, module, command.parse_args(argv[1:])
+
+
+def _run(command: argparse.ArgumentParser, module: Any, arguments: argparse.Namespace) -> int:
+    """The one place where errors become a line and an exit code."""
+    import warnings
+
+    from mechanics.errors import PalpateError
+    from mechanics.files import told
+    from mechanics.recording import MisspeltKey
+    from palpate.arguments import check_paths
+
+    def refused(words: str) -> int:
+        print(f"{command.prog}: {' '.join(words.split())}", file=sys.stderr)
         return 2
-    except KeyboardInterrupt:
-        print(f"palpate {name}: interrupted", file=sys.stderr)
-        return 130
-    except BrokenPipeError:
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        return 0
+
+    plain = warnings.showwarning
+
+    def warned(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
+        if issubclass(category, MisspeltKey):
+            refused(f"warning: {message}")
+        else:
+            plain(message, category, *rest, **more)
+
+    with warnings.catch_warnings():
+        warnings.showwarning = warned
+        try:
+            check_paths(command, arguments)
+            return int(module.run(arguments) or 0)
+        except PalpateError as error:
+            return refused(str(error))
+        except BrokenPipeError:
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+            return 0
+        except OSError as error:
+            return refused(told(error, None, "used"))
+        except MemoryError as error:
+            return refused(
+                f"not enough memory ({error}): use a coarser mesh or a shorter recording, or close programs"
+            )
+
+
+def _listen(handler: Any) -> dict[int, Any]:
+    """Let `handler` answer Ctrl-C and requests to end; returns what answered before."""
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
+    try:
+        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        return {n: signal.signal(n, handler) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
+    except ValueError:  # in a thread: signals are the main one's business
+        return {}
+
+
+def _leave(number: int, frame: Any) -> None:
+    os.write(2, b"palpate: interrupted\n")
+    os._exit(128 + number)
+
+
+def _interrupt(number: int, frame: Any) -> None:
+    _listen(_leave)  # a second time leaves without tidying up
+    raise KeyboardInterrupt if number == signal.SIGINT else Ended
+
+
+def _end(code: int) -> None:
+    """End this process without unloading libraries, some of which were interrupted at their work."""
+    import atexit
+
+    atexit._run_exitfuncs()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    os._exit(code)
 
 
 def _top_parser() -> argparse.ArgumentParser:
+    import argparse
+
     width = max(map(len, COMMANDS))
     listing = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in COMMANDS.items())
     parser = argparse.ArgumentParser(
@@ -78,6 +172,8 @@ def _top_parser() -> argparse.ArgumentParser:
         epilog=f"commands:\n{listing}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
+    from palpate import __version__
+
     parser.add_argument("--version", action="version", version=f"palpate {__version__}")
     return parser
 

@@ -15,11 +15,13 @@ from numbers import Integral, Real
 from typing import Any
 
 from mechanics.errors import OptionError
+from mechanics.options import check_range, span_of
 
 _RENDER = ("render.options:RenderOptions",)
 _KINDS: dict[str, tuple[str, ...]] = {
     "reconstruct": (
         "reconstruct.pipeline:ReconstructOptions",
+        "reconstruct.known_shape:GeometryOptions",
         "reconstruct.filtering:FilterOptions",
         "reconstruct.boundary:BoundaryOptions",
         "reconstruct.contacts:ContactOptions",
@@ -45,14 +47,16 @@ FUNCTIONS = tuple(_KINDS)
 
 @dataclass(frozen=True)
 class Option:
-    """One option: its name as a keyword, default, unit ('' for a pure number or a word), words, and the only
-    values allowed where they are few."""
+    """One option: its name as a keyword, default, unit ('' for a pure number or a word), words, the only
+    values allowed where they are few, and the least and greatest number."""
 
     name: str
     default: Any
     unit: str
     help: str
     choices: tuple[str, ...] | None
+    low: float
+    high: float
 
     def __str__(self) -> str:
         unit = f" [{self.unit}]" if self.unit else ""
@@ -76,7 +80,7 @@ def options(function: str) -> Options:
     default, unit and words. Raises OptionError for another name.
     """
     return Options(
-        Option(f.name, f.default, f.metadata["unit"], f.metadata["help"], f.metadata["choices"])
+        Option(f.name, f.default, f.metadata["unit"], f.metadata["help"], f.metadata["choices"], *span_of(f))
         for kind in kinds(function)
         for f in _declared(kind)
     )
@@ -130,3 +134,4 @@ def _check(name: str, value: Any, field: Field, hint: Any) -> None:
         if kind in allowed and not fits:
             unit = f" in {field.metadata['unit']}" if field.metadata["unit"] else ""
             raise OptionError(f"{name} is {value!r}; it must be {words}{unit}")
+    check_range(field, value)

@@ -88,7 +88,7 @@ def _gap_and_speed(signals: Signals, contact: Found) -> tuple[float, float, floa
     )
     lost = int(np.argmin(np.abs(travel - rise.u0_m)))
     beside = float(np.linalg.norm(moved[lost] + travel[lost] * normal))
-    half = int(_SPEED_S * rate / 2)
+    half = max(1, int(_SPEED_S * rate / 2))
     approach = -(signals.position[max(contact.start - half, 0) : contact.start + half]) @ normal
     withdrawal = travel[max(lost - half, 0) : lost + half]
     speeds = [np.ptp(x) * rate / max(len(x) - 1, 1) for x in (approach, withdrawal)]

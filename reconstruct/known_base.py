@@ -1,4 +1,4 @@
-"""The base of an earlier model, for recordings without phase I ([object] model = PATH)."""
+"""A base that was not traced: that of an earlier model ([object] model = PATH), or of a known shape."""
 
 from __future__ import annotations
 
@@ -21,16 +21,20 @@ def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
             f"the base of the model '{model.path}' has only {len(rim)} rim nodes; at least 8 are needed: "
             "reconstruct that model with a finer --mesh-size"
         )
-    n = model.support.normal
+    return base_of_rim(rim, model.support.point, model.support.normal, tip_radius_m)
+
+
+def base_of_rim(rim: np.ndarray, point: np.ndarray, normal: np.ndarray, tip_radius_m: float) -> Boundary:
+    """What a tracing of a rim (k, 3), in order, would have told; on the plane (point, normal), m."""
     after, before = np.roll(rim, -1, axis=0), np.roll(rim, 1, axis=0)
-    outward = np.cross(after - before, n)
-    outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+    outward = np.cross(after - before, normal)
+    outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)
     outward *= np.sign(np.sum(outward * (rim - rim.mean(axis=0))))
     return Boundary(
-        support_point=model.support.point,
-        support_normal=n,
+        support_point=point,
+        support_normal=normal,
         outline=rim,
-        centres=rim + tip_radius_m * (outward + n),
+        centres=rim + tip_radius_m * (outward + normal),
         points=rim,
         interval=(0, 0),
         flatness_m=0.0,

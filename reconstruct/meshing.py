@@ -95,6 +95,11 @@ def mesh_surface(
             if not rest:
                 raise
     progress("meshing", 1.0)
+    return as_meshed(mesh, surface)
+
+
+def as_meshed(mesh: TetMesh, surface: Surface) -> Meshing:
+    """A mesh that was there already, as what `mesh_surface` returns."""
     return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
 
 

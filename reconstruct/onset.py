@@ -65,9 +65,13 @@ def fit_rise(travel: np.ndarray, force: np.ndarray, noise_n: float, *, guess_m: 
     for _ in range(_LEAST_SQUARES_STEPS):
         weight = _soft(residual)[1]
         normal = (slopes * weight[:, None]).T @ slopes
-        step = np.linalg.solve(
-            normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3), slopes.T @ (weight * residual)
-        )
+        try:
+            step = np.linalg.solve(
+                normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3),
+                slopes.T @ (weight * residual),
+            )
+        except np.linalg.LinAlgError:  # a tip that stands still tells nothing of where it touched
+            break
         trial = np.clip(p - step, low, high)
         trial_residual, trial_slopes = _residual(trial, travel, force, noise_n)
         trial_cost = _soft(trial_residual)[0]

@@ -16,19 +16,24 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.recording import Recording
+from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
+from reconstruct.checks.base import Finding
+from reconstruct.checks.outcome import result_of
+from reconstruct.checks.registry import Checkup
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
-from reconstruct.meshing import Meshing, MeshingOptions, mesh_surface, uncertainty_at
+from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
+from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
+from reconstruct.slides import without_slides
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface, shape_table
 from reconstruct.uniaxial import profiles
 
@@ -46,6 +51,8 @@ class ReconstructOptions:
     poisson_ratio: float | None = option(
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
+    geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    force: bool = option(False, "go on although the check-up finds something grave")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
     contact: ContactOptions = field(default_factory=ContactOptions)
@@ -62,6 +69,8 @@ class Reconstruction:
     """The model and everything on the way to it (for reports, comparison and diagnosis).
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
+    seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
+    findings: of the check-up, grave ones first; the interval is as wide as they make it.
     normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
 
@@ -76,13 +85,15 @@ class Reconstruction:
     sites: TouchSites | None = None
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
+    placed: Placed | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises ContactError, SurfaceError or MeshError where a step cannot be
-    done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless options.force);
+    ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -95,13 +106,26 @@ def reconstruct_fully(
     nu = _poisson_ratio(recording, options)
     clock = _Clock()
     progress("contacts", 0.02)
-    exploration = _explored(recording, options)
-    clock.lap("contacts")
-    surface = reconstruct_surface(
-        evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
-    )
-    clock.lap("surface")
-    meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
+    checkup = Checkup(recording, options.force)
+    geometry = stated_geometry(recording, options.geometry)
+    placed = None
+    if geometry.known:
+        exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        checkup.presses(exploration)
+        surface = placed.surface
+        clock.lap("contacts and registration")
+    else:
+        exploration = _explored(recording, options)
+        checkup.presses(exploration)
+        clock.lap("contacts")
+        surface = reconstruct_surface(
+            evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
+        )
+        clock.lap("surface")
+    if placed is not None and placed.mesh is not None:
+        meshing = as_meshed(placed.mesh, surface)
+    else:
+        meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
     clock.lap("mesh")
     touched = exploration.presses
     where = cast(surface.vertices, surface.triangles, touched.point, touched.contact_normal)
@@ -121,7 +145,10 @@ def reconstruct_fully(
         )
         clock.lap("touch sites")
         progress("modulus", 0.8)
-        covariance = compliance_covariance(solver, sites, uncertainty_at(solver.mesh, surface))
+        local = surface if placed is None else placed.by_itself
+        covariance = compliance_covariance(
+            solver, sites, uncertainty_at(solver.mesh, local), pose=None if placed is None else placed.pose
+        )
         clock.lap("shape error")
         fit = fit_modulus(
             presses,
@@ -132,11 +159,14 @@ def reconstruct_fully(
             seed=options.seed,
         )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
+    interval = checkup.interval(result_of(presses, modulus, interval, fit))
     clock.lap("modulus")
     progress("1D models", 0.95)
     one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
     clock.lap("1D models")
     tables = {"shape": shape_table(surface)}
+    if placed is not None:
+        tables["geometry"] = placed.about
     if sites is not None:
         tables["linear_range"] = linear_range(sites, recording.tip_radius_m).table()
     model = Model(
@@ -166,6 +196,8 @@ def reconstruct_fully(
         sites=sites,
         modulus=fit,
         paper_fit=paper_fit,
+        placed=placed,
+        findings=checkup.found,
     )
 
 
@@ -190,25 +222,44 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     return float(nu)
 
 
+def _touches(recording: Recording, options: ReconstructOptions, base: Boundary | None = None) -> Exploration:
+    return explore(
+        recording,
+        method="paper" if options.method == "paper" else "noise",
+        contact_options=options.contact,
+        boundary_options=options.boundary,
+        filter_options=options.filter,
+        boundary=base,
+    )
+
+
 def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
     """Where the recording traces no base, that of [object] model = PATH stands in."""
-
-    def explored(base: Boundary | None = None) -> Exploration:
-        return explore(
-            recording,
-            method="paper" if options.method == "paper" else "noise",
-            contact_options=options.contact,
-            boundary_options=options.boundary,
-            filter_options=options.filter,
-            boundary=base,
-        )
-
     try:
-        return explored()
+        return _touches(recording, options)
     except NoBaseError:
         if recording.base_model is None:
             raise
-    return explored(base_of_model(read_model(recording.base_model), recording.tip_radius_m))
+    base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
+    return _touches(recording, options, base)
+
+
+def _on_known(
+    recording: Recording, options: ReconstructOptions, geometry: GeometryOptions, progress: Progress
+) -> tuple[Exploration, Placed]:
+    """Touches told without a support place the geometry; then they are told again, over its base."""
+    first = without_slides(_touches(recording, options, nowhere(recording)), options.contact.least_palpations)
+    progress("contacts", 0.3)
+    placed = place(
+        recording,
+        first,
+        geometry,
+        mesh_size_m=options.meshing.mesh_size_m,
+        spacing_m=options.surface.surface_spacing_m,
+        progress=_part(progress, 0.3, 0.8),
+    )
+    again = _touches(recording, options, placed.base)
+    return without_slides(again, options.contact.least_palpations), placed
 
 
 def _provenance(

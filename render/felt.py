@@ -24,6 +24,7 @@ from mechanics.model import Model
 from mechanics.sites import TouchSites
 from mechanics.store import content_key
 from mechanics.touch import touch_forces
+from mechanics.vtk_files import vtk_bytes
 from render.base import Renderer
 from render.effects import rendered_touch
 from render.fem import FemRenderer
@@ -202,7 +203,7 @@ def _keep(model: Model, surface: FeltSurface) -> FeltSurface:
     shape.field_data["stiffness_from"] = [surface.stiffness_from]
     try:
         with atomic_file(Path(model.path) / FILE) as temporary:
-            shape.save(temporary)
+            temporary.write_bytes(vtk_bytes(shape))
     except OSError:
         pass  # a full or read-only disk: the surface in memory serves as well
     return surface

@@ -23,8 +23,10 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
+from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 
 LONGEST_DELAY_TICKS = 64
 MOST_OWED_J = 2e-3
@@ -43,17 +45,17 @@ class PassivityOptions:
     forgiven_w: float = option(5e-5, "power at which spent allowance comes back", unit="W")
 
     def __post_init__(self) -> None:
-        for name in (
-            "allowance_j",
-            "payback_s",
-            "velocity_time_s",
-            "most_damping_n_s_per_m",
-            "least_mass_kg",
-            "forgiven_w",
-        ):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value > 0):
-                raise OptionError(f"{name} is {value}; it must be finite and greater than 0")
+        check_ranges(self, RANGES)
+
+
+RANGES = {
+    "allowance_j": Range(1e-7, 0.01, "higher"),
+    "payback_s": Range(1e-4, 1.0, "higher"),
+    "velocity_time_s": Range(1e-4, 0.1),
+    "most_damping_n_s_per_m": Range(0.01, 100.0),
+    "least_mass_kg": Range(0.001, 10.0, "higher"),
+    "forgiven_w": Range(1e-8, 0.01, "higher"),
+}
 
 
 class PassivityParameters(NamedTuple):
@@ -132,6 +134,22 @@ def passivity_state() -> PassivityState:
 
 
 @njit(cache=True, nogil=True)
+def passivity_restart(state):
+    """As at rest with nothing exchanged; the least net energy so far stays for the report.
+
+    When force is enabled anew, and while a fault is latched: what the pose did then was no work of a hand.
+    """
+    for i in range(3):
+        state.position[i] = math.nan
+        state.velocity[i] = state.moved[i] = state.base[i] = state.damping_force[i] = state.acting[i] = 0.0
+        for k in range(LONGEST_DELAY_TICKS):
+            state.commanded[k, i] = 0.0
+    state.energies[NET] = state.energies[OWED] = state.energies[TOTAL] = 0.0
+    state.ticks[0] = state.ticks[1] = 0
+    state.cut[0] = 0.0
+
+
+@njit(cache=True, nogil=True)
 def passivity_before(parameters, state, wanted, position, fresh, dt_s):
     """Observe the last interval and change `wanted` (3,) in place; True where it was changed.
 
@@ -139,7 +157,8 @@ def passivity_before(parameters, state, wanted, position, fresh, dt_s):
     that was really sent, in the same tick.
     """
     energies = state.energies
-    known = math.isfinite(state.position[0]) and math.isfinite(position[0] + position[1] + position[2])
+    here = within(position, FARTHEST_M)
+    known = here and math.isfinite(state.position[0])
     whole = int(parameters.delay_ticks)
     part = parameters.delay_ticks - whole
     tick = state.ticks[0]
@@ -149,12 +168,13 @@ def passivity_before(parameters, state, wanted, position, fresh, dt_s):
         state.acting[i] += part * state.commanded[(tick - 2 - whole) % LONGEST_DELAY_TICKS, i]
     if fresh:
         between = state.ticks[1] * dt_s
-        share = between / (parameters.velocity_time_s + between)
+        lag = parameters.velocity_time_s + between
         given, force2, touch2 = 0.0, 0.0, 0.0
         for i in range(3):
             moved = position[i] - state.position[i] if known else 0.0
             state.moved[i] = moved
-            state.velocity[i] += share * (moved / between - state.velocity[i])
+            # the low pass of moved / between
+            state.velocity[i] += (moved - between * state.velocity[i]) / lag
             given += state.acting[i] / state.ticks[1] * moved
             # the reference's half of this tick; the other half is added once this tick's force is known
             energies[OWED] -= 0.5 * state.base[i] * moved
@@ -169,7 +189,7 @@ def passivity_before(parameters, state, wanted, position, fresh, dt_s):
             # out of contact nothing is stored: what was dissipated is no licence for the next contact
             energies[NET] = min(energies[NET], 0.0)
             energies[OWED] = 0.0
-        if math.isfinite(position[0] + position[1] + position[2]):
+        if here:
             for i in range(3):
                 state.position[i] = position[i]
     else:
@@ -177,10 +197,11 @@ def passivity_before(parameters, state, wanted, position, fresh, dt_s):
             state.moved[i] = 0.0
     if energies[NET] < 0.0:
         energies[NET] = min(0.0, energies[NET] + parameters.forgiven_w * dt_s)
-    energies[LEAST] = min(energies[LEAST], energies[TOTAL])
     for i in range(3):
         state.damping_force[i] = 0.0
-    if not parameters.active:
+    state.cut[0] = 0.0
+    # what is no force becomes zero in the safety filter: it must not enter the books on the way
+    if not (parameters.active and within(wanted, LARGEST_N)):
         return False
     return _control(parameters, state, wanted, dt_s)
 
@@ -228,7 +249,6 @@ def _guard(parameters, state, wanted, speed, dt_s):
     # on the way the force itself speeds the mass up: F (v T + F T^2 / 2m) <= left
     half = 0.5 * dt_s * dt_s / parameters.least_mass_kg
     affordable = 2.0 * max(left, 0.0) / (reach + math.sqrt(reach * reach + 4.0 * half * max(left, 0.0)))
-    state.cut[0] = 0.0
     excess = max(0.0, scale * along - affordable)
     if scale < 1.0 or excess > 0.0:
         for i in range(3):
@@ -254,4 +274,5 @@ def passivity_after(state, wanted, sent):
         energies[DISSIPATED] -= share * state.damping_force[i] * moved
         state.commanded[state.ticks[0] % LONGEST_DELAY_TICKS, i] = sent[i]
     energies[OWED] = min(max(energies[OWED], -1e-5), MOST_OWED_J)
+    energies[LEAST] = min(energies[LEAST], energies[TOTAL])
     state.ticks[0] += 1

@@ -8,13 +8,14 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import OptionError
-from mechanics.files import atomic_file
+from mechanics.files import Kind, atomic_file
 from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from render.base import Renderer
 from render.scene import TouchScene, scene_of
 
+FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
 _CHUNK = 4000
 
 
@@ -59,7 +60,7 @@ def replay_recording(
 
 def write_forces(path: Path | str, t: np.ndarray, forces: np.ndarray) -> None:
     """Write `t,fx,fy,fz`: s, and N on the tool."""
-    with atomic_file(path) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
+    with atomic_file(path, FORCES) as temporary, open(temporary, "w", newline="", encoding="utf-8") as file:
         table = np.column_stack([t, forces])
         np.savetxt(file, table, fmt="%.10g", delimiter=",", header="t,fx,fy,fz", comments="")
 

@@ -12,9 +12,9 @@ from typing import NamedTuple
 import numpy as np
 from numba import njit
 
-from mechanics.errors import OptionError
 from mechanics.model import Model
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 
 CREEP_M_PER_S = 0.005
 """Below this speed friction falls off linearly, so that it does not chatter at rest."""
@@ -30,10 +30,14 @@ class SupportOptions:
     support_friction: float = option(0.2, "friction on the support")
 
     def __post_init__(self) -> None:
-        for name in ("support_stiffness_n_per_m", "support_damping_n_s_per_m", "support_friction"):
-            value = getattr(self, name)
-            if not (math.isfinite(value) and value >= 0):
-                raise OptionError(f"{name} is {value}; it must be a finite number, 0 or greater")
+        check_ranges(self, RANGES)
+
+
+RANGES = {
+    "support_stiffness_n_per_m": Range(0.0, 100_000.0, "higher"),
+    "support_damping_n_s_per_m": Range(0.0, 100.0, "higher"),
+    "support_friction": Range(0.0, 10.0),
+}
 
 
 class SupportParameters(NamedTuple):

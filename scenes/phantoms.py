@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import SceneError
+from mechanics.standing import standing
+from mechanics.surface_files import SUFFIXES, is_surface_file, read_surface
 
 SPACING_M = 0.0018
 """Edge length of the surfaces' triangles, m."""
@@ -80,7 +82,7 @@ def _stack(rings: np.ndarray, bottom: np.ndarray, top: np.ndarray) -> tuple[np.n
     return vertices, np.vstack(faces)
 
 
-def _resample(corners: np.ndarray, spacing: float) -> np.ndarray:
+def resampled(corners: np.ndarray, spacing: float) -> np.ndarray:
     """Points along a polyline, corners kept."""
     pieces = []
     for a, b in zip(corners[:-1], corners[1:], strict=True):
@@ -89,13 +91,13 @@ def _resample(corners: np.ndarray, spacing: float) -> np.ndarray:
     return np.vstack([*pieces, corners[-1:]])
 
 
-def _stacked(
+def stacked(
     outline: np.ndarray,
     profile: np.ndarray,
     height: Callable[[np.ndarray, np.ndarray], np.ndarray] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """outline (n, 2) m; profile (k, 2): scale of the outline and z; `height(xy, z)` may replace
-    z by place.
+    """(vertices, faces) of a closed surface. outline (n, 2) m, star-shaped about the origin; profile (k, 2):
+    scale of the outline and z; `height(xy, z)` may replace z by place.
     """
     scale, z = profile[:, 0], profile[:, 1]
     inner = (scale > 1e-9).nonzero()[0]
@@ -109,33 +111,35 @@ def _stacked(
     return _stack(rings, ends[:1], ends[1:])
 
 
-def _circle(radius: float) -> np.ndarray:
+def circle(radius: float) -> np.ndarray:
+    """(n, 2) m, counter-clockwise, about SPACING_M apart."""
     count = 8 * int(np.ceil(2 * np.pi * radius / SPACING_M / 8))
     angle = 2 * np.pi * np.arange(count) / count
     return radius * np.column_stack([np.cos(angle), np.sin(angle)])
 
 
-def _rectangle(length: float, width: float) -> np.ndarray:
+def rectangle(length: float, width: float) -> np.ndarray:
+    """(n, 2) m, counter-clockwise, corners kept."""
     x, y = length / 2, width / 2
-    return _resample(np.array([[x, -y], [x, y], [-x, y], [-x, -y], [x, -y]]), SPACING_M)[:-1]
+    return resampled(np.array([[x, -y], [x, y], [-x, y], [-x, -y], [x, -y]]), SPACING_M)[:-1]
 
 
-def _column(radius: float, height: float) -> np.ndarray:
+def column(radius: float, height: float) -> np.ndarray:
     """Profile of an upright wall with a flat top, in units of the outline and m."""
     corners = np.array([[0.0, 0.0], [radius, 0.0], [radius, height], [0.0, height]])
-    path = _resample(corners, SPACING_M)
+    path = resampled(corners, SPACING_M)
     return np.column_stack([path[:, 0] / radius, path[:, 1]])
 
 
 def cylinder() -> Phantom:
     """The paper's first silicone: radius 40 mm, height 80 mm, 29 kPa."""
-    vertices, faces = _stacked(_circle(0.040), _column(0.040, 0.080))
+    vertices, faces = stacked(circle(0.040), column(0.040, 0.080))
     return Phantom("cylinder", "cylinder radius 0.040 height 0.080", vertices, faces, 29e3)
 
 
 def block() -> Phantom:
     """The paper's second silicone: 105 mm square, 47 mm high, 16 kPa."""
-    vertices, faces = _stacked(_rectangle(0.105, 0.105), _column(0.0525, 0.047))
+    vertices, faces = stacked(rectangle(0.105, 0.105), column(0.0525, 0.047))
     return Phantom("block", "square block 0.105 x 0.105 x 0.047", vertices, faces, 16e3)
 
 
@@ -146,13 +150,13 @@ def half_sphere() -> Phantom:
     angle = np.linspace(low, np.pi / 2, int(np.ceil(radius * (np.pi / 2 - low) / SPACING_M)) + 1)
     cap = np.column_stack([radius * np.cos(angle), height - radius + radius * np.sin(angle)])
     cap[0, 1], cap[-1] = 0.0, (0.0, height)
-    path = np.vstack([_resample(np.array([[0.0, 0.0], cap[0]]), SPACING_M)[:-1], cap])
+    path = np.vstack([resampled(np.array([[0.0, 0.0], cap[0]]), SPACING_M)[:-1], cap])
     profile = np.column_stack([path[:, 0] / cap[0, 0], path[:, 1]])
-    vertices, faces = _stacked(_circle(cap[0, 0]), profile)
+    vertices, faces = stacked(circle(cap[0, 0]), profile)
     return Phantom("half-sphere", "sphere radius 0.060 cut to height 0.055", vertices, faces, 16e3)
 
 
-def _cushion(height: float, exponent: float, reach: float) -> np.ndarray:
+def cushion(height: float, exponent: float, reach: float) -> np.ndarray:
     """Profile whose wall rises and bends over into a cap: (scale)^p + (z / height)^p = 1."""
     angle = np.linspace(0.0, np.pi / 2, 4000)
     path = np.column_stack(
@@ -162,7 +166,7 @@ def _cushion(height: float, exponent: float, reach: float) -> np.ndarray:
     wanted = np.linspace(0.0, length[-1], int(np.ceil(length[-1] / SPACING_M)) + 1)
     cap = np.column_stack([np.interp(wanted, length, path[:, k]) for k in (0, 1)])
     cap[-1, 0] = 0.0
-    floor = _resample(np.array([[0.0, 0.0], cap[0]]), SPACING_M)[:-1]
+    floor = resampled(np.array([[0.0, 0.0], cap[0]]), SPACING_M)[:-1]
     profile = np.vstack([floor, cap])
     profile[:, 0] /= reach
     return profile
@@ -175,13 +179,13 @@ def bean() -> Phantom:
     turn = np.angle(np.exp(1j * (angle + np.pi / 2)))
     radius *= 1 - 0.45 * np.exp(-((turn / 0.75) ** 2))
     outline = radius[:, None] * np.column_stack([np.cos(angle), np.sin(angle)])
-    vertices, faces = _stacked(outline, _cushion(0.046, 3.0, 0.045))
+    vertices, faces = stacked(outline, cushion(0.046, 3.0, 0.045))
     return Phantom("bean", "kidney 0.111 x 0.065 x 0.046, dent 0.006 deep in one side", vertices, faces, 20e3)
 
 
 def dome() -> Phantom:
     """A breast-like dome, 120 mm wide and 50 mm high, 12 kPa, with two stiff nodules."""
-    vertices, faces = _stacked(_circle(0.060), _cushion(0.050, 2.2, 0.060))
+    vertices, faces = stacked(circle(0.060), cushion(0.050, 2.2, 0.060))
     vertices = vertices.copy()
     vertices[:, 0] += 0.12 * vertices[:, 2] * (vertices[:, 2] / 0.050)
     nodules = (
@@ -200,7 +204,7 @@ def wedge() -> Phantom:
         top = low + (high - low) * (xy[..., 0] / length + 0.5)
         return z / high * top
 
-    vertices, faces = _stacked(_rectangle(length, 0.080), _column(0.040, high), slope)
+    vertices, faces = stacked(rectangle(length, 0.080), column(0.040, high), slope)
     return Phantom("wedge", "wedge 0.100 x 0.080, height 0.032 to 0.058", vertices, faces, 22e3)
 
 
@@ -215,9 +219,9 @@ def bowl() -> Phantom:
     dish = np.column_stack([ball * np.sin(angle), height - deep + ball * (1 - np.cos(angle))])
     dish[0], dish[-1, 0] = (mouth, height), 0.0
     corners = np.array([[0.0, 0.0], [radius, 0.0], [radius, height], [mouth, height]])
-    path = np.vstack([_resample(corners, SPACING_M), dish[1:]])
+    path = np.vstack([resampled(corners, SPACING_M), dish[1:]])
     profile = np.column_stack([path[:, 0] / radius, path[:, 1]])
-    vertices, faces = _stacked(_circle(radius), profile)
+    vertices, faces = stacked(circle(radius), profile)
     return Phantom("bowl", "round block radius 0.048 height 0.050, dish 0.018 deep", vertices, faces, 20e3)
 
 
@@ -237,55 +241,28 @@ DEFAULT_MODULUS_PA = 20e3
 
 
 def phantom(name: str | Path) -> Phantom:
-    """A phantom by its name, or the closed surface in an STL, PLY or VTU file (metres, standing on z = 0).
+    """A phantom by its name, or the closed surface in a file (metres, z up), its base's middle put on the origin.
 
-    Raises SceneError for an unknown name and for a surface that is open or does not stand on its support.
+    Raises SceneError for an unknown name, SurfaceError for a surface that is open or has no flat foot.
     """
     if str(name) in PHANTOMS:
         return PHANTOMS[str(name)]()
     path = Path(name)
-    if path.suffix.lower() not in (".stl", ".ply", ".vtu"):
+    if not is_surface_file(path):
         raise SceneError(
-            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as STL, "
-            f"PLY or VTU"
+            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as "
+            f"{', '.join(SUFFIXES)}"
         )
     if not path.is_file():
         raise SceneError(
             f"'{path}' does not exist: name a phantom ({', '.join(PHANTOMS)}) or a file that is there"
         )
-    return _read(path)
-
-
-def _read(path: Path) -> Phantom:
     import trimesh
 
-    if path.suffix.lower() == ".vtu":
-        import pyvista
-
-        shell = pyvista.read(path).extract_surface().triangulate()
-        surface = trimesh.Trimesh(np.asarray(shell.points), shell.faces.reshape(-1, 4)[:, 1:])
-    else:
-        loaded = trimesh.load(path, force="mesh")
-        if not isinstance(loaded, trimesh.Trimesh):
-            raise SceneError(f"'{path}' holds no surface: a closed one of triangles is needed")
-        surface = loaded
-    surface.merge_vertices()
-    if not surface.is_watertight:
-        raise SceneError(
-            f"'{path}' is not closed: every edge must belong to two triangles; close its holes first"
-        )
-    if surface.volume < 0:
-        surface.invert()
-    low, span = surface.bounds[0], np.ptp(surface.bounds, axis=0)
-    if span.max() > 2.0 or span.max() < 0.01:
-        raise SceneError(f"'{path}' is {span.max():.4g} m across: lengths must be metres, 0.01 to 2 m")
-    shift = np.array([*-(surface.bounds[0] + surface.bounds[1])[:2] / 2, -low[2]])
-    surface.apply_translation(shift)
-    flat = (surface.triangles_center[:, 2] < 0.02 * span[2]) & (surface.face_normals[:, 2] < -0.99)
-    if surface.area_faces[flat].sum() < 0.02 * surface.area:
-        raise SceneError(
-            f"'{path}' has no flat foot: the object must stand on the plane of its lowest point (z up)"
-        )
+    stood = standing(read_surface(path))
+    surface = trimesh.Trimesh(stood.vertices, stood.triangles)
+    low, high = surface.bounds
+    surface.apply_translation([*-(low + high)[:2] / 2, -stood.support_point[2]])
     for _ in range(8):
         if surface.edges_unique_length.max() <= 2.5 * SPACING_M or len(surface.faces) > 60000:
             break

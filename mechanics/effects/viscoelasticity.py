@@ -81,6 +81,7 @@ def _starts() -> list[np.ndarray]:
             (0.05, 0.1, 0.3, 0.5),
             (0.05, 0.15, 0.2, 3.0),
             (0.0, 0.1, 0.05, 10.0),
+            (2.0, 0.4, 1.0, 4.0),  # tissue
         )
     ]
 
@@ -91,10 +92,12 @@ EFFECT = Effect(
     scope=Scope.TIME,
     words="the material creeps and relaxes: force depends on how fast and how long",
     parameters=(
-        Parameter("g_fast", "1", 0.0, 3.0, 0.0, (0.1, 0.0), 0.01, 1.0),
-        Parameter("log_tau_fast", "ln s", np.log(0.02), np.log(0.3), np.log(0.1), (np.log(0.1),), 0.05, 1.0),
-        Parameter("g_slow", "1", 0.0, 3.0, 0.0, (0.1, 0.2), 0.01, 1.0),
-        Parameter("log_tau_slow", "ln s", np.log(0.2), np.log(20.0), np.log(0.7), (np.log(0.7),), 0.05, 1.0),
+        Parameter("g_fast", "1", 0.0, 20.0, 0.0, (0.1, 0.0), 0.01, 1.0),
+        Parameter("log_tau_fast", "ln s", np.log(0.005), np.log(2.0), np.log(0.1), (np.log(0.1),), 0.05, 1.0),
+        Parameter("g_slow", "1", 0.0, 20.0, 0.0, (0.1, 0.2), 0.01, 1.0),
+        Parameter(
+            "log_tau_slow", "ln s", np.log(0.05), np.log(100.0), np.log(0.7), (np.log(0.7),), 0.05, 1.0
+        ),
     ),
     report=_report,
     keys_in_words=_in_words,

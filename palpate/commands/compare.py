@@ -10,16 +10,35 @@ from __future__ import annotations
 import argparse
 
 from palpate import api
-from palpate.arguments import add_json, add_options_of, add_seed, emit_json, given_for, say
+from palpate.arguments import (
+    add_input,
+    add_json,
+    add_options_of,
+    add_output,
+    add_seed,
+    emit_json,
+    given_for,
+    say,
+)
+from palpate.report.page import PAGE
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "FEM against interpolated 1D models on held-out palpations"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, --model, --report, folds, --json, --seed."""
-    parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument("--model", metavar="MODEL", help="take the geometry from it (default: reconstruct)")
-    parser.add_argument("-o", "--report", metavar="REPORT.html", help="write tables and pictures as one page")
+    add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
+    add_input(parser, "--model", metavar="MODEL", help="take the geometry from it (default: reconstruct)")
+    add_output(
+        parser,
+        "-o",
+        "--report",
+        kind=PAGE,
+        metavar="REPORT.html",
+        help="write tables and pictures as a page",
+    )
+    add_mesh_arguments(parser)
     add_options_of(parser, "compare")
     add_json(parser)
     add_seed(parser)
@@ -28,7 +47,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print, report."""
     options = given_for(arguments, "compare")
-    result = api.compare(arguments.recording, arguments.model, seed=arguments.seed, **options)
+    result = api.compare(arguments.recording, given_model(arguments, arguments.model), seed=arguments.seed, **options)
     say(arguments, *result.lines())
     if arguments.report:
         say(arguments, f"report: {result.report(arguments.report)}")

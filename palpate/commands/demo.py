@@ -12,7 +12,10 @@ import os
 import sys
 from pathlib import Path
 
+from mechanics.files import check_target, sole_writer
+from mechanics.model import MODEL
 from palpate.arguments import (
+    add_input,
     add_json,
     add_options,
     add_seed,
@@ -28,7 +31,7 @@ SUMMARY = "the main job on the embedded example; prints the report's path"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where from, where to, and the options."""
-    parser.add_argument("recording", nargs="?", help="a recording (default: the embedded silicone cylinder)")
+    add_input(parser, "recording", nargs="?", help="a recording (default: the embedded silicone cylinder)")
     parser.add_argument(
         "-o", "--output", default="palpate-demo", help="folder for model and report (default: %(default)s)"
     )
@@ -45,13 +48,23 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Run the demo."""
+    folder = Path(arguments.output)
+    check_target(folder / "model", MODEL)
+    with sole_writer(folder):
+        _run(arguments, folder)
+    if arguments.window or (arguments.window is None and _has_screen()):
+        from palpate.cli import main
+
+        return main(["touch", str(folder / "model"), "--device", "mouse"])
+    return 0
+
+
+def _run(arguments: argparse.Namespace, folder: Path) -> None:
     from palpate.report.demo import write_report
     from scenes.build import keep
     from scenes.embedded import embedded_recording
     from scenes.scene import load_scene
 
-    folder = Path(arguments.output)
-    folder.mkdir(parents=True, exist_ok=True)
     source = arguments.recording or embedded_recording()
     result = run_demo(source, folder, options_from(arguments, DemoOptions), progress_bar, arguments.seed)
     report = write_report(result, folder)
@@ -78,11 +91,6 @@ def run(arguments: argparse.Namespace) -> int:
         },
         arguments.json,
     )
-    if arguments.window or (arguments.window is None and _has_screen()):
-        from palpate.cli import main
-
-        return main(["touch", str(folder / "model"), "--device", "mouse"])
-    return 0
 
 
 def _has_screen() -> bool:

@@ -11,29 +11,42 @@ from __future__ import annotations
 import argparse
 
 from mechanics.errors import OptionError
+from mechanics.model import MODEL
+from mechanics.recording import SAMPLES
 from palpate import api
-from palpate.arguments import add_json, add_options_of, add_seed, emit_json, given_for, say
+from palpate.arguments import (
+    add_input,
+    add_json,
+    add_options_of,
+    add_output,
+    add_seed,
+    emit_json,
+    given_for,
+    say,
+)
+from palpate.report.page import PAGE
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "the sim-to-real gap: where, which effect, how far it shrinks"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, --model, --apply, --corrected, --report, options, --json, --seed."""
-    parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument(
-        "--model", metavar="MODEL", help="its model; without it the recording is reconstructed"
-    )
-    parser.add_argument(
-        "--apply", metavar="MODEL2", help="write the improved model (object, contact, boundary effects)"
-    )
-    parser.add_argument(
-        "--corrected",
-        metavar="REC2",
+    add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
+    add_input(parser, "--model", metavar="MODEL", help="its model; without it the recording is reconstructed")
+    add_output(
+        parser, "--apply", kind=MODEL, metavar="MODEL2",
+        help="write the improved model (object, contact, boundary effects)",
+    )  # fmt: skip
+    add_output(
+        parser, "--corrected", kind=SAMPLES, metavar="REC2",
         help="write the recording with the instrument's effects taken off (.csv.gz, .csv)",
-    )
-    parser.add_argument(
-        "--report", metavar="HTML", help="write the three answers with pictures as one HTML page"
-    )
+    )  # fmt: skip
+    add_output(
+        parser, "--report", kind=PAGE, metavar="HTML",
+        help="write the three answers with pictures as one HTML page",
+    )  # fmt: skip
+    add_mesh_arguments(parser)
     add_options_of(parser, "diagnose", skip=("seed",))
     add_json(parser)
     add_seed(parser)
@@ -43,7 +56,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, say it, and write what was asked for."""
     if arguments.corrected and not arguments.corrected.endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{arguments.corrected}' must end in .csv or .csv.gz")
-    result = api.diagnose(arguments.recording, arguments.model, **given_for(arguments, "diagnose"))
+    result = api.diagnose(arguments.recording, given_model(arguments, arguments.model), **given_for(arguments, "diagnose"))
     say(arguments, *result.lines())
     if arguments.apply:
         better = result.improved().save(arguments.apply)

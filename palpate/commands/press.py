@@ -11,16 +11,29 @@ from __future__ import annotations
 import argparse
 
 from palpate import api
-from palpate.arguments import add_json, add_options_of, emit_json, finite, given_for, say, vector
+from palpate.arguments import (
+    add_input,
+    add_json,
+    add_options_of,
+    add_output,
+    emit_json,
+    finite,
+    given_for,
+    say,
+    vector,
+)
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "one scripted press on a model, headless"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """MODEL_OR_SCENE, where and how to press, what to expect."""
+    from render.press import CURVE
     from render.registry import names
 
-    parser.add_argument("model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
+    add_input(parser, "model", metavar="MODEL_OR_SCENE", help="folder of a model, a scene, a surface file")
+    add_mesh_arguments(parser)
     parser.add_argument("--at", type=vector, required=True, metavar="X,Y,Z", help="point aimed at [m]")
     parser.add_argument(
         "--direction", type=vector, required=True, metavar="X,Y,Z", help="of the motion; any length"
@@ -30,8 +43,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--hold", type=finite, default=0.0, metavar="S", help="at depth (default: 0) [s]")
     parser.add_argument("--tip-radius", type=finite, metavar="M", help="(default: the model's) [m]")
     parser.add_argument("--renderer", choices=names(), default="fem", help="(default: fem)")
-    parser.add_argument("-o", "--output", metavar="CURVE.csv", help="write the curve")
-    parser.add_argument("--expect", metavar="CURVE.csv", help="a curve to compare with")
+    add_output(parser, "-o", "--output", kind=CURVE, metavar="CURVE.csv", help="write the curve")
+    add_input(parser, "--expect", metavar="CURVE.csv", help="a curve to compare with")
     parser.add_argument(
         "--tolerance", type=finite, default=0.02, metavar="N", help="of --expect (default: 0.02) [N]"
     )
@@ -45,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     expected = read_curve(arguments.expect) if arguments.expect else None
     curve = api.press(
-        arguments.model,
+        given_model(arguments, arguments.model) or arguments.model,
         arguments.at,
         arguments.direction,
         arguments.depth,

@@ -9,23 +9,44 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mechanics.model import read_model
+from mechanics.model import MODEL, read_model
 from palpate import api
-from palpate.arguments import add_json, add_options_of, add_seed, emit_json, given_for, say
+from palpate.arguments import (
+    add_input,
+    add_json,
+    add_options_of,
+    add_output,
+    add_seed,
+    emit_json,
+    given_for,
+    say,
+)
+from palpate.report.page import PAGE
 
 SUMMARY = "a recording becomes a model"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, -o MODEL, the options of every step, --json, --seed."""
-    parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument("-o", "--output", metavar="MODEL", required=True, help="folder of the model to write")
-    parser.add_argument(
+    add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
+    add_output(
+        parser,
+        "-o",
+        "--output",
+        kind=MODEL,
+        metavar="MODEL",
+        required=True,
+        help="the folder to write",
+    )
+    add_output(
+        parser,
         "--report",
+        kind=PAGE,
         metavar="HTML",
         help="write the paper's figures and table, remade; PNGs into HTML's folder",
     )
-    parser.add_argument(
+    add_input(
+        parser,
         "--beside",
         metavar="MODEL",
         action="append",

@@ -10,7 +10,7 @@ from __future__ import annotations
 import argparse
 
 from palpate import api
-from palpate.arguments import add_json, add_options_of, emit_json, given_for, say
+from palpate.arguments import add_input, add_json, add_options_of, add_output, emit_json, given_for, say
 
 SUMMARY = "a recorded tip path through a renderer, headless"
 
@@ -18,10 +18,11 @@ SUMMARY = "a recorded tip path through a renderer, headless"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """MODEL, REC, -o, the renderer and its options."""
     from render.registry import names
+    from render.replay import FORCES
 
-    parser.add_argument("model", metavar="MODEL", help="folder of a model, or a scene")
-    parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument("-o", "--output", metavar="FORCES.csv", help="write the forces")
+    add_input(parser, "model", metavar="MODEL", help="folder of a model, or a scene")
+    add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
+    add_output(parser, "-o", "--output", kind=FORCES, metavar="FORCES.csv", help="write the forces")
     parser.add_argument("--renderer", choices=names(), default="fem", help="(default: fem)")
     add_options_of(parser, "replay")
     add_json(parser)

@@ -12,9 +12,20 @@ from __future__ import annotations
 import argparse
 
 from mechanics.errors import OptionError
-from mechanics.files import atomic_file
+from mechanics.files import JSON, PNG, atomic_file
+from mechanics.recording import SAMPLES
 from palpate import api
-from palpate.arguments import add_json, add_options_of, add_seed, emit_json, given_for, say
+from palpate.arguments import (
+    add_input,
+    add_json,
+    add_options_of,
+    add_output,
+    add_seed,
+    emit_json,
+    given_for,
+    natural,
+    say,
+)
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.sealing import write_sealed
 from scenes.phantoms import PHANTOMS
@@ -24,10 +35,11 @@ SUMMARY = "the virtual laboratory: a person's exploration of a phantom"
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Phantom, output, effects, sealing, and the options of the exploration and of the hand."""
-    parser.add_argument("phantom", help=f"{', '.join(PHANTOMS)}, or a surface file")
-    parser.add_argument(
-        "-o", "--output", required=True, metavar="REC", help="recording to write (.csv.gz, .csv)"
-    )
+    add_input(parser, "phantom", help=f"{', '.join(PHANTOMS)}, or a surface file")
+    add_output(
+        parser, "-o", "--output", kind=SAMPLES, required=True, metavar="REC",
+        help="recording to write (.csv.gz, .csv)",
+    )  # fmt: skip
     parser.add_argument(
         "--effect",
         action="append",
@@ -37,11 +49,15 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         f"{', '.join(REGISTRY)}",
     )
     parser.add_argument("--seal", action="store_true", help="withhold the truth; needs --truth")
-    parser.add_argument(
-        "--truth", metavar="PATH", help="where the truth goes (JSON), with the salt when sealed"
+    add_output(
+        parser,
+        "--truth",
+        kind=JSON,
+        metavar="PATH",
+        help="where truth (JSON) and, when sealed, salt go",
     )
     parser.add_argument(
-        "--person", type=int, default=0, help="whose hand: 0 the average, 1... others (default: 0)"
+        "--person", type=natural, default=0, help="whose hand: 0 the average, 1... others (default: 0)"
     )
     parser.add_argument(
         "--sizes",
@@ -49,12 +65,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         default=True,
         help="state each effect's size in newtons, which solves without it too (default: yes)",
     )
-    parser.add_argument(
+    add_output(
+        parser,
         "--pictures",
+        kind=PNG,
         metavar="PNG",
         help="also draw the path, the force and every press beside the ideal object",
     )
-    parser.add_argument("--workers", type=int, help="processes that solve touches (default: one a core)")
+    parser.add_argument("--workers", type=natural, help="processes that solve touches (default: one a core)")
     add_options_of(parser, "simulate")
     add_seed(parser)
     add_json(parser)
@@ -99,7 +117,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.pictures:
         from palpate.report.laboratory import simulation_figure
 
-        with atomic_file(arguments.pictures) as picture:
+        with atomic_file(arguments.pictures, PNG) as picture:
             simulation_figure(result).savefig(picture, dpi=110, format="png")
         say(arguments, f"pictures: {arguments.pictures}")
     duration = float(result.recording.t[-1])

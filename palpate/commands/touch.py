@@ -1,7 +1,8 @@
 """Feel a model or scene at 1 kHz: in a window, or headless.
 
 MODEL_OR_SCENE is a MODEL folder, a scene (demo, silicone-1, silicone-2, silicone-3, bean, nodule,
-your-recording, or a scene's .toml), a recording, or a phantom. In the window the mouse hovers over the
+your-recording, or a scene's .toml), a recording, a phantom, or the file of a surface (STL, OBJ, PLY, glTF, VTP, VTU,
+MSH, INP) with --unit and --modulus. In the window the mouse hovers over the
 object, the left button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
 """
 
@@ -22,10 +23,14 @@ from devices.intention import Intention
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
 from mechanics.errors import DeviceError, OptionError
+from mechanics.files import PNG
 from mechanics.model import Model
+from mechanics.recording import SAMPLES
 from palpate.arguments import (
+    add_input,
     add_json,
     add_options,
+    add_output,
     add_seed,
     emit_json,
     finite,
@@ -34,14 +39,14 @@ from palpate.arguments import (
     say,
 )
 from palpate.servo import SafetyOptions, ServoOptions
-from palpate.sources import with_friction
+from palpate.sources import add_mesh_arguments, given_scene, with_friction
 from palpate.window.session import TouchSession
 from render.options import RenderOptions
 from render.registry import names
 from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
-from scenes.scene import Scene, load_scene
+from scenes.scene import Scene
 
 SUMMARY = "feel a model or scene at 1 kHz"
 DEFAULT_SCENE = "demo"
@@ -50,13 +55,15 @@ POLL_S = 0.1
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """The scene, the device, the window, and every option of the parts."""
-    parser.add_argument(
+    add_input(
+        parser,
         "scene",
         nargs="?",
         default=DEFAULT_SCENE,
         metavar="MODEL_OR_SCENE",
         help=f"what to touch (default: {DEFAULT_SCENE})",
     )
+    add_mesh_arguments(parser)
     parser.add_argument(
         "--device",
         metavar="NAME",
@@ -66,16 +73,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--seconds", type=finite, help="stop after this time [s] (default: when the window closes)"
     )
-    parser.add_argument(
-        "--record", metavar="REC", type=Path, help="write the session as a recording (NAME.csv.gz)"
-    )
-    parser.add_argument("--replay", metavar="REC", help="the recording that the device 'replay' plays")
+    add_output(
+        parser, "--record", kind=SAMPLES, metavar="REC", type=Path,
+        help="write the session as a recording (NAME.csv.gz)",
+    )  # fmt: skip
+    add_input(parser, "--replay", metavar="REC", help="the recording that the device 'replay' plays")
     parser.add_argument(
         "--renderer", metavar="NAME", help=f"one of {', '.join(names())} (default: the scene's)"
     )
     parser.add_argument("--beside", metavar="NAME", help="a second renderer, driven by the same tip; 'none'")
-    parser.add_argument(
-        "--screenshot", metavar="PNG", type=Path, help="save a picture of the window at its end"
+    add_output(
+        parser,
+        "--screenshot",
+        kind=PNG,
+        metavar="PNG",
+        type=Path,
+        help="save the window at its end",
     )
     add_options(parser, MapperOptions)
     add_options(parser, RenderOptions)
@@ -91,9 +104,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Open, touch, close; prints what the servo did."""
-    scene = load_scene(arguments.scene)
+    scene = given_scene(arguments, arguments.scene)
     name = arguments.device or ("simulated" if arguments.headless else "mouse")
     _check(arguments, name)
+    servo_options = options_from(
+        arguments,
+        ServoOptions,
+        safety=options_from(arguments, SafetyOptions),
+        support_plane=options_from(arguments, SupportOptions),
+    )
+    for word in servo_options.loosened:
+        print(f"palpate touch: {word}", file=sys.stderr)
     with ExitStack() as stack:
         bar = stack.enter_context(progress_bar("touch"))
         model = model_of(scene, lambda stage, share: bar(stage, 0.5 * share))
@@ -112,12 +133,7 @@ def run(arguments: argparse.Namespace) -> int:
                 beside=_beside(arguments, scene),
                 render_options=with_friction(options_from(arguments, RenderOptions), scene),
                 mapping=_mapping(arguments, name, scene, model),
-                options=options_from(
-                    arguments,
-                    ServoOptions,
-                    safety=options_from(arguments, SafetyOptions),
-                    support_plane=options_from(arguments, SupportOptions),
-                ),
+                options=servo_options,
                 recording=arguments.record,
                 pictures=not arguments.headless,
             )
@@ -137,6 +153,8 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.record is not None:
         say(arguments, f"recorded {arguments.record}")
     emit_json({"scene": scene.name, "device": name, "servo": report.as_dict()}, arguments.json)
+    if session.servo.failure:
+        raise DeviceError(session.servo.failure)
     return 0
 
 

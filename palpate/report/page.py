@@ -9,7 +9,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from mechanics.files import atomic_file
+from mechanics.files import PNG, Kind, atomic_file, reading
+
+PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
 
 _STYLE = """
 :root { color-scheme: light; }
@@ -71,6 +73,10 @@ class Page:
         )
         self._parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
 
+    def part(self, text: str) -> None:
+        """HTML as it is."""
+        self._parts.append(text)
+
     def figure(self, picture: Any, caption: str) -> None:
         """A picture: a matplotlib figure, a PNG's path, or an (h, w, 3) uint8 image."""
         data = base64.b64encode(png_bytes(picture)).decode()
@@ -89,7 +95,7 @@ class Page:
             + "\n".join(self._parts)
             + "<footer>Made by palpate. Forces are on the tool; SI units.</footer></body></html>"
         )
-        with atomic_file(path) as temporary:
+        with atomic_file(path, PAGE) as temporary:
             temporary.write_text(text, encoding="utf-8")
         return Path(path)
 
@@ -97,7 +103,8 @@ class Page:
 def png_bytes(picture: Any) -> bytes:
     """PNG data of a matplotlib figure, a PNG file, or an (h, w, 3) uint8 image."""
     if isinstance(picture, str | Path):
-        return Path(picture).read_bytes()
+        with reading(picture):
+            return Path(picture).read_bytes()
     buffer = io.BytesIO()
     if hasattr(picture, "savefig"):
         picture.savefig(buffer, format="png", dpi=110, bbox_inches="tight")
@@ -113,7 +120,7 @@ def save_figures(folder: Path | str, figures: dict[str, Any]) -> dict[str, Path]
     paths = {}
     for name, picture in figures.items():
         paths[name] = Path(folder) / f"{name}.png"
-        with atomic_file(paths[name]) as temporary:
+        with atomic_file(paths[name], PNG) as temporary:
             temporary.write_bytes(png_bytes(picture))
     return paths
 

@@ -22,7 +22,7 @@ from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from palpate.child import module_command, module_environment
 from palpate.servo import report as reports
-from palpate.servo.layout import ENABLE, STOP, SharedArrays, SharedBlock
+from palpate.servo.layout import BEAT, ENABLE, STOP, SharedArrays, SharedBlock
 from palpate.servo.options import ServoOptions
 from palpate.servo.process import Job
 from palpate.servo.report import ServoReport, ServoSnapshot
@@ -30,6 +30,7 @@ from palpate.servo.source import ModelFolder, ModelSource, RendererChange, Rende
 
 START_TIMEOUT_S = 600.0
 STOP_TIMEOUT_S = 5.0
+BEAT_S = 0.1
 
 
 class Servo:
@@ -37,6 +38,9 @@ class Servo:
 
     model: a Model, a MODEL folder, or a RendererSource. device: a name or a DeviceChoice, made in the servo
     process, which owns it. mapping: device to scene (devices.mapper), the identity by default.
+
+    Force lasts only while this side shows that it lives: every call here is a heartbeat, and so is each turn
+    of `wait`. After `options.silence_s` without one the force goes off, and ramps in again at the next.
     """
 
     def __init__(
@@ -63,6 +67,7 @@ class Servo:
         self._answers: queue.Queue[dict[str, Any]] = queue.Queue()
         self._words: list[str] = []
         self._error = ""
+        self._listener: threading.Thread | None = None
         self._tip_radius_m: float | None = None
         self._enablings = 0
         self._cpu_start_s = 0.0
@@ -99,8 +104,15 @@ class Servo:
 
     @property
     def words(self) -> tuple[str, ...]:
-        """What the system did not permit, and what the servo had to say."""
+        """What the system did not permit, what protects less than by default, what acts on the forces."""
         return tuple(self._words)
+
+    @property
+    def failure(self) -> str:
+        """Why the servo ended by itself; '' while it runs, and after an ordinary end."""
+        if self._listener is not None and not self.alive:
+            self._listener.join(1.0)  # its last words may still be on their way
+        return self._error
 
     def start(self, progress: Progress = silent) -> Self:
         """Spawn; returns when compiled, warmed up and ticking with force off.
@@ -115,7 +127,8 @@ class Servo:
             # a Ctrl-C at the terminal is the parent's to handle
             start_new_session=True,
         )
-        threading.Thread(target=self._listen, daemon=True).start()
+        self._listener = threading.Thread(target=self._listen, daemon=True)
+        self._listener.start()
         self._send(self._job)
         ready = self._await("ready", progress, START_TIMEOUT_S)
         self._block.forget()
@@ -124,8 +137,24 @@ class Servo:
         self._started_s = time.perf_counter()
         return self
 
+    def beat(self) -> None:
+        """One heartbeat: this side lives. Called by whatever asks the servo for something."""
+        self.arrays.control[BEAT] += 1
+
+    def wait(self, seconds: float) -> bool:
+        """Let the servo run for so long, heart beating; False where it ended by itself meanwhile."""
+        end = time.perf_counter() + seconds
+        while self.alive:
+            self.beat()
+            left = end - time.perf_counter()
+            if left <= 0.0:
+                return True
+            time.sleep(min(left, BEAT_S))
+        return False
+
     def enable(self) -> None:
         """Force on: it ramps in. Needed again after every fault that latched."""
+        self.beat()
         self._enablings += 1
         self.arrays.control[ENABLE] = self._enablings
 
@@ -177,11 +206,13 @@ class Servo:
 
     def snapshot(self) -> ServoSnapshot | None:
         """The newest tick; None before the first."""
+        self.beat()
         return reports.snapshot(self.arrays)
 
     def history(self, since: int = 0) -> tuple[np.ndarray, int]:
         """Rows (palpate.servo.layout.ROW) after the first `since` that the ring still holds (7 s at 1 kHz),
         and the number to pass next time."""
+        self.beat()
         return reports.ring_rows(self.arrays, since)
 
     def report(self) -> ServoReport:
@@ -250,10 +281,13 @@ class Servo:
     def _await(self, key: str, progress: Progress, timeout_s: float) -> MappingType[str, Any]:
         end = time.perf_counter() + timeout_s
         while True:
+            self.beat()
             try:
-                message: MappingType[str, Any] = self._answers.get(timeout=max(end - time.perf_counter(), 0))
+                message: MappingType[str, Any] = self._answers.get(timeout=BEAT_S)
             except queue.Empty:
-                raise DeviceError(f"the servo did not answer within {timeout_s:.0f} s") from None
+                if time.perf_counter() > end:
+                    raise DeviceError(f"the servo did not answer within {timeout_s:.0f} s") from None
+                continue
             if "stage" in message:
                 progress(message["stage"], message["fraction"])
             elif "failed" in message:

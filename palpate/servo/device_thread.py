@@ -59,6 +59,7 @@ class DeviceThread:
         self.device = device
         self.mapping = mapping
         self.words: list[str] = []
+        self.failure = ""
         self._loop = loop
         self._arrays = loop.arrays
         self._read_ahead_ns = round(read_ahead_s * 1e9)
@@ -159,7 +160,7 @@ class DeviceThread:
                 self.read_pose()
                 self.send_command(fresh=self._await_tick(poll))
         except Exception as error:  # whatever a driver raises must end in zero force, with its reason
-            self.words.append(f"the device failed: {error}")
+            self.failure = f"the device failed: {str(error) or type(error).__name__}"
             self._arrays.shared.control[STOP] = 1
         finally:
             self._release()

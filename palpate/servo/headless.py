@@ -12,6 +12,7 @@ import numpy as np
 from devices.intention import FreeExploration
 from devices.mapper import Mapping
 from devices.registry import DeviceChoice
+from mechanics.errors import DeviceError
 from mechanics.model import Model, read_model
 from mechanics.progress import Progress, silent
 from palpate.servo.client import Servo
@@ -75,14 +76,17 @@ def run_headless(
         recorder = Recorder(servo) if record is not None else None
         servo.enable()
         start = time.perf_counter()
-        while (elapsed := time.perf_counter() - start) < seconds and servo.alive:
+        while (elapsed := time.perf_counter() - start) < seconds:
             progress("touching", 0.3 + 0.7 * elapsed / seconds)
-            time.sleep(min(POLL_S, max(seconds - elapsed, 0.0)))
+            if not servo.wait(min(POLL_S, seconds - elapsed)):
+                break
             if recorder is not None:
                 recorder.collect()
         result = servo.report()
         servo.stop()
         if recorder is not None and record is not None:
             recorder.write(record)
+        if servo.failure:
+            raise DeviceError(servo.failure)
         progress("touching", 1.0)
         return result

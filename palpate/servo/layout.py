@@ -14,13 +14,15 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.files import memory_folder, temporary_prefix, writing
 from palpate.servo.histogram import BINS
 
 RING_ROWS = 8192
 MOST_TIPS = 32
 
-STOP, ENABLE = range(2)
-"""Cells of `control`: STOP not 0 ends the loop; ENABLE: 0 for force off, else the number of the enabling."""
+STOP, ENABLE, BEAT = range(3)
+"""Cells of `control`: STOP not 0 ends the loop; ENABLE: 0 for force off, else the number of the enabling;
+BEAT: the parent's heartbeat, counted up for as long as it lives and runs."""
 
 TICKS, MISSED, LATE, CONTACT_TICKS, DEADLINE, STARTED, STATUS = range(7)
 """Cells of `counts` (int64): ticks run, deadlines skipped, ticks started late, ticks in contact, the next
@@ -100,6 +102,20 @@ def views(buffer: mmap.mmap | bytearray) -> SharedArrays:
     return SharedArrays(**arrays)
 
 
+def _take(descriptor: int, path: str) -> None:
+    """Give the file its room now: where there is none, writing through the map would kill the process."""
+    with writing(path):
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(descriptor, 0, total_bytes())
+            else:
+                os.ftruncate(descriptor, total_bytes())
+        except OSError:
+            os.close(descriptor)
+            os.unlink(path)
+            raise
+
+
 class SharedBlock:
     """The block: a file in memory, made by the parent, mapped by its path in the servo.
 
@@ -110,11 +126,8 @@ class SharedBlock:
     def __init__(self, path: str | None = None) -> None:
         self._owner = path is None
         if path is None:
-            memory = "/dev/shm"
-            descriptor, path = tempfile.mkstemp(
-                prefix="palpate-servo-", dir=memory if os.access(memory, os.W_OK) else None
-            )
-            os.ftruncate(descriptor, total_bytes())
+            descriptor, path = tempfile.mkstemp(prefix=temporary_prefix("servo-"), dir=memory_folder())
+            _take(descriptor, path)
         else:
             descriptor = os.open(path, os.O_RDWR)
         try:

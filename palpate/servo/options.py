@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, field
 
 import numpy as np
 
+from devices.safety import RANGES as SAFETY_RANGES
 from devices.safety import SafetyOptions
 from mechanics.errors import OptionError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges, loosened
+from render.passivity import RANGES as PASSIVITY_RANGES
 from render.passivity import PassivityOptions
+from render.support import RANGES as SUPPORT_RANGES
 from render.support import SupportOptions
 
 
@@ -27,6 +30,7 @@ class ServoOptions:
     )
     coupling: bool = option(True, "soften stiffness beyond what the device renders stably")
     read_ahead_s: float = option(250e-6, "how long before a tick the device is read", unit="s")
+    silence_s: float = option(1.0, "the window may be silent for so long; then no force", unit="s")
     late_s: float = option(200e-6, "a tick that starts later than this counts as late", unit="s")
     priority: int = option(60, "real-time priority where permitted, 0 for none")
     tip_offsets_m: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
@@ -35,12 +39,9 @@ class ServoOptions:
     passivity: PassivityOptions = field(default_factory=PassivityOptions)
 
     def __post_init__(self) -> None:
-        if not (math.isfinite(self.rate_hz) and 10.0 <= self.rate_hz <= 10_000.0):
-            raise OptionError(f"rate_hz is {self.rate_hz}; allowed is 10 to 10000")
+        check_ranges(self, RANGES)
         if self.on_orphan not in ("stop", "continue"):
             raise OptionError(f"on_orphan is '{self.on_orphan}'; allowed are stop, continue")
-        if not 0 <= self.priority <= 98:
-            raise OptionError(f"priority is {self.priority}; allowed is 0 to 98")
         if not 0.0 <= self.read_ahead_s < 1.0 / self.rate_hz:
             raise OptionError(f"read_ahead_s is {self.read_ahead_s}; allowed is 0 to less than a tick")
         offsets = np.asarray(self.tip_offsets_m, dtype=float)
@@ -51,3 +52,25 @@ class ServoOptions:
     def period_ns(self) -> int:
         """One tick."""
         return round(1e9 / self.rate_hz)
+
+    @property
+    def loosened(self) -> tuple[str, ...]:
+        """What protects less than by default, in plain words."""
+        words = loosened(self, RANGES)
+        words += loosened(self.safety, SAFETY_RANGES) + loosened(self.passivity, PASSIVITY_RANGES)
+        words += loosened(self.support_plane, SUPPORT_RANGES)
+        if not self.coupling:
+            words += ("protection loosened: --no-coupling",)
+        if not self.passivity.passivity:
+            words += ("protection loosened: the passivity controller is off",)
+        if self.on_orphan != "stop":
+            words += (f"protection loosened: --on-orphan is {self.on_orphan} (default stop)",)
+        return words
+
+
+RANGES = {
+    "rate_hz": Range(10.0, 10_000.0),
+    "silence_s": Range(0.1, 60.0, "higher"),
+    "late_s": Range(1e-6, 1.0),
+    "priority": Range(0, 98),
+}

@@ -22,7 +22,7 @@ import numpy as np
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DeviceChoice
 from devices.safety import safety_parameters
-from mechanics.errors import OptionError, PalpateError
+from mechanics.errors import DeviceError, OptionError, PalpateError
 from mechanics.model import Model
 from palpate.servo.device_thread import DeviceThread
 from palpate.servo.layout import ENABLE, MOST_TIPS, STOP, SharedBlock
@@ -117,19 +117,30 @@ class ServoProcess:
                 delay_ticks=self._delay_ticks(),
                 rate_hz=options.rate_hz,
             ),
+            # with on_orphan 'continue' the hand may go on feeling without a window
+            float(options.silence_s) if options.on_orphan == "stop" else 0.0,
         )
 
     def run(self, commands: BinaryIO) -> None:
         """Warm up, tick, follow commands, and end in zero force."""
         quiet_interpreter()
+        for word in self.job.options.loosened:
+            self._tell({"word": word})
         self._progress("loading the model", 0.0)
-        scene = self._scene(*self._source.make(self._progress))
+        renderer, model = self._source.make(self._progress)
+        kind = self._device.spec
+        scene = self._scene(renderer, model)
         self._progress("compiling the loop", 0.95)
         program = make_program(scene, self._arrays, self._parameters())
         locked = lock_memory()
         if locked:
             self._tell({"word": locked})
         self._device.open()
+        for condition in self._device.spec.conditions:
+            self._tell({"word": f"{self._device.spec.title}: {condition}"})
+        if self._device.spec != kind:
+            # the device that is there may be able to do less than its kind
+            program = program._replace(scene=self._scene(renderer, model), parameters=self._parameters())
         priority = self.job.options.priority
 
         def begin_loop() -> None:
@@ -159,6 +170,8 @@ class ServoProcess:
             pump.join(3.0)
             for word in pump.words:
                 self._tell({"word": word})
+        if pump.failure:
+            raise DeviceError(pump.failure)
 
     def _follow(self, commands: BinaryIO) -> None:
         """Take commands until the input ends, which is the parent's end."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
@@ -16,23 +17,31 @@ class Recorder:
     """Call `collect` at least every few seconds, then `write`.
 
     Recorded are the first tip's centre and the rendered force on the tool (support included), scene frame.
+    Rows wait in a file without a name, so that an hour of them takes no memory and nothing is left behind.
     """
 
     def __init__(self, servo: Servo) -> None:
         self._servo = servo
-        self._rows: list[np.ndarray] = []
+        self._spool = tempfile.TemporaryFile(prefix="palpate-rows-")
         self._next = int(servo.arrays.ring_head[0])
 
     def collect(self) -> np.ndarray:
-        """Take what came since the last time, and return those rows."""
+        """Take what came since the last time, and return it; raises RecordingError where it finds no room."""
         rows, self._next = self._servo.history(self._next)
-        if len(rows):
-            self._rows.append(rows)
+        try:
+            self._spool.write(rows.tobytes())
+            self._spool.flush()
+        except OSError as error:
+            raise RecordingError(
+                f"the recording finds no room in {tempfile.gettempdir()} ({error.strerror}): free some, "
+                "or set TMPDIR to another place"
+            ) from error
         return rows
 
     def recording(self, tip_radius_m: float, object_name: str = "object") -> Recording:
         """What was collected; raises RecordingError where there is nothing."""
-        rows = np.concatenate(self._rows) if self._rows else np.zeros(0, dtype=ROW)
+        self._spool.seek(0)
+        rows = np.frombuffer(self._spool.read(), dtype=ROW)
         rows = rows[np.isfinite(rows["tip"]).all(axis=1)]
         if len(rows) < 2:
             raise RecordingError("nothing was recorded: the servo ran for less than two ticks")

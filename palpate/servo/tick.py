@@ -14,15 +14,19 @@ import numpy as np
 from numba import njit
 
 from devices.safety import (
+    LATCHING,
     PASSIVITY,
+    SILENT,
     Reading,
     SafetyParameters,
     SafetyState,
     safety_state,
     safety_step,
 )
+from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from palpate.servo.histogram import count
 from palpate.servo.layout import (
+    BEAT,
     CONTACT_TICKS,
     DEADLINE,
     ENABLE,
@@ -41,6 +45,7 @@ from render.passivity import (
     PassivityState,
     passivity_after,
     passivity_before,
+    passivity_restart,
     passivity_state,
 )
 from render.support import add_support_force
@@ -66,12 +71,18 @@ OUT_WIDTH = 5
 
 
 class TickParameters(NamedTuple):
-    """Fixed between swaps."""
+    """Fixed between swaps. silence_s: how long the parent's heartbeat may stand still; 0: nobody beats."""
 
     period_ns: int
     late_ns: int
     safety: SafetyParameters
     passivity: PassivityParameters
+    silence_s: float = 0.0
+
+
+SEQUENCE, LAST_S, COMPUTE_S, LAST_BEAT, SILENT_S, LAST_ENABLE = range(6)
+"""Cells of `previous`, all of the tick before: the pose's sequence, its deadline, what it took, the parent's
+heartbeat and how long that has stood still, and the enabling."""
 
 
 class TickArrays(NamedTuple):
@@ -114,7 +125,7 @@ def tick_arrays(shared: SharedArrays, offsets_m: np.ndarray, workspace_centre_m:
         forces=np.zeros(offsets.shape),
         rendered=np.zeros(3),
         wanted=np.zeros(3),
-        previous=np.array([-1.0, 0.0, 0.0]),
+        previous=np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
         timespec=np.zeros(2, dtype=np.int64),
         word=np.ones(1, dtype=np.int64),
         safety=safety_state(workspace_centre_m),
@@ -141,6 +152,10 @@ def before(arrays):
         arrays.tips[t, 0] = pose[IN_TIP] + a + 2.0 * (w * cx + y * cz - z * cy)
         arrays.tips[t, 1] = pose[IN_TIP + 1] + b + 2.0 * (w * cy + z * cx - x * cz)
         arrays.tips[t, 2] = pose[IN_TIP + 2] + c + 2.0 * (w * cz + x * cy - y * cx)
+        if not within(arrays.tips[t], FARTHEST_M):
+            # a garbled reading is no place: every renderer leaves contact at NaN and remembers nothing of it
+            for i in range(3):
+                arrays.tips[t, i] = np.nan
 
 
 @njit(cache=True, nogil=True)
@@ -180,9 +195,12 @@ def after(
         for j in range(3):
             wanted[i] += pose[IN_FORCE_MAP + 3 * i + j] * rendered[j]
     enable = arrays.shared.control[ENABLE]
+    if enable != arrays.previous[LAST_ENABLE]:
+        arrays.previous[LAST_ENABLE] = enable
+        passivity_restart(arrays.passivity)
     position = pose[IN_POSITION : IN_POSITION + 3]
-    fresh = pose[IN_SEQUENCE] != arrays.previous[0]
-    arrays.previous[0] = pose[IN_SEQUENCE]
+    fresh = pose[IN_SEQUENCE] != arrays.previous[SEQUENCE]
+    arrays.previous[SEQUENCE] = pose[IN_SEQUENCE]
     damped = passivity_before(parameters.passivity, arrays.passivity, wanted, position, fresh, dt_s)
     reading = Reading(
         position,
@@ -196,8 +214,13 @@ def after(
     if clutched:
         for i in range(3):
             wanted[i] = 0.0
-    reasons = safety_step(parameters.safety, arrays.safety, wanted, reading, enable, dt_s)
+    silent = _parent_is_silent(arrays, parameters, dt_s)
+    reasons = safety_step(
+        parameters.safety, arrays.safety, wanted, reading, enable, dt_s, SILENT if silent else 0
+    )
     command = arrays.safety.force
+    if reasons & LATCHING:
+        passivity_restart(arrays.passivity)
     passivity_after(arrays.passivity, wanted, command)
     if damped and command[0] ** 2 + command[1] ** 2 + command[2] ** 2 > 0.0:
         reasons |= PASSIVITY
@@ -214,13 +237,25 @@ def after(
 
 
 @njit(cache=True, nogil=True)
+def _parent_is_silent(arrays, parameters, dt_s):
+    """Whether the parent's heartbeat has stood still for longer than it may."""
+    previous, beat = arrays.previous, float(arrays.shared.control[BEAT])
+    if beat != previous[LAST_BEAT]:
+        previous[LAST_BEAT] = beat
+        previous[SILENT_S] = 0.0
+    else:
+        previous[SILENT_S] += dt_s
+    return 0.0 < parameters.silence_s < previous[SILENT_S]
+
+
+@njit(cache=True, nogil=True)
 def _elapsed(arrays, parameters, deadline_ns):
     """Seconds since the last tick by deadlines, so that jitter is no acceleration; at most five ticks."""
     period_s = parameters.period_ns * 1e-9
     elapsed = period_s
-    if arrays.previous[1] > 0.0:
-        elapsed = deadline_ns * 1e-9 - arrays.previous[1]
-    arrays.previous[1] = deadline_ns * 1e-9
+    if arrays.previous[LAST_S] > 0.0:
+        elapsed = deadline_ns * 1e-9 - arrays.previous[LAST_S]
+    arrays.previous[LAST_S] = deadline_ns * 1e-9
     return min(max(elapsed, period_s), 5.0 * period_s)
 
 
@@ -248,7 +283,7 @@ def _publish(arrays, reasons, contacts, now_ns, deadline_ns, period_ns):
     row[20] = contacts
     row[21] = arrays.shared.control[ENABLE]
     row[22] = (now_ns - deadline_ns) * 1e-9
-    row[23] = arrays.previous[2]
+    row[23] = arrays.previous[COMPUTE_S]
     fence()
     arrays.shared.ring_head[0] += 1
     if contacts:
@@ -256,7 +291,8 @@ def _publish(arrays, reasons, contacts, now_ns, deadline_ns, period_ns):
     for k in range(arrays.shared.reason_counts.size):
         if reasons & (1 << k):
             arrays.shared.reason_counts[k] += 1
-    arrays.shared.peak[0] = max(arrays.shared.peak[0], force2**0.5)
+    if within(arrays.rendered, LARGEST_N):
+        arrays.shared.peak[0] = max(arrays.shared.peak[0], force2**0.5)
     arrays.shared.peak[1] = max(arrays.shared.peak[1], command2**0.5)
     for k in range(arrays.passivity.energies.size):
         arrays.shared.energies[k] = arrays.passivity.energies[k]
@@ -294,7 +330,7 @@ def account(arrays, parameters, deadline_ns, started_ns, ended_ns):
         counts[LATE] += 1
     count(arrays.shared.compute_bins, arrays.shared.compute_extremes, ended_ns - started_ns)
     count(arrays.shared.lateness_bins, arrays.shared.lateness_extremes, lateness)
-    arrays.previous[2] = (ended_ns - started_ns) * 1e-9
+    arrays.previous[COMPUTE_S] = (ended_ns - started_ns) * 1e-9
     following = deadline_ns + parameters.period_ns
     if ended_ns >= following + parameters.period_ns:
         skipped = (ended_ns - following) // parameters.period_ns

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -70,7 +71,9 @@ class SessionRecording:
             base_model=None if base is None else base.resolve(),
             boundary_phase=phase,
         )
-        truth = {"young_modulus_pa": young_modulus_pa, "effects": sorted(self._model.effects)}
+        truth: dict[str, Any] = {"young_modulus_pa": young_modulus_pa, "effects": sorted(self._model.effects)}
+        if self._servo.options.loosened:
+            truth["protection_loosened"] = list(self._servo.options.loosened)
         if inclusion is not None:
             truth["inclusion"] = {k: v for k, v in asdict(inclusion).items() if k != "name"}
         return write_recording(self.path, recording, truth=truth)

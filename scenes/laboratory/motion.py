@@ -195,7 +195,7 @@ def _reach(
     a, b = start - middle, end - middle
     angle = np.arccos(np.clip(a @ b / np.linalg.norm(a) / np.linalg.norm(b), -1, 1))
     travel = angle * clear + abs(clear - np.linalg.norm(a)) + abs(clear - np.linalg.norm(b))
-    count = int(max(0.45, travel / rng.uniform(120, 220)) * RATE_HZ)
+    count = int(max(0.45, travel / rng.uniform(120, 220)) / hand.reach_pace * RATE_HZ)
     x = minimum_jerk(count)
     unit_a, unit_b = a / np.linalg.norm(a), b / np.linalg.norm(b)
     if angle > 1e-3:

@@ -142,11 +142,11 @@ def touch_forces(
     deepest: dict[int, float] = {}
     for touch in touches:
         if touch.kind == "press":
-            deepest[touch.site] = max(deepest.get(touch.site, 0.0), touch.depth)
+            deepest[touch.site] = max(deepest.get(touch.site, 0.0), touch.depth, touch.reach)
     for touch in touches:
         shared = specimen.reversible and touch.kind != "drag"
         if shared:
-            depth = deepest[touch.site] if touch.kind == "press" else touch.depth
+            depth = deepest[touch.site] if touch.kind == "press" else max(touch.depth, touch.reach)
             travel = (LOADING * depth)[:, None] * touch.direction
         else:
             travel = _in_and_out(touch)[0]

@@ -53,7 +53,8 @@ class Touch:
     kind: "press" (straight along -n), "oblique" (straight, tilted), "drag" (along -n, then sideways).
     depth: greatest travel of the way in, mm. direction: unit vector of the way in. side: (3,) mm, sideways
     travel of a drag. slow: the person holds or presses slowly here. repeat: how often this site was
-    touched before.
+    touched before. reach: mm, as deep as its path is solved where that is deeper than `depth`, so that
+    presses of unlike depths share a solved path.
     """
 
     site: int
@@ -64,6 +65,7 @@ class Touch:
     direction: np.ndarray
     side: np.ndarray
     repeat: int = 0
+    reach: float = 0.0
 
 
 def sites(phantom: Phantom, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

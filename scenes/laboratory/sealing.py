@@ -10,13 +10,13 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from mechanics.errors import RecordingError
-from mechanics.files import atomic_file, sha256_of_file
+from mechanics.files import JSON, atomic_file, sha256_of_file
 from mechanics.recording import Recording, write_recording
 
 
@@ -31,17 +31,22 @@ def digest(truth: Mapping[str, Any], salt: str) -> str:
 
 
 def write_sealed(
-    path: Path | str, recording: Recording, truth: Mapping[str, Any], truth_path: Path | str
+    path: Path | str,
+    recording: Recording,
+    truth: Mapping[str, Any],
+    truth_path: Path | str,
+    write: Callable[[Path, Recording], Path] = write_recording,
 ) -> Path:
     """Write the recording without truth, `NAME.sealed` beside it, and truth with salt to `truth_path`
     (JSON).
 
-    Raises RecordingError where the truth would lie beside the recording under its name.
+    write: writes a recording as `NAME.csv.gz` and `NAME.toml`. Raises RecordingError where the truth would
+    lie beside the recording under its name.
     """
     path, truth_path = Path(path), Path(truth_path)
     salt = secrets.token_hex(32)
     plain = json.loads(canonical(truth))
-    samples = write_recording(path, replace(recording, truth=None, object_name="object"))
+    samples = write(path, replace(recording, truth=None, object_name="object"))
     stem = samples.name.removesuffix(".gz").removesuffix(".csv")
     seal = samples.with_name(f"{stem}.sealed")
     if truth_path.resolve() == seal.resolve():
@@ -50,9 +55,9 @@ def write_sealed(
         )
     table = {"algorithm": "sha256(salt + canonical json)", "sha256": digest(plain, salt)}
     table["recording_sha256"] = sha256_of_file(samples)
-    with atomic_file(seal) as temporary:
+    with atomic_file(seal, JSON) as temporary:
         temporary.write_text(json.dumps(table, indent=1) + "\n", encoding="utf-8")
-    with atomic_file(truth_path) as temporary:
+    with atomic_file(truth_path, JSON) as temporary:
         temporary.write_text(json.dumps({"salt": salt, "truth": plain}, indent=1) + "\n", encoding="utf-8")
     return samples
 

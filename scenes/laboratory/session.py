@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import zlib
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -50,6 +50,19 @@ class SimulateOptions:
     finest_mm: float = option(3.0, "longest edge of the solid's elements next to the touch", unit="mm")
 
 
+@dataclass(frozen=True)
+class Staging:
+    """What may be laid down about an exploration instead of being left to numbers and seeds.
+
+    touches: instead of a press set. frame: (rotation (3, 3), shift (3,) m) from the object's frame to the
+    device's. instrument: what the readings go through before any effect; no effect of its own.
+    """
+
+    touches: tuple[Touch, ...] | None = None
+    frame: tuple[np.ndarray, np.ndarray] | None = None
+    instrument: Callable[[Readings], Readings] | None = None
+
+
 class Session:
     """One hand on one object; runs the same exploration with any subset of its effects."""
 
@@ -65,6 +78,7 @@ class Session:
         workers: int | None,
         cache: Path | None,
         progress: Progress,
+        staging: Staging | None = None,
     ) -> None:
         self.phantom, self.modulus, self.options, self.hand = phantom, modulus, options, hand
         self.touches, self.parameters, self.seed = touches, parameters, seed
@@ -75,6 +89,9 @@ class Session:
         self.rotation, self.shift = np.eye(3), np.zeros(3)
         if options.frame:
             self.rotation, self.shift = random_frame(seed, 1e3 * phantom.height_m)
+        self.staging = staging or Staging()
+        if self.staging.frame is not None:
+            self.rotation, self.shift = self.staging.frame
 
     def _rng(self, what: str) -> np.random.Generator:
         return np.random.default_rng([self.seed, zlib.crc32(what.encode())])
@@ -136,6 +153,8 @@ class Session:
             turn @ axes_of(way.axis),
             way.t > way.phase[1] + 0.05,
         )
+        if self.staging.instrument is not None:
+            readings = self.staging.instrument(readings)
         for name in present:
             read = effect(name).on_readings
             if read is not None:

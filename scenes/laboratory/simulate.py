@@ -13,11 +13,11 @@ import numpy as np
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
-from scenes.laboratory.effects import REGISTRY, Bench, effect
+from scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
 from scenes.laboratory.hand import HandOptions
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.presses import Touch, press_set
-from scenes.laboratory.session import Session, SimulateOptions
+from scenes.laboratory.session import Session, SimulateOptions, Staging
 from scenes.laboratory.truth import truth_of
 from scenes.phantoms import Phantom
 
@@ -25,7 +25,8 @@ from scenes.phantoms import Phantom
 @dataclass(frozen=True)
 class Simulation:
     """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device
-    frame; `motion` is the hand's true way, object frame. `ideal_n` (n, 3): where asked for, what the ideal
+    frame; `readings` are it with the true positions beside, before noise and rounding; `motion` is the
+    hand's true way, object frame. `ideal_n` (n, 3): where asked for, what the ideal
     object would have answered to the same way.
     """
 
@@ -34,6 +35,7 @@ class Simulation:
     clean_n: np.ndarray
     touches: tuple[Touch, ...]
     motion: Motion
+    readings: Readings
     ideal_n: np.ndarray | None = None
 
 
@@ -49,6 +51,7 @@ def simulate(
     workers: int | None = None,
     cache: Path | None = None,
     progress: Progress = silent,
+    staging: Staging | None = None,
 ) -> Simulation:
     """Explore `phantom` with `effects` (name: strength, see INTERFACE of the docs) and write down what is
     read.
@@ -56,7 +59,7 @@ def simulate(
     The ideal model has no effect: linear elastic, bonded, sticking, exact but for noise. Regions of the
     phantom count as the effect `inclusion`. seed: timing, straying, tracing and noise; the press set has
     its own number, so that solved curves are shared. sizes: also solve without each effect, to state its
-    size. Raises OptionError, LabError.
+    size. staging: lay down touches, frame or instrument. Raises OptionError, LabError.
     """
     options = options or SimulateOptions()
     hand = hand or HandOptions()
@@ -71,15 +74,18 @@ def simulate(
         strengths.setdefault("finite_strain", 1.0)
     modulus = options.young_modulus_pa or phantom.young_modulus_pa
     plain = replace(phantom, regions=())
-    touches = tuple(press_set(plain, options.protocol, options.presses))
+    staging = staging or Staging()
+    touches = staging.touches or tuple(press_set(plain, options.protocol, options.presses))
     parameters = _parameters(plain, strengths, modulus, options, touches)
-    session = Session(phantom, modulus, options, hand, touches, parameters, seed, workers, cache, progress)
+    session = Session(
+        phantom, modulus, options, hand, touches, parameters, seed, workers, cache, progress, staging
+    )
     present = tuple(parameters)
     whole, clean = session.run(present)
     truth = truth_of(session, present, clean, whole, sizes, strengths)
     recording, way = session.recording(whole, clean, truth), session.way
     plain_n = session.run((), regions=False)[1] if ideal else None
-    return Simulation(recording, truth, clean, touches, way, plain_n)
+    return Simulation(recording, truth, clean, touches, way, whole, plain_n)
 
 
 def _parameters(

@@ -93,11 +93,13 @@ def trace(
     surface = Surface(phantom.vertices * 1e3, phantom.faces)
     path, outward, arc = foot_path(surface, radius)
     total = arc[-1]
-    turns = 1.0 + rng.uniform(0.08, 0.22)
+    turns = hand.trace_rounds + rng.uniform(0.08, 0.22)
     duration = turns * total / (1e3 * hand.trace_speed_m_per_s)
     count = int(duration * RATE_HZ)
     pace = 1 + 0.35 * band_noise(count, RATE_HZ, 0.1, 1.0, rng)
-    progress = np.cumsum(np.maximum(pace, 0.1))
+    away = _breaks(count, hand.trace_breaks, rng)
+    # broken off, the tip comes back a little before the place where it left
+    progress = np.cumsum(np.where(away > 0, -0.1, np.maximum(pace, 0.1)))
     # slips: the tip jumps ahead a few millimetres
     for at in rng.integers(count // 10, count - 400, size=int(rng.integers(2, 5))):
         progress[at:] += (
@@ -111,12 +113,14 @@ def trace(
     normal = np.column_stack([np.interp(along, arc, normals[:, k]) for k in range(3)])
     normal /= np.linalg.norm(normal, axis=1)[:, None]
     lean = np.clip(1e3 * hand.lean_m * (1 + 0.6 * band_noise(count, RATE_HZ, 0.2, 3, rng)), -0.4, 0.65)
+    lean -= (lean + 4.0) * away
     position -= lean[:, None] * normal
     load = np.maximum(0.7 + 0.25 * band_noise(count, RATE_HZ, 0.2, 4, rng), 0.15)
     lift = np.zeros(count)
     for at in rng.integers(count // 8, count - 700, size=int(rng.integers(1, 3))):
         length = int(rng.integers(120, 260))
         lift[at : at + length] = rng.uniform(0.5, 1.6) * np.sin(np.pi * np.arange(length) / length) ** 2
+    lift = np.maximum(lift, 15.0 * away)
     position[:, 2] += lift
     touching = lift <= 0
     velocity = np.gradient(position, axis=0)
@@ -133,6 +137,16 @@ def trace(
     forces = np.vstack([np.zeros_like(down), force, np.zeros_like(up)])
     contact = np.concatenate([np.zeros(len(down), bool), np.ones(count, bool), np.zeros(len(up), bool)])
     return Trace(everything, forces, contact)
+
+
+def _breaks(count: int, breaks: int, rng: np.random.Generator) -> np.ndarray:
+    """(count,) 0 to 1: how far the tip is lifted off, `breaks` times for most of a second."""
+    away = np.zeros(count)
+    for at in (np.arange(breaks) + rng.uniform(0.3, 0.7, breaks)) / max(breaks, 1) * count:
+        length = int(rng.uniform(600, 1100))
+        part = away[int(at) : int(at) + length]
+        part[:] = np.sin(np.pi * np.arange(1, length + 1) / (length + 1))[: len(part)] ** 2
+    return away
 
 
 def _descent(end: np.ndarray, rng: np.random.Generator) -> np.ndarray:

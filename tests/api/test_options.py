@@ -71,7 +71,8 @@ def other(option):
         return option.default + 1
     if isinstance(option.default, str):
         return "adhesion"
-    return 0.4 if option.default is None else option.default * 0.5 + 1e-3
+    value = 0.4 if option.default is None else option.default * 0.5 + 1e-3
+    return min(max(value, option.low), option.high)
 
 
 def held(thing) -> Iterator[tuple[type, object]]:

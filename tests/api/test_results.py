@@ -133,7 +133,7 @@ def test_without_a_screen_show_says_what_to_do(results, monkeypatch):
 
 def test_folder_that_is_no_model_is_refused_before_the_work(recording, tmp_path):
     (tmp_path / "mine.txt").write_text("precious")
-    with pytest.raises(pp.ModelError, match="is no MODEL folder"):
+    with pytest.raises(pp.FileError, match="is no MODEL folder"):
         pp.reconstruct(recording, save=tmp_path)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from devices.base import DeviceSpec
+from devices.base import DeviceSpec, finite_vector
 from devices.safety import (
     Reading,
     SafetyOptions,
@@ -27,8 +27,12 @@ class SafetyFilter:
     def step(
         self, wanted_n: np.ndarray, reading: Reading, enable: int, dt_s: float
     ) -> tuple[np.ndarray, str]:
-        """(3,) N that may be sent, and why it differs from what was wanted."""
-        reasons = safety_step(
-            self.parameters, self.state, np.asarray(wanted_n, dtype=float), reading, enable, dt_s
+        """(3,) N that may be sent, and why it differs from what was wanted.
+
+        Raises DeviceError for anything but 3-vectors, which compiled code would read past.
+        """
+        checked = reading._replace(
+            position=finite_vector(reading.position), velocity=finite_vector(reading.velocity)
         )
+        reasons = safety_step(self.parameters, self.state, finite_vector(wanted_n), checked, enable, dt_s)
         return self.state.force.copy(), reason_words(reasons)

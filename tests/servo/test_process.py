@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -211,3 +212,75 @@ def test_a_model_that_is_not_there_is_told():
     with Servo("nowhere/model", options=ServoOptions()) as servo:
         with pytest.raises(PalpateError, match="nowhere/model"):
             servo.start()
+
+
+BEATING = """
+import sys, time
+from devices.haply import HaplyOptions
+from devices.registry import DeviceChoice
+from palpate.servo import SafetyOptions, Servo, ServoOptions
+from palpate.servo.elastic_plane import PlaneSource
+
+options = HaplyOptions(uri=sys.argv[1], events_uri=sys.argv[2], answer_s=2.0)
+with Servo(PlaneSource(500.0), device=DeviceChoice("haply", {"options": options}),
+           options=ServoOptions(silence_s=0.3, safety=SafetyOptions(ramp_s=0.1, stale_s=2.0))) as servo:
+    servo.start()
+    servo.enable()
+    print(servo.process_id, flush=True)
+    while True:
+        servo.wait(3.0)
+        servo.enable()
+"""
+
+
+def test_a_stopped_window_takes_the_force_with_it(fake):
+    states, events = fake.ports
+    parent = subprocess.Popen(
+        [sys.executable, "-c", BEATING, f"ws://localhost:{states}", f"ws://localhost:{events}"],
+        stdout=subprocess.PIPE,
+    )
+    assert parent.stdout is not None
+    process_id = int(parent.stdout.readline())
+    try:
+        assert eventually(lambda: pressing(fake))
+        os.kill(parent.pid, signal.SIGSTOP)
+        assert eventually(lambda: fake.force_n() == (0.0, 0.0, 0.0), 3.0)
+        time.sleep(0.5)
+        assert fake.force_n() == (0.0, 0.0, 0.0) and process_runs(process_id)
+        os.kill(parent.pid, signal.SIGCONT)
+        assert eventually(lambda: pressing(fake)), "a window that goes on is felt again"
+    finally:
+        parent.kill()
+        parent.wait()
+    assert eventually(lambda: not process_runs(process_id), 5.0)
+
+
+def test_what_loosens_a_protection_is_said(servo):
+    assert any("--stale is 2" in word and "default 0.02" in word for word in servo.words)
+    assert any("--stale is 2" in word for word in servo.report().as_dict()["words"])
+    assert ServoOptions().loosened == ()
+
+
+def test_a_device_that_fails_ends_the_session_with_its_reason(fake):
+    with Servo(PlaneSource(500.0), device=DeviceChoice("broken", {})) as servo:
+        servo._job = replace(servo._job, device=Breaking())
+        servo.start()
+        assert not servo.wait(20.0)
+        assert "the device failed: hand lost" in servo.failure
+        assert servo.stop() == 2
+
+
+class Breaking:
+    """A DeviceChoice of a device that gives a few readings and then fails."""
+
+    def make(self):
+        from devices.simulated import SimulatedHand
+
+        class Hand(SimulatedHand):
+            def read(self):
+                state = super().read()
+                if state.sequence > 20:
+                    raise RuntimeError("hand lost")
+                return state
+
+        return Hand()

@@ -12,7 +12,7 @@ from devices.safety import SafetyOptions, reason_words, safety_parameters
 from devices.simulated import SPEC
 from palpate.servo import loop as loops
 from palpate.servo.elastic_plane import ElasticPlane
-from palpate.servo.layout import DEADLINE, ENABLE, LATE, MISSED, STATUS, STOP, TICKS, total_bytes, views
+from palpate.servo.layout import BEAT, DEADLINE, ENABLE, LATE, MISSED, STATUS, STOP, TICKS, total_bytes, views
 from palpate.servo.loop import ServoLoop, make_program, one_tick, run_tick
 from palpate.servo.report import report, ring_rows, snapshot
 from palpate.servo.tick import (
@@ -33,7 +33,7 @@ from palpate.servo.tick import (
     put_pose,
     tick_arrays,
 )
-from render.passivity import PassivityOptions, passivity_parameters
+from render.passivity import DISSIPATED, PassivityOptions, passivity_parameters
 from render.scene import TouchScene, in_the_air
 from render.support import SupportParameters, no_support
 
@@ -256,3 +256,61 @@ def test_the_loop_of_other_platforms_runs_swaps_and_stops(monkeypatch):
         servo.shared.control[STOP] = 1
         assert loop.join(20.0)
     assert servo.shared.counts[STATUS] == 0
+
+
+@pytest.mark.parametrize("huge", [1e200, 1e308, -1e154])
+def test_one_huge_reading_poisons_nothing(huge):
+    servo, fresh = FakeServo(), FakeServo()
+    servo.press(0.002, 600)
+    for place in ([huge, 0.0, 0.003], [huge, huge, huge]):
+        servo.pose(place, servo.arrays.shared.counts[DEADLINE] * 1e-9)
+        assert (servo.tick() == 0).all()
+    assert np.isfinite(servo.arrays.passivity.velocity).all()
+    assert np.isfinite(servo.arrays.passivity.energies).all()
+    assert np.isfinite(servo.arrays.safety.speed).all()
+    servo.arrays.shared.control[ENABLE] = 2
+    servo.press(-0.001, 50)
+    fresh.press(-0.001, 50)
+    np.testing.assert_allclose(servo.press(0.002, 600), fresh.press(0.002, 600), atol=1e-9)
+    for k in range(300):
+        servo.press(0.002 - 0.001 * np.cos(0.2 * k), 1)
+    # the reference follower's damper acts again: it takes back what held forces owe
+    assert servo.arrays.passivity.energies[DISSIPATED] > 0.0
+
+
+def test_a_jump_in_contact_leaves_no_debt_when_enabled_anew():
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    assert (servo.press(-0.5, 5) == 0).all(), "latched"
+    servo.arrays.shared.control[ENABLE] = 2
+    servo.press(-0.001, 10)
+    np.testing.assert_allclose(servo.press(0.002, 600), [0.0, 0.0, 1.0], rtol=1e-6)
+    seen = report(servo.shared, PERIOD, (), 0.0, 0.0)
+    assert seen.energy_given_back_j < 1e-4, "a leap of the pose is no work of the hand"
+
+
+def test_a_force_that_is_none_leaves_the_books_clean():
+    servo = FakeServo()
+    servo.press(0.002, 600)
+    servo.program = servo.program._replace(scene=in_the_air(ElasticPlane(1e300)))
+    for _ in range(3):
+        assert (servo.press(0.0021, 1) == 0).all()
+    servo.program = servo.program._replace(scene=in_the_air(ElasticPlane(500.0)))
+    np.testing.assert_allclose(servo.press(0.002, 600), [0.0, 0.0, 1.0], rtol=1e-6)
+    assert np.isfinite(servo.arrays.passivity.energies).all()
+    assert np.isfinite(report(servo.shared, PERIOD, (), 0.0, 0.0).peak_rendered_n)
+
+
+def test_a_parent_that_falls_silent_takes_the_force_with_it():
+    servo = FakeServo()
+    servo.program = servo.program._replace(parameters=servo.program.parameters._replace(silence_s=0.1))
+    control = servo.arrays.shared.control
+    for _ in range(20):
+        control[BEAT] += 1
+        force = servo.press(0.002, 50)
+    np.testing.assert_allclose(force, [0.0, 0.0, 1.0], rtol=1e-6)
+    still = [servo.press(0.002, 1)[2] for _ in range(120)]
+    assert min(still[:49]) > 0.99 and not any(still[60:]), "100 ms after the last beat, and a tick"
+    assert "silent" in servo.reasons
+    control[BEAT] += 1
+    assert 0 < servo.press(0.002, 1)[2] < 0.01, "ramps in anew"

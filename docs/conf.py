@@ -1,0 +1,86 @@
+"""The documentation's site: `python -m sphinx -W --keep-going docs site` (extra `docs`).
+
+The pages of this folder are the guide, `examples` is a gallery that runs while it is built, and the reference
+is read from the docstrings without importing anything. A warning is an error.
+"""
+
+import re
+import sys
+from importlib.metadata import version as installed
+from pathlib import Path
+
+import pyvista
+
+ROOT = Path(__file__).resolve().parents[1]
+sys.path.insert(0, str(ROOT))
+
+project = "Palpate"
+author = "The Palpate developers"
+version = release = installed("palpate")
+extensions = ["myst_parser", "autoapi.extension", "sphinx_gallery.gen_gallery", "sphinx_copybutton"]
+html_theme = "furo"
+html_title = f"Palpate {release}"
+html_show_copyright = False
+html_favicon = None
+exclude_patterns = ["**/README.md"]
+# names of constants that are unpacked from a tuple are there all the same
+suppress_warnings = ["config.cache", "autoapi.python_import_resolution"]
+
+myst_heading_anchors = 4
+myst_enable_extensions = ["dollarmath"]
+
+ROOMS = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
+autoapi_dirs = [str(ROOT / room) for room in ROOMS]
+autoapi_root = "reference/rooms"
+autoapi_options = ["members", "undoc-members", "show-module-summary"]
+autoapi_ignore = ["*/benchmarks/*", "*/commands/*"]
+autoapi_member_order = "groupwise"
+autoapi_python_class_content = "class"
+autoapi_add_toctree_entry = False
+autoapi_keep_files = False
+
+pyvista.OFF_SCREEN = True
+pyvista.BUILDING_GALLERY = True
+sphinx_gallery_conf = {
+    "examples_dirs": [str(ROOT / "examples")],
+    "gallery_dirs": ["gallery"],
+    "filename_pattern": r".*\.py",
+    "ignore_pattern": r"(__init__|conftest)\.py",
+    "image_scrapers": ("matplotlib", "pyvista"),
+    "within_subsection_order": "FileNameSortKey",
+    "download_all_examples": False,
+    "show_memory": False,
+    "remove_config_comments": True,
+    "min_reported_time": 0,
+    "abort_on_example_error": True,
+    "show_signature": False,
+    "reset_modules": (),
+}
+
+_TICKS = re.compile(r"(?<!`)`([^`\n]+)`(?!`)")
+_MARKS = re.compile(r"(?<!\\)([*|])|(?<=\w)(_)(?=[\s.,;:)\]]|$)")
+
+
+def plain_words(app, what, name, obj, options, lines):
+    """Docstrings are plain words, no markup: single ticks are code, stars and bars are themselves, what is
+    set in stands as it is."""
+    said: list[str] = []
+    inside = False
+    for line in lines:
+        if line.startswith(" ") and not inside:
+            said += ["", "::", ""]
+        elif line and not line.startswith(" ") and inside:
+            said.append("")
+        inside = line.startswith(" ") or (inside and not line)
+        said.append(line if inside else _escaped(line))
+    lines[:] = said
+
+
+def _escaped(line: str) -> str:
+    parts = _TICKS.split(line)
+    return "".join(f"``{p}``" if k % 2 else _MARKS.sub(r"\\\1\2", p) for k, p in enumerate(parts))
+
+
+def setup(app):
+    """Sphinx's hook."""
+    app.connect("autodoc-process-docstring", plain_words)

@@ -1,0 +1,115 @@
+"""All of a batch: find, plan, do, and write what came out beside the recordings' folders."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from mechanics.errors import OptionError, RecordingError
+from mechanics.files import atomic_file
+from mechanics.progress import Progress
+from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
+from palpate.batching.summary import Agreement, Entry, agreements, entry_of, write_csv, write_parquet
+from palpate.tasks.driver import Outcome
+from palpate.tasks.engine import run_with_bar
+from palpate.tasks.graph import Graph, Task
+
+
+@dataclass(frozen=True)
+class Batch:
+    """What came out. entries: one a recording, in the order of their paths; folder: the output; reused: tasks
+    that were finished before; agreements: how far the explorations of one object agree; undescribed: tables
+    in the folders that are no recordings, as no .toml lies beside them."""
+
+    folder: Path
+    entries: tuple[Entry, ...]
+    agreements: tuple[Agreement, ...]
+    tasks: int
+    reused: int
+    undescribed: tuple[Path, ...] = ()
+
+
+def batch(
+    sources: Iterable[str | Path],
+    out: str | Path,
+    choice: Choice,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    memory_bytes: int | None = None,
+    force: bool = False,
+    progress: bool | Progress = True,
+) -> Batch:
+    """Do what is not finished of all recordings; the summary is written when the user stops it, too.
+
+    Raises OptionError for sources that lead to nothing, an output that is a file, and what
+    `tasks.engine.executor` refuses.
+    """
+    folder = absolute(out)
+    if folder.is_file():
+        raise OptionError(f"'{out}' is a file: name a folder for the output")
+    sources = list(sources)
+    found = find(sources, folder)
+    folder.mkdir(parents=True, exist_ok=True)
+    bad: dict[str, str] = {}
+    tasks: dict[str, list[Task]] = {}
+    for recording in found:
+        try:
+            tasks[recording.name] = tasks_of(recording, choice, folder)
+        except (RecordingError, OSError) as error:
+            bad[recording.name] = " ".join(str(error).split())
+    outcomes: dict[str, Outcome] = {}
+    graph = Graph(task for own in tasks.values() for task in own)
+    try:
+        run_with_bar(
+            graph,
+            folder,
+            workers=workers,
+            scheduler=scheduler,
+            memory_bytes=memory_bytes,
+            force=force,
+            progress=progress,
+            outcomes=outcomes,
+        )
+    except KeyboardInterrupt:
+        _write(_made(folder, found, choice, tasks, bad, outcomes), choice)
+        raise
+    made = replace(
+        _made(folder, found, choice, tasks, bad, outcomes), undescribed=tuple(undescribed(sources, folder))
+    )
+    _write(made, choice)
+    return made
+
+
+def _made(
+    folder: Path,
+    found: list[Found],
+    choice: Choice,
+    tasks: dict[str, list[Task]],
+    bad: dict[str, str],
+    outcomes: dict[str, Outcome],
+) -> Batch:
+    entries = []
+    for recording in found:
+        own = tasks.get(recording.name, [])
+        ended = {task.stage: outcomes[task.name] for task in own if task.name in outcomes}
+        entries.append(entry_of(recording.name, ended, bad.get(recording.name), choice.steps))
+    reused = sum(outcome.reused for outcome in outcomes.values())
+    return Batch(folder, tuple(entries), tuple(agreements(entries)), sum(map(len, tasks.values())), reused)
+
+
+def _write(made: Batch, choice: Choice) -> None:
+    from palpate.report.batch import write_report
+
+    for entry in made.entries:
+        log = made.folder / entry.row.recording / "error.txt"
+        if entry.trace:
+            with atomic_file(log) as temporary:
+                temporary.write_text(entry.trace, encoding="utf-8")
+        else:
+            log.unlink(missing_ok=True)
+    rows = [entry.row for entry in made.entries]
+    write_csv(made.folder / "summary.csv", rows)
+    write_parquet(made.folder / "summary.parquet", rows)
+    write_report(made.folder / "index.html", made, choice.steps)

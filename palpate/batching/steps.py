@@ -1,0 +1,141 @@
+"""What a worker does with one recording: the door's own functions, and files beside one another.
+
+FOLDER/model is the MODEL, FOLDER/STEP.json what `--json` of the command gives, FOLDER/STEP.html its report,
+FOLDER/thumbnail.png the object. Each returns what the summary needs.
+"""
+
+from __future__ import annotations
+
+import contextlib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from mechanics.errors import RecordingError
+from mechanics.files import atomic_file, sha256_of_file
+from mechanics.recording import recording_files
+from palpate import api
+from palpate.arguments import emit_json
+from palpate.results.recording import Recording
+
+STEPS = ("reconstruct", "compare", "diagnose")
+MODEL, THUMBNAIL = "model", "thumbnail.png"
+
+
+def content_of(recording: str | Path) -> dict[str, str]:
+    """SHA-256 of each of a recording's files: samples, description, and the surface that it names.
+
+    Raises RecordingError where one is missing or no TOML.
+    """
+    import tomllib
+
+    samples, description = recording_files(recording)
+    files = {"samples": samples, "description": description}
+    try:
+        base = tomllib.loads(description.read_text(encoding="utf-8")).get("object", {}).get("model")
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, AttributeError) as error:
+        raise RecordingError(f"'{description}' is no valid TOML: {error}") from error
+    if base is not None and (description.parent / str(base)).is_file():
+        files["model"] = description.parent / str(base)
+    return {name: sha256_of_file(path) for name, path in files.items()}
+
+
+def reconstruct(
+    *,
+    sha256: Mapping[str, str],
+    options: Mapping[str, Any],
+    seed: int,
+    reports: bool,
+    recording: str,
+    folder: str,
+) -> dict[str, Any]:
+    """The model. What an older model gave is removed first."""
+    place = Path(folder)
+    for step in STEPS[1:]:
+        for name in (f"{step}.json", f"{step}.html"):
+            (place / name).unlink(missing_ok=True)
+    measured = _read(recording, sha256)
+    result = api.reconstruct(measured, save=place / MODEL, seed=seed, progress=False, **options)
+    emit_json({"model": place / MODEL, **result.as_json()}, str(place / "reconstruct.json"))
+    with _closing_figures():
+        _draw_thumbnail(result.model, place / THUMBNAIL)
+        if reports:
+            result.report(place / "reconstruct.html")
+    about = measured.description.get("object", {})
+    return {
+        "object": about.get("name"),
+        "presses": len(result.model.presses),
+        "young_modulus_pa": result.young_modulus_pa,
+        "young_modulus_ci95_pa": result.young_modulus_ci95_pa,
+    }
+
+
+def compare(
+    *,
+    sha256: Mapping[str, str],
+    options: Mapping[str, Any],
+    seed: int,
+    reports: bool,
+    recording: str,
+    folder: str,
+) -> dict[str, Any]:
+    """FEM against the 1D models, on the model's geometry."""
+    place = Path(folder)
+    result = api.compare(_read(recording, sha256), place / MODEL, seed=seed, progress=False, **options)
+    emit_json(result.as_json(), str(place / "compare.json"))
+    with _closing_figures():
+        if reports:
+            result.report(place / "compare.html")
+    return {"rmse_n": result.rmse_n, "relative_rmse": result.relative_rmse}
+
+
+def diagnose(
+    *,
+    sha256: Mapping[str, str],
+    options: Mapping[str, Any],
+    seed: int,
+    reports: bool,
+    recording: str,
+    folder: str,
+) -> dict[str, Any]:
+    """The gap, its cause, and how far it shrinks."""
+    place = Path(folder)
+    result = api.diagnose(_read(recording, sha256), place / MODEL, seed=seed, progress=False, **options)
+    found = result.as_json()
+    emit_json(found, str(place / "diagnose.json"))
+    with _closing_figures():
+        if reports:
+            result.report(place / "diagnose.html")
+    keys = ("noise_n", "gap_before_n", "gap_after_n", "gap_closed")
+    return {**found["verdict"], **{key: found[key] for key in keys}}
+
+
+def _read(recording: str, sha256: Mapping[str, str]) -> Recording:
+    """The recording, which must still be the one that was planned for."""
+    if content_of(recording) != dict(sha256):
+        raise RecordingError(f"'{recording}' changed after the batch began: run it again")
+    return api.read_recording(recording)
+
+
+def _draw_thumbnail(model: Any, path: Path) -> None:
+    from matplotlib.figure import Figure
+
+    from palpate.report.object3d import draw_object
+
+    figure = Figure(figsize=(1.6, 1.2))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    draw_object(ax, model, touches=model.presses.point)
+    ax.set_axis_off()
+    with atomic_file(path) as temporary:
+        figure.savefig(temporary, dpi=150, format="png", transparent=True)
+
+
+@contextlib.contextmanager
+def _closing_figures() -> Iterator[None]:
+    """A worker lives long: pictures of one recording are not kept for the next."""
+    from matplotlib import pyplot
+
+    try:
+        yield
+    finally:
+        pyplot.close("all")

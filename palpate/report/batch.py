@@ -1,0 +1,314 @@
+"""The page of a batch: a sortable table of all recordings, and how far explorations of one object agree."""
+
+from __future__ import annotations
+
+import html
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from palpate.batching.run import Batch
+from palpate.batching.steps import THUMBNAIL
+from palpate.batching.summary import Entry
+from palpate.report.page import Page
+
+MOST_OBJECTS = 12
+"""That are drawn; the table beside has all."""
+
+_STYLE = """<style>
+body { max-width: 76rem; } figure img { max-width: min(100%, 46rem); }
+table.sortable { width: 100%; } .sortable td, .sortable th { padding: .3rem .6rem; vertical-align: middle; }
+.sortable td { white-space: nowrap; } .sortable th { vertical-align: bottom; }
+.sortable td.words { white-space: normal; overflow-wrap: anywhere; min-width: 8rem; }
+.sortable button { font: inherit; font-weight: 600; background: none; border: 0; padding: 0; color: inherit;
+                   text-align: inherit; cursor: pointer; }
+.sortable button::after { content: "\\00a0\\2195"; color: #a3adb8; }
+.sortable th[aria-sort=ascending] button::after { content: "\\00a0\\2191"; color: inherit; }
+.sortable th[aria-sort=descending] button::after { content: "\\00a0\\2193"; color: inherit; }
+.sortable img { display: block; width: 5rem; height: 3.75rem; object-fit: contain; }
+.sortable small { color: #55606e; font-size: .86rem; } .sortable td small { display: block; }
+tr.failed { background: #fdf0ee; } tr.waiting { background: #f6f7f9; }
+#find { font: inherit; padding: .35rem .6rem; width: min(100%, 24rem); box-sizing: border-box;
+        border: 1px solid #8a96a5; border-radius: 4px; }
+@media (max-width: 48rem) {
+  table.sortable, .sortable thead, .sortable tbody { display: block; }
+  .sortable thead tr { display: flex; flex-wrap: wrap; gap: .2rem .9rem; }
+  .sortable th { border: 0; padding: 0; font-size: .9rem; } .sortable th:empty { display: none; }
+  .sortable tbody tr { display: block; border: 1px solid #d9dee5; border-radius: 4px; margin: .7rem 0;
+                       padding: .4rem .7rem; }
+  .sortable tbody tr[hidden] { display: none; }
+  .sortable td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .12rem 0;
+                 text-align: right; }
+  .sortable td.words { text-align: right; } .sortable td:empty { display: none; }
+  .sortable td::before { content: attr(data-name); color: #55606e; text-align: left; white-space: normal;
+                         overflow-wrap: normal; flex: none; max-width: 60%; }
+  .sortable td.picture::before { content: none; } .sortable td.picture { justify-content: center; }
+  .sortable td.picture img { width: 9rem; height: 6.75rem; }
+}
+</style>"""
+
+_SCRIPT = """<script>
+for (const table of document.querySelectorAll("table.sortable")) {
+  const heads = [...table.tHead.rows[0].cells], body = table.tBodies[0];
+  heads.forEach((head, column) => head.querySelector("button")?.addEventListener("click", () => {
+    const up = head.getAttribute("aria-sort") !== "ascending";
+    heads.forEach(other => other.removeAttribute("aria-sort"));
+    head.setAttribute("aria-sort", up ? "ascending" : "descending");
+    const value = row => row.cells[column].dataset.by;
+    const number = text => text === "" ? NaN : Number(text);
+    const rows = [...body.rows], numeric = rows.every(row => value(row) === "" || !isNaN(number(value(row))));
+    rows.sort((a, b) => {
+      const [x, y] = [value(a), value(b)];
+      if (x === "" || y === "") return (x === "") - (y === "");  // what is not known comes last, always
+      const order = numeric ? number(x) - number(y) : x.localeCompare(y, undefined, {numeric: true});
+      return up ? order : -order;
+    });
+    body.append(...rows);
+  }));
+}
+document.getElementById("find")?.addEventListener("input", event => {
+  const words = event.target.value.toLowerCase().split(/\\s+/);
+  for (const row of document.querySelectorAll("#recordings tbody tr")) {
+    const text = row.textContent.toLowerCase();
+    row.hidden = !words.every(word => text.includes(word));
+  }
+});
+</script>"""
+
+
+@dataclass(frozen=True)
+class Cell:
+    """text: HTML; by: what its column is sorted by, '' where it is not known; kind: '', words or picture."""
+
+    text: str = ""
+    by: Any = ""
+    kind: str = ""
+
+
+def write_report(path: Path, result: Batch, steps: Sequence[str]) -> Path:
+    """Write the page; thumbnails and reports are linked where they lie, below the page's folder."""
+    page = Page(f"Batch of {_count(len(result.entries), 'recording')}")
+    page.part(_STYLE)
+    page.lead(lead(result))
+    if result.agreements:
+        _agreement(page, result)
+    page.heading("Recordings")
+    if len(result.entries) > 8:
+        page.part(
+            '<p><input id="find" type="search" placeholder="find: a name, an object, a verdict" '
+            'aria-label="find recordings"></p>'
+        )
+    page.part(_recordings(result, steps))
+    if "compare" in steps:
+        page.paragraph("Errors of FEM and of the best 1D model: rms force at touches that no fit has seen.")
+    _cost(page, result, steps)
+    page.part(_SCRIPT)
+    return page.write(path)
+
+
+def lead(result: Batch) -> str:
+    """How many are done, failed and waiting, in a sentence."""
+    count = {s: sum(e.row.status == s for e in result.entries) for s in ("done", "failed", "waiting")}
+    parts = [f"{count['done']} of {_count(len(result.entries), 'recording')} done"]
+    if count["failed"]:
+        parts.append(f"{count['failed']} failed, with the reason beside")
+    if count["waiting"]:
+        parts.append(f"{count['waiting']} not finished: run the same command again")
+    return "; ".join(parts) + "."
+
+
+def _count(number: int, noun: str) -> str:
+    return f"{number} {noun}" + ("s" if number != 1 else "")
+
+
+def _agreement(page: Page, result: Batch) -> None:
+    page.heading("Repeatability: one object, explored more than once")
+    page.figure(
+        agreement_figure(result),
+        "Young's modulus of every exploration with its 95 % interval, relative to the mean of its object."
+        + (
+            f" The {MOST_OBJECTS} objects with most explorations."
+            if len(result.agreements) > MOST_OBJECTS
+            else ""
+        ),
+    )
+    heads = ["object", "recordings", "mean modulus [kPa]", "spread between them [%]", "95 % interval of it",
+             "expected of their own intervals [%]"]  # fmt: skip
+    rows = [
+        [
+            Cell(html.escape(a.object), a.object, "words"),
+            Cell(str(a.count), a.count),
+            Cell(f"{a.young_modulus_pa / 1e3:.2f}", a.young_modulus_pa),
+            Cell(f"{100 * a.spread:.1f}", a.spread),
+            Cell("{:.1f} to {:.1f}".format(*(100 * v for v in a.spread_ci95)), a.spread_ci95[0]),
+            Cell(f"{100 * a.expected:.1f}", a.expected),
+        ]
+        for a in result.agreements
+    ]
+    page.part(_table(heads, [("", row) for row in rows]))
+    page.paragraph(
+        "Spread: standard deviation of ln E between explorations, about the relative one. Where it is larger "
+        "than what the recordings' own intervals let expect, something differs between the explorations that "
+        "no single one of them can see."
+    )
+
+
+def agreement_figure(result: Batch) -> Figure:
+    """Moduli of the explorations of every object with their intervals, over the object's mean."""
+    count = min(len(result.agreements), MOST_OBJECTS)
+    figure = Figure(figsize=(7, 1.1 + 0.55 * count), layout="constrained")
+    draw_agreement(figure.subplots(), result)
+    return figure
+
+
+def draw_agreement(ax: Axes, result: Batch) -> Axes:
+    """One line an object: each exploration's modulus over their mean, with its 95 % interval."""
+    shown = result.agreements[:MOST_OBJECTS]
+    for k, found in enumerate(shown):
+        rows = [e.row for e in result.entries if e.object == found.object and e.row.young_modulus_pa]
+        e, low, high = (
+            np.array([getattr(row, f"young_modulus_{end}pa") for row in rows], dtype=float)
+            / found.young_modulus_pa
+            for end in ("", "lo_", "hi_")
+        )
+        at = k + (np.linspace(-0.3, 0.3, len(rows)) if len(rows) > 1 else np.zeros(1))
+        ax.errorbar(e, at, xerr=[np.maximum(e - low, 0), np.maximum(high - e, 0)], fmt="o", ms=3.5,
+                    lw=1, color="#1d3557", ecolor="#8fa3bd")  # fmt: skip
+        ax.fill_betweenx(
+            [k - 0.42, k + 0.42], 1 - found.spread, 1 + found.spread, color="#2a9d8f", alpha=0.15
+        )
+    ax.axvline(1, color="#8a96a5", lw=0.8)
+    labels = [f"{a.object}\n{a.young_modulus_pa / 1e3:.1f} kPa" for a in shown]
+    ax.set_yticks(range(len(shown)), labels, fontsize=9)
+    ax.invert_yaxis()
+    ax.set_xlabel("modulus over the mean of its object; band: one standard deviation")
+    return ax
+
+
+def _recordings(result: Batch, steps: Sequence[str]) -> str:
+    heads = ["", "recording", "object", "presses", "modulus [kPa]"]
+    heads += ["verdict", "gap before [mN]", "gap after [mN]"] if "diagnose" in steps else ["status"]
+    heads += ["error of FEM [mN]", "of best 1D [mN]"] if "compare" in steps else []
+    rows = [(e.row.status, _row(result, e, steps)) for e in result.entries]
+    return _table([*heads, "CPU [s]"], rows, "recordings")
+
+
+def _row(result: Batch, entry: Entry, steps: Sequence[str]) -> list[Cell]:
+    row, values = entry.row, entry.values
+    cells = [
+        _thumbnail(result, row.recording),
+        Cell(_link(result, row.recording, "reconstruct", row.recording), row.recording, "words"),
+        Cell(html.escape(entry.object or ""), entry.object or "", "words"),
+        _number(values.get("reconstruct", {}).get("presses"), 1, 0),
+        _modulus(entry),
+        _verdict(result, entry),
+    ]
+    if "diagnose" in steps:
+        cells += [_number(value, 1e3, 0) for value in (row.gap_before_n, row.gap_after_n)]
+    if "compare" in steps:
+        rmse = values.get("compare", {}).get("rmse_n")
+        if rmse is None:
+            cells += [Cell(), Cell()]
+        else:
+            best = min(value for name, value in rmse.items() if name != "fem")
+            fem = _link(result, row.recording, "compare", f"{1e3 * rmse['fem']:.0f}")
+            cells += [Cell(fem, rmse["fem"]), _number(best, 1e3, 0)]
+    cpu = sum(seconds for seconds, _ in entry.cost.values())
+    return [*cells, _number(cpu or None, 1, 0)]
+
+
+def _verdict(result: Batch, entry: Entry) -> Cell:
+    """What was found, or why it was not."""
+    row = entry.row
+    said = verdict_words(entry) or row.status
+    text = _link(result, row.recording, "diagnose", said)
+    if row.status != "done":
+        said = row.status
+        text = f"{row.status}<small>{html.escape(row.reason)}</small>" if row.reason else row.status
+    if entry.trace:
+        text += f' <a href="{quote(row.recording)}/error.txt">trace</a>'
+    return Cell(text, said, "words")
+
+
+def _modulus(entry: Entry) -> Cell:
+    e, low, high = (getattr(entry.row, f"young_modulus_{end}pa") for end in ("", "lo_", "hi_"))
+    if e is None:
+        return Cell()
+    known = low is not None and high is not None and low == low and high == high
+    interval = f"<small>{low / 1e3:.2f} to {high / 1e3:.2f}</small>" if known else ""
+    return Cell(f"<span>{e / 1e3:.2f}{interval}</span>", e)
+
+
+def verdict_words(entry: Entry) -> str:
+    """'viscoelasticity', 'force bias or force drift', 'none', ...; '' where nothing was diagnosed."""
+    found = entry.values.get("diagnose")
+    if found is None:
+        return ""
+    said = [name.replace("_", " ") for name in found["effects"]]
+    if "unknown" in found["kind"]:
+        said.append("something unknown")
+    if found["candidates"] and not said:
+        said = [" or ".join(name.replace("_", " ") for name in found["candidates"])]
+    return " and ".join(said) or str(found["kind"])
+
+
+def _thumbnail(result: Batch, name: str) -> Cell:
+    if not (result.folder / name / THUMBNAIL).exists():
+        return Cell(kind="picture")
+    return Cell(f'<img loading="lazy" alt="" src="{quote(name)}/{THUMBNAIL}">', "", "picture")
+
+
+def _link(result: Batch, name: str, step: str, text: str) -> str:
+    there = text and (result.folder / name / f"{step}.html").exists()
+    return f'<a href="{quote(name)}/{step}.html">{html.escape(text)}</a>' if there else html.escape(text)
+
+
+def _number(value: Any, scale: float, digits: int) -> Cell:
+    known = isinstance(value, int | float) and value == value
+    return Cell(f"{value * scale:.{digits}f}", value) if known else Cell()
+
+
+def _table(heads: Sequence[str], rows: Sequence[tuple[str, Sequence[Cell]]], name: str = "") -> str:
+    """heads: '' cannot be sorted by; rows: (class, cells)."""
+    wordy = [any(cells[k].kind == "words" for _, cells in rows) for k in range(len(heads))]
+    top = "".join(
+        f"<th{' class=words' if words else ''}>"
+        + (f'<button type="button">{html.escape(text)}</button>' if text else "")
+        + "</th>"
+        for text, words in zip(heads, wordy, strict=True)
+    )
+    body = "\n".join(
+        f'<tr class="{kind}">' + "".join(map(_cell, cells, heads)) + "</tr>" for kind, cells in rows
+    )
+    return f'<table class="sortable" id="{name}"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>'
+
+
+def _cell(cell: Cell, name: str) -> str:
+    kind = f' class="{cell.kind}"' if cell.kind else ""
+    return f'<td{kind} data-name="{html.escape(name)}" data-by="{html.escape(str(cell.by))}">{cell.text}</td>'
+
+
+def _cost(page: Page, result: Batch, steps: Sequence[str]) -> None:
+    rows = []
+    for step in steps:
+        known = [e.cost[step] for e in result.entries if step in e.cost]
+        if known:
+            cpu, peak = np.array(known, dtype=float).T
+            rows.append(
+                [
+                    Cell(step, step, "words"),
+                    Cell(str(len(known)), len(known)),
+                    *(_number(value, 1, 0) for value in (float(np.median(cpu)), float(cpu.max()))),
+                    _number(float(peak.max()), 1e-6, 0),
+                ]
+            )
+    if rows:
+        page.heading("What it cost")
+        heads = ["step", "recordings", "CPU, median [s]", "CPU, most [s]", "memory, most [MB]"]
+        page.part(_table(heads, [("", row) for row in rows]))

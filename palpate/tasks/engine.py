@@ -1,0 +1,107 @@
+"""Which executor: the flags that choose it, and a run with a bar."""
+
+from __future__ import annotations
+
+import argparse
+import shutil
+import sys
+from contextlib import AbstractContextManager
+from pathlib import Path
+from typing import Any
+
+from mechanics.errors import OptionError
+from mechanics.progress import Progress
+from palpate.tasks.driver import Outcome, run
+from palpate.tasks.graph import Graph
+from palpate.tasks.words import Status
+
+
+def add_engine(parser: argparse.ArgumentParser) -> None:
+    """--workers, --memory, --scheduler, --force."""
+    group = parser.add_argument_group("who does it")
+    group.add_argument(
+        "--workers",
+        type=int,
+        metavar="N",
+        help="processes of one thread each on this machine (default: one a core)",
+    )
+    group.add_argument(
+        "--memory",
+        type=float,
+        metavar="GB",
+        help="what they may take together (default: 90 %% of what is free)",
+    )
+    group.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://HOST:8786, in their place"
+    )
+    group.add_argument("--force", action="store_true", help="do what is finished again")
+
+
+def executor(
+    workers: int | None = None, scheduler: str | None = None, memory_bytes: int | None = None
+) -> AbstractContextManager[Any]:
+    """Processes of this machine, or the workers of a Dask scheduler; leaving the block ends what runs.
+
+    Raises OptionError for fewer workers than one, for both at once, and where no scheduler answers.
+    """
+    if scheduler is not None and (workers is not None or memory_bytes is not None):
+        raise OptionError("a scheduler's workers are its own: give --scheduler, or --workers and --memory")
+    if workers is not None and workers < 1:
+        raise OptionError(f"--workers {workers}: allowed are 1 and more")
+    if memory_bytes is not None and not memory_bytes > 0:
+        raise OptionError("--memory must be greater than 0")
+    if scheduler is not None:
+        from palpate.tasks.cluster import DaskExecutor
+
+        return DaskExecutor(scheduler)
+    from palpate.tasks.local import LocalExecutor
+
+    return LocalExecutor(workers, memory_bytes)
+
+
+def run_with_bar(
+    graph: Graph,
+    root: Path,
+    *,
+    workers: int | None = None,
+    scheduler: str | None = None,
+    memory_bytes: int | None = None,
+    force: bool = False,
+    progress: bool | Progress = True,
+    outcomes: dict[str, Outcome] | None = None,
+) -> dict[str, Outcome]:
+    """`driver.run` on the executor that is wanted; progress: a bar where standard error is a terminal, or who
+    is told words and the share that is done."""
+    with executor(workers, scheduler, memory_bytes) as chosen, Bar(progress is True) as bar:
+
+        def tell(status: Status) -> None:
+            bar(status)
+            if callable(progress):
+                progress(status.words(), status.fraction)
+
+        return run(graph, chosen, root, force=force, tell=tell, outcomes=outcomes)
+
+
+class Bar:
+    """One line on standard error: share, bar, time, what runs and how long the rest may take."""
+
+    def __init__(self, wanted: bool = True) -> None:
+        from tqdm import tqdm
+
+        self._bar = tqdm(
+            total=100.0,
+            disable=not (wanted and sys.stderr.isatty()),
+            bar_format="{percentage:3.0f}% {bar:20} {elapsed} {desc}",
+        )
+
+    def __call__(self, status: Status) -> None:
+        room = shutil.get_terminal_size().columns - 36
+        self._bar.set_description_str(status.words()[: max(10, room)], refresh=False)
+        self._bar.n = 100.0 * status.fraction
+        self._bar.refresh()
+
+    def __enter__(self) -> Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._bar.close()

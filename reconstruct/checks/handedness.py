@@ -1,0 +1,114 @@
+"""One test of the map from motion to force: pressing must push back against the way that the tip has gone.
+
+For a touch that sticks, the force on the tool points against its travel since first touch, to within friction
+and the surface's slope. Of all maps that a wrong axis, sign or handedness makes (the 48 signed permutations,
+and |force| a component) the one under which forces are most nearly where they must be is compared with the
+identity, sites weighed alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations, product
+
+import numpy as np
+
+from mechanics.press_sites import SITE_M, sites_of
+from reconstruct.checks.base import SURE_ODDS, Finding
+from reconstruct.checks.sight import Sight
+
+_LEAST_SITES = 5
+_LEAST_ANGLE_RAD = 0.15
+"""Directions of force and of travel agree no better than this on a sound recording."""
+_FLIPPED, _PRIOR = np.pi / 2, 1e-3
+_FORCE = ("fx", "fy", "fz")
+
+
+def handedness(sight: Sight) -> Iterator[Finding]:
+    """A finding where another map than the identity explains the forces' directions far better."""
+    touches = sight.touches
+    length, force = np.linalg.norm(touches.travel, axis=1), np.linalg.norm(touches.push, axis=1)
+    good = (length > 5 * max(float(sight.step[:3].max()), 1e-6)) & (force > 0)
+    if good.sum() < _LEAST_SITES:
+        return
+    against = -touches.travel[good] / length[good, None]
+    push = touches.push[good] / force[good, None]
+    site = sites_of(sight.path[touches.start[good]], against, SITE_M)
+    share = 1.0 / np.bincount(site)[site]
+    sites = int(site.max()) + 1
+    if sites < _LEAST_SITES:
+        return
+
+    def astray(expected: np.ndarray) -> float:
+        """Mean of 1 - cos of the angle between expected and read direction, sites alike."""
+        off = 1 - np.einsum("ij,ij->i", push, expected)
+        return float((share * off).sum() / sites) + 0.5 * _LEAST_ANGLE_RAD**2
+
+    as_read = astray(against)
+    found = {name: astray(against @ matrix.T) for name, matrix in _MAPS.items()}
+    found["abs"] = astray(np.abs(against))
+    best = min(found, key=lambda name: found[name])
+    decades = sites * float(np.log10(as_read / found[best])) + np.log10(_PRIOR)
+    if decades < np.log10(SURE_ODDS):
+        return
+    off = np.arccos(np.clip(np.einsum("ij,ij->i", push, against), -1, 1))
+    worst = int(np.flatnonzero(good)[np.argmax(off)])
+    stretch = sight.touches.start[worst], sight.touches.end[worst] - 1
+    name, words, todo = _described(best)
+    at = [float(sight.recording.t[int(i)]) for i in stretch]
+    yield Finding(
+        name,
+        f"{words}: force and travel are {np.degrees(np.median(off)):.0f} degrees (median) from opposite, "
+        f"{np.mean(off > _FLIPPED) * 100:.0f} % of {len(off)} touches push the wrong way",
+        f"odds {10 ** min(decades, 99.0):.1g} to 1 over the axes as they are, {sites} sites",
+        todo,
+        np.inf,
+        decades,
+        (at[0], at[1]),
+        _FORCE,
+    )
+
+
+def _maps() -> dict[str, np.ndarray]:
+    """Signed permutations by name: 'x -y z' says what fx, fy, fz are."""
+    found = {}
+    for order in permutations(range(3)):
+        for sign in product((1, -1), repeat=3):
+            matrix = np.zeros((3, 3))
+            matrix[range(3), order] = sign
+            found[" ".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, sign, strict=True))] = (
+                matrix
+            )
+    del found["x y z"]
+    return found
+
+
+_MAPS = _maps()
+
+
+def _described(best: str) -> tuple[str, str, str]:
+    """Name, words and remedy of a map."""
+    if best == "abs":
+        return (
+            "force magnitude",
+            "fx, fy, fz look like sizes without sign",
+            "log the signed components of the force",
+        )
+    if best == "-x -y -z":
+        return (
+            "force sign",
+            "the force pulls where it should push",
+            'swap [recording] force_on between "tool" and "object"',
+        )
+    parts = best.split()
+    words = "fx, fy, fz behave like " + ", ".join(p if p[0] == "-" else "+" + p for p in parts)
+    if np.linalg.det(_MAPS[best]) < 0:
+        flipped = [axis for axis, part in zip("xyz", parts, strict=True) if part == "-" + axis]
+        if len(flipped) == 1 and all(p[-1] == a for p, a in zip(parts, "xyz", strict=True)):
+            return (
+                "mirrored",
+                words,
+                f"turn the sign of {flipped[0]} or of f{flipped[0]}: one of them is left-handed",
+            )
+        return "swapped axes", words, "swap the two force columns back: the frames differ in handedness"
+    return "turned axes", words, "give position and force in one frame: they are turned against each other"

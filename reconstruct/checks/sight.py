@@ -1,0 +1,235 @@
+"""What the checks look at: the samples in the units believed so far, their noise, steps and touches.
+
+Nothing here relies on the stated rate, on the force's direction or on a base, as these are what is checked.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from mechanics.errors import ContactError
+from mechanics.recording import Recording
+from mechanics.robust import spread_about_zero
+from mechanics.samples import runs
+from reconstruct.baseline import free_air_force
+from reconstruct.boundary import find_interval
+from reconstruct.contacts import hysteresis
+from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
+from reconstruct.tool_weight import tool_weight
+
+CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
+_LATTICE = 0.02  # of a step: how well increments must be its multiples
+_LOW, _HIGH, _PEAK, _FEEBLE = 5.0, 10.0, 20.0, 0.15
+_LEAST_S = 0.05
+_SLIDE = 8.0
+_TIPS_M = (1e-3, 0.02)
+_GAP_S = 1.0
+_BLOCK = 32
+_STILL_S, _SLOW = 0.5, 5.0
+_SHIFTS_S = np.arange(-0.5, 0.5001, 0.004)
+
+
+@dataclass(frozen=True)
+class Units:
+    """Factors that samples are divided by to have s, m and N."""
+
+    time: float = 1.0
+    position: float = 1.0
+    force: float = 1.0
+    tip: float = 1.0
+
+
+@dataclass(frozen=True)
+class Touches:
+    """k touches after the base was traced, force filtered and free air taken off.
+
+    start, peak, end: (k,) samples. travel: (k, 3) m, the tip's way from first touch to the greatest force.
+    push: (k, 3) N on the tool at the greatest force.
+    """
+
+    start: np.ndarray
+    peak: np.ndarray
+    end: np.ndarray
+    travel: np.ndarray
+    push: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.start)
+
+
+class Sight:
+    """A recording as the checks see it.
+
+    times: (n,) s as they are; t: (n,) s, gaps cut to a second. position (n, 3) m, force (n, 3) N on the tool.
+    """
+
+    def __init__(self, recording: Recording, units: Units | None = None) -> None:
+        self.recording = recording
+        self.units = units or Units()
+        self.times = recording.t / self.units.time
+        self.t = _without_gaps(self.times)
+        self.tip_radius_m = recording.tip_radius_m / self.units.tip
+        self.position = recording.position / self.units.position
+        self.force = recording.force_on_tool / self.units.force
+
+    @cached_property
+    def values(self) -> np.ndarray:
+        """(n, 6), CHANNELS."""
+        return np.hstack([self.position, self.force])
+
+    @cached_property
+    def rate_hz(self) -> float:
+        """Of most samples, by their own times: neither gaps nor jitter count."""
+        blocks = self.times[: len(self.times) // _BLOCK * _BLOCK].reshape(-1, _BLOCK)
+        return (_BLOCK - 1) / float(np.median(blocks[:, -1] - blocks[:, 0]))
+
+    @cached_property
+    def step(self) -> np.ndarray:
+        """(6,) the least step of each channel; 0 where none shows."""
+        return np.array([_lattice(self.values[:, k]) for k in range(6)])
+
+    @cached_property
+    def noise_n(self) -> float:
+        """N an axis, of a raw force: of second differences, and of steps that hide it."""
+        return max(white_noise_std(self.force), float(np.median(self.step[3:])) / np.sqrt(12), 1e-9)
+
+    @cached_property
+    def cutoff_hz(self) -> float:
+        """Of the low-pass."""
+        return FilterOptions().cutoff_hz
+
+    @cached_property
+    def path(self) -> np.ndarray:
+        """(n, 3) m, low-passed position."""
+        return low_pass(self.position, self.rate_hz, self.cutoff_hz)
+
+    @cached_property
+    def air(self) -> np.ndarray:
+        """(n, 3) N, what is read in free air."""
+        return self._air[0]
+
+    @property
+    def steady(self) -> float:
+        """Share of the stretches of 8 s in which the reading in free air was found."""
+        return self._air[1]
+
+    @cached_property
+    def _air(self) -> tuple[np.ndarray, float]:
+        filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
+        weight = tool_weight(self.recording, filtered, self.cutoff_hz, self.spread_n)
+        air, share = free_air_force(self.t, filtered - weight, self.spread_n)
+        return weight + air, share
+
+    @cached_property
+    def spread_n(self) -> float:
+        """N an axis, noise of the filtered force, white or slow: that of the stillest fifth of half seconds."""
+        size = max(4, round(_STILL_S * self.rate_hz))
+        filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
+        still = filtered[: len(filtered) // size * size].reshape(-1, size, 3).std(axis=1)
+        white = self.noise_n * noise_gain(self.rate_hz, self.cutoff_hz)
+        if not len(still):
+            return white
+        return max(white, min(float(np.percentile(still.mean(axis=1), 20)), _SLOW * white))
+
+    @cached_property
+    def net(self) -> np.ndarray:
+        """(n, 3) N, low-passed, free air taken off."""
+        return low_pass(self.force, self.rate_hz, self.cutoff_hz) - self.air
+
+    @cached_property
+    def size(self) -> np.ndarray:
+        """(n,) N, length of the net force."""
+        return np.linalg.norm(self.net, axis=1)
+
+    @cached_property
+    def contact(self) -> np.ndarray:
+        """(n,) bool, whether something is touched."""
+        return hysteresis(self.size, _LOW * self.spread_n, _HIGH * self.spread_n)
+
+    @cached_property
+    def traced(self) -> tuple[int, int]:
+        """Samples [first, last) of the tracing; (0, 0) where none is found."""
+        recording = self.recording
+        phase = recording.boundary_phase
+        try:
+            return find_interval(self.t, self.path, self.contact, phase, self.tip_radius_m)
+        except ContactError:
+            return 0, 0
+
+    @cached_property
+    def spans(self) -> list[tuple[int, int]]:
+        """[start, end) of each touch after the tracing, short ones and slides left out."""
+        contact = self.contact.copy()
+        contact[: self.traced[1]] = False
+        least = max(3, round(_LEAST_S * self.rate_hz))
+        found = [(a, b) for a, b in runs(contact) if b - a >= least and a > 0 and b < len(self.t)]
+        reach = _SLIDE * float(np.clip(self.tip_radius_m, *_TIPS_M))
+        found = [(a, b) for a, b in found if np.ptp(self.path[a:b], axis=0).max() < reach]
+        peaks = np.array([self.size[a:b].max() for a, b in found])
+        if not len(peaks):
+            return []
+        # a brisk hand with a heavy tool makes many feeble contacts in the air
+        least = max(_PEAK * self.spread_n, _FEEBLE * float(np.percentile(peaks, 90)))
+        return [span for span, peak in zip(found, peaks, strict=True) if peak > least]
+
+    @cached_property
+    def touches(self) -> Touches:
+        """The touches, their force read earlier by `lag_s`."""
+        late = round(self.lag_s[0] * self.rate_hz)
+        rows = []
+        for a, b in self.spans:
+            peak = a + int(np.argmax(self.size[a:b]))
+            start, top = (min(max(i - late, 0), len(self.t) - 1) for i in (a, peak))
+            rows.append((a, peak, b, *(self.path[top] - self.path[start]), *self.net[peak]))
+        table = np.array(rows, dtype=float).reshape(-1, 9)
+        start, peak, end = table[:, :3].T.astype(int)
+        return Touches(start, peak, end, table[:, 3:6], table[:, 6:])
+
+    @cached_property
+    def lags(self) -> np.ndarray:
+        """(k,) s: how late each touch's force reads. Where the force passes three tenths of its peak on its
+        way up and down the tip is at nearly the same place; the shift of time that brings both together."""
+        out = []
+        for a, b in self.spans:
+            level = self.size[a:b] > 0.3 * self.size[a:b].max()
+            first, last = a + np.flatnonzero(level)[[0, -1]]
+            gap = np.zeros(len(_SHIFTS_S))
+            for axis in range(3):
+                x = self.path[:, axis]
+                up = np.interp(self.t[first] - _SHIFTS_S, self.t, x)
+                gap += (up - np.interp(self.t[last] - _SHIFTS_S, self.t, x)) ** 2
+            best = int(np.argmin(gap))
+            if 0 < best < len(gap) - 1:
+                out.append(_SHIFTS_S[best])
+        return np.array(out)
+
+    @cached_property
+    def lag_s(self) -> tuple[float, float]:
+        """How late the force reads, s, and its standard error (infinite where fewer than 6 touches say)."""
+        if len(self.lags) < 6:
+            return 0.0, np.inf
+        middle = float(np.median(self.lags))
+        scatter = max(spread_about_zero(self.lags - middle), 0.004)
+        return middle, 1.25 * scatter / float(np.sqrt(len(self.lags)))
+
+
+def _without_gaps(t: np.ndarray) -> np.ndarray:
+    dt = np.diff(t)
+    return t[0] + np.concatenate([[0.0], np.cumsum(np.minimum(dt, max(_GAP_S, 2 * float(np.median(dt)))))])
+
+
+def _lattice(values: np.ndarray) -> float:
+    steps = np.abs(np.diff(values))
+    steps = steps[steps > 1e-12 * max(float(np.ptp(values)), 1e-300)]
+    if len(steps) < 20:
+        return 0.0
+    step = float(np.percentile(steps, 2))
+    for reach in (4, 40, 400):  # rounding in the file makes the least increments a coarse scale
+        few = steps[steps < (reach + 0.5) * step]
+        step = float(few.sum() / np.round(few / step).sum())
+    multiple = steps / step
+    off = np.abs(multiple - np.round(multiple))[multiple < 1000]
+    return step if np.mean(off < _LATTICE) > 0.98 else 0.0

@@ -1,0 +1,158 @@
+"""The traced base against the presses: one support, one object."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from mechanics.robust import spread_about_zero
+from reconstruct.checks.base import Finding
+from reconstruct.contacts import Exploration
+
+_BELOW = 6.0
+_SCALE = 1.35
+_LEAST = 4
+_CERTAIN = 4.0
+_PRESS_S, _FEEBLE = 0.5, 0.2
+"""A contact that stays below this share of the usual press's force in its first half second was none."""
+_STEEP = 0.85
+"""A wall's normal rises from the horizontal by less than this cosine."""
+
+
+def support(exploration: Exploration) -> Iterator[Finding]:
+    """A tip below the support; a base of another size than the walls that stand on it."""
+    boundary = exploration.boundary
+    if not boundary.interval[1] > boundary.interval[0]:
+        return
+    yield from _below(exploration)
+    yield from _hollow(exploration)
+    yield from _size(exploration)
+
+
+def _below(exploration: Exploration) -> Iterator[Finding]:
+    recording, boundary = exploration.recording, exploration.boundary
+    radius = recording.tip_radius_m
+    height = boundary.height(exploration.position) - radius
+    height[: boundary.interval[1]] = 0.0
+    least = max(_BELOW * boundary.flatness_m, 0.1 * radius, 10 * (recording.position_resolution_m or 0.0))
+    below = height < -least
+    if not below.any():
+        return
+    deepest = int(np.argmin(height))
+    away = np.flatnonzero(~below)
+    before, after = away[away < deepest], away[away > deepest]
+    a = int(before[-1]) if len(before) else 0
+    b = int(after[0]) if len(after) else len(below) - 1
+    yield Finding(
+        "below the support",
+        f"the tip is {-1e3 * height[deepest]:.3g} mm below the support that was traced, at "
+        f"{recording.t[deepest]:.1f} s; {100 * below.mean():.2g} % of the samples are",
+        f"{-height[deepest] / max(boundary.flatness_m, 1e-6):.0f} times the trace's rms off its plane",
+        "trace on the support that the object stands on, in one frame; do not move the device in between",
+        np.inf,
+        np.inf,
+        (float(recording.t[a]), float(recording.t[b])),
+        ("x", "y", "z"),
+    )
+
+
+def _hollow(exploration: Exploration) -> Iterator[Finding]:
+    """A tip goes round a base on a wider path than itself: what it goes round has a size."""
+    boundary, radius = exploration.boundary, exploration.recording.tip_radius_m
+    path = boundary.centres - boundary.centres.mean(axis=0)
+    reach = float(np.median(np.linalg.norm(path, axis=1)))
+    if reach > 1.2 * radius:
+        return
+    t, (a, b) = exploration.recording.t, boundary.interval
+    yield Finding(
+        "tip radius",
+        f"the tip went round the base on a path of radius {reach * 1e3:.3g} mm, and its own radius is "
+        f"{radius * 1e3:.3g} mm: nothing is left for the object",
+        f"ratio {reach / radius:.2f}; it is above 1.2 for anything that can be pressed",
+        "state [tool] tip_radius_m in metres, and check the positions' unit",
+        np.inf,
+        np.inf,
+        (float(t[a]), float(t[b - 1])),
+        ("x", "y", "z"),
+    )
+
+
+def _size(exploration: Exploration) -> Iterator[Finding]:
+    """Walls followed down to the support along their slope must meet it where it was traced."""
+    boundary, presses = exploration.boundary, exploration.presses
+    up = boundary.support_normal
+    rise = presses.contact_normal @ up
+    height = boundary.height(presses.point)
+    wall = (np.abs(rise) < _STEEP) & (height > 0)
+    if wall.sum() < _LEAST:
+        return
+    middle = boundary.outline.mean(axis=0)
+    along = presses.contact_normal[wall] - rise[wall, None] * up
+    flat = np.linalg.norm(along, axis=1)
+    along /= flat[:, None]
+    # the wall's tangent, followed down by the height: outwards where the wall leans in
+    foot = presses.point[wall] + (height[wall] * rise[wall] / flat)[:, None] * along - middle
+    foot -= (foot @ up)[:, None] * up
+    reach = np.linalg.norm(foot, axis=1)
+    rim = boundary.outline - middle
+    bearing = rim / np.linalg.norm(rim, axis=1)[:, None]
+    nearest = np.argmax((foot / np.maximum(reach, 1e-9)[:, None]) @ bearing.T, axis=1)
+    traced = np.linalg.norm(rim[nearest], axis=1)
+    ratio = np.log(np.maximum(reach, 1e-6) / np.maximum(traced, 1e-6))
+    # a curved wall leaves its tangent by as much as it is high: the lower a press, the better it tells
+    weight = 1 / (0.05 + (height[wall] / traced) ** 2)
+    order = np.argsort(ratio)
+    total = np.cumsum(weight[order])
+    centre = float(ratio[order][np.searchsorted(total, 0.5 * total[-1])])
+    error = 1.25 * max(spread_about_zero(ratio - centre), 0.05) / np.sqrt(wall.sum())
+    if abs(centre) < np.log(_SCALE) + _CERTAIN * error:
+        return
+    t, (a, b) = exploration.recording.t, boundary.interval
+    yield Finding(
+        "base size",
+        f"the walls that were pressed stand {np.exp(centre):.2f} times as far out as the base that was traced",
+        f"{abs(centre) / error:.0f} standard errors, {wall.sum()} presses on walls",
+        "trace the base of the same object in the same units, or leave the trace out and give [object] model",
+        np.inf,
+        float(min(0.5 * (centre / error) ** 2 / np.log(10), 300)),
+        (float(t[a]), float(t[b - 1])),
+        ("x", "y", "z"),
+    )
+
+
+def dropped(exploration: Exploration) -> Iterator[Finding]:
+    """Contacts that were not used, and why, where they are many."""
+    used, lost = len(exploration.presses), exploration.rejected
+    # what is over in an instant was never meant as a press
+    lost = tuple((t, why) for t, why in lost if not why.startswith("lasts only"))
+    t, size = exploration.recording.t, np.linalg.norm(exploration.force, axis=1)
+
+    def peak(start: float) -> float:
+        return float(size[slice(*np.searchsorted(t, [start, start + _PRESS_S]))].max(initial=0.0))
+
+    least = _FEEBLE * float(np.median([peak(at) for at in exploration.presses.onset_s]))
+    lost = tuple((at, why) for at, why in lost if peak(at) > least)
+    if len(lost) < 3 or len(lost) < 0.25 * (used + len(lost)):
+        return
+    why = [_kind(reason) for _, reason in lost]
+    most = max(set(why), key=why.count)
+    share = len(lost) / (used + len(lost))
+    first = next(t for (t, _), kind in zip(lost, why, strict=True) if kind == most)
+    yield Finding(
+        "presses dropped",
+        f"{len(lost)} of {used + len(lost)} contacts were not used, {why.count(most)} as one "
+        f"{most} (the first at {first:.1f} s)",
+        f"{100 * share:.0f} %; up to 25 % is usual",
+        "press longer, harder and from the air; look at the named ones",
+        float(0.05 + 0.1 * share),
+        np.inf,
+        (max(first - 0.5, float(exploration.recording.t[0])), first + 1.0),
+        ("fx", "fy", "fz"),
+    )
+
+
+def _kind(reason: str) -> str:
+    """A reason without its figures."""
+    words = reason.split("(")[0].split(",")[0].split()
+    return "that " + " ".join(w for w in words if not any(c.isdigit() for c in w)).removesuffix(" ms")

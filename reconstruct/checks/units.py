@@ -1,0 +1,200 @@
+"""Units by plausibility: which units make a hand's exploration of the samples most probable.
+
+Each reading of the samples (seconds or milliseconds, metres or inches, newtons or grams) gives the same dozen
+quantities other values. What is known of them is wide and log-normal; ratios to what the recording states
+(tip radius, noise, resolution, rate) are heavy-tailed, since statements are wrong too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+from scipy.stats import norm
+
+from mechanics.recording import Recording
+from reconstruct.checks.base import SURE_ODDS, Finding, p_words, sure
+from reconstruct.checks.sight import Sight, Units
+
+READINGS = {
+    "time": {"s": 1.0, "ms": 1e3, "us": 1e6},
+    "position": {
+        "m": 1.0, "mm": 1e3, "cm": 1e2, "inches": 39.37, "dm": 10.0, "um": 1e6,
+        "m divided by 10": 0.1, "m divided by 100": 0.01, "km": 1e-3,
+    },
+    "force": {"N": 1.0, "mN": 1e3, "grams": 101.97, "kgf": 0.10197, "kN": 1e-3, "lbf": 0.22481},
+    "tip": {"m": 1.0, "mm": 1e3, "cm": 1e2, "m times 10": 10.0, "m divided by 10": 0.1, "km": 1e-3},
+}  # fmt: skip
+"""What the samples may be, and how many of it make the SI unit, which comes first."""
+COLUMNS = {"time": ("t",), "position": ("x", "y", "z"), "force": ("fx", "fy", "fz"), "tip": ("tip_radius_m",)}
+_SI = {"time": "seconds", "position": "metres", "force": "newtons", "tip": "metres"}
+_SHOWN = 3
+_PRIOR = 1e-2
+"""Odds on a reading other than SI before anything is seen."""
+_ELSE = 1e-3
+"""Probability that a quantity is out of the usual for a reason that has nothing to do with units."""
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """What a hand's exploration gives: median of what is usual, the factor of one standard deviation, and how
+    the value goes with the units of time, position, force and tip. stated: a ratio to what the recording says."""
+
+    words: str
+    usual: float
+    factor: float
+    powers: tuple[float, float, float, float]
+    stated: bool = False
+
+    def off(self, value: float, shift: float = 0.0) -> float:
+        """Standard deviations from the usual, ln of a factor taken off."""
+        return float((np.log(value / self.usual) - shift) / np.log(self.factor))
+
+
+QUANTITIES = {
+    "duration": Quantity("duration [s]", 100.0, 3.0, (1, 0, 0, 0)),
+    "rate": Quantity("rate over the stated one", 1.0, 1.2, (-1, 0, 0, 0), stated=True),
+    "speed": Quantity("speed in the air [m/s]", 0.06, 2.5, (-1, 1, 0, 0)),
+    "touch": Quantity("time from first touch to the peak [s]", 0.4, 2.5, (1, 0, 0, 0)),
+    "extent": Quantity("extent of the path [m]", 0.15, 2.0, (0, 1, 0, 0)),
+    "tip": Quantity("tip's radius [m]", 0.0045, 2.2, (0, 0, 0, 1)),
+    "ratio": Quantity("extent of the path over the tip's radius", 33.0, 2.0, (0, 1, 0, -1)),
+    "depth": Quantity("depth of a press over the tip's radius", 0.9, 2.0, (0, 1, 0, -1)),
+    "resolution": Quantity("step of the positions over the stated one", 1.0, 1.3, (0, 1, 0, 0), stated=True),
+    "peak": Quantity("greatest force of a press [N]", 1.2, 3.0, (0, 0, 1, 0)),
+    "noise": Quantity("force noise an axis [N]", 0.012, 3.0, (0, 0, 1, 0)),
+    "noise stated": Quantity("force noise over the stated one", 1.0, 1.3, (0, 0, 1, 0), stated=True),
+    "modulus": Quantity("modulus by Hertz [Pa]", 5e4, 4.6, (0, -1.5, 1, -0.5)),
+}
+_OF_TIME = ("duration", "rate", "speed", "extent")
+
+
+def settled(recording: Recording) -> tuple[Sight, tuple[Finding, ...]]:
+    """The samples in their most probable units, and a finding for each that is far more probable than SI.
+
+    The clock comes first: everything else is read through filters that need one.
+    """
+    sight = Sight(recording)
+    known, odds = _best({k: v for k, v in measured(sight, of_touches=False).items() if k in _OF_TIME})
+    found = []
+    if known["time"] != "s" and odds["time"] > SURE_ODDS:
+        found.append(_finding(sight, "time", known["time"], odds["time"], measured(sight, of_touches=False)))
+        sight = Sight(recording, Units(time=READINGS["time"][known["time"]]))
+    seen = measured(sight)
+    known, odds = _best(seen)
+    wrong = [
+        kind for kind in ("position", "force", "tip") if known[kind] not in _PLAIN and odds[kind] > SURE_ODDS
+    ]
+    if wrong:
+        found += [_finding(sight, kind, known[kind], odds[kind], seen) for kind in wrong]
+        factors = {kind: READINGS[kind][known[kind]] for kind in wrong}
+        sight = Sight(recording, replace(sight.units, **factors))
+    return sight, (*found, *_beyond(measured(sight)))
+
+
+def _beyond(seen: dict[str, float]) -> Iterator[Finding]:
+    """A quantity that no reading of the units makes usual. (A simulation has no noise.)"""
+    for name, value in seen.items():
+        q = QUANTITIES[name]
+        z = abs(q.off(value))
+        decades = float(-(norm.logsf(z) + np.log(2)) / np.log(10))
+        if q.stated or name == "noise" or not sure(decades):
+            continue
+        kind = list(READINGS)[int(np.flatnonzero(q.powers)[-1])]
+        yield Finding(
+            "tip radius" if kind == "tip" else f"{kind} unit",
+            f"{q.words} is {value:.3g}, where {q.usual:.3g} is usual",
+            f"{z:.0f} standard deviations, each a factor of {q.factor:g}; {p_words(decades)}",
+            f"check the unit and meaning of {', '.join(COLUMNS[kind])}",
+            np.inf,
+            decades,
+            None,
+            COLUMNS[kind],
+        )
+
+
+_PLAIN = ("s", "m", "N")
+
+
+def _best(seen: dict[str, float]) -> tuple[dict[str, str], dict[str, float]]:
+    """The most probable reading of each kind, and its odds over the best one that reads this kind as SI."""
+    kinds = tuple(READINGS)
+
+    def score(names: tuple[str, ...]) -> float:
+        logs = [np.log(READINGS[kind][name]) for kind, name in zip(kinds, names, strict=True)]
+        total = float(np.log(_PRIOR)) * sum(x != 0.0 for x in logs)
+        for name, value in seen.items():
+            q = QUANTITIES[name]
+            z = q.off(value, sum(p * x for p, x in zip(q.powers, logs, strict=True)))
+            usual = 1 / (1 + z**2) if q.stated else np.exp(-0.5 * z**2)
+            total += float(np.log((1 - _ELSE) * usual + _ELSE))
+        return total
+
+    scores = {names: score(names) for names in product(*READINGS.values())}
+    best = max(scores, key=lambda names: scores[names])
+    odds = {}
+    for i, kind in enumerate(kinds):
+        plain = max(v for names, v in scores.items() if names[i] in _PLAIN)
+        odds[kind] = float(np.exp(min(scores[best] - plain, 200.0)))
+    return dict(zip(kinds, best, strict=True)), odds
+
+
+def _finding(sight: Sight, kind: str, name: str, odds: float, seen: dict[str, float]) -> Finding:
+    index, columns = list(READINGS).index(kind), COLUMNS[kind]
+    told = [(QUANTITIES[k], v) for k, v in seen.items() if QUANTITIES[k].powers[index]]
+    told.sort(key=lambda pair: -abs(pair[0].off(pair[1])))
+    shown = ", ".join(f"{q.words} {v:.3g} (usual {q.usual:.3g})" for q, v in told[:_SHOWN])
+    return Finding(
+        "tip radius" if kind == "tip" else f"{kind} unit",
+        f"{', '.join(columns)} look like {name}: {shown}",
+        f"odds {odds:.1g} to 1 over {_SI[kind]}",
+        f"convert {', '.join(columns)} to {_SI[kind]}; check the stated noise, resolution and tip radius",
+        float("inf"),
+        float(np.log10(odds)),
+        (float(sight.recording.t[0]), float(sight.recording.t[-1])),
+        columns,
+    )
+
+
+def measured(sight: Sight, of_touches: bool = True) -> dict[str, float]:
+    """The quantities of QUANTITIES that the recording has, in the units of `sight`."""
+    recording, radius = sight.recording, sight.tip_radius_m
+    every = max(1, round(0.05 * sight.rate_hz))
+    moved = np.linalg.norm(np.diff(sight.position[::every], axis=0), axis=1)
+    passed = np.diff(sight.times[::every])
+    extent = float(np.ptp(sight.position, axis=0).max())
+    found = {
+        "duration": float(np.ptp(sight.t)),
+        "rate": sight.rate_hz / recording.sample_rate_hz,
+        "extent": extent,
+        "tip": radius,
+        "ratio": extent / radius,
+    }
+    if len(moved) > 3:
+        found["speed"] = float(np.percentile(moved / passed, 80))
+    if not of_touches:
+        return _proper(found)
+    found["noise"] = sight.noise_n
+    if recording.position_resolution_m and (sight.step[:3] > 0).all():
+        found["resolution"] = float(np.median(sight.step[:3])) / recording.position_resolution_m
+    if recording.force_noise_std_n:
+        found["noise stated"] = sight.noise_n / recording.force_noise_std_n
+    touches = sight.touches
+    depth, peak = (np.linalg.norm(v, axis=1) for v in (touches.travel, touches.push))
+    rise = sight.t[touches.peak] - sight.t[touches.start]
+    good = (depth > 3 * sight.step[:3].max()) & (rise > 0) & (depth > 0)
+    if good.sum() > 3:
+        plane = 4 / 3 * np.sqrt(radius) * depth[good] ** 1.5
+        found |= {
+            "touch": float(np.median(rise[good])),
+            "depth": float(np.median(depth[good])) / radius,
+            "peak": float(np.median(peak[good])),
+            "modulus": 0.75 * float(np.median(peak[good] / plane)),
+        }
+    return _proper(found)
+
+
+def _proper(found: dict[str, float]) -> dict[str, float]:
+    return {name: value for name, value in found.items() if np.isfinite(value) and value > 0}

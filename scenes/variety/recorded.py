@@ -1,0 +1,162 @@
+"""From a draw to a recording on disk, by way of the virtual laboratory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.progress import Progress, silent
+from mechanics.recording import Recording, read_recording
+from scenes.laboratory.hand import HandOptions, cohort_hand
+from scenes.laboratory.motion import Motion
+from scenes.laboratory.presses import Touch
+from scenes.laboratory.session import SimulateOptions, Staging
+from scenes.laboratory.simulate import Simulation, simulate
+from scenes.variety.draws import Draw
+from scenes.variety.instrument import logged, weighed
+from scenes.variety.objects import Thing, thing
+from scenes.variety.writing import object_name, write
+
+LEAST_DEPTH_MM = 1.0
+
+
+@dataclass(frozen=True)
+class Varied:
+    """One drawn exploration. recording: as read from its file. simulation: the laboratory's, before the
+    drawn instrument (its readings and truth). thing: what was explored.
+    """
+
+    draw: Draw
+    thing: Thing
+    recording: Recording
+    simulation: Simulation
+
+
+def record(
+    draw: Draw,
+    folder: Path,
+    effects: Mapping[str, float] | None = None,
+    *,
+    it: Thing | None = None,
+    sizes: bool = False,
+    workers: int | None = 1,
+    progress: Progress = silent,
+) -> Varied:
+    """Explore the drawn object, or `it`, with `effects`; write NAME.csv.gz and NAME.toml into `folder`.
+
+    The truth is the laboratory's, with the nuisances beside ([truth.nuisances]). What was solved before is
+    not solved again. Raises OptionError, LabError.
+    """
+    varied = explored(draw, effects, it=it, sizes=sizes, workers=workers, progress=progress)
+    name = "+".join([f"variety-{draw.seed:05d}", *(f"{k}={v:g}" for k, v in (effects or {}).items())])
+    path = write(folder / f"{name}.csv.gz", varied.recording, draw)
+    return replace(varied, recording=read_recording(path))
+
+
+def explored(
+    draw: Draw,
+    effects: Mapping[str, float] | None = None,
+    *,
+    it: Thing | None = None,
+    sizes: bool = False,
+    workers: int | None = 1,
+    cache: Path | None = None,
+    progress: Progress = silent,
+) -> Varied:
+    """The same, with nothing written. cache: where solved touches are kept, by default the user's."""
+    it = it or thing(draw.number)
+    options = SimulateOptions(
+        young_modulus_pa=draw.young_modulus_pa,
+        tip_radius_m=it.tip_radius_m,
+        force_noise_std_n=draw.noise_n,
+        position_resolution_m=draw.resolution_m,
+    )
+    staging = Staging(
+        touches=tuple(touches(it, draw)),
+        frame=frame(draw),
+        instrument=lambda readings: weighed(readings, draw),
+    )
+    simulation = simulate(
+        it.phantom, effects, options, hand=hand(draw), seed=draw.seed, sizes=sizes,
+        workers=workers, cache=cache, progress=progress, staging=staging,
+    )  # fmt: skip
+    truth = {**simulation.truth, "poisson_ratio": it.phantom.poisson_ratio, "nuisances": draw.table()}
+    stated = draw.poisson_ratio_stated or it.phantom.poisson_ratio != 0.49
+    recording = logged(
+        simulation.readings,
+        draw,
+        within_s=_within(simulation.motion, draw),
+        phase_s=simulation.motion.phase,
+        rng=np.random.default_rng([19, draw.seed]),
+        tip_radius_m=it.tip_radius_m,
+        object_name=object_name(draw),
+        poisson_ratio=it.phantom.poisson_ratio if stated else None,
+        truth=truth,
+    )
+    return Varied(draw, it, recording, simulation)
+
+
+def touches(it: Thing, draw: Draw) -> list[Touch]:
+    """The drawn presses in the order in which they are made; a few are oblique or dragged."""
+    rng = np.random.default_rng([23, draw.seed])
+    distinct = int(np.clip(round(draw.presses * (1 - draw.repeat_share)), 4, len(it.places)))
+    order = np.arange(len(it.places))
+    if draw.clusters:
+        distinct = min(distinct, max(4, len(order) // 2))
+        points = np.array([place[0].point for place in it.places])
+        heaps = points[rng.choice(len(points), draw.clusters, replace=False)]
+        order = np.argsort(np.linalg.norm(points[:, None] - heaps, axis=2).min(axis=1))
+    chosen = order[:distinct]
+    visits = np.concatenate([rng.permutation(chosen), rng.choice(chosen, draw.presses - distinct)])
+    found: list[Touch] = []
+    for k in visits:
+        kinds = it.places[k]
+        touch = kinds[int(rng.integers(len(kinds)))] if rng.random() < 0.3 else kinds[0]
+        if touch.kind != "drag":
+            depth = 1e3 * rng.uniform(draw.least_depth_m, draw.most_depth_m)
+            touch = replace(touch, depth=float(np.clip(depth, min(LEAST_DEPTH_MM, touch.reach), touch.reach)))
+        touch = replace(touch, repeat=sum(t.site == touch.site for t in found))
+        here = [i for i, t in enumerate(found) if t.site == touch.site]
+        # half of the repeats follow at once
+        if here and rng.random() < 0.5:
+            found.insert(here[-1] + 1, touch)
+        else:
+            found.append(touch)
+    return found
+
+
+def hand(draw: Draw) -> HandOptions:
+    """The drawn person's habits."""
+    person = cohort_hand(draw.person)
+    return replace(
+        person,
+        slowest_m_per_s=person.slowest_m_per_s * draw.pace,
+        fastest_m_per_s=min(person.fastest_m_per_s * draw.pace, 0.150),
+        trace_rounds=2.0 if draw.tracing == "two" else 1.0,
+        trace_breaks=2 if draw.tracing == "broken" else 0,
+        reach_pace=draw.briskness,
+    )
+
+
+def frame(draw: Draw) -> tuple[np.ndarray, np.ndarray]:
+    """(rotation (3, 3), shift (3,) m) from the object's frame to the device's."""
+    from scipy.spatial.transform import Rotation
+
+    axis = np.array([np.cos(draw.about_rad), np.sin(draw.about_rad), 0.0])
+    turned = Rotation.from_rotvec(draw.tilt_rad * axis) * Rotation.from_rotvec([0.0, 0.0, draw.turn_rad])
+    return turned.as_matrix(), np.array(draw.shift_m)
+
+
+def _within(way: Motion, draw: Draw) -> tuple[float, float]:
+    """(start, end) s of what is recorded: whole, or from within the tracing, or into the last touch."""
+    rng = np.random.default_rng([29, draw.seed])
+    start, end = float(way.t[0]), float(way.t[-1])
+    if draw.begins_in_contact:
+        start = way.phase[0] + rng.uniform(0.1, 0.4)
+    if draw.ends_in_contact:
+        last = way.t[(way.touch == way.touch.max()) & (way.s > 0)]
+        end = float(last[0] + rng.uniform(0.3, 0.8) * (last[-1] - last[0]))
+    return start, end

@@ -1,0 +1,146 @@
+"""Surfaces of other programs: every format to the same solid, holes closed or refused with their place, units."""
+
+from __future__ import annotations
+
+import meshio
+import numpy as np
+import pytest
+import pyvista
+import trimesh
+
+from mechanics.box_mesh import box_mesh
+from mechanics.errors import SurfaceError
+from mechanics.standing import standing
+from mechanics.surface_files import ClosedSurface, read_surface
+
+SIZE_MM = (60, 50, 40)
+
+
+def volume(surface: ClosedSurface) -> float:
+    shell = trimesh.Trimesh(surface.vertices, surface.triangles, process=False)
+    assert shell.is_watertight and shell.is_winding_consistent
+    return float(shell.volume)
+
+
+def written(folder, name: str):
+    """A block of 60 x 50 x 40 mm, in mm, in one of the formats."""
+    path, suffix = folder / name, name.rsplit(".", 1)[1]
+    block = box_mesh((3, 3, 2), SIZE_MM)
+    if suffix in ("vtu", "inp"):
+        meshio.Mesh(block.points, [("tetra", block.tetrahedra)]).write(path)
+    elif suffix == "msh":
+        # Gmsh writes the boundary's triangles beside the tetrahedra
+        cells = [("tetra", block.tetrahedra), ("triangle", block.surface)]
+        meshio.Mesh(block.points, cells).write(path, file_format="gmsh22")
+    else:
+        shell = trimesh.creation.box(extents=SIZE_MM)
+        if suffix == "vtp":
+            pyvista.wrap(shell).save(path)
+        else:
+            shell.export(path)
+    return path
+
+
+@pytest.mark.parametrize("suffix", ["stl", "obj", "ply", "glb", "vtp", "vtu", "msh", "inp"])
+def test_every_format_holds_the_same_solid(tmp_path, suffix):
+    surface = read_surface(written(tmp_path, f"block.{suffix}"), "mm")
+    assert volume(surface) == pytest.approx(60 * 50 * 40 * 1e-9, rel=1e-6)
+    assert surface.size_m == pytest.approx(0.06)
+
+
+def test_a_quadratic_mesh_keeps_its_corners(tmp_path):
+    block = box_mesh((2, 2, 2), SIZE_MM).quadratic()
+    meshio.Mesh(block.points, [("tetra10", block.tetrahedra)]).write(tmp_path / "q.vtu")
+    assert volume(read_surface(tmp_path / "q.vtu", "mm")) == pytest.approx(1.2e-4)
+
+
+def without(shell: trimesh.Trimesh, gone: np.ndarray, path):
+    shell.update_faces(~gone)
+    shell.export(path)
+    return path
+
+
+def test_small_and_flat_holes_are_closed(tmp_path):
+    cylinder = trimesh.creation.cylinder(radius=30, height=50, sections=64)
+    whole = cylinder.volume
+    bare = read_surface(without(cylinder, cylinder.face_normals[:, 2] < -0.9, tmp_path / "bare.stl"), "mm")
+    assert bare.notes == ("1 hole closed",) and volume(bare) == pytest.approx(whole * 1e-9, rel=1e-6)
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=30)
+    whole = ball.volume
+    pierced = np.linalg.norm(ball.triangles_center - [0, 0, 30], axis=1) < 2.5
+    assert volume(read_surface(without(ball, pierced, tmp_path / "b.stl"), "mm")) == pytest.approx(
+        whole * 1e-9, rel=2e-3
+    )
+
+
+def test_a_wide_hole_is_refused_with_its_place(tmp_path):
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=30)
+    gone = (ball.triangles_center[:, 0] > 10) & (ball.triangles_center[:, 1] > 0)
+    with pytest.raises(SurfaceError, match=r"hole 5\d\.?\d* mm wide at \(1\d\.?\d*, ") as refused:
+        read_surface(without(ball, gone, tmp_path / "open.ply"), "mm")
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_triangles_wound_at_random_come_out_outward(tmp_path):
+    shell = trimesh.creation.box(extents=SIZE_MM)
+    faces = shell.faces.copy()
+    faces[::3] = faces[::3, ::-1]
+    lines = [f"v {x} {y} {z}" for x, y, z in shell.vertices] + [f"f {a} {b} {c}" for a, b, c in faces + 1]
+    (tmp_path / "mixed.obj").write_text("\n".join(lines))
+    assert volume(read_surface(tmp_path / "mixed.obj", "mm")) == pytest.approx(1.2e-4)
+
+
+@pytest.mark.parametrize(("unit", "words"), [("m", "these look like mm: give --unit mm"), ("um", "--unit mm")])
+def test_units_that_make_no_object_for_a_hand_are_named(tmp_path, unit, words):
+    with pytest.raises(SurfaceError, match=words):
+        read_surface(written(tmp_path, "block.stl"), unit)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "words"),
+    [
+        ("bad.stl", b"hello", "no triangles"),
+        ("bad.msh", b"foo", "cannot be read as msh"),
+        ("bad.inp", b"\x00\xff", "cannot be read as inp"),
+        ("bad.vtu", b"<a/>", "no triangles"),
+        ("thing.step", b"", "allowed are stl, obj"),
+        ("gone.stl", None, "does not exist"),
+    ],
+)
+def test_bad_files_are_one_line(tmp_path, capfd, name, content, words):
+    if content is not None:
+        (tmp_path / name).write_bytes(content)
+    with pytest.raises(SurfaceError, match=words) as refused:
+        read_surface(tmp_path / name)
+    assert len(str(refused.value).splitlines()) == 1
+    assert capfd.readouterr() == ("", "")
+
+
+def surface_of(shell: trimesh.Trimesh) -> ClosedSurface:
+    return ClosedSurface(np.array(shell.vertices), np.array(shell.faces), "thing.stl")
+
+
+def test_an_object_without_a_foot_says_what_to_do_and_can_be_cut():
+    ball = surface_of(trimesh.creation.icosphere(subdivisions=4, radius=0.03))
+    with pytest.raises(SurfaceError, match="no flat foot .* --sink"):
+        standing(ball)
+    cut = standing(ball, sink_m=0.003)
+    shell = trimesh.Trimesh(cut.vertices, cut.triangles, process=False)
+    assert shell.is_watertight
+    cap = np.pi * 0.003**2 * (0.03 - 0.001)
+    assert shell.volume == pytest.approx(4 / 3 * np.pi * 0.03**3 - cap, rel=0.005)
+    assert cut.support_point == pytest.approx([0, 0, -0.027], abs=1e-6)
+
+
+def test_up_is_a_direction_of_the_file():
+    block = surface_of(trimesh.creation.box(extents=(0.06, 0.05, 0.04)))
+    for up, height in (("+z", 0.04), ("-x", 0.06), ("0,1,0", 0.05)):
+        stood = standing(block, up)
+        reach = (stood.vertices - stood.support_point) @ stood.support_normal
+        assert reach.min() == pytest.approx(0, abs=1e-12) and reach.max() == pytest.approx(height)
+    with pytest.raises(SurfaceError, match="allowed are"):
+        standing(block, "z up")
+    leaning = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
+    leaning.apply_transform(trimesh.transformations.rotation_matrix(0.5, [1, 0, 0]))
+    with pytest.raises(SurfaceError, match=r"flat ones are for --up \+x, -x"):
+        standing(surface_of(leaning))
