@@ -31,7 +31,7 @@ _BY_NAME = {
     "coloured_share": (0.0, 1.0),
     "hold_share": (0.0, 1.0),
     "folds": (2, 1000),
-    "bootstraps": (10, 100_000),
+    "bootstraps": (20, 100_000),
     "bootstrap": (10, 100_000),
     "sites": (1, 1000),
     "repeats": (1, 1000),
@@ -99,10 +99,11 @@ def check_range(field: dataclasses.Field[Any], value: Any, name: str | None = No
     """Raise OptionError for a number outside what the option takes; other values pass."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return
+    number: Any = value
     low, high = span_of(field)
-    if not low <= value <= high:
+    if not low <= number <= high:
         words = span(low, high, field.metadata["unit"])
-        raise OptionError(f"{name or field.name} is {value:g}; allowed are numbers{words}")
+        raise OptionError(f"{name or field.name} is {str(number)[:30]}; allowed are numbers{words}")
 
 
 def check_ranges(options: Any) -> None:
