@@ -30,7 +30,8 @@ def held_out(found: Fit) -> tuple[np.ndarray, np.ndarray]:
     for g in range(len(gram)):
         rest = total - gram[g]
         hessian = (rest[1:, 1:] + np.diag(found.prior))[np.ix_(free, free)]
-        hessian = hessian + 1e-9 * np.diag(np.diag(hessian))
+        # a parameter that nothing here moves (a slip where no motion is sideways) has no curvature at all
+        hessian = hessian + 1e-9 * np.diag(np.maximum(np.diag(hessian), 1e-12))
         move = np.zeros(len(found.values))
         move[free] = np.linalg.solve(hessian, (rest[1:, 0] - found.pull)[free])
         # where sites leave a parameter loose, a linear answer is good near the optimum only

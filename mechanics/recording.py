@@ -24,6 +24,7 @@ from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file, check_target, named_in, read_toml, reading, sha256_of_file
 from mechanics.schema import ANY, Key, Schema, check_table
 from mechanics.store import content_key
+from mechanics.surface_files import UNITS
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
@@ -35,13 +36,26 @@ SCHEMA: Schema = {
         "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
         "force_on": Key(str, choices=("tool", "object"), required=True),
         "boundary_phase": Key(size=2, unit="s"),
+        "quasi_static": Key(bool),
     },
     "tool": {"tip_radius_m": TIP_RADIUS, "mass_kg": Key(low=0.0, high=5.0, unit="kg")},
     "sensor": {
         "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
         "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
     },
-    "object": {"name": Key(str), "poisson_ratio": POISSON, "model": Key(str)},
+    "object": {
+        "name": Key(str),
+        "poisson_ratio": POISSON,
+        "model": Key(str),
+        "shape": Key(str),
+        "shape_unit": Key(str, choices=tuple(UNITS)),
+        "shape_pose": Key(str, choices=("auto", "given")),
+        "shape_up": Key(str),
+        "shape_sink_m": Key(low=0.0, high=1.0, unit="m"),
+        "slab_m": Key(low=1e-6, high=2.0, unit="m"),
+        "half_space": Key(bool),
+    },
+    "import": ANY,
     "truth": ANY,
 }
 """What a recording's TOML may hold; further keys are left alone."""
@@ -346,7 +360,7 @@ def _read_table(path: Path) -> dict[str, np.ndarray]:
                 raise RecordingError(f"'{path}' has the column {twice[0]} twice: leave one of them out")
             try:
                 with warnings.catch_warnings():
-                    warnings.filterwarnings("ignore", "loadtxt: input contained no data")
+                    warnings.simplefilter("ignore", UserWarning)  # of empty lines and files
                     values = np.loadtxt(
                         file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2,
                         comments=None, max_rows=MOST_SAMPLES + 1,

@@ -30,7 +30,8 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 LEAST_M, GREATEST_M = 0.002, 2.0
 """An object that a hand explores is so large across."""
 _SMALL, _FLAT = 0.1, 0.01
-"""Of the object's size: how wide a hole may be that is closed, how far off its plane the rim of a wider one."""
+"""Of the object's size: how wide a hole may be that is closed, how far off its plane the rim of a wider
+one."""
 
 
 @dataclass(frozen=True)
@@ -68,19 +69,42 @@ def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
         raise SurfaceError(f"--unit is '{unit}'; allowed are {', '.join(UNITS)}")
     if not path.is_file():
         raise SurfaceError(f"'{path}' does not exist: name a file that is there")
-    shell = _cleaned(_shell_of(path))
+    return _closed(_shell_of(path), path.name, unit)
+
+
+def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
+    """The closed surface of a file, or of a triangle mesh that has `vertices` (n, 3) in `unit` and `faces`
+    (m, 3).
+
+    Raises SurfaceError as `read_surface` does, and for what is neither.
+    """
+    import trimesh
+
+    if isinstance(shape, str | Path):
+        return read_surface(shape, unit)
+    if not (hasattr(shape, "vertices") and hasattr(shape, "faces")):
+        raise SurfaceError(
+            f"a {type(shape).__name__} is no surface: give a file, or a mesh with vertices and faces"
+        )
+    if unit not in UNITS:
+        raise SurfaceError(f"unit is '{unit}'; allowed are {', '.join(UNITS)}")
+    mesh = trimesh.Trimesh(np.array(shape.vertices, dtype=float), np.array(shape.faces), process=False)
+    return _closed(mesh, "the mesh", unit)
+
+
+def _closed(shell: trimesh.Trimesh, name: str, unit: str) -> ClosedSurface:
+    shell = _cleaned(shell)
     if not len(shell.faces):
-        raise SurfaceError(f"'{path}' holds no triangles: export the object as a surface of triangles")
+        raise SurfaceError(f"'{name}' holds no triangles: export the object as a surface of triangles")
     size = float(np.ptp(shell.vertices, axis=0).max())
-    _check_size(path, size, unit)
-    notes = _close(shell, path.name, UNITS[unit])
+    _check_size(name, size, unit)
+    notes = _close(shell, name, UNITS[unit])
     if shell.volume < 0:
         shell.invert()
     if not shell.volume > 1e-6 * size**3:
-        raise SurfaceError(f"'{path}' encloses no volume: a solid object is needed, no sheet")
-    return ClosedSurface(
-        np.asarray(shell.vertices) * UNITS[unit], np.asarray(shell.faces, dtype=np.int64), path.name, notes
-    )
+        raise SurfaceError(f"'{name}' encloses no volume: a solid object is needed, no sheet")
+    vertices = np.asarray(shell.vertices) * UNITS[unit]
+    return ClosedSurface(vertices, np.asarray(shell.faces, dtype=np.int64), name, notes)
 
 
 def _shell_of(path: Path) -> trimesh.Trimesh:
@@ -160,18 +184,19 @@ def _cleaned(shell: trimesh.Trimesh) -> trimesh.Trimesh:
     return shell
 
 
-def _check_size(path: Path, size: float, unit: str) -> None:
+def _check_size(name: str, size: float, unit: str) -> None:
     if LEAST_M <= size * UNITS[unit] <= GREATEST_M:
         return
     fits = [name for name, metres in UNITS.items() if 0.01 <= size * metres <= 0.5]
     hint = f"these look like {' or '.join(fits)}: give --unit {fits[0]}" if fits else "mend its scale"
     raise SurfaceError(
-        f"'{path}' is {size:.4g} {unit} across; {LEAST_M:g} to {GREATEST_M:g} m are allowed: {hint}"
+        f"'{name}' is {size:.4g} {unit} across; {LEAST_M:g} to {GREATEST_M:g} m are allowed: {hint}"
     )
 
 
 def _close(shell: trimesh.Trimesh, name: str, metres: float) -> tuple[str, ...]:
-    """Close small and flat holes of the shell in place; what was done. Raises SurfaceError for other holes."""
+    """Close small and flat holes of the shell in place; what was done. Raises SurfaceError for other
+    holes."""
     if shell.is_watertight:
         _wind(shell)
         return ()

@@ -22,9 +22,11 @@ if TYPE_CHECKING:
     import mechanics.recording
     from mechanics.presses import Presses
     from palpate.results.batch import Batch
+    from palpate.results.check import Checkup
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
+    from palpate.results.imported import Imported
     from palpate.results.model import Model
     from palpate.results.reconstruction import Reconstruction
     from palpate.results.recording import Recording
@@ -69,6 +71,65 @@ def read_recording(source: RecordingLike) -> Recording:
         raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
 
 
+def check(recording: RecordingLike, *, full: bool = False, progress: bool | Progress = True) -> Checkup:
+    """What may be wrong with a recording: units, axes, channels, clock, traced base, presses (docs/check.md).
+
+    full: reconstruct it too, some 20 s, and check its modulus. The result has findings, the gravest first,
+    each with a stretch in s; `reconstruct` refuses what is grave. Raises RecordingError for what is no
+    recording, and what `reconstruct` raises with `full`.
+    """
+    from palpate.results.check import Checkup
+    from reconstruct.checks.registry import check as checked
+    from reconstruct.checks.registry import seen
+    from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+
+    measured = read_recording(recording)
+    with _told("check", progress) as tell:
+        findings = checked(measured)
+        if full and not any(f.grave for f in findings):
+            findings = reconstruct_fully(measured, ReconstructOptions(force=True), tell).findings
+    return Checkup(measured, findings, seen(measured), full)
+
+
+def import_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Imported:
+    """What other programs' files hold, as a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS
+    bag, MCAP.
+
+    mapping: a TOML file that says what the columns are (docs/import-export.md); said: the same by keyword,
+    which count before it: columns {role: name}, units {kind: unit}, tip_radius_m, force_on ("tool",
+    "object"), frame ("device", "tool"), rotation (3, 3), flange_to_tip_m (3,), mass_kg, tare_s (start,
+    end), offset_s, rate_hz, thing (what [object] of the recording is to say). Raises RecordingError where
+    something needed is missing.
+    """
+    import dataclasses as classes
+
+    from palpate.importing.convert import understand
+    from palpate.importing.mapping import Said, read_mapping
+    from palpate.importing.tables import read_tables
+    from palpate.results.imported import Imported
+
+    held = {} if mapping is None else read_mapping(mapping)
+    for key, value in said.items():
+        merged = isinstance(value, Mapping) and isinstance(held.get(key), Mapping)
+        held[key] = {**held[key], **value} if merged else value
+    allowed = [field.name for field in classes.fields(Said)]
+    strange = sorted(set(held) - set(allowed))
+    if strange:
+        raise OptionError(f"pp.import_table has no option '{strange[0]}': allowed are {', '.join(allowed)}")
+    if not files:
+        raise OptionError("pp.import_table needs a file")
+    chosen = Said(**held)
+    tables = [table for file in files for table in read_tables(file)]
+    understood = understand(tables, chosen, Path(files[0]).name.split(".")[0])
+    return Imported(understood, chosen.thing, tuple(Path(file).name for file in files))
+
+
+def read_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Recording:
+    """The recording in other programs' files; what may be said is as for `import_table`, which also tells
+    and draws what it understood."""
+    return import_table(*files, mapping=mapping, **said).recording
+
+
 def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
     """The model of a MODEL folder; or of a scene, which is built the first time and then kept.
 
@@ -96,6 +157,50 @@ def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
         raise OptionError(f"a {type(source).__name__} is no model: give one, a MODEL folder or a scene")
     with _told("load", progress) as tell:
         return model_of(scene_model(source, tell))
+
+
+def model_of(
+    shape: Any,
+    young_modulus_pa: float | None = None,
+    *,
+    unit: str = "m",
+    up: str = "+z",
+    sink_m: float = 0.0,
+    poisson_ratio: float | None = None,
+    tip_radius_m: float | None = None,
+    mesh_size_m: float | None = None,
+    save: str | Path | None = None,
+    progress: bool | Progress = True,
+) -> Model:
+    """The model of an object whose shape is known, in the frame of its file.
+
+    shape: an STL, OBJ, PLY, glTF, VTP, VTU, MSH or INP file with lengths in `unit` ("m", "cm", "mm", "um",
+    "in"), or a triangle mesh with `vertices` and `faces` (trimesh's). young_modulus_pa: None takes 20 kPa.
+    up: out of the support, "+z", "-x", ... or "X,Y,Z" in the file's frame; sink_m: cut off flat at the
+    bottom. poisson_ratio: None takes 0.49; tip_radius_m: 5 mm; mesh_size_m: 10 mm, or an eighth of the
+    object. save: MODEL folder to write. Raises SurfaceError where the surface is open or has no flat foot.
+    """
+    from dataclasses import replace as changed
+
+    from mechanics.files import check_target
+    from mechanics.model import MODEL
+    from palpate.results.model import model_of as dressed_model
+    from scenes.build import model_of_mesh
+    from scenes.scene import Scene
+
+    if save is not None:
+        check_target(save, MODEL)
+    scene = Scene("mesh", "mesh", "", unit=unit, up=up, sink_m=sink_m, mesh_size_m=mesh_size_m)
+    scene = changed(
+        scene, young_modulus_pa=young_modulus_pa, poisson_ratio=poisson_ratio, tip_radius_m=tip_radius_m
+    )
+    for name in ("young_modulus_pa", "tip_radius_m", "mesh_size_m"):
+        value = getattr(scene, name)
+        if value is not None and not value > 0:
+            raise OptionError(f"{name} is {value}; it must be greater than 0")
+    with _told("model", progress) as tell:
+        made = dressed_model(model_of_mesh(shape, scene, tell))
+    return made if save is None else made.save(save)
 
 
 def reconstruct(
@@ -362,6 +467,31 @@ def simulate(
         )
     result = simulation_of(plain, Path(thing.name).name)
     return result if save is None else result.save(save)
+
+
+def export(
+    model: ModelLike,
+    to: str,
+    path: str | Path,
+    *,
+    at: Sequence[float] | None = None,
+    depth_m: float | None = None,
+    unit: str = "m",
+    progress: bool | Progress = True,
+) -> tuple[str, ...]:
+    """Write a model for another program: a minimal scene that runs there, or its mesh.
+
+    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl". at: (3,) m, where the
+    scene's tip presses, None is the middle of the top; depth_m: how deep, None is half the tip's radius.
+    unit: of an STL's lengths; all else is in SI units and the model's frame. Returns what the format cannot
+    say, one line each.
+    """
+    import numpy as np
+
+    from palpate.exporting.registry import write
+
+    plain = load(model, progress=progress)
+    return write(plain, to, path, at=None if at is None else np.asarray(at), depth_m=depth_m, unit=unit)
 
 
 def batch(

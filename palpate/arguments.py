@@ -13,7 +13,7 @@ import types
 import typing
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, NoReturn, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from mechanics.errors import OptionError, PalpateError
 from mechanics.files import JSON, FolderKind, Kind, atomic_file, check_target
 from mechanics.options import check_range
 from mechanics.recording import recording_files
-from mechanics.schema import span
 from palpate.keywords import kinds, options
 
 
@@ -32,6 +31,14 @@ class Options(Protocol):
 
 
 T = TypeVar("T", bound=Options)
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Wrong words are an OptionError, which the command line prints in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise it."""
+        raise OptionError(f"{message}; '{self.prog} --help' tells all options")
 
 
 def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[str] = ()) -> None:
@@ -117,18 +124,6 @@ def natural(text: str) -> int:
     return value
 
 
-def between(low: float, high: float) -> Callable[[str], float]:
-    """argparse type: a number of that range, ends included."""
-
-    def number(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"'{text}' must be a number{span(low, high, '')}")
-        return value
-
-    return number
-
-
 def vector(text: str) -> np.ndarray:
     """argparse type: three finite numbers, 'X,Y,Z'."""
     parts = text.split(",")
@@ -159,28 +154,34 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
     """Before any work: no output is an input or another output, and each can be written (check_target)."""
     read: dict[str, str] = {}
     written: dict[str, str] = {}
+    targets: list[tuple[Path, Kind | FolderKind]] = []
     for action in parser._actions:
         given = getattr(arguments, action.dest, None)
         flag = action.option_strings[-1] if action.option_strings else str(action.metavar or action.dest)
+        kind = getattr(action, _WRITES, None)
         for each in given if isinstance(given, list) else [given]:
-            if each is None:
+            if each is None or str(each) == "-":
                 continue
             if hasattr(action, _READS):
                 read |= {_identity(file): flag for file in _files_of(Path(each))}
-            kind = getattr(action, _WRITES, None)
-            if kind is None or str(each) == "-":
-                continue
-            path = Path(each)
-            also = kind.beside(path) if isinstance(kind, Kind) else []
-            for file in (path, *(other for other, _ in also)):
-                if _identity(file) in written:
-                    raise OptionError(f"{flag} and {written[_identity(file)]} both name '{file}': name two")
-                written[_identity(file)] = flag
-            check_target(path, kind)
+            if kind is not None:
+                targets.append((Path(each), kind))
+                for file in _written_at(*targets[-1]):
+                    if _identity(file) in written:
+                        raise OptionError(
+                            f"{flag} and {written[_identity(file)]} both name '{file}': name two"
+                        )
+                    written[_identity(file)] = flag
     for same in written.keys() & read.keys():
         raise OptionError(
             f"{written[same]} would replace what {read[same]} names and is read from: name another output"
         )
+    for path, kind in targets:
+        check_target(path, kind)
+
+
+def _written_at(path: Path, kind: Kind | FolderKind) -> list[Path]:
+    return [path, *(other for other, _ in kind.beside(path))] if isinstance(kind, Kind) else [path]
 
 
 def _files_of(path: Path) -> list[Path]:
@@ -280,10 +281,3 @@ class Bar:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def positive(value: float, name: str) -> float:
-    """`value`, or OptionError where it is not greater than 0."""
-    if not value > 0:
-        raise OptionError(f"{name} is {value}; it must be greater than 0")
-    return value

@@ -17,7 +17,11 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "demo": "the main job on the embedded example; prints the report's path",
+    "check": "what may be wrong with a recording, before it is believed",
     "reconstruct": "a recording becomes a model",
+    "model": "a MODEL from a surface's file and a modulus",
+    "import": "other programs' files become a recording",
+    "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",
@@ -29,6 +33,8 @@ COMMANDS = {
     "batch": "many recordings at once",
 }
 """Every sub-command, one line each; its module is `palpate.commands.NAME`."""
+MODULES = {"import": "palpate.commands.import_"}
+"""Where a command's name is a word of Python's own."""
 
 
 class Ended(KeyboardInterrupt):
@@ -40,11 +46,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     before = _listen(_leave)
     try:
         # nothing is open yet, and libraries that are half loaded do not bear an exception: leave at once
-        command, module, arguments = _parsed(list(sys.argv[1:] if argv is None else argv))
+        words = list(sys.argv[1:] if argv is None else argv)
+        command, module, code = _loaded(words)
         if module is None:
-            return arguments
+            return code
         _listen(_interrupt)
-        return _run(command, module, arguments)
+        return _run(command, module, words[1:])
     except KeyboardInterrupt as how:
         print(f"{command.prog}: interrupted", file=sys.stderr)
         code = 143 if isinstance(how, Ended) else 130
@@ -56,8 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             signal.signal(number, handler)
 
 
-def _parsed(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, Any]:
-    """(parser, the command's module, its arguments); without a module, the exit code instead of these."""
+def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, int]:
+    """(parser, the command's module or None, then the exit code)."""
     import argparse
     import importlib
 
@@ -70,22 +77,25 @@ def _parsed(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, Any]:
     if name not in COMMANDS:
         parser.error(f"'{name}' is no command; allowed are {', '.join(COMMANDS)}")
     try:
-        module = importlib.import_module(f"palpate.commands.{name}")
+        module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
     except ModuleNotFoundError as error:
         if error.name != f"palpate.commands.{name}":
             raise
         print(f"palpate {name}: not in this version yet; see CHANGELOG.md for what is", file=sys.stderr)
         return parser, None, 2
-    command = argparse.ArgumentParser(
+
+    from palpate.arguments import OneLineParser
+
+    command = OneLineParser(
         prog=f"palpate {name}",
         description=module.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_arguments(command)
-    return command, module, command.parse_args(argv[1:])
+    return command, module, 0
 
 
-def _run(command: argparse.ArgumentParser, module: Any, arguments: argparse.Namespace) -> int:
+def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
     import warnings
 
@@ -109,6 +119,7 @@ def _run(command: argparse.ArgumentParser, module: Any, arguments: argparse.Name
     with warnings.catch_warnings():
         warnings.showwarning = warned
         try:
+            arguments = command.parse_args(words)
             check_paths(command, arguments)
             return int(module.run(arguments) or 0)
         except PalpateError as error:
@@ -129,7 +140,8 @@ def _listen(handler: Any) -> dict[int, Any]:
     names = ("SIGINT", "SIGTERM", "SIGHUP")
     try:
         numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-        return {n: signal.signal(n, handler) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
+        ours = [n for n in numbers if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+        return {n: signal.signal(n, handler) for n in ours}
     except ValueError:  # in a thread: signals are the main one's business
         return {}
 

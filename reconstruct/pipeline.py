@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from mechanics.errors import NoBaseError, OptionError
+from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.linear_range import linear_range
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
@@ -20,12 +21,16 @@ from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
+from reconstruct.checks.base import Finding
+from reconstruct.checks.outcome import result_of
+from reconstruct.checks.registry import Checkup
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
 from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
@@ -48,12 +53,14 @@ class ReconstructOptions:
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    force: bool = option(False, "go on although the check-up finds something grave")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
     contact: ContactOptions = field(default_factory=ContactOptions)
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     meshing: MeshingOptions = field(default_factory=MeshingOptions)
     modulus: ModulusOptions = field(default_factory=ModulusOptions)
+    modulus_field: FieldOptions = field(default_factory=FieldOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
     seed: int = 0
 
@@ -64,6 +71,8 @@ class Reconstruction:
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
+    findings: of the check-up, grave ones first; the interval is as wide as they make it.
+    normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
 
     model: Model
@@ -78,13 +87,14 @@ class Reconstruction:
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises ContactError, SurfaceError or MeshError where a step cannot be
-    done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave, unless
+    options.force; ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -95,16 +105,20 @@ def reconstruct_fully(
     options = options or ReconstructOptions()
     paper = options.method == "paper"
     nu = _poisson_ratio(recording, options)
+    _check_timed(recording)
     clock = _Clock()
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
+    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
     placed = None
     if geometry.known:
         exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
         exploration = _explored(recording, options)
+        checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
             evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
@@ -147,6 +161,7 @@ def reconstruct_fully(
             seed=options.seed,
         )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
+    interval = checkup.interval(result_of(presses, modulus, interval, fit))
     clock.lap("modulus")
     progress("1D models", 0.95)
     one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
@@ -167,6 +182,9 @@ def reconstruct_fully(
         provenance=_provenance(exploration, options, surface, fit),
         about=tables,
     )
+    if sites is not None and options.modulus_field.field != "homogeneous":
+        model = with_fitted_field(model, sites, exploration.noise_n)
+        clock.lap("modulus field")
     progress("done", 1.0)
     return Reconstruction(
         model=model,
@@ -181,7 +199,18 @@ def reconstruct_fully(
         modulus=fit,
         paper_fit=paper_fit,
         placed=placed,
+        findings=checkup.found,
     )
+
+
+def _check_timed(recording: Recording) -> None:
+    """Raises ContactError for rows that are no path: their first touches and noise cannot be told yet."""
+    about = recording.description.get("recording", {})
+    if isinstance(about, Mapping) and about.get("quasi_static"):
+        raise ContactError(
+            f"'{recording.name}' holds quasi-static points without a time, and presses are read off "
+            "paths from free air: if its rows are in order of time, import it with --rate HZ"
+        )
 
 
 def _surface_options(options: ReconstructOptions) -> SurfaceOptions:

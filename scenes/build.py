@@ -10,8 +10,9 @@ import hashlib
 import json
 import shutil
 from collections.abc import Collection
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,17 +22,22 @@ from mechanics.material import Ball, Material
 from mechanics.model import MODEL, Model, Support, Tool, read_model, write_model
 from mechanics.progress import Progress, silent
 from mechanics.recording import read_recording, recording_files
+from mechanics.standing import Standing, standing
+from mechanics.surface_files import surface_of
 from reconstruct.meshing import MeshingOptions, mesh_surface
-from reconstruct.pipeline import reconstruct
+from reconstruct.pipeline import DEFAULT_POISSON_RATIO, reconstruct
+from reconstruct.shapes.decimation import decimated
 from reconstruct.surface import Surface
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.inclusions import ball_of
-from scenes.phantoms import Region, phantom
+from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene
 from scenes.virtual_presses import palpate_model
 
-VERSION = 5
+VERSION = 6
 DEFAULT_TIP_RADIUS_M = 0.005
+MESH_SIZE_M, LEAST_EDGES = 0.010, 8
+"""Edge length of the tetrahedra, and the least number of edges along an object."""
 
 
 def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = None) -> Model:
@@ -45,6 +51,7 @@ def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = 
         except ModelError:
             pass  # damaged: built again below
     model = _MAKERS[scene.kind](scene, progress)
+    _check_inside(model)
     try:
         write_model(path, model)
         return read_model(path)
@@ -101,34 +108,80 @@ def _recording_path(scene: Scene) -> Path:
     return embedded_recording(scene.source) if scene.source in embedded_names() else Path(scene.source)
 
 
+def _check_inside(model: Model) -> None:
+    """Raises SceneError for a ball that lies wholly beside the object."""
+    low, high = model.mesh.points.min(axis=0), model.mesh.points.max(axis=0)
+    for name, ball in model.material.inclusions.items():
+        centre = np.array(ball.centre_m)
+        if (centre + ball.radius_m < low).any() or (centre - ball.radius_m > high).any():
+            raise SceneError(
+                f"the inclusion '{name}' at {centre.tolist()} m lies outside the object "
+                f"({np.round(low, 4).tolist()} to {np.round(high, 4).tolist()} m): move it inside"
+            )
+
+
 def _from_phantom(scene: Scene, progress: Progress) -> Model:
     shape = phantom(scene.source)
+    stood = Standing(shape.vertices, shape.faces, np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    about = {"method": "scene", "phantom": shape.name, "shape": shape.shape}
+    own = Material(
+        young_modulus_pa=shape.young_modulus_pa,
+        poisson_ratio=shape.poisson_ratio,
+        inclusions=_balls(shape.regions if scene.inclusions is None else scene.inclusions),
+    )
+    return _built(scene, stood, own, about, progress)
+
+
+def _from_mesh(scene: Scene, progress: Progress) -> Model:
+    return model_of_mesh(scene.source, scene, progress)
+
+
+def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Model:
+    """The model of a surface's file, or of a mesh with `vertices` and `faces` in the scene's unit, in its
+    own frame.
+
+    Raises SurfaceError where it is open or has no flat foot.
+    """
+    surface = surface_of(shape, scene.unit)
+    return _built(
+        scene,
+        standing(surface, scene.up, scene.sink_m),
+        Material(DEFAULT_MODULUS_PA, DEFAULT_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
+        {"method": "scene", "mesh": surface.name, "mended": ", ".join(surface.notes)},
+        progress,
+    )
+
+
+def _built(
+    scene: Scene, stood: Standing, own: Material, provenance: dict[str, str], progress: Progress
+) -> Model:
+    """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
     surface = Surface(
-        vertices=shape.vertices,
-        triangles=shape.faces,
-        uncertainty_m=np.zeros(len(shape.vertices)),
-        support_point=np.zeros(3),
-        support_normal=np.array([0.0, 0.0, 1.0]),
+        vertices=stood.vertices,
+        triangles=stood.triangles,
+        uncertainty_m=np.zeros(len(stood.vertices)),
+        support_point=stood.support_point,
+        support_normal=stood.support_normal,
         method="known",
         reason="the shape is given",
+        redraw=lambda edge_m: decimated(stood, edge_m),
     )
-    meshing = mesh_surface(
-        surface, MeshingOptions(mesh_size_m=scene.mesh_size_m), lambda s, f: progress(s, 0.4 * f)
+    edge = scene.mesh_size_m or min(MESH_SIZE_M, float(np.ptp(stood.vertices, axis=0).max()) / LEAST_EDGES)
+    meshing = mesh_surface(surface, MeshingOptions(mesh_size_m=edge), lambda s, f: progress(s, 0.4 * f))
+    material = replace(
+        own,
+        young_modulus_pa=scene.young_modulus_pa or own.young_modulus_pa,
+        poisson_ratio=own.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
+        dent_law="neo-hookean" if scene.finite_strain else "linear",
     )
-    regions = shape.regions if scene.inclusions is None else scene.inclusions
     model = Model(
         mesh=meshing.mesh.quadratic(),
-        material=Material(
-            young_modulus_pa=scene.young_modulus_pa or shape.young_modulus_pa,
-            poisson_ratio=shape.poisson_ratio if scene.poisson_ratio is None else scene.poisson_ratio,
-            dent_law="neo-hookean" if scene.finite_strain else "linear",
-            inclusions=_balls(regions),
-        ),
+        material=material,
         support=Support(surface.support_point, surface.support_normal),
         tool=Tool(scene.tip_radius_m or DEFAULT_TIP_RADIUS_M),
-        mesh_size_m=scene.mesh_size_m,
+        mesh_size_m=edge,
         effects={"finite_strain": {}} if scene.finite_strain else {},
-        provenance={"method": "scene", "phantom": shape.name, "shape": shape.shape},
+        provenance=provenance,
     )
     return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
 
@@ -162,4 +215,4 @@ def _changed(scene: Scene, model: Model) -> Model:
     return model.replaced(tool=tool, path=None)
 
 
-_MAKERS = {"phantom": _from_phantom, "recording": _from_recording, "model": _from_model}
+_MAKERS = {"phantom": _from_phantom, "mesh": _from_mesh, "recording": _from_recording, "model": _from_model}

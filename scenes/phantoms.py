@@ -13,6 +13,8 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import SceneError
+from mechanics.standing import standing
+from mechanics.surface_files import SUFFIXES, is_surface_file, read_surface
 
 SPACING_M = 0.0018
 """Edge length of the surfaces' triangles, m."""
@@ -239,55 +241,29 @@ DEFAULT_MODULUS_PA = 20e3
 
 
 def phantom(name: str | Path) -> Phantom:
-    """A phantom by its name, or the closed surface in an STL, PLY or VTU file (metres, standing on z = 0).
+    """A phantom by its name, or the closed surface in a file (metres, z up), its base's middle put on the
+    origin.
 
-    Raises SceneError for an unknown name and for a surface that is open or does not stand on its support.
+    Raises SceneError for an unknown name, SurfaceError for a surface that is open or has no flat foot.
     """
     if str(name) in PHANTOMS:
         return PHANTOMS[str(name)]()
     path = Path(name)
-    if path.suffix.lower() not in (".stl", ".ply", ".vtu"):
+    if not is_surface_file(path):
         raise SceneError(
-            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as STL, "
-            f"PLY or VTU"
+            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as "
+            f"{', '.join(SUFFIXES)}"
         )
     if not path.is_file():
         raise SceneError(
             f"'{path}' does not exist: name a phantom ({', '.join(PHANTOMS)}) or a file that is there"
         )
-    return _read(path)
-
-
-def _read(path: Path) -> Phantom:
     import trimesh
 
-    if path.suffix.lower() == ".vtu":
-        import pyvista
-
-        shell = pyvista.read(path).extract_surface().triangulate()
-        surface = trimesh.Trimesh(np.asarray(shell.points), shell.faces.reshape(-1, 4)[:, 1:])
-    else:
-        loaded = trimesh.load(path, force="mesh")
-        if not isinstance(loaded, trimesh.Trimesh):
-            raise SceneError(f"'{path}' holds no surface: a closed one of triangles is needed")
-        surface = loaded
-    surface.merge_vertices()
-    if not surface.is_watertight:
-        raise SceneError(
-            f"'{path}' is not closed: every edge must belong to two triangles; close its holes first"
-        )
-    if surface.volume < 0:
-        surface.invert()
-    low, span = surface.bounds[0], np.ptp(surface.bounds, axis=0)
-    if span.max() > 2.0 or span.max() < 0.01:
-        raise SceneError(f"'{path}' is {span.max():.4g} m across: lengths must be metres, 0.01 to 2 m")
-    shift = np.array([*-(surface.bounds[0] + surface.bounds[1])[:2] / 2, -low[2]])
-    surface.apply_translation(shift)
-    flat = (surface.triangles_center[:, 2] < 0.02 * span[2]) & (surface.face_normals[:, 2] < -0.99)
-    if surface.area_faces[flat].sum() < 0.02 * surface.area:
-        raise SceneError(
-            f"'{path}' has no flat foot: the object must stand on the plane of its lowest point (z up)"
-        )
+    stood = standing(read_surface(path))
+    surface = trimesh.Trimesh(stood.vertices, stood.triangles)
+    low, high = surface.bounds
+    surface.apply_translation([*-(low + high)[:2] / 2, -stood.support_point[2]])
     for _ in range(8):
         if surface.edges_unique_length.max() <= 2.5 * SPACING_M or len(surface.faces) > 60000:
             break

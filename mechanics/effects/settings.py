@@ -78,7 +78,7 @@ class Scene(Protocol):
 
     places: the pressed places. start: (p + 1,) rows of each press. t: (n,) s, the recording's clock. press:
     (n,). lead: (n, 3) side of the tip in a play that the reading follows. quaternion: (n, 4) tool to device,
-    or None. acceleration: (n, 3) m/s^2, device frame.
+    or None. acceleration: (n, 3) m/s^2, device frame. tip_radius: m, of the recording, as stated.
     """
 
     places: Places
@@ -95,3 +95,5 @@ class Scene(Protocol):
     def quaternion(self) -> np.ndarray | None: ...
     @property
     def acceleration(self) -> np.ndarray: ...
+    @property
+    def tip_radius(self) -> float: ...

@@ -21,6 +21,7 @@ from palpate.arguments import (
     say,
 )
 from palpate.report.page import PAGE
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "FEM against interpolated 1D models on held-out palpations"
 
@@ -37,6 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="REPORT.html",
         help="write tables and pictures as a page",
     )
+    add_mesh_arguments(parser)
     add_options_of(parser, "compare")
     add_json(parser)
     add_seed(parser)
@@ -45,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print, report."""
     options = given_for(arguments, "compare")
-    result = api.compare(arguments.recording, arguments.model, seed=arguments.seed, **options)
+    result = api.compare(
+        arguments.recording, given_model(arguments, arguments.model), seed=arguments.seed, **options
+    )
     say(arguments, *result.lines())
     if arguments.report:
         say(arguments, f"report: {result.report(arguments.report)}")

@@ -25,6 +25,7 @@ from palpate.arguments import (
     say,
 )
 from palpate.report.page import PAGE
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "the sim-to-real gap: where, which effect, how far it shrinks"
 
@@ -45,6 +46,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         parser, "--report", kind=PAGE, metavar="HTML",
         help="write the three answers with pictures as one HTML page",
     )  # fmt: skip
+    add_mesh_arguments(parser)
     add_options_of(parser, "diagnose", skip=("seed",))
     add_json(parser)
     add_seed(parser)
@@ -54,7 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, say it, and write what was asked for."""
     if arguments.corrected and not arguments.corrected.endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{arguments.corrected}' must end in .csv or .csv.gz")
-    result = api.diagnose(arguments.recording, arguments.model, **given_for(arguments, "diagnose"))
+    result = api.diagnose(
+        arguments.recording, given_model(arguments, arguments.model), **given_for(arguments, "diagnose")
+    )
     say(arguments, *result.lines())
     if arguments.apply:
         better = result.improved().save(arguments.apply)

@@ -22,6 +22,7 @@ from palpate.arguments import (
     say,
     vector,
 )
+from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "one scripted press on a model, headless"
 
@@ -31,7 +32,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     from render.press import CURVE
     from render.registry import names
 
-    add_input(parser, "model", metavar="MODEL_OR_SCENE", help="folder of a model, or a scene")
+    add_input(parser, "model", metavar="MODEL_OR_SCENE", help="folder of a model, a scene, a surface file")
+    add_mesh_arguments(parser)
     parser.add_argument("--at", type=vector, required=True, metavar="X,Y,Z", help="point aimed at [m]")
     parser.add_argument(
         "--direction", type=vector, required=True, metavar="X,Y,Z", help="of the motion; any length"
@@ -56,7 +58,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     expected = read_curve(arguments.expect) if arguments.expect else None
     curve = api.press(
-        arguments.model,
+        given_model(arguments, arguments.model) or arguments.model,
         arguments.at,
         arguments.direction,
         arguments.depth,

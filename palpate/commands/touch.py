@@ -1,7 +1,8 @@
 """Feel a model or scene at 1 kHz: in a window, or headless.
 
 MODEL_OR_SCENE is a MODEL folder, a scene (demo, silicone-1, silicone-2, silicone-3, bean, nodule,
-your-recording, or a scene's .toml), a recording, or a phantom. In the window the mouse hovers over the
+your-recording, or a scene's .toml), a recording, a phantom, or the file of a surface (STL, OBJ, PLY, glTF,
+VTP, VTU, MSH, INP) with --unit and --modulus. In the window the mouse hovers over the
 object, the left button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
 """
 
@@ -38,14 +39,14 @@ from palpate.arguments import (
     say,
 )
 from palpate.servo import SafetyOptions, ServoOptions
-from palpate.sources import with_friction
+from palpate.sources import add_mesh_arguments, given_scene, with_friction
 from palpate.window.session import TouchSession
 from render.options import RenderOptions
 from render.registry import names
 from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
-from scenes.scene import Scene, load_scene
+from scenes.scene import Scene
 
 SUMMARY = "feel a model or scene at 1 kHz"
 DEFAULT_SCENE = "demo"
@@ -62,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="MODEL_OR_SCENE",
         help=f"what to touch (default: {DEFAULT_SCENE})",
     )
+    add_mesh_arguments(parser)
     parser.add_argument(
         "--device",
         metavar="NAME",
@@ -102,7 +104,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> int:
     """Open, touch, close; prints what the servo did."""
-    scene = load_scene(arguments.scene)
+    scene = given_scene(arguments, arguments.scene)
     name = arguments.device or ("simulated" if arguments.headless else "mouse")
     _check(arguments, name)
     servo_options = options_from(

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.results.base import Result, dressed
+from palpate.results.check import finding_json
 from palpate.results.model import Model, model_of
 from palpate.results.recording import Recording, recording_of
 from reconstruct import pipeline as room
@@ -66,6 +67,7 @@ class Reconstruction(Result, room.Reconstruction):
             f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
             f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
         ]
+        lines += [f.line() for f in self.findings]
         if self.modulus:
             misfit = float((self.modulus.press.rms_n**2).mean() ** 0.5)
             lines.append(f"  {self.modulus.reason}; misfit of a press {misfit:.3f} N")
@@ -76,6 +78,7 @@ class Reconstruction(Result, room.Reconstruction):
             )
         lines += [
             f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
+            *(f"  {note}" for note in (self.placed.notes if self.placed else ())),
             f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
             f"l = {model.mesh_size_m * 1e3:g} mm; radius-edge ratio {_spread(quality.radius_edge_ratio)}, "
             f"distance to the surface {_spread(1e3 * quality.surface_distance_m)} mm (50, 95, 100 %)",
@@ -92,6 +95,7 @@ class Reconstruction(Result, room.Reconstruction):
             "poisson_ratio": model.material.poisson_ratio,
             "palpations": len(exploration.presses),
             "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
+            "findings": [finding_json(f) for f in self.findings],
             "noise_n": exploration.noise_n,
             "force_delay_s": exploration.delay_s,
             "force_delay_sd_s": exploration.delay_error_s,
@@ -100,6 +104,7 @@ class Reconstruction(Result, room.Reconstruction):
                 "reason": self.surface.reason,
                 "volume_m3": self.surface.volume_m3,
             },
+            "geometry": {**self.placed.about, "notes": list(self.placed.notes)} if self.placed else None,
             "mesh": {
                 "radius_edge_ratio": _percentiles(self.meshing.report.radius_edge_ratio),
                 "surface_distance_m": _percentiles(self.meshing.report.surface_distance_m),

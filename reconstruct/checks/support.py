@@ -14,6 +14,8 @@ _BELOW = 6.0
 _SCALE = 1.35
 _LEAST = 4
 _CERTAIN = 4.0
+_PRESS_S, _FEEBLE = 0.5, 0.2
+"""A contact that stays below this share of the usual press's force in its first half second was none."""
 _STEEP = 0.85
 """A wall's normal rises from the horizontal by less than this cosine."""
 
@@ -109,9 +111,9 @@ def _size(exploration: Exploration) -> Iterator[Finding]:
     t, (a, b) = exploration.recording.t, boundary.interval
     yield Finding(
         "base size",
-        f"the walls that were pressed stand {np.exp(centre):.2f} times as far out as the base that was traced",
+        f"the walls that were pressed stand {np.exp(centre):.2f} times as far out as the traced base",
         f"{abs(centre) / error:.0f} standard errors, {wall.sum()} presses on walls",
-        "trace the base of the same object in the same units, or leave the trace out and give [object] model",
+        "trace the base of the same object in the same units, or give [object] model instead of the trace",
         np.inf,
         float(min(0.5 * (centre / error) ** 2 / np.log(10), 300)),
         (float(t[a]), float(t[b - 1])),
@@ -124,6 +126,13 @@ def dropped(exploration: Exploration) -> Iterator[Finding]:
     used, lost = len(exploration.presses), exploration.rejected
     # what is over in an instant was never meant as a press
     lost = tuple((t, why) for t, why in lost if not why.startswith("lasts only"))
+    t, size = exploration.recording.t, np.linalg.norm(exploration.force, axis=1)
+
+    def peak(start: float) -> float:
+        return float(size[slice(*np.searchsorted(t, [start, start + _PRESS_S]))].max(initial=0.0))
+
+    least = _FEEBLE * float(np.median([peak(at) for at in exploration.presses.onset_s]))
+    lost = tuple((at, why) for at, why in lost if peak(at) > least)
     if len(lost) < 3 or len(lost) < 0.25 * (used + len(lost)):
         return
     why = [_kind(reason) for _, reason in lost]

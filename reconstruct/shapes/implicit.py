@@ -92,6 +92,8 @@ def implicit_held_out(evidence: Evidence, seen: Seen) -> float:
         if left_out.any() and not left_out.all():
             shell = implicit_surface(evidence, 0.006, left_out)
             misses.append(distance(*shell, seen.centres[left_out]) - seen.tip_radius_m)
+    if not misses:
+        return float("inf")  # all touches at one place: nothing can be left out
     return float(np.sqrt(np.mean(np.concatenate(misses) ** 2)))
 
 

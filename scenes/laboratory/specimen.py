@@ -38,10 +38,10 @@ class Specimen:
     model.
 
     finite: finite strain (neo-Hookean) instead of linear. balls: (x, y, z, radius, ratio) mm. gradient:
-    modulus ratios (base, top). skin: (thickness mm, ratio). field: of scenes.laboratory.field. base: None bonded; ("unbonded", bonded
-    fraction, direction angle rad); ("springs", k_normal, k_tangential) in E per mm. friction: None sticks.
-    fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m). plastic: (share, yield strain
-    measure). prony: ((g, tau s), ...).
+    modulus ratios (base, top). skin: (thickness mm, ratio). field: of scenes.laboratory.field.
+    base: None bonded; ("unbonded", bonded fraction, direction angle rad); ("springs", k_normal, k_tangential)
+    in E per mm. friction: None sticks. fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m).
+    plastic: (share, yield strain measure). prony: ((g, tau s), ...).
     """
 
     poisson_ratio: float = 0.49

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from mechanics.errors import SceneError
+from mechanics.errors import SceneError, SurfaceError
 from scenes.laboratory.hand import HandOptions
 from scenes.laboratory.presses import FLOOR_MM, RIM_MM, press_set
 from scenes.laboratory.surface import Surface
@@ -51,10 +51,10 @@ def test_phantom_from_file(tmp_path) -> None:
 def test_phantom_errors_name_what_is_allowed(tmp_path) -> None:
     with pytest.raises(SceneError, match="cylinder"):
         phantom("teapot")
-    open_box = trimesh.creation.box(extents=(0.06, 0.05, 0.04))
-    open_box.update_faces(np.arange(len(open_box.faces)) > 0)
-    open_box.export(tmp_path / "open.stl")
-    with pytest.raises(SceneError, match="not closed"):
+    open_ball = trimesh.creation.icosphere(radius=0.03)
+    open_ball.update_faces((open_ball.triangles_center[:, :2] < 0.005).any(axis=1))
+    open_ball.export(tmp_path / "open.stl")
+    with pytest.raises(SurfaceError, match="is open: a hole"):
         phantom(tmp_path / "open.stl")
 
 

@@ -25,10 +25,14 @@ def test_headless_session_with_a_recording(
 ) -> None:
     path = tmp_path / "session.csv.gz"
     words = ["touch", str(block.path), "--headless", "--seconds", "4", "--record", str(path), "--json", "-"]
-    assert main(words) == 0
-    result = json.loads(capsys.readouterr().out)
+    assert main([*words, "--jump-m", "0.01"]) == 0
+    out, err = capsys.readouterr()
+    result = json.loads(out)
+    loosened = "protection loosened: --jump-m is 0.01 (default 0.005)"
+    assert loosened in err and loosened in result["servo"]["words"]
     assert result["device"] == "simulated" and result["servo"]["ticks"] > 1000
     recording = read_recording(path)
+    assert recording.truth["protection_loosened"] == [loosened]
     assert recording.t[-1] > 2.0 and recording.object_name == block.path.name
 
 
@@ -149,3 +153,25 @@ def test_what_was_rendered_is_reconstructed(block: Model, tmp_path: Path) -> Non
     assert recording.base_model is None, "the base was traced, so nothing stands in for it"
     model = reconstruct(recording)
     assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--hand-mass", "0"], "--hand-mass"),
+        (["--stale", "1e9"], "--stale"),
+        (["--jump-m", "1e9"], "--jump-m"),
+        (["--slew", "1e300"], "--slew"),
+        (["--ramp", "1e-300"], "--ramp"),
+        (["--silence-s", "1e9"], "--silence-s"),
+        (["--support-damping-n-s-per-m=-1e6"], "--support-damping-n-s-per-m"),
+        (["--support-friction=-5"], "--support-friction"),
+    ],
+)
+def test_no_option_disarms_the_hand(
+    block: Model, words: list[str], says: str, capsys: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["touch", str(block.path), "--headless", "--seconds", "1", *words])
+    error = capsys.readouterr().err.strip().splitlines()[-1]
+    assert end.value.code == 2 and says in error and "allowed are numbers" in error

@@ -1,0 +1,1 @@
+"""A model for other programs: one file a format, each written from the same `Subject`."""

@@ -1,0 +1,64 @@
+"""Which programs a model can be written for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import OptionError
+from mechanics.files import Kind, atomic_file
+from mechanics.model import Model
+from mechanics.surface_files import UNITS
+from palpate.exporting import abaqus, gmsh, mujoco, sofa, stl
+from palpate.exporting.subject import Subject, subject_of
+
+Writer = Callable[[Path, Subject], tuple[str, ...]]
+FORMATS: dict[str, tuple[str, Writer, Kind]] = {
+    "mujoco": (".xml", mujoco.write, Kind("a scene of palpate export", (b"<!-- Palpate model",))),
+    "sofa": (".scn", sofa.write, Kind("a scene of palpate export", (b"<?xml",), holds=b"<!-- Palpate model")),
+    "abaqus": (".inp", abaqus.write, Kind("a deck of palpate export", (b"*Heading\n Palpate model",))),
+    "gmsh": (
+        ".msh",
+        gmsh.write,
+        Kind("a mesh of palpate export", (b"$MeshFormat",), holds=b"young_modulus_pa"),
+    ),
+    "stl": (".stl", stl.write, Kind("an STL of palpate export", (stl.HEADER,))),
+}
+"""Name -> the file's suffix, its writer, which returns what the format cannot say, and how such a file
+begins."""
+
+
+def write(
+    model: Model,
+    to: str,
+    path: Path | str,
+    *,
+    at: np.ndarray | None = None,
+    depth_m: float | None = None,
+    unit: str = "m",
+) -> tuple[str, ...]:
+    """Write a model for another program; what its format cannot say, one line each.
+
+    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. Raises OptionError
+    for a program or suffix that does not fit.
+    """
+    if to not in FORMATS:
+        raise OptionError(f"--to is '{to}'; allowed are {', '.join(FORMATS)}")
+    suffix, writer, kind = FORMATS[to]
+    path = Path(path)
+    if path.suffix.lower() != suffix:
+        raise OptionError(f"'{path}' must end in {suffix} for {to}")
+    if unit not in UNITS or (unit != "m" and to != "stl"):
+        allowed = ", ".join(UNITS) if to == "stl" else "m: the other formats are in metres"
+        raise OptionError(f"--unit is '{unit}'; allowed are {allowed}")
+    if depth_m is not None and not depth_m > 0:
+        raise OptionError(f"--depth is {depth_m} m; it must be greater than 0")
+    subject = subject_of(model, at, depth_m)
+    chosen = partial(stl.write, unit=unit) if to == "stl" else writer
+    with atomic_file(path, kind) as temporary:
+        notes = chosen(temporary, subject)
+    lost = [f"not in the file: {', '.join(subject.left_out)}"] if subject.left_out else []
+    return (*notes, *lost)

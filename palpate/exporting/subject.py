@@ -1,0 +1,92 @@
+"""What every format is written from: the mesh, its moduli, and a press that shows that it works."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.frames import tangents
+from mechanics.model import Model
+from mechanics.nearest import closest
+from mechanics.tetmesh import TetMesh
+
+DENSITY_KG_M3 = 1000.0
+"""Of soft tissue and silicone; a model states none, and a quasi-static press does not ask."""
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A model in the device frame, SI units, and one press: from `start` the tip's centre goes by `depth_m`
+    beyond first touch along `direction` (3,).
+
+    element_modulus_pa: (m,). top: (3,) where it touches; normal: (3,) outward there.
+    """
+
+    model: Model
+    top: np.ndarray
+    normal: np.ndarray
+    depth_m: float
+
+    @property
+    def mesh(self) -> TetMesh:
+        """As the model has it, linear or quadratic."""
+        return self.model.mesh
+
+    @property
+    def element_modulus_pa(self) -> np.ndarray:
+        """(m,) Pa."""
+        return self.model.material.young_modulus_pa * self.model.element_ratio
+
+    @property
+    def radius_m(self) -> float:
+        """Of the tip."""
+        return self.model.tool.tip_radius_m
+
+    @property
+    def start(self) -> np.ndarray:
+        """(3,) m, the tip's centre a millimetre (or a fifth of its radius) above first touch."""
+        return self.top + (self.radius_m + min(1e-3, 0.2 * self.radius_m)) * self.normal
+
+    @property
+    def pressed(self) -> np.ndarray:
+        """(3,) m, the tip's centre at depth."""
+        return self.top + (self.radius_m - self.depth_m) * self.normal
+
+    @property
+    def label(self) -> str:
+        """What the file says of itself."""
+        material = self.model.material
+        return (
+            f"Palpate model: E {material.young_modulus_pa:g} Pa, nu {material.poisson_ratio:g}, "
+            f"tip radius {self.radius_m:g} m; metres, newtons, device frame"
+        )
+
+    @property
+    def left_out(self) -> tuple[str, ...]:
+        """Effects of the model that no file states."""
+        return tuple(name for name in self.model.effects if name not in _MATERIAL)
+
+
+_MATERIAL = ("inclusion", "modulus_gradient", "skin_layer", "poisson_ratio", "finite_strain")
+
+
+def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None = None) -> Subject:
+    """The press of a model that shows that it works: at: (3,) m, the surface point nearest to it is
+    pressed; None: the middle of the top. depth_m: None is half the tip's radius."""
+    up, mesh = model.support.normal, model.mesh
+    surface = mesh.touchable_surface[:, :3]
+    if at is None:
+        spots = mesh.points[np.unique(surface)]
+        u, v = tangents(up)
+        middle = np.array([(spots @ a).max() + (spots @ a).min() for a in (u, v)]) / 2
+        at = middle[0] * u + middle[1] * v + (spots @ up).max() * up
+    spot, triangle, _ = closest(mesh.points, surface, np.asarray(at, dtype=float)[None])
+    corners = mesh.points[surface[triangle[0]]]
+    normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
+    return Subject(
+        model,
+        spot[0],
+        normal / np.linalg.norm(normal),
+        0.5 * model.tool.tip_radius_m if depth_m is None else float(depth_m),
+    )

@@ -1,0 +1,1 @@
+"""Other programs' files become recordings: readers make tables, a mapping says what their columns are."""

@@ -1,0 +1,328 @@
+"""From tables and what is said of them to a recording: one clock, one frame, the tip's centre, the force at
+the tip.
+
+Frames: a sensor's reading is turned by `rotation` (sensor to tool, or to device where frame = "device"), a
+tool frame by the orientation; the tip's centre is the stated position plus the orientation's turn of
+`flange_to_tip_m`. The weight of `mass_kg` beyond the sensor acts along -z of the device frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation, Slerp
+
+from mechanics.errors import RecordingError
+from mechanics.recording import Recording
+from palpate.importing.mapping import ROLES, Column, Said, find_columns, time_of
+from palpate.importing.tables import Table
+
+GRAVITY_M_PER_S2 = 9.80665
+_SEARCH_S, _SURE = 3.0, 0.5
+_MOST_HZ = 2000.0
+POINTS_HZ = 100.0
+"""Rows without a time are numbered by this clock; a recording needs one."""
+
+
+@dataclass(frozen=True)
+class Understood:
+    """recording: SI, device frame, force on the tool. columns: by role. notes: what was done, one line each.
+    quasi_static: rows without a time."""
+
+    recording: Recording
+    columns: dict[str, Column]
+    notes: tuple[str, ...]
+    quasi_static: bool = False
+
+
+def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
+    """The recording that the tables hold. Raises RecordingError where something needed is missing or
+    impossible."""
+    if said.tip_radius_m is None:
+        raise RecordingError("the tip's radius is in no table: give --tip-radius M (or [tool] tip_radius_m)")
+    columns = find_columns(tables, said)
+    notes: list[str] = []
+    streams = {
+        part: _stream(part, [columns[r] for r in roles if r in columns], columns, tables, said, notes)
+        for part, roles in _PARTS.items()
+        if any(r in columns for r in roles)
+    }
+    timed = all(s.t is not None for s in streams.values())
+    rows = {len(s.values) for s in streams.values()}
+    if not timed and len(rows) > 1:
+        raise RecordingError(
+            f"tables of {', '.join(map(str, sorted(rows)))} rows without a time cannot be joined: "
+            "say --column t=NAME"
+        )
+    if not timed and said.rate_hz:
+        steps = np.arange(rows.pop()) / said.rate_hz
+        streams = {part: _Stream(steps, s.values, s.source) for part, s in streams.items()}
+        timed = True
+        notes.append(f"no column of time: rows taken at {said.rate_hz:g} Hz")
+    if timed:
+        t, position, force, quaternion, rate = _one_clock(streams, said, notes)
+    else:
+        notes.append(
+            "no column of time: quasi-static points, which tell no rates and no delay (else give --rate)"
+        )
+        t, rate = np.arange(rows.pop()) / POINTS_HZ, POINTS_HZ
+        position, force = streams["position"].values, streams["force"].values
+        quaternion = streams["orientation"].values if "orientation" in streams else None
+    position, force = _framed(position, force, quaternion, said, notes)
+    force = _tared(t, force, said, notes)
+    notes += _signs(position, force if said.force_on == "tool" else -force)
+    thing = dict(said.thing)
+    recording = Recording(
+        t=t,
+        position=position,
+        force_on_tool=force if said.force_on == "tool" else -force,
+        sample_rate_hz=rate,
+        tip_radius_m=float(said.tip_radius_m),
+        quaternion=quaternion,
+        object_name=str(thing.get("name", name)),
+        poisson_ratio=None if thing.get("poisson_ratio") is None else float(thing["poisson_ratio"]),
+    )
+    return Understood(recording, columns, tuple(notes), not timed)
+
+
+_PARTS = {"position": ROLES[1:4], "force": ROLES[4:7], "orientation": ROLES[7:]}
+
+
+@dataclass(frozen=True)
+class _Stream:
+    """t (n,) s or None; values (n, 3 or 4) SI; source: the table's name."""
+
+    t: np.ndarray | None
+    values: np.ndarray
+    source: str
+
+
+def _stream(
+    part: str,
+    held: list[Column],
+    columns: dict[str, Column],
+    tables: Sequence[Table],
+    said: Said,
+    notes: list[str],
+) -> _Stream:
+    """The columns of one part, finite rows in order of time."""
+    sources = {id(c.table): c.table for c in held if c.table is not None}
+    if len(sources) > 1:
+        raise RecordingError(f"the columns of the {part} are of several tables: take them from one")
+    if not sources:
+        raise RecordingError(f"the {part} is a constant: name at least one column of it")
+    table = next(iter(sources.values()))
+    values = np.column_stack([np.broadcast_to(np.asarray(c.values, float), table.rows) for c in held])
+    clock = _clock_of(table, columns, said)
+    good = np.isfinite(values).all(axis=1)
+    t = None if clock is None else np.asarray(clock.values, float)
+    if t is not None:
+        good &= np.isfinite(t)
+    if not good.all():
+        notes.append(f"{part}: {int((~good).sum())} of {len(good)} rows hold no numbers and are left out")
+    values, t = values[good], None if t is None else t[good]
+    if len(values) < 2:
+        raise RecordingError(f"the {part} has fewer than two rows of numbers")
+    if t is not None:
+        order = np.argsort(t, kind="stable")
+        if (np.diff(order) < 0).any():
+            notes.append(f"{part}: rows sorted by time")
+        t, values = t[order], values[order]
+        fresh = np.concatenate([[True], np.diff(t) > 0])
+        if not fresh.all():
+            notes.append(f"{part}: {int((~fresh).sum())} rows repeat an earlier time and are left out")
+        t, values = t[fresh], values[fresh]
+    if part == "orientation":
+        length = np.linalg.norm(values, axis=1, keepdims=True)
+        if not (np.abs(length - 1) < 0.05).all():
+            raise RecordingError("qw,qx,qy,qz are no unit quaternions (w first): name the right columns")
+        values = values / length
+    return _Stream(t, values, table.name)
+
+
+def _clock_of(table: Table, columns: dict[str, Column], said: Said) -> Column | None:
+    """The time of a table: the column that was found, or the one of the same name in this table."""
+    found = columns.get("t")
+    if found is None or found.table is table:
+        return found
+    if found.name in table.columns:
+        return Column("t", table, found.name, found.factor, found.unit, found.guessed)
+    alone = time_of(table, said)
+    if alone is None:
+        raise RecordingError(
+            f"'{table.name}' has no column of time: its rows cannot be put beside the others'"
+        )
+    return alone
+
+
+def _one_clock(
+    streams: dict[str, _Stream], said: Said, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, float]:
+    """All on one clock from 0 s: the position's own where all share it, else even steps over what they
+    share."""
+    place, push, turn = streams["position"], streams["force"], streams.get("orientation")
+    times = {part: np.asarray(s.t) for part, s in streams.items()}
+    together = all(
+        len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values()
+    )
+    if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz:
+        t = times["position"] - times["position"][0]
+        rate = float(1 / np.median(np.diff(t)))
+        return t, place.values, push.values, None if turn is None else turn.values, rate
+    offset = _offset(place, push, said, notes)
+    times["force"] = times["force"] + offset
+    begin, end = max(t[0] for t in times.values()), min(t[-1] for t in times.values())
+    if not end > begin:
+        raise RecordingError("the clocks of position and force share no time: give --offset S or auto")
+    finest = max(1 / float(np.median(np.diff(t))) for t in times.values())
+    rate = said.rate_hz or min(finest, _MOST_HZ)
+    t = begin + np.arange(int((end - begin) * rate) + 1) / rate
+    even = {
+        part: np.column_stack([np.interp(t, times[part], column) for column in streams[part].values.T])
+        for part in ("position", "force")
+    }
+    quaternion = None
+    if turn is not None:
+        slerp = Slerp(times["orientation"], Rotation.from_quat(turn.values[:, [1, 2, 3, 0]]))
+        quaternion = slerp(np.clip(t, *times["orientation"][[0, -1]])).as_quat()[:, [3, 0, 1, 2]]
+    notes.append(f"resampled to {rate:g} Hz over the {end - begin:.3g} s that all clocks share")
+    return t - t[0], even["position"], even["force"], quaternion, float(rate)
+
+
+def _offset(place: _Stream, push: _Stream, said: Said, notes: list[str]) -> float:
+    """s to add to the force's clock: what was said; 0 where the clocks overlap; else by cross-correlation."""
+    assert place.t is not None and push.t is not None
+    if isinstance(said.offset_s, int | float):
+        notes.append(f"force's clock moved by {said.offset_s:g} s, as said")
+        return float(said.offset_s)
+    if said.offset_s not in (None, "auto"):
+        raise RecordingError(f"offset_s is {said.offset_s!r}; allowed are seconds or auto")
+    shared = min(place.t[-1], push.t[-1]) - max(place.t[0], push.t[0])
+    overlap = shared / max(min(np.ptp(place.t), np.ptp(push.t)), 1e-9)
+    if said.offset_s is None and overlap > 0.5:
+        return 0.0
+    rough = 0.0 if overlap > 0.5 else float(place.t[0] - push.t[0])
+    lag, sure = cross_correlated(place.t, place.values, push.t + rough, push.values)
+    if sure < _SURE:
+        raise RecordingError(
+            f"the clocks of position and force cannot be joined: pressing and force correlate by {sure:.2f} "
+            "at best: give --offset S"
+        )
+    notes.append(
+        f"force's clock moved by {rough + lag:.4f} s: depth and force correlate best there ({sure:.2f})"
+    )
+    return rough + lag
+
+
+def cross_correlated(
+    t: np.ndarray, position: np.ndarray, t_force: np.ndarray, force: np.ndarray
+) -> tuple[float, float]:
+    """(lag s to add to t_force, correlation): where force and motion against it agree best, within 3 s.
+
+    position (n, 3) m at t, force (m, 3) N at t_force. The motion is that along the mean direction of the
+    force.
+    """
+    step = max(float(np.median(np.diff(t))), float(np.median(np.diff(t_force))))
+    size = np.linalg.norm(force - np.median(force, axis=0), axis=1)
+    strong = size > np.percentile(size, 95)
+    along = (force - np.median(force, axis=0))[strong].mean(axis=0)
+    along /= max(np.linalg.norm(along), 1e-12)
+    grid = np.arange(max(t[0], t_force[0]) - _SEARCH_S, min(t[-1], t_force[-1]) + _SEARCH_S, step)
+    path = np.interp(grid, t, position @ along)
+    push = np.interp(grid, t_force, np.linalg.norm(force - np.median(force, axis=0), axis=1))
+    # contacts start and end where the motion turns: rates agree where levels drift
+    a, b = (v - v.mean() for v in (path, push))
+    count = round(_SEARCH_S / step)
+    lags = np.arange(-count, count + 1)
+    inner = slice(count, len(grid) - count)
+    if len(grid) - 2 * count < 20:
+        return 0.0, 0.0
+    found = np.empty(len(lags))
+    for i, lag in enumerate(lags):
+        one, other = a[inner], b[count - lag : len(grid) - count - lag]
+        one, other = one - one.mean(), other - other.mean()
+        found[i] = abs(one @ other) / max(np.linalg.norm(one) * np.linalg.norm(other), 1e-300)
+    best = int(np.argmax(found))
+    shift = 0.0
+    if 0 < best < len(lags) - 1:
+        left, here, right = found[best - 1 : best + 2]
+        bend = left - 2 * here + right
+        shift = 0.5 * (left - right) / bend if bend < 0 else 0.0
+    return float((lags[best] + shift) * step), float(found[best])
+
+
+def _framed(
+    position: np.ndarray, force: np.ndarray, quaternion: np.ndarray | None, said: Said, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """The tip's centre and the force without the tool's weight, device frame."""
+    if said.rotation is not None:
+        turn = _matrix(said.rotation)
+        force = force @ turn.T
+        notes.append("force turned from the sensor's frame by the stated rotation")
+    if said.frame == "tool" or said.flange_to_tip_m is not None:
+        if quaternion is None:
+            raise RecordingError(
+                "a sensor in the tool's frame, or flange_to_tip_m, needs the orientation: name qw, qx, qy, qz"
+            )
+        turned = Rotation.from_quat(quaternion[:, [1, 2, 3, 0]])
+        if said.frame == "tool":
+            force = turned.apply(force)
+            notes.append("force turned from the tool's frame by the orientation")
+        if said.flange_to_tip_m is not None:
+            arm = np.asarray(said.flange_to_tip_m, dtype=float)
+            if arm.shape != (3,):
+                raise RecordingError(
+                    f"flange_to_tip_m is {said.flange_to_tip_m}; it must be three numbers X,Y,Z"
+                )
+            position = position + turned.apply(arm)
+            notes.append(f"tip's centre {1e3 * np.linalg.norm(arm):.4g} mm off the stated position")
+    if said.mass_kg:
+        sign = 1.0 if said.force_on == "tool" else -1.0
+        force = force + sign * np.array([0.0, 0.0, said.mass_kg * GRAVITY_M_PER_S2])
+        notes.append(f"weight of {said.mass_kg:g} kg beyond the sensor taken off")
+    return position, force
+
+
+def _signs(position: np.ndarray, force: np.ndarray) -> list[str]:
+    """A warning where the force on the tool grows as the tip moves along it, not against it."""
+    moved, size = position - np.median(position, axis=0), np.linalg.norm(force, axis=1)
+    along = force[size > np.percentile(size, 90)].mean(axis=0)
+    along /= max(np.linalg.norm(along), 1e-300)
+    path = moved @ along
+    if np.ptp(path) <= 0 or np.ptp(size) <= 0:
+        return []
+    together = float(np.corrcoef(path, size)[0, 1])
+    if together < 0.5:
+        return []
+    return [
+        f"WARNING: the force grows as the tip moves along it ({together:.2f}): is a sign or force_on wrong?"
+    ]
+
+
+def _matrix(value: Any) -> np.ndarray:
+    turn = np.asarray(value, dtype=float)
+    if (
+        turn.shape != (3, 3)
+        or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)
+        or np.linalg.det(turn) < 0
+    ):
+        raise RecordingError("rotation must be a right-handed 3 x 3 rotation matrix, sensor to frame")
+    return turn
+
+
+def _tared(t: np.ndarray, force: np.ndarray, said: Said, notes: list[str]) -> np.ndarray:
+    """Less the mean force of a stretch in free air."""
+    if said.tare_s is None:
+        return force
+    begin, end = said.tare_s
+    inside = (t >= begin) & (t <= end)
+    if inside.sum() < 3:
+        raise RecordingError(
+            f"tare from {begin:g} to {end:g} s holds {int(inside.sum())} samples; 3 are needed"
+        )
+    level = force[inside].mean(axis=0)
+    notes.append(f"tared by {np.linalg.norm(level):.4g} N, the mean from {begin:g} to {end:g} s")
+    return force - level

@@ -1,0 +1,61 @@
+"""ROS bags and MCAP: every topic a table of its messages' numbers, with the time of its stamp or of its
+log."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from palpate.importing.tables import Table, flattened, of_messages
+
+
+def bag(path: Path) -> list[Table]:
+    """A ROS 1 bag, or a ROS 2 bag's folder (or its .db3)."""
+    from rosbags.highlevel import AnyReader
+    from rosbags.typesys import Stores, get_typestore
+
+    if path.suffix == ".db3":
+        path = path.parent
+    kept: dict[str, tuple[list[float], list[dict[str, float]]]] = {}
+    with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        for connection, stamp, raw in reader.messages():
+            times, messages = kept.setdefault(connection.topic, ([], []))
+            times.append(1e-9 * stamp)
+            messages.append(flattened("", reader.deserialize(raw, connection.msgtype)))
+    return [of_messages(topic, *held) for topic, held in kept.items()]
+
+
+def mcap(path: Path) -> list[Table]:
+    """JSON and ROS messages of an MCAP file."""
+    from mcap.reader import make_reader
+
+    kept: dict[str, tuple[list[float], list[dict[str, float]]]] = {}
+    decoders: dict[str, Any] = {}
+    with path.open("rb") as file:
+        for schema, channel, message in make_reader(file).iter_messages():
+            if channel.message_encoding == "json":
+                content = json.loads(message.data)
+            elif channel.message_encoding in ("cdr", "ros1") and schema is not None:
+                key = f"{channel.message_encoding} {schema.name}"
+                if key not in decoders:
+                    decoders[key] = _decoder(channel.message_encoding, schema.name, schema.data.decode())
+                content = decoders[key](message.data)
+            else:
+                continue
+            times, messages = kept.setdefault(channel.topic, ([], []))
+            times.append(1e-9 * message.log_time)
+            messages.append(flattened("", content))
+    return [of_messages(topic, *held) for topic, held in kept.items()]
+
+
+def _decoder(encoding: str, name: str, definition: str) -> Any:
+    """From bytes to a message of that type."""
+    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
+
+    kind = name if name.count("/") == 2 else name.replace("/", "/msg/")
+    store = get_typestore(Stores.ROS2_HUMBLE if encoding == "cdr" else Stores.ROS1_NOETIC)
+    if kind not in store.fielddefs:
+        store.register(get_types_from_msg(definition, kind))
+    decode = store.deserialize_cdr if encoding == "cdr" else store.deserialize_ros1
+    return lambda data: decode(data, kind)

@@ -1,0 +1,102 @@
+"""Text tables as instruments write them: any separator, decimal comma, lines before the header, a line of
+units."""
+
+from __future__ import annotations
+
+import gzip
+import re
+from pathlib import Path
+
+import numpy as np
+
+from mechanics.errors import RecordingError
+from palpate.importing.tables import Table
+from palpate.importing.units import is_unit
+
+_SEPARATORS = ("\t", ";", ",", "|", None)
+_LOOK = 400
+"""Lines that are looked at to find separator, decimal sign and first row."""
+
+
+def read(path: Path) -> list[Table]:
+    """The one table of a text file: the longest run of rows of numbers, named by the line before it."""
+    raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
+    lines = _decoded(raw).splitlines()
+    best: tuple[int, int, str | None, bool] = (0, 0, None, False)
+    for separator in _SEPARATORS:
+        for comma in (False, True):
+            if comma and separator == ",":
+                continue
+            start, cells = _run(lines, separator, comma)
+            if cells > best[0]:
+                best = cells, start, separator, comma
+    cells, start, separator, comma = best
+    if not cells:
+        raise RecordingError(f"'{path}' holds no rows of two numbers or more: is it a table?")
+    width = len(_split(lines[start], separator))
+    rows = []
+    for line in lines[start:]:
+        parts = _split(line, separator)
+        if len(parts) != width:
+            if line.strip():
+                parts = (parts + [""] * width)[:width]
+            else:
+                continue
+        rows.append([_number(part, comma) for part in parts])
+    values = np.array(rows)
+    names = _names(lines, start, separator, width)
+    return [Table(path.name, dict(zip(names, values.T, strict=True)))]
+
+
+def _decoded(raw: bytes) -> str:
+    if raw[:2] in (b"\xff\xfe", b"\xfe\xff"):
+        return raw.decode("utf-16")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        return raw.decode("latin-1")
+
+
+def _split(line: str, separator: str | None) -> list[str]:
+    return [part.strip().strip('"').strip() for part in line.strip("\r\n").split(separator)]
+
+
+def _number(text: str, comma: bool) -> float:
+    try:
+        return float(text.replace(".", "").replace(",", ".") if comma and "," in text else text)
+    except ValueError:
+        return np.nan
+
+
+def _run(lines: list[str], separator: str | None, comma: bool) -> tuple[int, int]:
+    """First line and number of cells of the longest run of lines of numbers among the first ones."""
+    best, start, width, length = (0, 0), 0, 0, 0
+    for i, line in enumerate([*lines[:_LOOK], ""]):
+        parts = _split(line, separator) if line.strip() else []
+        known = [part for part in parts if part]
+        fits = len(known) > 1 and all(np.isfinite(_number(part, comma)) for part in known)
+        if fits and length and len(parts) == width:
+            length += 1
+        else:
+            start, width, length = i, len(parts), int(fits)
+        if fits and length * len(known) > best[1]:
+            best = start, length * len(known)
+    return best
+
+
+def _names(lines: list[str], start: int, separator: str | None, width: int) -> list[str]:
+    """The columns' names, with their units in brackets where a line of units follows them; else their
+    numbers."""
+    above = [line for line in lines[:start] if line.strip()]
+    header = _split(above[-1].lstrip("#%"), separator) if above else []
+    if len(header) == width and len(above) > 1 and all(not h or is_unit(h.strip("[]()")) for h in header):
+        named = _split(above[-2].lstrip("#%"), separator)
+        if len(named) == width:
+            header = [f"{n} ({u.strip('[]()')})" if u else n for n, u in zip(named, header, strict=True)]
+    if len(header) != width or all(re.fullmatch(r"[-+.\d,eE]*", name) for name in header):
+        header = [""] * width
+    names: list[str] = []
+    for k, name in enumerate(header):
+        name = name or f"#{k + 1}"
+        names.append(name if name not in names else f"{name} #{k + 1}")
+    return names

@@ -1,0 +1,51 @@
+"""Units in columns' names, and what they are in SI."""
+
+from __future__ import annotations
+
+import re
+
+SI: dict[str, dict[str, float]] = {
+    "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
+    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
+    "force": {
+        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665,
+        "lbf": 4.4482216,
+        "newton": 1.0, "g": 9.80665e-3, "kg": 9.80665,
+    },
+}  # fmt: skip
+"""Kind of quantity -> unit -> what one is in SI."""
+_BRACKETS = re.compile(r"[\[({]\s*([^\])}\d][^\])}]*?)\s*[\])}]\s*(?:#\d+)?$")
+_TAIL = re.compile(r"_([A-Za-zµμ]+)$")
+
+
+def plain(unit: str) -> str:
+    """A unit in plain letters: either micro sign is u."""
+    return unit.strip().replace("µ", "u").replace("μ", "u").replace("\ufffd", "u")
+
+
+def is_unit(text: str) -> bool:
+    """Whether a word is a unit of anything."""
+    word = plain(text).lower()
+    return word in _OTHER or any(word == unit.lower() for units in SI.values() for unit in units)
+
+
+_OTHER = ("-", "%", "pa", "kpa", "mpa", "deg", "rad", "nm", "n/mm^2")
+
+
+def unit_in(name: str, kind: str) -> str | None:
+    """The unit of that kind that a column's name ends with, in brackets or after an underscore."""
+    found = _BRACKETS.search(name) or _TAIL.search(name)
+    if not found:
+        return None
+    unit, allowed = plain(found[1]), SI[kind]
+    if unit in allowed:
+        return unit
+    alike = [u for u in allowed if u.lower() == unit.lower()]
+    return alike[0] if len(alike) == 1 else None
+
+
+def without_unit(name: str) -> str:
+    """The name without the unit in brackets, or after an underscore, that it ends with."""
+    bare = _BRACKETS.sub("", name)
+    tail = _TAIL.search(bare)
+    return bare[: tail.start()] if tail and is_unit(tail[1]) and len(bare) > len(tail[0]) else bare

@@ -1,0 +1,80 @@
+"""An imported recording that prints, draws and saves itself."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from palpate.importing.convert import Understood
+from palpate.importing.written import picture, write_imported
+from palpate.results.recording import Recording, recording_of
+
+
+@dataclass(frozen=True)
+class Imported:
+    """What was understood of a table: `recording` goes wherever a recording goes.
+
+    notes: what was done to it, one line each. thing: what was said of the object. sources: the files.
+    """
+
+    understood: Understood
+    thing: Mapping[str, Any]
+    sources: tuple[str, ...]
+
+    @property
+    def recording(self) -> Recording:
+        """SI units, device frame, force on the tool."""
+        return recording_of(self.understood.recording)
+
+    def draw(self, path: Path | str) -> Path:
+        """Write the picture of what was understood; returns its path."""
+        from matplotlib import pyplot as plt
+
+        path = Path(path)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure = picture(self.understood)
+        figure.savefig(path, dpi=110)
+        plt.close(figure)
+        return path
+
+    def save(self, path: Path | str) -> Path:
+        """Write NAME.csv.gz (or .csv) and NAME.toml; returns the samples' path."""
+        return write_imported(path, self.understood, self.thing, list(self.sources))
+
+    def lines(self) -> list[str]:
+        """What `print` says, line by line."""
+        recording = self.understood.recording
+        span = np.ptp(recording.position, axis=0)
+        greatest = float(np.linalg.norm(recording.force_on_tool, axis=1).max())
+        how = "quasi-static points" if self.understood.quasi_static else f"{np.ptp(recording.t):.4g} s"
+        return [
+            f"{len(recording.t)} samples, {how}; path within {_row(1e3 * span)} mm; "
+            f"force up to {greatest:.4g} N",
+            *(f"  {column}" for column in self.understood.columns.values()),
+            *(f"  {note}" for note in self.understood.notes),
+        ]
+
+    def __str__(self) -> str:
+        return "\n".join(self.lines())
+
+    __repr__ = __str__
+
+    def as_json(self) -> dict[str, Any]:
+        """The figures of `palpate import --json`."""
+        recording = self.understood.recording
+        return {
+            "samples": len(recording.t),
+            "duration_s": float(np.ptp(recording.t)),
+            "sample_rate_hz": recording.sample_rate_hz,
+            "quasi_static": self.understood.quasi_static,
+            "columns": {role: str(c).partition(" = ")[2] for role, c in self.understood.columns.items()},
+            "notes": list(self.understood.notes),
+        }
+
+
+def _row(values: np.ndarray) -> str:
+    return " x ".join(f"{v:.3g}" for v in values)

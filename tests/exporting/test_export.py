@@ -1,0 +1,145 @@
+"""A model in other programs' files: each read back to the same mesh and moduli; MuJoCo's scene is run."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+import re
+import xml.etree.ElementTree as tree
+
+import meshio
+import numpy as np
+import pytest
+import trimesh
+
+import palpate as pp
+from mechanics.box_mesh import box_mesh
+from mechanics.material import Ball, Material
+from mechanics.model import Model, Support, Tool, write_model
+from mechanics.surface_files import read_surface
+from palpate import cli
+
+SIZE = (0.06, 0.05, 0.03)
+
+
+def block(nu: float = 0.49, order: int = 2, ball: bool = True) -> Model:
+    mesh = box_mesh((8, 7, 5), SIZE)
+    inside = {"lump": Ball((0.0, 0.0, 0.015), 0.008, 5.0)} if ball else {}
+    return Model(
+        mesh=mesh if order == 1 else mesh.quadratic(),
+        material=Material(15e3, nu, inclusions=inside),
+        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(0.005),
+        mesh_size_m=0.0075,
+    )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_gmsh_holds_mesh_groups_and_moduli(tmp_path, order):
+    model = block(order=order)
+    pp.export(model, "gmsh", tmp_path / "m.msh", progress=False)
+    text, _, data = (tmp_path / "m.msh").read_text().partition("$ElementData\n")
+    # meshio cannot read element data where a kind of element comes in two groups
+    (tmp_path / "bare.msh").write_text(text)
+    found = meshio.read(tmp_path / "bare.msh", file_format="gmsh")
+    kind = "tetra" if order == 1 else "tetra10"
+    assert np.allclose(found.points, model.mesh.points)
+    assert np.array_equal(found.cells_dict[kind], model.mesh.tetrahedra)
+    assert set(found.field_data) == {"object", "base", "touchable"}
+    rows = np.array([line.split() for line in data.splitlines()[8:-1]], dtype=float)
+    moduli = rows[: len(model.mesh.tetrahedra), 1]
+    assert np.allclose(moduli, 15e3 * model.element_ratio) and np.ptp(moduli) > 1e4
+
+
+def test_abaqus_holds_mesh_base_and_a_step(tmp_path):
+    model = block()
+    pp.export(model, "abaqus", tmp_path / "m.inp", progress=False)
+    text = (tmp_path / "m.inp").read_text()
+    keywords = [line.split(",")[0].lower() for line in text.splitlines() if line.startswith("*")]
+    for needed in ("*rigid body", "*contact pair", "*step", "*static", "*end step", "*solid section"):
+        assert needed in keywords
+    stated = {float(m) for m in re.findall(r"\*Elastic\n([^,]+),", text)}
+    assert sorted(stated) == pytest.approx(np.unique(15e3 * model.element_ratio).tolist(), rel=1e-6)
+    found = meshio.read(tmp_path / "m.inp")
+    tets = np.vstack([b.data for b in found.cells if b.type.startswith("tetra")])
+    assert np.allclose(found.points[:-1], model.mesh.points)
+    rows = np.lexsort(np.sort(tets, axis=1).T)
+    same = np.lexsort(np.sort(model.mesh.tetrahedra, axis=1).T)
+    assert np.array_equal(tets[rows], model.mesh.tetrahedra[same])
+    base = np.sort(found.point_sets["BASE"])
+    assert np.array_equal(base, np.flatnonzero(model.mesh.fixed))
+
+
+def test_sofa_holds_mesh_base_and_moduli(tmp_path):
+    model = block()
+    pp.export(model, "sofa", tmp_path / "m.scn", progress=False)
+    root = tree.parse(tmp_path / "m.scn").getroot()
+    linear = model.mesh.linear()
+    topology = root.find(".//TetrahedronSetTopologyContainer")
+    assert np.allclose(np.fromstring(topology.get("position"), sep=" "), linear.points.ravel())
+    assert np.array_equal(
+        np.fromstring(topology.get("tetrahedra"), sep=" ", dtype=int), linear.tetrahedra.ravel()
+    )
+    fixed = root.find(".//FixedProjectiveConstraint").get("indices")
+    assert np.array_equal(np.fromstring(fixed, sep=" ", dtype=int), np.flatnonzero(linear.fixed))
+    moduli = np.fromstring(root.find(".//TetrahedronFEMForceField").get("youngModulus"), sep=" ")
+    assert np.allclose(moduli, 15e3 * model.element_ratio)
+
+
+def test_stl_is_closed_and_in_the_unit_asked_for(tmp_path):
+    pp.export(block(), "stl", tmp_path / "m.stl", unit="mm", progress=False)
+    shell = trimesh.load(tmp_path / "m.stl")
+    assert shell.is_watertight and shell.volume == pytest.approx(60 * 50 * 30, rel=1e-5)
+    assert read_surface(tmp_path / "m.stl", "mm").size_m == pytest.approx(0.06)
+
+
+def _pressed(path) -> np.ndarray:
+    text = tree.parse(path).getroot().find(".//custom/text").get("data")
+    return np.fromstring(text, sep=" ")
+
+
+def flex_force(path) -> float:
+    """The force on the tip, settled, with MuJoCo's own scene; N along z."""
+    mujoco = pytest.importorskip("mujoco")
+    model = mujoco.MjModel.from_xml_path(str(path))
+    data = mujoco.MjData(model)
+    start, pressed = data.mocap_pos[0].copy(), _pressed(path)
+    total, wrench = np.zeros(3), np.zeros(6)
+    for k in range(400):
+        data.mocap_pos[0] = start + (pressed - start) * min(1.0, k / 200)
+        mujoco.mj_step(model, data)
+    for c in range(data.ncon):
+        mujoco.mj_contactForce(model, data, c, wrench)
+        total += data.contact[c].frame.reshape(3, 3).T @ wrench[:3]
+    return float(abs(total[2]))
+
+
+@pytest.mark.slow
+def test_mujoco_runs_the_scene_and_presses_back_alike(tmp_path):
+    """At nu = 0.3 linear tetrahedra do not lock; what is left is their coarseness under a narrow tip."""
+    model = block(nu=0.3, ball=False)
+    depth = 0.003
+    with contextlib.chdir(tmp_path):  # MuJoCo leaves its warnings in a file where it runs
+        pp.export(model, "mujoco", tmp_path / "m.xml", depth_m=depth, progress=False)
+        theirs = flex_force(tmp_path / "m.xml")
+    ours = pp.press(model, (0, 0, 0.03), (0, 0, -1), depth, progress=False)
+    peak = float(np.abs(ours.force[:, 2]).max())
+    assert 0.8 < theirs / peak < 1.5
+
+
+def test_the_command_says_what_is_lost_and_refuses_in_one_line(tmp_path, capsys):
+    folder = write_model(tmp_path / "MODEL", block().replaced(effects={"friction_slip": {"mu": 0.3}}))
+    out = tmp_path / "m.inp"
+    words = ["export", str(folder), "--to", "abaqus", "-o", str(out), "--json", str(tmp_path / "j.json")]
+    assert cli.main(words) == 0 and out.stat().st_size > 1000
+    assert "not in the file: friction_slip" in json.loads((tmp_path / "j.json").read_text())["notes"]
+    for bad, part in (
+        (["--to", "gmsh", "-o", str(out)], "must end in .msh"),
+        (["--to", "gmsh", "-o", str(tmp_path / "a.msh"), "--unit", "mm"], "in metres"),
+        (["--to", "stl", "-o", str(tmp_path / "a.stl"), "--unit", "feet"], "allowed are m, cm"),
+        (["--to", "sofa", "-o", str(tmp_path / "a.scn"), "--depth", "0"], "greater than 0"),
+    ):
+        capsys.readouterr()
+        assert cli.main(["export", str(folder), *bad]) == 2
+        line = capsys.readouterr().err.strip()
+        assert part in line and len(line.splitlines()) == 1

@@ -1,0 +1,260 @@
+"""Other programs' files: the same exploration in every format comes out the same, and what is missing is
+told."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.io import savemat
+from scipy.spatial.transform import Rotation
+
+import palpate as pp
+from mechanics.errors import RecordingError
+from palpate import cli
+from palpate.importing.convert import cross_correlated
+
+RATE, TIP = 500.0, 0.004
+SHARED = Path("/work/shared/realdata")
+
+
+def exploration(seconds: float = 6.0) -> dict[str, np.ndarray]:
+    """Presses of a second each, 5 mm deep, the tip's centre in m, the force on the tool in N."""
+    t = np.arange(int(seconds * RATE)) / RATE
+    # no two presses alike, so that clocks can be told
+    swing = (1 + 0.3 * np.sin(0.8 * t + 1)) * 0.005 * np.sin(2 * np.pi * (t + 0.15 * np.sin(1.3 * t)))
+    depth = np.maximum(swing - 0.001, 0)
+    place = np.column_stack([0.01 * np.floor(t), np.zeros_like(t), 0.051 + TIP - swing])
+    force = np.column_stack([0.02 * depth / 0.005, np.zeros_like(t), 300 * depth])
+    return {"t": t, "p": place, "f": force}
+
+
+@pytest.fixture(scope="module")
+def world() -> dict[str, np.ndarray]:
+    return exploration()
+
+
+def check(recording, world, *, atol_m: float = 1e-8, atol_n: float = 1e-6) -> None:
+    assert np.allclose(recording.t, world["t"], atol=1e-6)
+    assert np.allclose(recording.position, world["p"], atol=atol_m)
+    assert np.allclose(recording.force_on_tool, world["f"], atol=atol_n)
+
+
+def test_units_separator_and_decimal_comma_come_from_the_file(tmp_path, world):
+    lines = ["Messung 12;;;", "Kraftsensor: K6D", "Zeit;x;y;z;fx;fy;fz", "ms;mm;mm;mm;mN;mN;mN"]
+    lines += [
+        ";".join(f"{v:.6f}".replace(".", ",") for v in (1e3 * t, *(1e3 * p), *(1e3 * f)))
+        for t, p, f in zip(world["t"], world["p"], world["f"], strict=True)
+    ]
+    (tmp_path / "log.csv").write_text("\n".join(lines), encoding="latin-1")
+    made = pp.import_table(tmp_path / "log.csv", columns={"t": "Zeit"}, tip_radius_m=TIP)
+    check(made.recording, world)
+    assert "x = x (mm) [mm] (guessed)" in str(made)
+
+
+def test_matlab_hdf5_parquet_and_numpy_hold_the_same(tmp_path, world):
+    h5py, pa = pytest.importorskip("h5py"), pytest.importorskip("pyarrow")
+    import pyarrow.parquet as pq
+
+    names = dict(
+        zip(("t", "x", "y", "z", "fx", "fy", "fz"), (world["t"], *world["p"].T, *world["f"].T), strict=True)
+    )
+    savemat(tmp_path / "a.mat", {"log": {"time": world["t"], "pos": world["p"], "force": world["f"]}})
+    with h5py.File(tmp_path / "b.h5", "w") as file:
+        file["robot/time"], file["robot/position"] = world["t"], world["p"]
+        file["robot/force"] = world["f"].T
+    pq.write_table(pa.table(names), tmp_path / "c.parquet")
+    np.savez(tmp_path / "d.npz", **names)
+    columns = {"t": "log.time"}
+    columns |= {a: f"log.pos[{k}]" for k, a in enumerate("xyz")} | {
+        f"f{a}": f"log.force[{k}]" for k, a in enumerate("xyz")
+    }
+    check(pp.read_table(tmp_path / "a.mat", columns=columns, tip_radius_m=TIP), world)
+    check(pp.read_table(tmp_path / "b.h5", tip_radius_m=TIP), world)
+    check(pp.read_table(tmp_path / "c.parquet", tip_radius_m=TIP), world)
+    check(pp.read_table(tmp_path / "d.npz", tip_radius_m=TIP), world)
+
+
+def test_topics_of_a_ros_bag_have_clocks_of_their_own(tmp_path, world):
+    rosbags = pytest.importorskip("rosbags.rosbag2")
+    from rosbags.typesys import Stores, get_typestore
+
+    store = get_typestore(Stores.ROS2_HUMBLE)
+    kinds = store.types
+    bare = kinds["std_msgs/msg/Header"]
+
+    def header(t: float):
+        whole = int(t)
+        return bare(
+            stamp=kinds["builtin_interfaces/msg/Time"](sec=whole, nanosec=int(round((t - whole) * 1e9))),
+            frame_id="",
+        )
+
+    vector, point = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Point"]
+    with rosbags.Writer(tmp_path / "bag", version=9) as writer:
+        poses = writer.add_connection("/tcp", "geometry_msgs/msg/PoseStamped", typestore=store)
+        pushes = writer.add_connection("/ft", "geometry_msgs/msg/WrenchStamped", typestore=store)
+        for k, t in enumerate(world["t"]):
+            turn = kinds["geometry_msgs/msg/Quaternion"](x=0.0, y=0.0, z=0.0, w=1.0)
+            pose = kinds["geometry_msgs/msg/Pose"](position=point(*world["p"][k]), orientation=turn)
+            message = kinds["geometry_msgs/msg/PoseStamped"](header=header(100 + t), pose=pose)
+            writer.write(poses, int(1e9 * t), store.serialize_cdr(message, poses.msgtype))
+            if k % 2 == 0:
+                wrench = kinds["geometry_msgs/msg/Wrench"](
+                    force=vector(*world["f"][k]), torque=vector(0.0, 0.0, 0.0)
+                )
+                message = kinds["geometry_msgs/msg/WrenchStamped"](header=header(100 + t), wrench=wrench)
+                writer.write(pushes, int(1e9 * t), store.serialize_cdr(message, pushes.msgtype))
+    made = pp.import_table(tmp_path / "bag", tip_radius_m=TIP)
+    count = len(made.recording.t)
+    cut = {"t": world["t"][:count], "p": world["p"][:count], "f": world["f"][:count]}
+    # every other force is interpolated
+    check(made.recording, cut, atol_m=1e-6, atol_n=0.02)
+    assert np.allclose(made.recording.quaternion, [1, 0, 0, 0])
+    assert any("resampled to 500" in note for note in made.understood.notes)
+
+
+def test_mcap_messages_in_json(tmp_path, world):
+    mcap = pytest.importorskip("mcap.writer")
+    with (tmp_path / "log.mcap").open("wb") as file:
+        writer = mcap.Writer(file)
+        writer.start()
+        schema = writer.register_schema(name="probe", encoding="jsonschema", data=b"{}")
+        channel = writer.register_channel(topic="probe", message_encoding="json", schema_id=schema)
+        for t, p, f in zip(world["t"], world["p"], world["f"], strict=True):
+            content = {"pos": dict(zip("xyz", p, strict=True)), "force": dict(zip("xyz", f, strict=True))}
+            stamp = int(round(1e9 * t))
+            writer.add_message(channel, log_time=stamp, publish_time=stamp, data=json.dumps(content).encode())
+        writer.finish()
+    check(pp.read_table(tmp_path / "log.mcap", tip_radius_m=TIP), world)
+
+
+def test_clocks_that_share_no_time_are_joined_by_cross_correlation(tmp_path, world):
+    table = np.column_stack([world["t"] + 1.6e9, world["p"]])
+    np.savetxt(tmp_path / "robot.csv", table, delimiter=",", header="time,x,y,z", comments="", fmt="%.9f")
+    table = np.column_stack([world["t"] + 0.35, world["f"]])
+    np.savetxt(tmp_path / "sensor.csv", table, delimiter=",", header="time,fx,fy,fz", comments="", fmt="%.9f")
+    made = pp.import_table(tmp_path / "robot.csv", tmp_path / "sensor.csv", tip_radius_m=TIP)
+    recording = made.recording
+    expected = 300 * np.maximum(0.05 + TIP - recording.position[:, 2], 0)
+    assert np.abs(recording.force_on_tool[:, 2] - expected).max() < 0.1 * expected.max()
+    lag, sure = cross_correlated(world["t"], world["p"], world["t"] + 0.137, world["f"])
+    assert lag == pytest.approx(-0.137, abs=0.01) and sure > 0.5
+
+
+def test_sensor_frame_flange_weight_and_tare_are_undone(tmp_path, world):
+    spin = Rotation.from_rotvec(
+        np.column_stack([0.2 * np.sin(world["t"]), 0.3 * np.cos(world["t"]), world["t"]])
+    )
+    arm, weight = np.array([0.0, 0.02, 0.15]), np.array([0, 0, -0.2 * 9.80665])
+    mounted = Rotation.from_euler("z", 30, degrees=True)
+    told = mounted.inv().apply(spin.inv().apply(world["f"] + weight))
+    columns = np.column_stack(
+        [world["t"], world["p"] - spin.apply(arm), told, spin.as_quat()[:, [3, 0, 1, 2]]]
+    )
+    header = "t x y z fx fy fz qw qx qy qz".replace(" ", "\t")
+    np.savetxt(tmp_path / "log.tsv", columns, delimiter="\t", header=header, comments="", fmt="%.12g")
+    rotation = mounted.as_matrix().tolist()
+    (tmp_path / "map.toml").write_text(
+        f"[tool]\ntip_radius_m = {TIP}\nmass_kg = 0.2\nflange_to_tip_m = [0, 0.02, 0.15]\n"
+        f'[sensor]\nframe = "tool"\nrotation = {rotation}\n[tare]\nstart_s = 0.6\nend_s = 0.8\n'
+    )
+    made = pp.read_table(tmp_path / "log.tsv", mapping=tmp_path / "map.toml")
+    check(made, world, atol_m=1e-7, atol_n=1e-5)
+
+
+def test_rows_without_a_time_are_points(tmp_path, world):
+    table = np.column_stack([1e3 * world["p"][::100], world["f"][::100]])
+    np.savetxt(tmp_path / "raster.txt", table, header="x_mm y_mm z_mm fx_n fy_n fz_n", comments="# ")
+    out = tmp_path / "raster.csv.gz"
+    words = [
+        "import",
+        str(tmp_path / "raster.txt"),
+        "-o",
+        str(out),
+        "--tip-radius",
+        str(TIP),
+        "--slab",
+        "0.02",
+    ]
+    assert cli.main(words) == 0
+    back = pp.read_recording(out)
+    assert (
+        back.description["recording"]["quasi_static"] is True and back.description["object"]["slab_m"] == 0.02
+    )
+    assert np.allclose(back.position, world["p"][::100], atol=1e-8)
+    assert (tmp_path / "raster.png").stat().st_size > 10_000
+
+
+def test_tiny_scales_keep_their_digits(tmp_path):
+    t = np.arange(400) / 100
+    load = 0.05 * np.sin(t) ** 2
+    np.savetxt(
+        tmp_path / "afm.txt",
+        np.column_stack([t, load, 5000 * np.sin(t) ** 2]),
+        header="Time (s)\tLoad (uN)\tIndentation (nm)",
+        delimiter="\t",
+        comments="",
+    )
+    out = tmp_path / "afm.csv.gz"
+    pp.import_table(tmp_path / "afm.txt", tip_radius_m=3e-6).save(out)
+    held = np.loadtxt(out, delimiter=",", skiprows=1)
+    assert np.allclose(held[:, 6], 1e-6 * load, atol=1e-15)
+    assert np.allclose(held[:, 3], -5e-6 * np.sin(t) ** 2, atol=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("content", "said", "words"),
+    [
+        ("a,b,c\n1,2,3\n2,3,4\n", {"tip_radius_m": TIP}, "--column x=NAME .*there are a, b, c"),
+        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {}, "--tip-radius"),
+        (
+            "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
+            {"tip_radius_m": TIP, "columns": {"fx": "load"}},
+            "'load' is not there",
+        ),
+        (
+            "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
+            {"tip_radius_m": TIP, "units": {"force": "mm"}},
+            "no unit of force",
+        ),
+        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "force_on": "me"}, "tool and object"),
+        ("hello\nworld\n", {"tip_radius_m": TIP}, "is it a table"),
+        (
+            "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
+            {"tip_radius_m": TIP, "frame": "tool"},
+            "needs the orientation",
+        ),
+    ],
+)
+def test_what_is_missing_is_one_line(tmp_path, content, said, words):
+    (tmp_path / "log.csv").write_text(content)
+    with pytest.raises(RecordingError, match=words) as refused:
+        pp.read_table(tmp_path / "log.csv", **said)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_a_missing_library_names_the_extra(tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "h5py", None)
+    (tmp_path / "log.h5").write_bytes(b"x")
+    with pytest.raises(RecordingError, match=r"needs h5py, .*pip install 'palpate\[import\]'"):
+        pp.read_table(tmp_path / "log.h5", tip_radius_m=TIP)
+
+
+def test_a_sign_that_is_wrong_is_warned_of(tmp_path, world):
+    table = np.column_stack([world["t"], world["p"] * [1, 1, -1], world["f"]])
+    np.savetxt(tmp_path / "log.csv", table, delimiter=",", header="t,x,y,z,fx,fy,fz", comments="")
+    assert "WARNING: the force grows" in str(pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP))
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared measured data")
+def test_instruments_of_others_are_understood():
+    file = SHARED / "chiaro_sphere_1khz" / "fmt-chiaro-txt_AEBP1_Indentation_002.txt"
+    made = pp.import_table(file, tip_radius_m=27.5e-6, columns={"z": "-Piezo (nm)", "fz": "Load (uN)"})
+    assert len(made.recording.t) == 13827 and made.recording.sample_rate_hz == pytest.approx(1000, rel=0.01)
+    meat = pp.import_table(SHARED / "meat_indentation_relaxation/csv/230331_FF1_1A.csv", tip_radius_m=0.005)
+    assert meat.recording.force_on_tool[:, 2].max() == pytest.approx(1.062, abs=1e-3)
+    assert 0.003 < np.ptp(meat.recording.position[:, 2]) < 0.006
