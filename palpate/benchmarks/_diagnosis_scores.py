@@ -78,6 +78,7 @@ class _Tally:
         tested, kind = case["tested"], case["kind"]
         if "seconds" in verdict:
             self.seconds.append(verdict["seconds"])
+        self.rates["no answer: the reconstruction or the diagnosis refused"].append(answer.first == "failed")
         excluded = case["without"]
         self.calibration += [
             (p, name in case["effects"]) for name, p in verdict.get("probability", {}).items()
@@ -96,6 +97,8 @@ class _Tally:
                                 "candidates": list(answer.candidates)})  # fmt: skip
 
     def _control(self, item: dict[str, Any], answer: Answer) -> bool:
+        if answer.first == "failed":
+            return False
         self.rates["false alarms (controls)"].append(answer.detected)
         self.rates["BIC baseline: false alarms (controls)"].append(
             item["verdict"].get("bic") not in (None, "none", *item["case"]["beside"])

@@ -130,10 +130,12 @@ class Problem:
         held, u, kept = state.grip.copy(), state.displacement, self._touching.kept
         compliance, mixing = self._compliance, Mixing()
         elements, _, energy, history = self.solid.evaluate(u, state.history, step_s, False)
+        if compliance is None:
+            compliance = self._linearise(u, state.history, step_s)
         last, before, near = 0.0, np.inf, False
         for iteration in range(MOST_ITERATIONS):
             # the old tangent predicts the step; the one that is taken there usually serves to the end
-            anew = compliance is None or iteration == 1 or last > SLOW * before
+            anew = iteration == 1 or last > SLOW * before
             if anew:
                 compliance = self._linearise(u, state.history, step_s)
                 mixing = Mixing()

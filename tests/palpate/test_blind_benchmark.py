@@ -10,7 +10,7 @@ import pytest
 from mechanics.errors import OptionError
 from palpate.benchmarks._diagnosis_blind import tasks_of, unfinished
 from palpate.benchmarks._diagnosis_cases import FINITE, WEIGHT, Case, cases
-from palpate.benchmarks._diagnosis_scores import answer_of
+from palpate.benchmarks._diagnosis_scores import answer_of, summarise
 from palpate.tasks.graph import Graph
 
 KNOWN = {"quick": 8, "medium": 142, "full": 640}
@@ -58,3 +58,11 @@ def test_what_a_drawn_tool_weighs_is_no_false_alarm_and_another_name_is() -> Non
     for name, alarm in (("tool_gravity_inertia", False), ("force_bias", False), ("backlash", True)):
         verdict = {"kind": "effect", "effects": [name], "candidates": []}
         assert answer_of({"case": case, "verdict": verdict}).detected == alarm
+
+
+def test_a_control_without_an_answer_is_a_miss_and_no_evidence_of_silence() -> None:
+    case = Case("control", 0, 1).as_json()
+    verdict = {"kind": "failed", "effects": [], "candidates": []}
+    summary = summarise([{"key": "one", "case": case, "verdict": verdict, "truth": {}}])
+    assert "false alarms (controls)" not in summary["rates"] and len(summary["misses"]) == 1
+    assert summary["rates"]["no answer: the reconstruction or the diagnosis refused"]["hits"] == 1
