@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -60,7 +61,8 @@ def _stuck(what: str, seconds: float) -> Change:
         rows = (r.t >= start) & (r.t < start + length)
         axes = slice(None) if random.random() < 0.5 else random.integers(3)
         values[rows, axes] = values[np.argmax(rows), axes]
-        return replace(r, **{what: values})
+        changed: dict[str, Any] = {what: values}
+        return replace(r, **changed)
 
     return change
 
@@ -116,7 +118,7 @@ def _jitter(r: Recording, random: np.random.Generator) -> Recording:
     return replace(r, t=t + 1e-3 * dt * np.arange(len(t)))
 
 
-def _rows(r: Recording, rows: np.ndarray, **changed: float) -> Recording:
+def _rows(r: Recording, rows: np.ndarray, **changed: Any) -> Recording:
     quaternion = None if r.quaternion is None else r.quaternion[rows]
     return replace(
         r, t=r.t[rows], position=r.position[rows], force_on_tool=r.force_on_tool[rows],

@@ -123,7 +123,7 @@ class Picture:
         self._rest = points
         faces = np.column_stack([np.full(len(triangles), 3), triangles])
         self._mesh = pv.PolyData(points.copy(), faces.ravel())
-        self._plotter = pv.Plotter(off_screen=True, window_size=(640, 480))
+        self._plotter = pv.Plotter(off_screen=True, window_size=[640, 480])
         self._plotter.add_mesh(self._mesh)
         self._actor = self._plotter.add_mesh(pv.Sphere(radius=model.tool.tip_radius_m))
         self._plotter.show(auto_close=False)

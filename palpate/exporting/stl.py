@@ -19,5 +19,6 @@ def write(path: Path, subject: Subject, unit: str = "m") -> tuple[str, ...]:
     mesh = subject.mesh.linear()
     used, index = np.unique(mesh.surface, return_inverse=True)
     shell = trimesh.Trimesh(mesh.points[used] / UNITS[unit], index.reshape(-1, 3), process=False)
-    path.write_bytes(HEADER.ljust(80) + shell.export(file_type="stl")[80:])
+    binary = bytes(shell.export(file_type="stl"))
+    path.write_bytes(HEADER.ljust(80) + binary[80:])
     return (f"lengths in {unit}: read it with --unit {unit}", "a shape alone: no modulus, no support")

@@ -128,13 +128,13 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
 
 def _limited(sight: Sight) -> Iterator[Finding]:
     """Touches whose greatest reading is one and the same: as improbable as their peaks are unlike."""
-    signals = {
-        f"{name} {words}": (sign * sight.force[:, k], sight.step[3 + k], (name,))
+    signals: dict[str, tuple[np.ndarray, float, tuple[str, ...]]] = {
+        f"{name} {words}": (sign * sight.force[:, k], float(sight.step[3 + k]), (name,))
         for k, name in enumerate(CHANNELS[3:])
         for sign, words in ((1, "upwards"), (-1, "downwards"))
     }
     if not sight.step[3:].any():
-        signals["|force|"] = (np.linalg.norm(sight.force, axis=1), 0.0, CHANNELS[3:])
+        signals["|force|"] = (np.linalg.norm(sight.force, axis=1), 0.0, tuple(CHANNELS[3:]))
     first, last = sight.traced
     spans = [*sight.spans, *([(first, last)] if last > first else [])]
     worst: tuple[float, str, int, int, float, int, tuple[str, ...]] | None = None

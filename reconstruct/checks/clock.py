@@ -121,6 +121,7 @@ def _coarse(sight: Sight) -> Iterator[Finding]:
     samples = float(np.median(rise)) if len(rise) else 0.0
     if samples >= enough and sight.rate_hz > sight.cutoff_hz / 0.45:
         return
+    t, middle = sight.recording.t, sight.spans[len(rise) // 2] if len(rise) else None
     yield Finding(
         "slow",
         f"{sight.rate_hz:.3g} Hz: {len(sight.t)} samples in all, {samples:.0f} from first touch to the peak",
@@ -129,6 +130,6 @@ def _coarse(sight: Sight) -> Iterator[Finding]:
         "record at 300 Hz or more",
         float("inf") if samples < few else float(0.2 * few / samples),
         np.inf,
-        None if not len(rise) else tuple(float(sight.recording.t[i]) for i in sight.spans[len(rise) // 2]),
+        None if middle is None else (float(t[middle[0]]), float(t[middle[1]])),
         ("t",),
     )

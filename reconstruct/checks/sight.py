@@ -139,9 +139,9 @@ class Sight:
     @cached_property
     def contact(self) -> np.ndarray:
         """(n,) bool, whether something is touched."""
-        return hysteresis(
-            self.size / self._signals[2], _LOW, _HIGH, round(0.25 * self.rate_hz / self.cutoff_hz)
-        )
+        signals, _, spread = self._signals
+        gap = round(0.25 * self.rate_hz / self.cutoff_hz)
+        return hysteresis(signals.magnitude / spread, _LOW, _HIGH, signals.force, gap)
 
     @cached_property
     def traced(self) -> tuple[int, int]:
@@ -158,8 +158,8 @@ class Sight:
         """[start, end) of each touch after the tracing, short ones and slides left out."""
         contact = self.contact.copy()
         contact[: self.traced[1]] = False
-        least = max(3, round(_LEAST_S * self.rate_hz))
-        found = [(a, b) for a, b in runs(contact) if b - a >= least and a > 0 and b < len(self.t)]
+        shortest = max(3, round(_LEAST_S * self.rate_hz))
+        found = [(a, b) for a, b in runs(contact) if b - a >= shortest and a > 0 and b < len(self.t)]
         reach = _SLIDE * float(np.clip(self.tip_radius_m, *_TIPS_M))
         found = [(a, b) for a, b in found if np.ptp(self.path[a:b], axis=0).max() < reach]
         peaks = np.array([self.size[a:b].max() for a, b in found])

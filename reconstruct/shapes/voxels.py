@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 
 from mechanics.errors import SurfaceError
@@ -58,7 +60,7 @@ def labels(vertices: np.ndarray, triangles: np.ndarray, pitch_m: float) -> tuple
     low = middle - pitch_m * (count - 1) / 2
     low[2] = -3.5 * pitch_m
     # no line through an edge: such a crossing would count for two triangles or none
-    x, y = (low[i] + pitch_m * (np.arange(count[i]) + 1e-5 * (1 + i / np.e)) for i in (0, 1))
+    x, y = (low[i] + pitch_m * (np.arange(count[i]) + 1e-5 * (1 + i / math.e)) for i in (0, 1))
     crossings = np.zeros((count[2] + 1, count[1], count[0]), dtype=int)
     for a, b, c in vertices[triangles]:
         columns = slice(*np.searchsorted(x, [min(a[0], b[0], c[0]), max(a[0], b[0], c[0])]))

@@ -128,10 +128,9 @@ class Problem:
 
     def _newton(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
         held, u, kept = state.grip.copy(), state.displacement, self._touching.kept
-        compliance, mixing = self._compliance, Mixing()
+        known, mixing = self._compliance, Mixing()
         elements, _, energy, history = self.solid.evaluate(u, state.history, step_s, False)
-        if compliance is None:
-            compliance = self._linearise(u, state.history, step_s)
+        compliance = self._linearise(u, state.history, step_s) if known is None else known
         last, before, near = 0.0, np.inf, False
         for iteration in range(MOST_ITERATIONS):
             # the old tangent predicts the step; the one that is taken there usually serves to the end

@@ -87,6 +87,9 @@ def draw(seed: int) -> Draw:
     def coin(share: float = 0.5) -> bool:
         return bool(rng.random() < share)
 
+    def shift() -> float:
+        return float(rng.uniform(-0.5, 0.5))
+
     depths = sorted((spread(1.5e-3, 10e-3), spread(1.5e-3, 10e-3)))
     return Draw(
         seed=seed,
@@ -96,7 +99,7 @@ def draw(seed: int) -> Draw:
         tilt_rad=float(np.radians(rng.uniform(0, 30))),
         about_rad=float(rng.uniform(-np.pi, np.pi)),
         turn_rad=float(rng.uniform(-np.pi, np.pi)),
-        shift_m=tuple(float(x) for x in rng.uniform(-0.5, 0.5, 3)),
+        shift_m=(shift(), shift(), shift()),
         boundary_phase_stated=coin(),
         rate_hz=float(rng.choice(RATES_HZ)),
         jitter=spread(0.01, 0.15) if coin() else 0.0,
