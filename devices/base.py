@@ -32,6 +32,8 @@ class DeviceSpec:
     position that stays zero; devices.mapper integrates it). sensed_axes: of x, y, z, rx, ry, rz.
     actuated_axes: of x, y, z; empty where there is no force. max_stiffness_n_per_m, max_damping_n_s_per_m:
     what it renders stably at 1 kHz. 0 stands for 'none' in every limit of a device without force.
+    conditions: what the maker's software does between a command and the hand, in plain words, as far as it
+    tells; limits here are in newtons at the hand. simulated: there is no hand behind it.
     """
 
     name: str
@@ -46,6 +48,8 @@ class DeviceSpec:
     workspace_radius_m: float = 0.1
     rate_hz: float = 1000.0
     buttons: int = 0
+    conditions: tuple[str, ...] = ()
+    simulated: bool = False
 
     @property
     def has_force(self) -> bool:

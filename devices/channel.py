@@ -15,6 +15,8 @@ import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
+from mechanics.files import memory_folder, temporary_prefix
+
 _RECORD = struct.Struct("<Qd3dI")
 _CHECK = struct.Struct("<I")
 _SIZE = _RECORD.size + _CHECK.size
@@ -44,8 +46,7 @@ class PoseChannel:
     @classmethod
     def create(cls) -> PoseChannel:
         """A new, empty channel; its creator removes the file on `close`."""
-        shared = Path("/dev/shm")
-        handle, name = tempfile.mkstemp(prefix="palpate-pose-", dir=shared if shared.is_dir() else None)
+        handle, name = tempfile.mkstemp(prefix=temporary_prefix("pose-"), dir=memory_folder())
         os.write(handle, bytes(_SIZE))
         os.close(handle)
         channel = cls(name)

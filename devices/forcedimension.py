@@ -1,8 +1,12 @@
 """Force Dimension omega, sigma, delta, and the Novint Falcon, through the maker's DHD library (ctypes).
 
 The device's own watchdog is set: without a new force for 20 ms its firmware lets go, whatever becomes of this
-program. Its velocity threshold is left as the maker set it. DHD's frame is x towards the person, y right, z
-up. Tested against emulators built from published protocols; no hardware tried.
+program. Its velocity threshold is left as the maker set it. DHD itself acts on a commanded force: it cuts it
+at a limit (dhdSetMaxForce) and adds what carries the arm's weight (gravity compensation, computed by the
+library, so only while forces are sent). The limit is read, compensation switched on, both declared.
+
+Source: Force Dimension SDK documentation (DHD). DHD's frame is x towards the person, y right, z up. Tested
+against emulators built from published protocols; no hardware tried.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ import numpy as np
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.io_thread import ForcefulDevice, Reading, found
-from devices.vendor_library import load, need
+from devices.vendor_library import load, need, offered
 from mechanics.errors import DeviceError
 from mechanics.options import option
 
@@ -57,6 +61,11 @@ FUNCTIONS = {
     "dhdGetStatus": (c_int, (POINTER(c_int), c_byte)),
     "dhdErrorGetLastStr": (c_char_p, ()),
 }
+NEWER_FUNCTIONS = {
+    "dhdGetMaxForce": (c_double, (c_byte,)),
+    "dhdSetGravityCompensation": (c_int, (c_int, c_byte)),
+}
+"""That older libraries may lack."""
 
 
 @dataclass(frozen=True)
@@ -73,6 +82,7 @@ class ForceDimensionWire:
         self.options = options
         self.spec = SPEC
         self._loaded: ctypes.CDLL | None = None
+        self._newer: frozenset[str] = frozenset()
         self._id: int | None = None
         self._forcing = False
 
@@ -84,6 +94,7 @@ class ForceDimensionWire:
             folders = (own, *FOLDERS) if own else FOLDERS
             library = load(("dhd", "drd", "dhd64", "drd64"), folders, INSTALL)
             need(library, FUNCTIONS)
+            self._newer = offered(library, NEWER_FUNCTIONS)
             self._loaded = library
         return self._loaded
 
@@ -96,12 +107,40 @@ class ForceDimensionWire:
                 "programs; on Linux install the SDK's udev rules"
             )
         self._id = number
+        try:
+            self._prepare(number)
+        except (DeviceError, OSError):
+            self.disconnect()
+            raise
+
+    def _prepare(self, number: int) -> None:
         name = (self._library.dhdGetSystemName(number) or b"").decode(errors="replace")
         limits = FALCON if "falcon" in name.lower() else SPEC
-        self.spec = replace(limits, title=name or SPEC.title)
+        self.spec = self._limited(replace(limits, title=name or SPEC.title), number)
         self._check(self._library.dhdSetWatchdog(WATCHDOG_TICKS, number), "set its watchdog")
         self._check(self._library.dhdEnableForce(0, number), "switch force off")
         self._forcing = False
+
+    def _limited(self, spec: DeviceSpec, number: int) -> DeviceSpec:
+        """The specification with what the library does to a force."""
+        words, most = [], spec.max_force_n
+        if "dhdGetMaxForce" not in self._newer:
+            words.append("the library is too old to tell its force limit")
+        else:
+            told = float(self._library.dhdGetMaxForce(number))
+            # negative: no limit is set
+            if told == 0.0:
+                raise DeviceError("the library cuts all forces to 0: lift its limit (dhdSetMaxForce)")
+            if 0.0 < told < most:
+                most = told
+                words.append(f"the library cuts forces at {told:g} N")
+        if "dhdSetGravityCompensation" not in self._newer:
+            words.append("the library is too old for gravity compensation to be set")
+        elif self._library.dhdSetGravityCompensation(1, number) < 0:
+            words.append("without gravity compensation: the arm's weight is felt")
+        else:
+            words.append("gravity compensation adds the arm's weight to every force")
+        return replace(spec, max_force_n=most, conditions=tuple(words))
 
     def _why(self) -> str:
         return (self._library.dhdErrorGetLastStr() or b"no reason given").decode(errors="replace")

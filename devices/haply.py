@@ -1,13 +1,24 @@
 """Haply Inverse3 through its Inverse service (WebSocket on this machine).
 
+A service of 3.5 or later stands between a command and the motors: a global force scale, a damping filter, a
+force gate, a mount with a scale, a basis. What it tells of them is read at every connection. The basis, the
+mount and the damping are set for this session alone; commands are divided by the force scale, so that a
+newton here is one at the hand, and the greatest force is what then can act; the force gate, the maker's guard
+against oscillation, is left alone and declared. A frame that is mirrored or scaled is refused.
+
+Sources: docs.haply.co, Inverse service 3.5 (WebSocket protocol, device configuration, basis, mount and
+workspace, settings, HTTP, migration to 3.5). The meaning of the force gate's gain is not documented there.
 Tested against emulators built from published protocols; no hardware tried.
 """
 
 from __future__ import annotations
 
+import http.client
+import math
 import time
+import urllib.request
 from contextlib import ExitStack
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -17,6 +28,7 @@ from devices.codecs import haply as codec
 from devices.io_thread import ForcefulDevice, Reading, found
 from mechanics.errors import DeviceError
 from mechanics.options import option
+from mechanics.ranges import Range, check_ranges
 
 SPEC = DeviceSpec(
     name="haply",
@@ -33,6 +45,9 @@ OPEN_S = 1.0
 FAULT_SHOWN_S = 1.0
 EVENTS_EVERY_S = 0.01
 LEAST_PERIOD_S = 0.0005
+HTTP_S = 0.5
+LEAST_SCALE, MOST_SCALE = 0.01, 10.0
+PROFILE = "palpate"
 _NO_SERVICE = (
     "the Haply Inverse service does not answer at {uri}: install it from Haply's developer site, start it, "
     "and connect the Inverse3"
@@ -47,15 +62,23 @@ class HaplyOptions:
     events_uri: str = option("ws://localhost:10020", "event socket; '' for none", flag="--haply-events-uri")
     device_id: str = option("", "which Inverse3; '' for the first", flag="--haply-device")
     answer_s: float = option(0.1, "silence after which it counts as gone", unit="s", flag="--haply-answer")
+    preset: str = option(
+        "arm_front_centered",
+        "the service's mount (3.5 or later): origin in the workspace's middle; '' keeps the one that it has",
+        flag="--haply-preset",
+    )
+
+    def __post_init__(self) -> None:
+        check_ranges(self, {"answer_s": Range(0.002, 10.0)})
 
 
 class HaplyWire:
     """The blocking side: one message out, exactly one state back, over `websockets`."""
 
-    spec = SPEC
-
     def __init__(self, options: HaplyOptions, clock: Clock) -> None:
         self.options = options
+        self.spec = SPEC
+        self._scale = 1.0
         self._clock = clock
         self._socket: Any = None
         self._events: Any = None
@@ -79,8 +102,11 @@ class HaplyWire:
                 )
             self.device_id = first.device_id
             self._key = codec.spelling(inventory)
-            self._socket.send(codec.introduction(self.device_id, "palpate"))
-            self._socket.recv(timeout=OPEN_S)
+            told = codec.config(inventory, self.device_id)
+            self._ask(codec.introduction(self.device_id, PROFILE, told, self.options.preset))
+            if told is not None:
+                told = codec.config(self._ask(codec.full_state(self.device_id)), self.device_id) or told
+            self._settle(told)
         except (OSError, TimeoutError, client_errors()) as error:
             self.disconnect()
             raise DeviceError(
@@ -92,6 +118,40 @@ class HaplyWire:
         self._fault, self._fault_until_s = "", 0.0
         self._next_events_s = 0.0
         self._connect_events(client)
+
+    def _ask(self, message: str) -> str | bytes:
+        self._socket.send(message)
+        return self._socket.recv(timeout=OPEN_S)
+
+    def _settle(self, told: codec.HaplyConfig | None) -> None:
+        """What acts between a command and the hand, into the specification; refuses what cannot be undone."""
+        base = self.options.uri.replace("ws", "http", 1).rstrip("/")
+        version = codec.version(_get(f"{base}/version"))
+        scale = codec.number(_get(f"{base}/settings/devices/force_scale"))
+        words = [f"Inverse service {version}" if version else "the Inverse service does not tell its version"]
+        if scale is None:
+            words.append("its force scale is not told and taken as 1")
+        elif not LEAST_SCALE <= scale <= MOST_SCALE:
+            raise DeviceError(
+                f"the Inverse service scales forces by {scale:g}: set its devices/force_scale to 1"
+            )
+        elif scale != 1.0:
+            words.append(f"its force scale of {scale:g} is undone; at most {_most(scale):g} N can act")
+        self._scale = 1.0 if scale is None else scale
+        damping = 0.0
+        if told is None:
+            words.append("it does not tell its filters and its mount")
+        else:
+            _refuse_mirrored_or_scaled(told)
+            words += _declared(told)
+            damping = told.damping_n_s_per_m or 0.0
+        self.spec = replace(
+            SPEC,
+            max_force_n=_most(self._scale),
+            max_damping_n_s_per_m=max(0.0, SPEC.max_damping_n_s_per_m - damping),
+            conditions=tuple(words),
+            simulated=told is not None and told.simulated,
+        )
 
     def _enter(self, client: Any, uri: str) -> Any:
         connection = client.connect(uri, compression=None, open_timeout=OPEN_S, close_timeout=0.2)
@@ -112,7 +172,7 @@ class HaplyWire:
         if force_on_tool_n is None:
             message = codec.probe(self.device_id)
         else:
-            message = codec.force(self.device_id, tuple(force_on_tool_n), self._key)
+            message = codec.force(self.device_id, tuple(force_on_tool_n / self._scale), self._key)
         self._socket.send(message)
         try:
             answer = self._socket.recv(timeout=self.options.answer_s)
@@ -163,6 +223,54 @@ class HaplyWire:
         except errors:
             pass
         self._socket = self._events = None
+
+
+def _most(scale: float) -> float:
+    """N that can act at the hand: the service takes no command beyond the device's own limit."""
+    return SPEC.max_force_n * min(1.0, scale)
+
+
+def _refuse_mirrored_or_scaled(told: codec.HaplyConfig) -> None:
+    if told.basis not in (None, codec.BASIS):
+        raise DeviceError(
+            f"the Inverse service keeps its basis at {told.basis}: set it to {codec.BASIS} "
+            "(X right, Y forward, Z up)"
+        )
+    if not all(abs(s - 1.0) < 1e-6 for s in told.mount_scale):
+        raise DeviceError(
+            f"the Inverse service's mount scales lengths by {told.mount_scale}, so that work is not force "
+            "times way: set the mount's scale to 1, or choose --haply-preset arm_front_centered"
+        )
+
+
+def _declared(told: codec.HaplyConfig) -> list[str]:
+    """In plain words, what stays between a command and the hand."""
+    words = []
+    if told.preset is not None:
+        words.append(f"mount preset {told.preset}")
+    if told.mount_turn_rad > 1e-3:
+        words.append(f"the mount is turned by {math.degrees(told.mount_turn_rad):.0f} degrees")
+    if told.damping_n_s_per_m:
+        words.append(f"its damping filter of {told.damping_n_s_per_m:g} N s/m acts on the hand as well")
+    if told.force_gate is not None:
+        words.append(
+            f"its force gate (gain {told.force_gate:g}) may weaken forces that oscillate: left on, it guards"
+        )
+    if told.gravity_compensation is not None and told.gravity_compensation != 1.0:
+        words.append(f"it carries {told.gravity_compensation:g} of the arm's weight")
+    if told.simulated:
+        words.append("a simulated device: no hand feels it")
+    return words
+
+
+def _get(address: str) -> bytes:
+    """The body of an answer over HTTP, without a proxy; b'' where there is none."""
+    opener = urllib.request.build_opener(urllib.request.ProxyHandler({}))
+    try:
+        with opener.open(address, timeout=HTTP_S) as answer:
+            return answer.read(65536)
+    except (OSError, ValueError, http.client.HTTPException):
+        return b""
 
 
 def _client() -> Any:

@@ -93,7 +93,6 @@ class ThreadedDevice(OpenInWith):
 
     def __init__(self, wire: Wire, *, clock: Clock = host_clock) -> None:
         self.wire = wire
-        self.spec = wire.spec
         self.rate = Rate()
         self._clock = clock
         self._force: np.ndarray = ZERO
@@ -105,6 +104,11 @@ class ThreadedDevice(OpenInWith):
         self._thread: threading.Thread | None = None
         self._spacings: list[float] = []
         self._state = TipState(clock(), -1, ZERO, connected=False, calibrated=False, fault="not open")
+
+    @property
+    def spec(self) -> DeviceSpec:
+        """Of the kind of device; once it is open, of the one that is there."""
+        return self.wire.spec
 
     def open(self) -> None:
         """Connect (raises DeviceError that says what is missing), then start the thread."""
@@ -199,8 +203,13 @@ class ThreadedDevice(OpenInWith):
             self.wire.disconnect()
 
     def _reconnect(self) -> None:
+        before = self.wire.spec
         try:
             self.wire.connect()
+            if self.wire.spec != before:
+                # the caller's limits were made for what it was
+                self.wire.disconnect()
+                raise DeviceError("it came back with other limits or settings: start anew")
         except Exception as error:  # still away: the state keeps saying so
             self._state = self._flagged(fault=_plain(error))
             return

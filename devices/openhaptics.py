@@ -1,8 +1,10 @@
 """3D Systems Touch, Touch X and Phantom through the maker's OpenHaptics HD library (ctypes).
 
 The library calls us back 1000 times a second in a thread of its own; the callback sends the newest force,
-or zero when none came for 20 ms. Its units are millimetres and newtons, its frame x right, y up, z towards
-the person. Tested against emulators built from published protocols; no hardware tried.
+or zero when none came for 20 ms. The driver acts on a force as well: it refuses or cuts what exceeds its
+nominal greatest force, and may ramp forces in. Both are read at connecting; ramping, which would come on top
+of ours, is switched off. Its units are millimetres and newtons, its frame x right, y up, z towards the
+person. Tested against emulators built from published protocols; no hardware tried.
 """
 
 from __future__ import annotations
@@ -10,15 +12,26 @@ from __future__ import annotations
 import ctypes
 import threading
 import time
-from ctypes import CFUNCTYPE, POINTER, c_char_p, c_double, c_int, c_uint, c_ulong, c_ushort, c_void_p
-from dataclasses import dataclass
+from ctypes import (
+    CFUNCTYPE,
+    POINTER,
+    c_char_p,
+    c_double,
+    c_int,
+    c_ubyte,
+    c_uint,
+    c_ulong,
+    c_ushort,
+    c_void_p,
+)
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.spatial.transform import Rotation
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.io_thread import STALE_FORCE_S, ZERO, ForcefulDevice, Reading, found
-from devices.vendor_library import load, need
+from devices.vendor_library import load, need, offered
 from mechanics.errors import DeviceError
 from mechanics.options import option
 
@@ -39,6 +52,7 @@ INSTALL = (
 )
 FOLDERS = ("$OPENHAPTICS_DIR", "~/.local/lib", "/usr/local/lib", "/usr/lib", "/opt/OpenHaptics")
 BUTTONS, POSITION, VELOCITY, TRANSFORM, FORCE, FORCE_OUTPUT = 0x2000, 0x2050, 0x2051, 0x2052, 0x2700, 0x4000
+NOMINAL_MAX_FORCE, FORCE_RAMPING = 0x2603, 0x4002
 CALIBRATION_OK = 0x5000
 INVALID_HANDLE = 0xFFFFFFFF
 CONTINUE = 1
@@ -81,6 +95,8 @@ FUNCTIONS = {
     "hdCheckCalibration": (c_uint, ()),
     "hdGetError": (HdError, ()),
 }
+NEWER_FUNCTIONS = {"hdIsEnabled": (c_ubyte, (c_uint,))}
+"""That a library may lack."""
 
 
 @dataclass(frozen=True)
@@ -96,10 +112,10 @@ class OpenHapticsOptions:
 class OpenHapticsWire:
     """The blocking side hands forces to the library's callback and waits for its readings."""
 
-    spec = SPEC
-
     def __init__(self, options: OpenHapticsOptions) -> None:
         self.options = options
+        self.spec = SPEC
+        self._newer: frozenset[str] = frozenset()
         self._loaded: ctypes.CDLL | None = None
         self._handle: int | None = None
         self._arrived = threading.Event()
@@ -116,6 +132,7 @@ class OpenHapticsWire:
             folders = (own, *FOLDERS) if own else FOLDERS
             library = load(("HD", "hd"), folders, INSTALL)
             need(library, FUNCTIONS)
+            self._newer = offered(library, NEWER_FUNCTIONS)
             self._loaded = library
         return self._loaded
 
@@ -133,9 +150,26 @@ class OpenHapticsWire:
         self._order = (float("-inf"), None)
         self._arrived.clear()
         self._last_s = time.perf_counter()
+        self.spec = self._limited()
         library.hdEnable(FORCE_OUTPUT)
         self._schedule = library.hdScheduleAsynchronous(self._callback, None, TOP_PRIORITY)
         library.hdStartScheduler()
+
+    def _limited(self) -> DeviceSpec:
+        """The specification with what the driver does to a force."""
+        library, words, most = self._library, [], SPEC.max_force_n
+        values = (c_double * 16)()
+        library.hdGetDoublev(NOMINAL_MAX_FORCE, values)
+        if library.hdGetError().code or not 0.0 < values[0] < 1e3:
+            words.append(f"the driver does not tell its greatest force; {most:g} N is taken")
+        elif values[0] < most:
+            most = float(values[0])
+            words.append(f"the driver allows at most {most:g} N")
+        if "hdIsEnabled" in self._newer and library.hdIsEnabled(FORCE_RAMPING):
+            library.hdDisable(FORCE_RAMPING)
+            words.append("the driver's own ramp of forces is switched off")
+        library.hdGetError()
+        return replace(SPEC, max_force_n=most, conditions=tuple(words))
 
     def _turn(self, _: object) -> int:
         """The library's 1 kHz callback. It must never raise: ctypes swallows that, the force stays."""

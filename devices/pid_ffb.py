@@ -35,6 +35,7 @@ SPEC = DeviceSpec(
     workspace_radius_m=0.05,
     buttons=8,
 )
+NOT_MEASURED = "{:g} N at full scale is taken, not measured: give --ffb-full-scale for true newtons"
 EFFECT_MS = 50
 RESTART_S = 0.02
 QUIET_S = 0.01
@@ -61,8 +62,12 @@ class PidWire:
 
     def __init__(self, options: PidOptions, clock: Clock, hid: Any = None) -> None:
         self.options = options
+        measured = options.full_scale_n != PidOptions().full_scale_n
         self.spec = replace(
-            SPEC, max_force_n=min(options.full_scale_n, SPEC.max_force_n), workspace_radius_m=options.stroke_m
+            SPEC,
+            max_force_n=min(options.full_scale_n, SPEC.max_force_n),
+            workspace_radius_m=options.stroke_m,
+            conditions=() if measured else (NOT_MEASURED.format(options.full_scale_n),),
         )
         self._clock = clock
         self._hid = hid

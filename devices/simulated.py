@@ -29,6 +29,7 @@ SPEC = DeviceSpec(
     max_speed_m_per_s=2.0,
     workspace_radius_m=1.0,
     buttons=1,
+    simulated=True,
 )
 LONGEST_CATCH_UP_S = 0.01
 """A hand that leapt on by more in one reading would look like a device whose pose jumps."""

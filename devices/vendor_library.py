@@ -43,7 +43,18 @@ def load(stems: Sequence[str], folders: Sequence[str], install: str) -> ctypes.C
     raise DeviceError(f"the library {' or '.join('lib' + s for s in stems)} was not found{broken}: {install}")
 
 
-def need(library: ctypes.CDLL, functions: Mapping[str, tuple[type | None, tuple[type, ...]]]) -> None:
+Functions = Mapping[str, tuple[type | None, tuple[type, ...]]]
+"""C functions by name: what each returns and takes."""
+
+
+def offered(library: ctypes.CDLL, functions: Functions) -> frozenset[str]:
+    """Declare those of the C functions that the library has; their names."""
+    names = frozenset(name for name in functions if hasattr(library, name))
+    need(library, {name: functions[name] for name in names})
+    return names
+
+
+def need(library: ctypes.CDLL, functions: Functions) -> None:
     """Declare C functions; raises DeviceError where the library lacks one."""
     for name, (result, arguments) in functions.items():
         try:

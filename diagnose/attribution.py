@@ -244,6 +244,8 @@ def _rivals(
             if score.share < RIVAL_CLOSES * max(first.share, 0.0) and not score.effect.few_places:
                 continue
             behind = first.gain - score.gain
+            if score.effect.any_form and first.effect.scope.between_places and behind > 0:
+                continue
             difference = first.per_group - score.per_group
             spread = difference.std() * np.sqrt(len(difference))
             near = behind < max(search.options.rival_share * first.gain, 2.0 * spread, 25.0)

@@ -12,6 +12,7 @@ from diagnose.attribution import Attribution
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir
 from diagnose.where import Where
+from mechanics.effects.registry import effect
 
 _SENTENCES = {
     "none": "the gap is noise; no effect is missing",
@@ -20,6 +21,11 @@ _SENTENCES = {
     "unknown": "there is a gap, and no effect known here explains it",
     "effect+unknown": "{effects} {explain} part of the gap; something unknown remains",
 }
+
+
+def _said(entry: EffectEntry) -> str:
+    in_words = effect(entry.name).keys_in_words
+    return in_words(entry.parameters) if in_words and entry.parameters else str(entry.parameters or "")
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -119,7 +125,7 @@ class Diagnosis:
             f"verdict: {self.summary}",
             f"where: gap {self.gap_before_n:.4f} N (noise {self.noise_n:.4f} N); it follows {near.axis} most "
             f"(share {near.share:.0%}, p = {near.p:.2g})",
-            *(f"which: {e.name} {e.parameters or ''}" for e in self.entries if e.name in self.effects),
+            *(f"which: {e.name} {_said(e)}" for e in self.entries if e.name in self.effects),
         ]
         if self.gap_closed is not None and self.gap_closed_ci95 is not None:
             low, high = self.gap_closed_ci95

@@ -28,6 +28,11 @@ EFFECT_KEYS: dict[str, Schema] = {
     "inclusion": BALL,
     "modulus_gradient": GRADIENT,
     "skin_layer": SKIN,
+    "stiffness_field": {
+        "places_m": None,
+        "ratio": Key(low=1e-3, high=1e3, size=0, required=True),
+        "length_m": LENGTH,
+    },
     "surface_shape": {"rms_m": Key(low=0.0, high=1.0, unit="m"), "where": None},
     "unbonded_base": {
         "bonded_fraction": Key(low=1e-3, high=1.0, required=True),

@@ -33,9 +33,7 @@ def shares_in_elements(places: Places, answer: np.ndarray) -> Shares:
     fields = energy_fields(places)
     weight = answer[:, None] * fields.energy[:, :, 0, 0][places.place]
     own = np.maximum(1 - weight.sum(axis=1), 0.0)
-    np.add.at(
-        weight, (slice(None), places.model.mesh.touchable_elements), own[:, None] * places.under_tip
-    )
+    np.add.at(weight, (slice(None), places.model.mesh.touchable_elements), own[:, None] * places.under_tip)
     return Shares(fields.centroid, weight / weight.sum(axis=1, keepdims=True))
 
 
@@ -54,6 +52,7 @@ def far_of(
     places: Places, fields: EnergyFields, ratio: np.ndarray, softness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """The same of elements' ratios (m,) and the softness under each tip (p,)."""
-    # the half-space that the far field takes off is of the modulus under the tip
-    far = far_with_weights(places, 1 / ratio) + (1 - softness)[:, None, None] * fields.half_space
-    return far, 1 / softness
+    # what the far field takes off is of the modulus under the tip: the half-space, and what the energies'
+    # elements are too wide for, so that the same ratio everywhere is another modulus
+    taken = fields.energy.sum(axis=1)[places.place] - places.far
+    return far_with_weights(places, 1 / ratio) + (1 - softness)[:, None, None] * taken, 1 / softness

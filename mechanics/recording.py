@@ -360,7 +360,7 @@ def _read_table(path: Path) -> dict[str, np.ndarray]:
                 raise RecordingError(f"'{path}' has the column {twice[0]} twice: leave one of them out")
             try:
                 with warnings.catch_warnings():
-                    warnings.filterwarnings("ignore", "loadtxt: input contained no data")
+                    warnings.simplefilter("ignore", UserWarning)  # of empty lines and files
                     values = np.loadtxt(
                         file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2,
                         comments=None, max_rows=MOST_SAMPLES + 1,

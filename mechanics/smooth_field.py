@@ -1,8 +1,8 @@
 """A smooth field of stiffness: a Gaussian process of the logarithm of Young's modulus over an object.
 
-Few numbers say how it varies: standard deviation, and length over which places are alike (Matern 3/2). What is
-unknown are its values at places that are spread over the object, the touched ones first; between them it is
-kriged. A press tells of a weighted mean of the field, by the share of its compliance that lies in each
+Few numbers say how it varies: standard deviation, and length over which places are alike (Matern 3/2). What
+is unknown are its values at places that are spread over the object, the touched ones first; between them it
+is kriged. A press tells of a weighted mean of the field, by the share of its compliance that lies in each
 element and under its tip (`Shares`), so that depth is told as far as presses tell it. Standard deviation,
 length, and how much places scatter without any field, are those of the greatest restricted likelihood.
 Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, chapters 2, 4, 5 and 8.
@@ -67,8 +67,9 @@ class Estimate:
 
     prior: the likeliest. gain: log likelihood by which it is likelier than places that scatter at random.
     left_out: (s,) what each site differs from the others' prediction of it, in log modulus; scattered: (s,)
-    the same where no field is taken. level: log of the object's modulus over what the presses' own stand for.
-    field: its mean. sd: (c,) of the log ratio at its places. covariance: (c, c).
+    the same where no field is taken. level, level_sd: ln of the object's modulus, and its standard error.
+    field: its mean. covariance: (c, c) of ln E at its places. felt: standard deviation of ln E that the field
+    says from site to site.
     """
 
     prior: Prior
@@ -76,12 +77,14 @@ class Estimate:
     left_out: np.ndarray
     scattered: np.ndarray
     level: float
+    level_sd: float
     field: SmoothField
     covariance: np.ndarray
+    felt: float
 
     @property
     def sd(self) -> np.ndarray:
-        """(c,) standard deviation of the log ratio at the field's places."""
+        """(c,) standard deviation of ln E at the field's places."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     @property
@@ -156,9 +159,13 @@ def estimate(
     likelihood, (log_sd, scatter), length, drawn, own, kernel = best
     whole = cover + scatter**2 * np.eye(len(y)) + log_sd**2 * kernel
     level, inverse, rest = _levelled(y, whole)
-    gained = log_sd**2 * own @ drawn.T @ inverse
-    mean = gained @ (y - level)
-    covariance = log_sd**2 * own - gained @ drawn @ own * log_sd**2
+    shared = log_sd**2 * own @ drawn.T
+    mean = shared @ rest
+    # of ln E, whose level is unknown as well
+    precise = np.linalg.inv(whole)
+    unlevelled = 1 - shared @ precise.sum(axis=1)
+    covariance = log_sd**2 * own - shared @ precise @ shared.T
+    covariance = covariance + np.outer(unlevelled, unlevelled) / precise.sum()
     apart = cover + nothing[1][0] ** 2 * np.eye(len(y))
     _, plain, plain_rest = _levelled(y, apart)
     return Estimate(
@@ -167,8 +174,10 @@ def estimate(
         rest / _left_out_weight(inverse),
         plain_rest / _left_out_weight(plain),
         float(level),
+        float(1 / np.sqrt(precise.sum())),
         SmoothField(places, mean, float(length)),
         covariance,
+        float(np.std(drawn @ mean)),
     )
 
 

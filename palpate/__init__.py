@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
     from palpate.api import batch as batch
+    from palpate.api import check as check
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
     from palpate.api import export as export
@@ -42,6 +43,7 @@ if TYPE_CHECKING:
     from palpate.api import simulate as simulate
     from palpate.keywords import options as options
     from palpate.results.batch import Batch as Batch
+    from palpate.results.check import Checkup as Checkup
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
@@ -57,12 +59,13 @@ if TYPE_CHECKING:
 
 _DOOR = {
     "palpate.api": (
-        "read_recording read_table import_table load model_of reconstruct renderer replay press compare "
+        "read_recording read_table import_table check load model_of reconstruct renderer replay press compare "
         "diagnose simulate export batch"
     ),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.imported": "Imported",
+    "palpate.results.check": "Checkup",
     "palpate.results.model": "Model",
     "palpate.results.reconstruction": "Reconstruction",
     "palpate.results.replay": "ReplayResult",

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import mechanics.recording
     from mechanics.presses import Presses
     from palpate.results.batch import Batch
+    from palpate.results.check import Checkup
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
@@ -68,6 +69,26 @@ def read_recording(source: RecordingLike) -> Recording:
         if Path(source).exists() or "." in Path(source).name:
             raise
         raise RecordingError(f"{error}; embedded are {', '.join(embedded_names())}") from error
+
+
+def check(recording: RecordingLike, *, full: bool = False, progress: bool | Progress = True) -> Checkup:
+    """What may be wrong with a recording: units, axes, channels, clock, traced base, presses (docs/check.md).
+
+    full: reconstruct it too, some 20 s, and check its modulus. The result has findings, the gravest first,
+    each with a stretch in s; `reconstruct` refuses what is grave. Raises RecordingError for what is no
+    recording, and what `reconstruct` raises with `full`.
+    """
+    from palpate.results.check import Checkup
+    from reconstruct.checks.registry import check as checked
+    from reconstruct.checks.registry import seen
+    from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+
+    measured = read_recording(recording)
+    with _told("check", progress) as tell:
+        findings = checked(measured)
+        if full and not any(f.grave for f in findings):
+            findings = reconstruct_fully(measured, ReconstructOptions(force=True), tell).findings
+    return Checkup(measured, findings, seen(measured), full)
 
 
 def import_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Imported:

@@ -159,28 +159,34 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
     """Before any work: no output is an input or another output, and each can be written (check_target)."""
     read: dict[str, str] = {}
     written: dict[str, str] = {}
+    targets: list[tuple[Path, Kind | FolderKind]] = []
     for action in parser._actions:
         given = getattr(arguments, action.dest, None)
         flag = action.option_strings[-1] if action.option_strings else str(action.metavar or action.dest)
+        kind = getattr(action, _WRITES, None)
         for each in given if isinstance(given, list) else [given]:
-            if each is None:
+            if each is None or str(each) == "-":
                 continue
             if hasattr(action, _READS):
                 read |= {_identity(file): flag for file in _files_of(Path(each))}
-            kind = getattr(action, _WRITES, None)
-            if kind is None or str(each) == "-":
-                continue
-            path = Path(each)
-            also = kind.beside(path) if isinstance(kind, Kind) else []
-            for file in (path, *(other for other, _ in also)):
-                if _identity(file) in written:
-                    raise OptionError(f"{flag} and {written[_identity(file)]} both name '{file}': name two")
-                written[_identity(file)] = flag
-            check_target(path, kind)
+            if kind is not None:
+                targets.append((Path(each), kind))
+                for file in _written_at(*targets[-1]):
+                    if _identity(file) in written:
+                        raise OptionError(
+                            f"{flag} and {written[_identity(file)]} both name '{file}': name two"
+                        )
+                    written[_identity(file)] = flag
     for same in written.keys() & read.keys():
         raise OptionError(
             f"{written[same]} would replace what {read[same]} names and is read from: name another output"
         )
+    for path, kind in targets:
+        check_target(path, kind)
+
+
+def _written_at(path: Path, kind: Kind | FolderKind) -> list[Path]:
+    return [path, *(other for other, _ in kind.beside(path))] if isinstance(kind, Kind) else [path]
 
 
 def _files_of(path: Path) -> list[Path]:

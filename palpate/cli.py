@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 COMMANDS = {
     "demo": "the main job on the embedded example; prints the report's path",
+    "check": "what may be wrong with a recording, before it is believed",
     "reconstruct": "a recording becomes a model",
     "model": "a MODEL from a surface's file and a modulus",
     "import": "other programs' files become a recording",

@@ -14,7 +14,9 @@ same first touches, at the same places with the same normals; of the model only 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 import numpy as np
 
@@ -31,7 +33,15 @@ from mechanics.sites import TouchSites, touch_sites
 from mechanics.smooth_field import SmoothField
 from mechanics.touch import forces_at
 from palpate.regions import Region, regions
-from reconstruct.modulus_field import PressModuli, asked_for, fit_field, press_moduli, unit_forces
+from reconstruct.modulus_field import (
+    LAW_ERROR,
+    FieldSites,
+    PressModuli,
+    asked_for,
+    fit_field,
+    press_moduli,
+    with_field,
+)
 from reconstruct.one_d import columns, fit_robust
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.placing import presses_on
@@ -42,6 +52,10 @@ RIVALS = ("kelvin-voigt", "hunt-crossley")
 HOMOGENEOUS = "fem-homogeneous"
 MODELS = ("fem", *RIVALS, HOMOGENEOUS)
 LAWS = ("linear", "neo-hookean")
+MOST_MOVED, MOVES = 2.5, 21
+"""Standard errors by which a held-out first touch may be moved, and places that are tried."""
+LASTING = 10
+"""Rows of a press that a lasting error of a law binds together."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +71,11 @@ class CompareOptions:
         "auto",
         "a field of the modulus in the FEM: where the presses ask for one, or never",
         choices=("auto", "homogeneous"),
+    )
+    first_touch: str = option(
+        "read",
+        "of held-out presses: as read, or moved by what its stated error allows, for every model alike",
+        choices=("read", "moved"),
     )
 
 
@@ -164,7 +183,7 @@ def compare_presses(
         progress("folds", 0.8 + 0.1 * k / folds)
         held = np.flatnonzero(fold == k)
         rows = presses.rows(held)
-        forces, fem = _predict(prepared, np.flatnonzero(fold != k), held, options.interpolation)
+        forces, fem = _predict(prepared, np.flatnonzero(fold != k), held, options)
         fitted.append(fem)
         for name in MODELS:
             predicted[name][rows] = forces[name]
@@ -172,7 +191,7 @@ def compare_presses(
     for region in regions(model, presses.point, presses.normal):
         progress(region.name, 0.95)
         held = np.flatnonzero(region.members)
-        forces, _ = _predict(prepared, np.flatnonzero(~region.members), held, options.interpolation)
+        forces, _ = _predict(prepared, np.flatnonzero(~region.members), held, options)
         measured = presses.force[presses.rows(held)]
         found.append(
             RegionResult(
@@ -278,21 +297,17 @@ def prepare(
 
 @dataclass(frozen=True)
 class Fem:
-    """The finite-element model of some presses: dent law, modulus Pa, and the field; None: of one modulus."""
+    """The finite-element model of some presses: dent law, modulus Pa, touch sites, and the field in them;
+    None: of one modulus."""
 
     law: str
     modulus_pa: float
+    sites: FieldSites
     field: SmoothField | None = None
 
-    def unit(self, prepared: Prepared) -> np.ndarray:
-        """(n, 3) m^2, force of every path for unit modulus."""
-        if self.field is None:
-            return prepared.unit[self.law]
-        return unit_forces(prepared.sites, prepared.places, prepared.presses, self.law, self.field)
-
-    def force(self, prepared: Prepared, rows: np.ndarray) -> np.ndarray:
-        """(k, 3) N of these rows."""
-        return self.modulus_pa * self.unit(prepared)[rows]
+    def forces(self, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) N of every path. moved_m: (p,) by how much earlier each press meets the surface."""
+        return self.modulus_pa * self.sites.unit_forces(presses, self.law, moved_m)
 
 
 def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
@@ -304,7 +319,7 @@ def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
         modulus = _scale(unit[seen], measured)
         fits.append((_rms(modulus * unit[seen] - measured), modulus, law))
     _, modulus, law = min(fits)
-    return Fem(law, modulus)
+    return Fem(law, modulus, with_field(prepared.sites, prepared.places, None))
 
 
 def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
@@ -316,32 +331,68 @@ def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
     found = fit_field(prepared.own[law], train)
     if found is None or not asked_for(found):
         return plain
-    with_field = Fem(law, 1.0, found.field)
-    seen = prepared.presses.rows(train)
-    return replace(
-        with_field, modulus_pa=_scale(with_field.unit(prepared)[seen], prepared.presses.force[seen])
-    )
+    fem = Fem(law, 1.0, with_field(prepared.sites, prepared.places, found.field), found.field)
+    presses = prepared.presses
+    seen = presses.rows(train)
+    # first touches of what is fitted are where that fit has them
+    shift = np.zeros(len(presses))
+    shift[train] = -prepared.own[law].fit.onset_shift_m[train]
+    return replace(fem, modulus_pa=_scale(fem.forces(presses, shift)[seen], presses.force[seen]))
 
 
 def _predict(
-    prepared: Prepared, train: np.ndarray, test: np.ndarray, interpolation: str
+    prepared: Prepared, train: np.ndarray, test: np.ndarray, options: CompareOptions
 ) -> tuple[dict[str, np.ndarray], Fem]:
     """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM."""
-    presses = prepared.presses
-    rows = presses.rows(test)
+    presses = prepared.presses.of(np.isin(np.arange(len(prepared.presses)), test))
     plain, fem = _homogeneous(prepared, train), _fem(prepared, train)
-    forces = {"fem": fem.force(prepared, rows), HOMOGENEOUS: plain.force(prepared, rows)}
-    counts = np.diff(presses.starts)[test]
+    models: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "fem": lambda moved: _of(fem, test).forces(presses, moved),
+        HOMOGENEOUS: lambda moved: _of(plain, test).forces(presses, moved),
+    }
+    whole = prepared.presses
     for name, fitted in prepared.laws.items():
         own = Law(*(column[train] for column in fitted))
-        at = spread_law(presses.point[train], presses.site[train], own, presses.point[test], interpolation)
-        k, b, r, s = (np.repeat(column, counts) for column in at)
-        u = np.maximum(presses.depth[rows], 0.0)
-        inside = u > 0
-        safe = np.where(inside, u, 1.0)
-        push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate[rows], 0.0), 0.0)
-        forces[name] = push[:, None] * np.repeat(presses.normal[test], counts, axis=0)
-    return {name: forces[name] for name in MODELS}, fem
+        at = spread_law(whole.point[train], whole.site[train], own, whole.point[test], options.interpolation)
+        models[name] = partial(_one_d, presses, at)
+    return {name: as_touched(models[name], presses, options.first_touch) for name in MODELS}, fem
+
+
+def _of(fem: Fem, test: np.ndarray) -> Fem:
+    s = fem.sites.sites
+    some = TouchSites(
+        s.points[test], s.normals[test], s.curvature[test], s.far[test], s.patch_width_m, s.poisson_ratio
+    )
+    return replace(fem, sites=FieldSites(some, fem.sites.ratio[test]))
+
+
+def _one_d(presses: Presses, law: Law, moved_m: np.ndarray) -> np.ndarray:
+    """(n, 3) N of a 1D law's parameters (p,) of each press."""
+    k, b, r, s = (column[presses.press] for column in law)
+    u = np.maximum(presses.depth + moved_m[presses.press], 0.0)
+    inside = u > 0
+    safe = np.where(inside, u, 1.0)
+    push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate, 0.0), 0.0)
+    return push[:, None] * presses.normal[presses.press]
+
+
+def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, first_touch: str) -> np.ndarray:
+    """(n, 3) N along the paths as read, or with each first touch where the force then meets what was measured
+    best, at the price of its stated error."""
+    stated = presses.onset_error_m
+    found = force(np.zeros(len(presses)))
+    if first_touch == "read" or not (stated > 0).any():
+        return found
+    variance = presses.noise.raw_n**2 + LAW_ERROR**2 * (presses.force**2).sum(axis=1) / 3
+    least = np.full(len(presses), np.inf)
+    for z in np.linspace(-MOST_MOVED, MOST_MOVED, MOVES):
+        tried = force(z * stated)
+        missed = ((tried - presses.force) ** 2).sum(axis=1) / variance / LASTING
+        cost = np.bincount(presses.press, weights=missed, minlength=len(presses)) + z**2
+        better = cost < least
+        found = np.where(better[presses.press][:, None], tried, found)
+        least = np.minimum(cost, least)
+    return found
 
 
 def _scale(unit: np.ndarray, measured: np.ndarray) -> float:
@@ -374,7 +425,7 @@ def stiffness_along(
     result = {}
     for name, fem in (("fem", _fem(prepared, train)), (HOMOGENEOUS, _homogeneous(prepared, train))):
         there = solve_places(model, places, solved.normals, pressed.frame)
-        force = fem.modulus_pa * unit_forces(solved, there, pressed, fem.law, fem.field)
+        force = replace(fem, sites=with_field(solved, there, fem.field)).forces(pressed)
         deepest = force.reshape(len(places), len(steps), 3)[:, -1]
         result[name] = (deepest * solved.normals).sum(axis=1)
     presses = prepared.presses

@@ -28,6 +28,7 @@ _KINDS: dict[str, tuple[str, ...]] = {
         "reconstruct.surface:SurfaceOptions",
         "reconstruct.meshing:MeshingOptions",
         "reconstruct.modulus:ModulusOptions",
+        "reconstruct.modulus_field:FieldOptions",
         "reconstruct.modulus_paper:PaperOptions",
     ),
     "renderer": _RENDER,

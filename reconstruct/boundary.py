@@ -16,7 +16,8 @@ from mechanics.robust import biweight
 from mechanics.samples import runs
 
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
-_GAP_S = 1.0
+_LEAST_PIECE = 2.0  # tip radii; less tells no plane
+_FLAT = 0.1  # tip radii off the plane
 
 
 @dataclass(frozen=True)
@@ -92,8 +93,8 @@ def find_interval(
     """Sample indices [first, last) of phase I.
 
     given: approximate times from the recording; contact that starts inside is followed to its end. Without
-    them: a contact in which the tip slides further than 8 radii while it stays in one plane, with the
-    contacts before and after it in that plane after short gaps. touching: (n,) bool. Raises ContactError
+    them: contacts in which the tip slides further than 8 radii while it stays in one plane, until one leaves
+    that plane. touching: (n,) bool. Raises ContactError
     where there is none.
     """
     found = runs(touching)
@@ -107,41 +108,22 @@ def find_interval(
             )
         return inside[0][0], inside[-1][1]
     for i, (a, b) in enumerate(found):
-        if _travel(position[a:b]) < _LEAST_SLIDE * tip_radius_m:
+        if _travel(position[a:b]) < _LEAST_PIECE * tip_radius_m:
             continue
         centre, normal, flatness = fit_plane(position[a:b])
-        if flatness > 0.1 * tip_radius_m:
+        if flatness > _FLAT * tip_radius_m:
             continue
-        reach = max(6 * flatness, 0.02 * tip_radius_m)
-        first, last = i, i
-        while first > 0 and _joins(found[first - 1], found[first], t, position, centre, normal, reach):
-            first -= 1
-        while last + 1 < len(found) and _joins(
-            found[last], found[last + 1], t, position, centre, normal, reach
-        ):
-            last += 1
-        return found[first][0], found[last][1]
+        off = np.array([np.median(np.abs((position[c:d] - centre) @ normal)) for c, d in found])
+        outside = np.flatnonzero(off > _FLAT * tip_radius_m)
+        first = int(max(outside[outside < i], default=-1)) + 1
+        last = int(min(outside[outside > i], default=len(found))) - 1
+        if sum(_travel(position[c:d]) for c, d in found[first : last + 1]) > _LEAST_SLIDE * tip_radius_m:
+            return found[first][0], found[last][1]
     raise NoBaseError(
-        "no boundary phase found: no contact slides further than 8 tip radii in one plane; trace "
+        "no boundary phase found: nowhere does the tip slide further than 8 of its radii in one plane; trace "
         "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
         "model whose base stands in"
     )
-
-
-def _joins(
-    earlier: tuple[int, int],
-    later: tuple[int, int],
-    t: np.ndarray,
-    position: np.ndarray,
-    centre: np.ndarray,
-    normal: np.ndarray,
-    reach_m: float,
-) -> bool:
-    """Whether two contacts are one trace: a short gap, and both all within `reach_m` of the plane."""
-    if t[later[0]] - t[earlier[1] - 1] > _GAP_S:
-        return False
-    path = position[earlier[0] : later[1]]
-    return bool(np.percentile(np.abs((path - centre) @ normal), 95) < reach_m)
 
 
 def _travel(points: np.ndarray) -> float:

@@ -21,13 +21,15 @@ from mechanics.samples import runs
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
 from reconstruct.delay import force_delay
-from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
+from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
+from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
 from reconstruct.tool_weight import tool_weight
 
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
-_LOW, _HIGH, _PEAK = 5.0, 10.0, 12.0  # in standard deviations of the noise
+_LOW = 0.7
+"""A touch lasts while the force stays above this share of the least contrast."""
 _PULL_S, _AGAINST = 0.15, -0.5
 """A force so soon after a press, against it by this cosine, is the surface that holds on to the tip."""
 _RIPPLE = 1e-4
@@ -42,13 +44,14 @@ class ContactOptions:
 
     contact_threshold_n: float | None = option(
         None,
-        "force tau that activates a contact; None: 1 N in the paper's mode, else 10 sigma",
+        "force tau that activates a contact; None: 1 N in the paper's mode, else what noise alone reaches "
+        "less than once in 1000 s",
         unit="N",
         flag="--contact-threshold",
     )
     least_peak_n: float | None = option(
         None,
-        "a press must peak above this; None: tau in the paper's mode, else 12 sigma",
+        "a press must peak above this; None: tau",
         unit="N",
         flag="--least-peak",
     )
@@ -207,10 +210,11 @@ def _speed(signals: Signals, contact: Found) -> float:
 def _searched(recording: Recording, given: _Given) -> _Found:
     method, options, boundary = given.method, given.contact, given.known_base
     signals, free_air, spread = _signals(recording, given.cutoff_hz)
-    magnitude = signals.magnitude
-    low = _LOW * spread
-    high = options.contact_threshold_n or (PAPER_THRESHOLD_N if method == "paper" else _HIGH * spread)
-    touching = hysteresis(magnitude, low, _HIGH * spread)
+    least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
+    high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
+    high = options.contact_threshold_n or high
+    gap = round(0.25 * recording.sample_rate_hz / given.cutoff_hz)
+    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, gap)
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -223,7 +227,7 @@ def _searched(recording: Recording, given: _Given) -> _Found:
         boundary = find_boundary(signals.position, signals.force, touching, interval, radius, given.boundary)
         start = interval[1]
     touching[:start] = False
-    least_peak = options.least_peak_n or (high if method == "paper" else _PEAK * signals.noise_n)
+    least_peak = options.least_peak_n or high
     contacts: list[Found] = []
     unused: list[tuple[int, int, str]] = []
     touches = runs(touching)
@@ -244,6 +248,11 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
         hint = "lower --contact-threshold or press harder" if method == "paper" else "press at more places"
+        if touches and np.median([boundary.height(signals.position[a]) for a, _ in touches]) < 0:
+            hint = (
+                "they lie below the support, so forces have the wrong sign; state the other force_on in the "
+                "recording's TOML"
+            )
         raise ContactError(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
@@ -251,33 +260,41 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
 
 
-def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, float]:
-    """Filtered signals, free-air force (n, 3) N, and the noise of the filtered force, N an axis."""
+def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
+    """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis."""
     rate = recording.sample_rate_hz
-    filtered = low_pass(recording.force_on_tool, rate, cutoff_hz)
+    filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
     noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
-    spread = noise * noise_gain(rate, cutoff_hz)
-    weight = tool_weight(recording, filtered, cutoff_hz, spread)
-    drift, _ = free_air_force(recording.t, filtered - weight, spread)
+    white = noise * noise_gain(rate, cutoff_hz)
+    weight, inertia = tool_weight(recording, filtered, cutoff_hz)
+    left = np.linalg.norm(filtered - weight, axis=1)
+    drift, _ = free_air_force(recording.t, filtered - weight, max(white, crowd_scale(left)))
     free_air = weight + drift
     force = filtered - free_air
     signals = Signals(
         recording=recording,
-        position=low_pass(recording.position, rate, cutoff_hz),
+        position=low_pass_at(recording.t, recording.position, rate, cutoff_hz),
         force=force,
         magnitude=np.linalg.norm(force, axis=1),
         raw_force=recording.force_on_tool - free_air,
         noise_n=noise,
     )
-    return signals, free_air, spread
+    still = max(white, crowd_scale(signals.magnitude))
+    return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
 
 
-def hysteresis(magnitude: np.ndarray, low: float, high: float) -> np.ndarray:
-    """(n,) bool: the state machine's contacts, each back-tracked: runs above `low` that reach `high`."""
-    state = np.zeros(len(magnitude), dtype=bool)
-    for a, b in runs(magnitude > low):
+def hysteresis(magnitude: np.ndarray, low: float, high: float, gap: int = 0) -> np.ndarray:
+    """(n,) bool: the state machine's contacts, each back-tracked: runs above `low` that reach `high`.
+
+    gap: samples; a shorter fall below `low` ends no contact.
+    """
+    state, above = np.zeros(len(magnitude), dtype=bool), magnitude > low
+    for a, b in runs(~above):
+        if 0 < a and b < len(above) and b - a < gap:
+            above[a:b] = True
+    for a, b in runs(above):
         if magnitude[a:b].max() > high:
             state[a:b] = True
     return state

@@ -5,11 +5,16 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.signal import butter, sosfiltfilt
+from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 from mechanics.errors import OptionError
 from mechanics.options import option
 from mechanics.robust import spread
+
+_EVEN = 1e-3
+"""Of a step: less is rounding of the clock."""
+_STENCIL = 7
+"""Samples of a derivative of what was smoothed before: exact on polynomials of degree four."""
 
 
 @dataclass(frozen=True)
@@ -32,6 +37,31 @@ def low_pass(values: np.ndarray, sample_rate_hz: float, cutoff_hz: float) -> np.
     sections = butter(2, cutoff_hz, fs=sample_rate_hz, output="sos")
     padding = min(len(values) - 1, int(3 * sample_rate_hz / cutoff_hz))
     return sosfiltfilt(sections, values, axis=0, padlen=padding)
+
+
+def low_pass_at(
+    t: np.ndarray, values: np.ndarray, sample_rate_hz: float, cutoff_hz: float, derivative: int = 0
+) -> np.ndarray:
+    """As `low_pass` of values (n, k) at times t (n,) s, which need not be even, or their time derivative.
+
+    The derivative passes what `low_pass` passes of another signal: an inertia and the acceleration that makes
+    it go through the same filter.
+    """
+    count = len(t)
+    step = (t[-1] - t[0]) / (count - 1)
+    even = t[0] + step * np.arange(count)
+    uneven = bool(np.abs(t - even).max() > _EVEN * step)
+    if uneven:
+        even = np.arange(t[0], t[-1] + 0.5 / sample_rate_hz, 1 / sample_rate_hz)
+        values, step = _columns(even, t, values), 1 / sample_rate_hz
+    passed = low_pass(values, sample_rate_hz, cutoff_hz)
+    if derivative:
+        passed = savgol_filter(passed, _STENCIL, _STENCIL - 3, deriv=derivative, delta=step, axis=0)
+    return _columns(t, even, passed) if uneven else passed
+
+
+def _columns(at: np.ndarray, t: np.ndarray, values: np.ndarray) -> np.ndarray:
+    return np.column_stack([np.interp(at, t, values[:, k]) for k in range(values.shape[1])])
 
 
 def noise_gain(sample_rate_hz: float, cutoff_hz: float) -> float:

@@ -13,7 +13,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.effects import stiffness_field
 from mechanics.field_response import changed, shares_of
+from mechanics.model import Model
+from mechanics.options import option
 from mechanics.places import Places, solve_places
 from mechanics.presses import Presses
 from mechanics.sites import TouchSites
@@ -25,8 +28,14 @@ LEAST_GAIN = 4.0
 """Log likelihood by which a field must be likelier than places that scatter at random ..."""
 LEAST_EXPLAINED = 0.2
 """... and the share of the places' scatter that it must predict where they were left out."""
+LEAST_FELT = 0.05
+"""... and by how much the places' moduli must differ by it (standard deviation of ln E): less than that shape
+and mesh bring about as well."""
 LEAST_SITES = 6
 LAW_ERROR = 0.03
+LEVEL_BIAS = 0.02
+"""Standard error of the level that no press tells: law and mesh, as of a global modulus
+(reconstruct.modulus.ModulusOptions.law_bias)."""
 
 
 @dataclass(frozen=True)
@@ -76,28 +85,82 @@ def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
 
 def asked_for(found: Estimate | None) -> bool:
     """Whether the evidence asks for a field."""
-    return found is not None and found.gain > LEAST_GAIN and found.explained > LEAST_EXPLAINED
+    return (
+        found is not None
+        and found.gain > LEAST_GAIN
+        and found.explained > LEAST_EXPLAINED
+        and found.felt > LEAST_FELT
+    )
 
 
-def unit_forces(
-    sites: TouchSites, places: Places, presses: Presses, law: str, field: SmoothField | None
-) -> np.ndarray:
-    """(n, 3) N, device frame, for unit modulus of the object, with a field or without."""
+@dataclass(frozen=True)
+class FieldSites:
+    """Touch sites of an object with a field. sites: their far fields over the modulus under each tip. ratio:
+    (p,) of that modulus over the object's."""
+
+    sites: TouchSites
+    ratio: np.ndarray
+
+    def unit_forces(self, presses: Presses, law: str, moved_m: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) N, device frame, for unit modulus of the object. moved_m: (p,) by how much earlier each
+        press meets the surface than it says."""
+        displacement = presses.displacement
+        if moved_m is not None:
+            displacement = displacement - (moved_m[:, None] * presses.normal)[presses.press]
+        force = forces_at(
+            self.sites, displacement, presses.starts, young_modulus_pa=1.0,
+            tip_radius_m=presses.tip_radius_m, law=law,
+        )  # fmt: skip
+        return force * self.ratio[presses.press][:, None]
+
+
+def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> FieldSites:
+    """The sites as they are with a field; None: of one modulus."""
+    if field is None:
+        return FieldSites(sites, np.ones(len(sites)))
     frame = places.frame
-    far, ratio = sites.far, np.ones(len(sites))
-    if field is not None:
-        local, ratio = changed(places, field)
-        far = far + np.einsum("pji,pjk,pkl->pil", frame, local - places.far, frame)
+    local, ratio = changed(places, field)
+    far = sites.far + np.einsum("pji,pjk,pkl->pil", frame, local - places.far, frame)
     # a dent of `ratio` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
     scaled = TouchSites(
         sites.points, sites.normals, sites.curvature, far * ratio[:, None, None],
         sites.patch_width_m, sites.poisson_ratio,
     )  # fmt: skip
-    force = forces_at(
-        scaled, presses.displacement, presses.starts, young_modulus_pa=1.0,
-        tip_radius_m=presses.tip_radius_m, law=law,
-    )  # fmt: skip
-    return force * ratio[presses.press][:, None]
+    return FieldSites(scaled, ratio)
 
 
-__all__ = ["PressModuli", "asked_for", "fit_field", "press_moduli", "solve_places", "unit_forces"]
+@dataclass(frozen=True)
+class FieldOptions:
+    """Whether an object may be of more than one modulus."""
+
+    field: str = option(
+        "homogeneous",
+        "a smooth field of the modulus: never, or where the presses ask for one",
+        choices=("homogeneous", "auto"),
+    )
+
+
+def fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Estimate | None:
+    """The likeliest field of the model's presses, which touch at `sites`, by the model's dent law; None where
+    they ask for none. noise_n: N, of a raw force component."""
+    presses = model.presses
+    places = solve_places(model, presses.point, presses.normal, presses.frame)
+    own = press_moduli(presses, sites, places, model.material.dent_law, noise_n)
+    found = fit_field(own, np.arange(len(presses)))
+    return found if asked_for(found) else None
+
+
+def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Model:
+    """The model with the field that its presses ask for; itself where they ask for none.
+
+    The modulus becomes that of the field's own level, with its 95 % interval.
+    """
+    found = fitted_field(model, sites, noise_n)
+    if found is None:
+        return model
+    modulus = float(np.exp(found.level))
+    share = float(np.exp(1.96 * np.hypot(found.level_sd, LEVEL_BIAS)))
+    levelled = model.with_material(
+        young_modulus_pa=modulus, young_modulus_ci95_pa=(modulus / share, modulus * share)
+    )
+    return stiffness_field.EFFECT.applied(levelled, stiffness_field.keys_of(found.field))

@@ -67,7 +67,8 @@ def fit_rise(travel: np.ndarray, force: np.ndarray, noise_n: float, *, guess_m: 
         normal = (slopes * weight[:, None]).T @ slopes
         try:
             step = np.linalg.solve(
-                normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3), slopes.T @ (weight * residual)
+                normal + damping * np.diag(np.diag(normal)) + 1e-12 * np.eye(3),
+                slopes.T @ (weight * residual),
             )
         except np.linalg.LinAlgError:  # a tip that stands still tells nothing of where it touched
             break

@@ -21,12 +21,16 @@ from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
+from reconstruct.checks.base import Finding
+from reconstruct.checks.outcome import result_of
+from reconstruct.checks.registry import Checkup
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
 from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
 from reconstruct.shape_error import compliance_covariance
@@ -49,12 +53,14 @@ class ReconstructOptions:
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
     )
     geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    force: bool = option(False, "go on although the check-up finds something grave")
     filter: FilterOptions = field(default_factory=FilterOptions)
     boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
     contact: ContactOptions = field(default_factory=ContactOptions)
     surface: SurfaceOptions = field(default_factory=SurfaceOptions)
     meshing: MeshingOptions = field(default_factory=MeshingOptions)
     modulus: ModulusOptions = field(default_factory=ModulusOptions)
+    modulus_field: FieldOptions = field(default_factory=FieldOptions)
     paper: PaperOptions = field(default_factory=PaperOptions)
     seed: int = 0
 
@@ -65,6 +71,7 @@ class Reconstruction:
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
+    findings: of the check-up, grave ones first; the interval is as wide as they make it.
     """
 
     model: Model
@@ -79,13 +86,14 @@ class Reconstruction:
     modulus: ModulusFit | None = None
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
+    findings: tuple[Finding, ...] = ()
 
 
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises ContactError, SurfaceError or MeshError where a step cannot be
-    done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless options.force);
+    ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -99,14 +107,17 @@ def reconstruct_fully(
     _check_timed(recording)
     clock = _Clock()
     progress("contacts", 0.02)
+    checkup = Checkup(recording, options.force)
     geometry = stated_geometry(recording, options.geometry)
     placed = None
     if geometry.known:
         exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
         exploration = _explored(recording, options)
+        checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
             evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
@@ -149,6 +160,7 @@ def reconstruct_fully(
             seed=options.seed,
         )
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
+    interval = checkup.interval(result_of(presses, modulus, interval, fit))
     clock.lap("modulus")
     progress("1D models", 0.95)
     one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
@@ -169,6 +181,9 @@ def reconstruct_fully(
         provenance=_provenance(exploration, options, surface, fit),
         about=tables,
     )
+    if sites is not None and options.modulus_field.field != "homogeneous":
+        model = with_fitted_field(model, sites, exploration.noise_n)
+        clock.lap("modulus field")
     progress("done", 1.0)
     return Reconstruction(
         model=model,
@@ -183,6 +198,7 @@ def reconstruct_fully(
         modulus=fit,
         paper_fit=paper_fit,
         placed=placed,
+        findings=checkup.found,
     )
 
 

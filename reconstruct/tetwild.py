@@ -10,12 +10,15 @@ import contextlib
 import os
 import subprocess
 import sys
-import tempfile
-from pathlib import Path
 
 import numpy as np
 
 from mechanics.errors import MeshError
+from mechanics.files import temporary_folder
+
+MOST_TETRAHEDRA = 150_000
+"""Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
+_REGULAR = 2**0.5 / 12
 
 _CHILD = """
 import numpy as np, pytetwild
@@ -46,15 +49,16 @@ def tetrahedralize(
     threads: None takes OMP_NUM_THREADS, without it all cores. timeout_s: for the second try, with one thread;
     the first has a third of it. Raises MeshError where nothing comes back.
     """
+    check_count(vertices, triangles, edge_m)
     if threads is None:
         threads = int(os.environ.get("OMP_NUM_THREADS", "").split(",")[0] or 0)
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
-    with tempfile.TemporaryDirectory(prefix="palpate-mesh-") as folder:
+    with temporary_folder("mesh-") as folder:
         done = None
         # now and then its threads wait for each other for ever; one thread alone does not
         for count, limit_s in ((threads, timeout_s / 3), (1, timeout_s)):
             np.savez(
-                Path(folder) / "surface.npz",
+                folder / "surface.npz",
                 vertices=np.asarray(vertices, dtype=np.float64),
                 triangles=np.asarray(triangles, dtype=np.int32),
                 edge_length_abs=edge_m,
@@ -77,11 +81,11 @@ def tetrahedralize(
             raise MeshError(
                 f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size than {edge_m} m"
             )
-        result = Path(folder) / "mesh.npz"
+        result = folder / "mesh.npz"
         if not result.is_file():
             words = done.stderr.decode(errors="replace").strip().splitlines()
             raise MeshError(f"the mesher gave no mesh ({words[-1] if words else f'exit {done.returncode}'})")
-        with np.load(result) as found:
+        with np.load(result, allow_pickle=False) as found:
             points, cells = found["points"], found["cells"].astype(np.int64)
     if not len(cells):
         raise MeshError(f"the mesher gave no tetrahedra: --mesh-size {edge_m} m does not fit the object")
@@ -93,3 +97,18 @@ def tetrahedralize(
     )
     cells[volume < 0] = cells[volume < 0][:, [0, 2, 1, 3]]
     return points, cells
+
+
+def check_count(vertices: np.ndarray, triangles: np.ndarray, edge_m: float) -> None:
+    """Raise MeshError where a closed surface would take more than MOST_TETRAHEDRA of that edge length."""
+    a, b, c = (vertices[triangles[:, k]] for k in range(3))
+    volume = abs(float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum())) / 6
+    count = volume / (_REGULAR * edge_m**3)
+    if count > MOST_TETRAHEDRA:
+        size = np.ptp(vertices, axis=0)
+        least = (volume / (_REGULAR * MOST_TETRAHEDRA)) ** (1 / 3)
+        raise MeshError(
+            f"an object of {' x '.join(f'{1e3 * x:.0f}' for x in size)} mm would take about {count:.2g} "
+            f"tetrahedra of {1e3 * edge_m:g} mm, {MOST_TETRAHEDRA} are allowed: use --mesh-size "
+            f"{least * 1.05:.2g}, or check that the positions are in metres"
+        )

@@ -1,9 +1,10 @@
-"""The tool's own weight and inertia in the force readings, found in free air from its orientation.
+"""The tool's own weight and inertia in the force readings, found in free motion.
 
-A sensor tared in one orientation reads, in another, f = c + R(q) b - m a: c the weight in the device frame
-(and the sensor's bias), b what taring took off, fixed in the tool's frame, a the acceleration of the moving
-mass. Phase II is half free air: the model that most samples share is that of free air (RANSAC), whatever the
-presses do.
+In free air a sensor reads f = c + d t + R(q) b - m a(t - s): c the weight in the device frame and the sensor's
+bias, d its drift, b what taring took off, fixed in the tool's frame, m a the inertia of the moving mass, s how
+late the force reads. A good part of an exploration is free air: the model whose nearer residuals are least is
+that of free air (least quantile of residuals, Rousseeuw 1984), whatever the presses do. Without quaternions
+the tool is taken to keep its orientation.
 """
 
 from __future__ import annotations
@@ -11,56 +12,77 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from mechanics.kinematics import acceleration
 from mechanics.recording import Recording
+from reconstruct.filtering import low_pass_at
+from reconstruct.free_noise import crowd_scale
 
 _SUBSAMPLE = 1500
-_TRIALS = 400
-_LEAST_SHARE = 0.25
+_TRIALS = 500
+_SHARE = 0.25
+"""At least so much of an exploration is free motion."""
+_INSIDE = 3.5
+_LATE_S = np.arange(-0.010, 0.0651, 0.005)
+_RIDGE = 1e-4
 
 
-def tool_weight(recording: Recording, filtered: np.ndarray, cutoff_hz: float, spread_n: float) -> np.ndarray:
-    """(n, 3) N on the tool that weight and inertia make in `filtered` force (n, 3), zero where none is found.
-
-    spread_n: noise of the filtered force, N an axis. None is found without quaternions, where too few samples
-    agree, or where it is within the noise.
+def tool_weight(
+    recording: Recording, filtered: np.ndarray, cutoff_hz: float
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) N on the tool that bias, weight and inertia make in `filtered` force (n, 3), and of that the
+    inertia's part.
     """
-    none = np.zeros_like(filtered)
-    if recording.quaternion is None:
-        return none
-    q = recording.quaternion
-    turned = Rotation.from_quat(q[:, [1, 2, 3, 0]]).as_matrix()
-    # fits as wide as the period of the cut-off pass what the filtered force has passed
-    hand = acceleration(recording.t, recording.position, width_s=1 / cutoff_hz)
-    # rows of the model: constant (3), tool frame (3), minus the acceleration (1)
-    model = np.concatenate([np.broadcast_to(np.eye(3), turned.shape), turned, -hand[:, :, None]], axis=2)
-    rows = np.linspace(0, len(filtered) - 1, min(_SUBSAMPLE, len(filtered))).astype(int)
-    best, inside = _consensus(model[rows], filtered[rows], 6 * spread_n + 0.005)
-    if best is None or inside.mean() < _LEAST_SHARE:
-        return none
-    weight = model @ best
-    return none if np.sqrt(np.mean(weight**2)) < 2 * spread_n else weight
+    t = recording.t
+    rows = np.linspace(0, len(t) - 1, min(_SUBSAMPLE, len(t))).astype(int)
+    hand = low_pass_at(t, recording.position, recording.sample_rate_hz, cutoff_hz, derivative=2)
+    fixed = [np.broadcast_to(np.eye(3), (len(t), 3, 3))]
+    if recording.quaternion is not None:
+        fixed.append(Rotation.from_quat(recording.quaternion[:, [1, 2, 3, 0]]).as_matrix())
+    drift = ((t - t.mean()) / np.ptp(t))[:, None, None] * np.eye(3)
+
+    def columns(late_s: float, at: np.ndarray) -> np.ndarray:
+        """(k, 3, p): constant, tool frame, inertia, drift, of samples `at`."""
+        late = np.column_stack([np.interp(t[at] - late_s, t, hand[:, a]) for a in range(3)])
+        return np.concatenate([*(f[at] for f in fixed), -late[:, :, None], drift[at]], axis=2)
+
+    model, force = columns(0.0, rows), filtered[rows]
+    guess = np.zeros(model.shape[2])
+    guess[:-3] = _least_quantile(model[:, :, :-3], force)
+    found, spread = _refined(model, force, guess)
+    late_s = 0.0
+    mass = len(guess) - 4
+    if np.sqrt(np.mean((model[:, :, mass] * found[mass]) ** 2)) > spread / 3:
+        tried = [(*_refined(columns(s, rows), force, found), s) for s in _LATE_S]
+        found, _, late_s = min(tried, key=lambda entry: entry[1])
+    whole = columns(late_s, np.arange(len(t)))
+    return whole @ found, whole[:, :, mass] * found[mass]
 
 
-def _consensus(model: np.ndarray, force: np.ndarray, reach_n: float) -> tuple[np.ndarray | None, np.ndarray]:
-    """The parameters (7,) that most samples agree with within `reach_n`, refined on those; and which
-    agree."""
+def _solved(model: np.ndarray, force: np.ndarray) -> np.ndarray:
+    a = model.reshape(-1, model.shape[2])
+    return np.linalg.solve(a.T @ a + _RIDGE * np.eye(a.shape[1]), a.T @ force.ravel())
+
+
+def _least_quantile(model: np.ndarray, force: np.ndarray) -> np.ndarray:
+    """(p,): of parameters that three samples tell, those whose quarter of least residuals is nearest."""
     random = np.random.default_rng(0)
-    best, inside = None, np.zeros(len(force), dtype=bool)
-    ridge = 1e-4 * np.eye(7)
-
-    def solved(rows: np.ndarray) -> np.ndarray:
-        a = model[rows].reshape(-1, 7)
-        return np.linalg.solve(a.T @ a + ridge, a.T @ force[rows].ravel())
-
+    best, least, kept = np.zeros(model.shape[2]), np.inf, int(_SHARE * len(force))
     for _ in range(_TRIALS):
-        found = solved(random.integers(0, len(force), 5))
-        agree = np.linalg.norm(model @ found - force, axis=1) < reach_n
-        if agree.sum() > inside.sum():
-            best, inside = found, agree
-    for _ in range(4):
-        if inside.sum() < 10:
-            return None, inside
-        best = solved(np.flatnonzero(inside))
-        inside = np.linalg.norm(model @ best - force, axis=1) < reach_n
-    return best, inside
+        found = _solved(*(x[random.integers(0, len(force), 3)] for x in (model, force)))
+        size = np.linalg.norm(model @ found - force, axis=1)
+        score = float(np.partition(size, kept)[kept])
+        if score < least:
+            best, least = found, score
+    return best
+
+
+def _refined(model: np.ndarray, force: np.ndarray, found: np.ndarray) -> tuple[np.ndarray, float]:
+    """(parameters, spread N an axis): fitted to the samples that crowd about them."""
+    spread = 0.0
+    for _ in range(6):
+        size = np.linalg.norm(model @ found - force, axis=1)
+        spread = crowd_scale(size)
+        inside = size < _INSIDE * spread
+        if inside.sum() < 20:
+            break
+        found = _solved(model[inside], force[inside])
+    return found, spread

@@ -15,6 +15,7 @@ import numpy as np
 
 from mechanics.errors import OptionError, RecordingError
 from mechanics.files import Kind, atomic_file, read_text
+from mechanics.recording import TIP_RADIUS
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
 from render.scene import TouchScene, scene_of
@@ -25,6 +26,7 @@ COLUMNS = ("t", "x", "y", "z", "depth", "fx", "fy", "fz")
 CURVE = Kind("a curve of palpate press", (",".join(COLUMNS).encode(),))
 _MARCH = 400
 _GRAZING = float(np.cos(np.radians(80)))
+MOST_SAMPLES = 1_000_000
 BESIDE = 1.1
 """Of the object's diagonal: from its middle so far the support is aimed at on purpose (and drawn)."""
 
@@ -89,6 +91,13 @@ def press(
         raise OptionError(f"hold is {hold_s} s and approach {approach_m} m: at least 0 s and more than 0 m")
     direction = direction / length
     radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
+    if not TIP_RADIUS.takes(radius):
+        raise OptionError(f"the tip's radius is {radius:g}; it must be {TIP_RADIUS.words}")
+    height = float(scene.model.support.height(scene.model.mesh.points).max())
+    if depth_m > height:
+        raise OptionError(
+            f"depth is {depth_m:g} m, and the object is {height:.4g} m high: press less deep (in metres)"
+        )
     touch, normal = first_touch(scene, at, direction, radius)
     steepness = -float(normal @ direction)
     if steepness < _GRAZING:
@@ -98,6 +107,11 @@ def press(
         )
     travel = approach_m + depth_m / steepness
     times = np.array([0.0, travel, travel, 2 * travel]) / speed_m_per_s + np.array([0.0, 0.0, hold_s, hold_s])
+    if not times[-1] * rate_hz <= MOST_SAMPLES:
+        raise OptionError(
+            f"the press would last {times[-1]:.4g} s, {times[-1] * rate_hz:.3g} samples, "
+            f"at most {MOST_SAMPLES}: press faster or hold it for less long"
+        )
     t = np.arange(0.0, times[-1] + 0.5 / rate_hz, 1.0 / rate_hz)
     along = np.interp(t, times, [-approach_m, travel - approach_m, travel - approach_m, -approach_m])
     position = touch + along[:, None] * direction

@@ -51,6 +51,7 @@ def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = 
         except ModelError:
             pass  # damaged: built again below
     model = _MAKERS[scene.kind](scene, progress)
+    _check_inside(model)
     try:
         write_model(path, model)
         return read_model(path)
@@ -105,6 +106,18 @@ def _files(scene: Scene) -> list[Path]:
 
 def _recording_path(scene: Scene) -> Path:
     return embedded_recording(scene.source) if scene.source in embedded_names() else Path(scene.source)
+
+
+def _check_inside(model: Model) -> None:
+    """Raises SceneError for a ball that lies wholly beside the object."""
+    low, high = model.mesh.points.min(axis=0), model.mesh.points.max(axis=0)
+    for name, ball in model.material.inclusions.items():
+        centre = np.array(ball.centre_m)
+        if (centre + ball.radius_m < low).any() or (centre - ball.radius_m > high).any():
+            raise SceneError(
+                f"the inclusion '{name}' at {centre.tolist()} m lies outside the object "
+                f"({np.round(low, 4).tolist()} to {np.round(high, 4).tolist()} m): move it inside"
+            )
 
 
 def _from_phantom(scene: Scene, progress: Progress) -> Model:

@@ -13,19 +13,22 @@ A TOML file whose keys carry their units. Allowed tables and keys:
     [device]     axes, motion_scale, force_scale, clutch_button, reach_m
     [render]     renderer, beside, colour, friction
 
-Paths are relative to the scene's file.
+Paths are relative to the scene's file and stay in its folder (mechanics.files.named_in).
 """
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from devices.mapper import MapperOptions
-from mechanics.errors import SceneError
+from devices.mapper import MapperOptions, axis_matrix
+from mechanics.effect_keys import BALL
+from mechanics.errors import OptionError, SceneError
+from mechanics.files import named_in, read_toml
+from mechanics.recording import POISSON, TIP_RADIUS
+from mechanics.schema import Key, Listed, Schema, check_table
 from mechanics.surface_files import SUFFIXES, is_surface_file
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import PHANTOMS, Region
@@ -33,23 +36,40 @@ from scenes.phantoms import PHANTOMS, Region
 FOLDER = Path(__file__).parent
 COLOURS = ("displacement", "stiffness")
 OBJECT_KINDS = ("phantom", "mesh", "model", "recording")
-_ALLOWED: dict[str, tuple[str, ...]] = {
-    "": ("title", "about", "object", "inclusion", "tool", "device", "render"),
-    "object": (
-        *OBJECT_KINDS,
-        "young_modulus_pa",
-        "poisson_ratio",
-        "mesh_size_m",
-        "finite_strain",
-        "unit",
-        "up",
-        "sink_m",
-    ),
-    "inclusion": ("name", "centre_m", "radius_m", "modulus_ratio"),
-    "tool": ("tip_radius_m",),
-    "device": ("axes", "motion_scale", "force_scale", "clutch_button", "reach_m"),
-    "render": ("renderer", "beside", "colour", "friction"),
+_OPTIONAL_TIP = replace(TIP_RADIUS, required=False)
+SCHEMA: Schema = {
+    "title": Key(str),
+    "about": Key(str),
+    "object": {
+        "phantom": Key(str),
+        "mesh": Key(str),
+        "model": Key(str),
+        "recording": Key(str),
+        "young_modulus_pa": Key(low=1.0, high=1e9, unit="Pa"),
+        "poisson_ratio": POISSON,
+        "mesh_size_m": Key(low=5e-4, high=0.2, unit="m"),
+        "finite_strain": Key(bool),
+        "unit": Key(str),
+        "up": Key(str),
+        "sink_m": Key(low=0.0, high=0.1, unit="m"),
+    },
+    "inclusion": Listed({**BALL, "name": Key(str)}),
+    "tool": {"tip_radius_m": _OPTIONAL_TIP},
+    "device": {
+        "axes": Key(str),
+        "motion_scale": Key(low=1e-3, high=1e3),
+        "force_scale": Key(low=0.0, high=100.0),
+        "clutch_button": Key(int, low=-1, high=63),
+        "reach_m": Key(low=1e-3, high=1.0, unit="m"),
+    },
+    "render": {
+        "renderer": Key(str),
+        "beside": Key(str),
+        "colour": Key(str, choices=COLOURS),
+        "friction": Key(low=0.0, high=100.0),
+    },
 }
+"""What a scene's file may hold."""
 
 
 @dataclass(frozen=True)
@@ -125,28 +145,11 @@ def read_scene(path: Path | str) -> Scene:
 
 
 def _toml(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8"))
-    except (OSError, tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise SceneError(f"'{path}' is no valid TOML: {error}") from error
-
-
-def _check_keys(path: Path, table: Mapping[str, Any], name: str) -> None:
-    unknown = [key for key in table if key not in _ALLOWED[name]]
-    if unknown:
-        where = f" in [{name}]" if name else ""
-        raise SceneError(
-            f"'{path}' has the key {unknown[0]!r}{where}: allowed are {', '.join(_ALLOWED[name])} "
-            "(keys carry their units: _m, _pa)"
-        )
+    return read_toml(path, SceneError)
 
 
 def _scene(table: Mapping[str, Any], path: Path) -> Scene:
-    _check_keys(path, table, "")
-    for name in ("object", "tool", "device", "render"):
-        if not isinstance(table.get(name, {}), Mapping):
-            raise SceneError(f"'{path}': [{name}] must be a table")
-        _check_keys(path, table.get(name, {}), name)
+    check_table(table, SCHEMA, path, SceneError, strict=True)
     thing, render = table.get("object", {}), table.get("render", {})
     kinds = [kind for kind in OBJECT_KINDS if kind in thing]
     if len(kinds) != 1:
@@ -156,65 +159,45 @@ def _scene(table: Mapping[str, Any], path: Path) -> Scene:
     if "motion_scale" in device:
         device["scale"] = device.pop("motion_scale")
     try:
+        axis_matrix(device.get("axes", "x,y,z"))
         return Scene(
             name=path.stem,
             kind=kind,
             source=_source(kind, str(thing[kind]), path),
             title=str(table.get("title", path.stem)),
             about=str(table.get("about", "")),
-            young_modulus_pa=_positive(thing, "young_modulus_pa"),
-            poisson_ratio=None if "poisson_ratio" not in thing else float(thing["poisson_ratio"]),
-            mesh_size_m=_positive(thing, "mesh_size_m"),
+            young_modulus_pa=thing.get("young_modulus_pa"),
+            poisson_ratio=thing.get("poisson_ratio"),
+            mesh_size_m=thing.get("mesh_size_m"),
             unit=str(thing.get("unit", "m")),
             up=str(thing.get("up", "+z")),
             sink_m=float(thing.get("sink_m", 0.0)),
             finite_strain=bool(thing.get("finite_strain", True)),
-            inclusions=_inclusions(path, table.get("inclusion")),
-            tip_radius_m=_positive(table.get("tool", {}), "tip_radius_m"),
+            inclusions=_inclusions(table.get("inclusion")),
+            tip_radius_m=table.get("tool", {}).get("tip_radius_m"),
             mapper=MapperOptions(**device),
             renderer=str(render.get("renderer", "fem")),
             beside=str(render.get("beside", "")),
-            colour=_one_of(render.get("colour", "displacement"), COLOURS),
-            friction=None if "friction" not in render else float(render["friction"]),
+            colour=render.get("colour", "displacement"),
+            friction=render.get("friction"),
         )
-    except (TypeError, ValueError) as error:
-        raise SceneError(f"'{path}' holds a value of the wrong kind: {error}") from error
+    except OptionError as error:
+        raise SceneError(f"'{path}': {error}") from error
 
 
 def _source(kind: str, value: str, path: Path) -> str:
     """Names stay names; paths become absolute, from the scene file's folder."""
     if kind == "phantom" and value in PHANTOMS or kind == "recording" and value in embedded_names():
         return value
-    return str((path.parent / value).resolve())
+    return str(named_in(path, value, SceneError))
 
 
-def _positive(table: Mapping[str, Any], key: str) -> float | None:
-    return None if key not in table else _required(table, key)
-
-
-def _required(table: Mapping[str, Any], key: str) -> float:
-    value = float(table[key])
-    if not value > 0:
-        raise ValueError(f"{key} is {value}; it must be greater than 0")
-    return value
-
-
-def _one_of(value: Any, allowed: tuple[str, ...]) -> str:
-    if value not in allowed:
-        raise ValueError(f"'{value}' is not allowed; allowed are {', '.join(allowed)}")
-    return str(value)
-
-
-def _inclusions(path: Path, tables: Any) -> tuple[Region, ...] | None:
+def _inclusions(tables: Any) -> tuple[Region, ...] | None:
     if tables is None:
         return None
     regions = []
     for number, table in enumerate(tables):
-        _check_keys(path, table, "inclusion")
-        missing = [k for k in ("centre_m", "radius_m", "modulus_ratio") if k not in table]
-        if missing:
-            raise SceneError(f"'{path}': inclusion {number + 1} lacks {', '.join(missing)}")
         x, y, z = (float(v) for v in table["centre_m"])
-        radius, ratio = _required(table, "radius_m"), _required(table, "modulus_ratio")
-        regions.append(Region(str(table.get("name", f"inclusion {number + 1}")), (x, y, z), radius, ratio))
+        name = table.get("name", f"inclusion {number + 1}")
+        regions.append(Region(name, (x, y, z), float(table["radius_m"]), float(table["modulus_ratio"])))
     return tuple(regions)

@@ -9,6 +9,7 @@ one-shot: silence returns the device to idle. Newer services spell a vector's ke
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -16,8 +17,111 @@ from typing import Any
 from mechanics.errors import DeviceError
 from mechanics.state import IDENTITY_QUATERNION
 
+BASIS = "XYZ"
 GRIPS = ("wireless_verse_grip", "verse_grip")
 GRIP_BUTTONS = ("a", "b", "c")
+
+
+@dataclass(frozen=True)
+class HaplyConfig:
+    """What a service of 3.5 or later tells of the way from a command to the hand; None: it does not tell.
+
+    preset, basis: names. mount_scale, mount_position, mount_turn: of the mount's transform; the turn is the
+    angle of its rotation, rad. damping_n_s_per_m: the greatest of the filter's; force_gate: its gain.
+    """
+
+    preset: str | None = None
+    basis: str | None = None
+    mount_position_m: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    mount_turn_rad: float = 0.0
+    mount_scale: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    damping_n_s_per_m: float | None = None
+    force_gate: float | None = None
+    gravity_compensation: float | None = None
+    simulated: bool = False
+
+
+def config(text: str | bytes, device_id: str) -> HaplyConfig | None:
+    """The configuration of one device in an inventory or full state; None where the message holds none.
+
+    Raises DeviceError where it holds one that cannot be read: forces must not pass through the unknown.
+    """
+    try:
+        devices = json.loads(text).get("inverse3") or []
+        found = next((d.get("config") for d in devices if d.get("device_id") == device_id), None)
+        return _config(found) if found else None
+    except (ValueError, TypeError, AttributeError, KeyError) as error:
+        raise DeviceError(
+            f"the Inverse service's configuration cannot be read ({error}): update this program"
+        ) from error
+
+
+def _config(table: Mapping[str, Any]) -> HaplyConfig:
+    filters, mount = table.get("filters") or {}, table.get("mount") or {}
+    mount = mount.get("transform") or mount
+    damping, gate, gravity = (
+        filters.get("damping"),
+        filters.get("force_gate"),
+        table.get("gravity_compensation"),
+    )
+    rotation = mount.get("rotation") or {}
+    w = min(1.0, abs(float(rotation.get("w", 1.0))))
+    scale = mount.get("scale") or {}
+    return HaplyConfig(
+        _name(table.get("preset"), "preset"),
+        _name(table.get("basis"), "permutation"),
+        _vector(mount.get("position") or {}),
+        2.0 * math.acos(w),
+        (float(scale.get("x", 1.0)), float(scale.get("y", 1.0)), float(scale.get("z", 1.0))),
+        None if damping is None else max(_numbers(damping), default=0.0),
+        None if gate is None else float(gate.get("gain", 0.0)),
+        None if gravity is None else gravity.get("enabled", True) * float(gravity.get("scaling_factor", 1.0)),
+        _is_simulated(table),
+    )
+
+
+def _name(value: Any, key: str) -> str | None:
+    """A name, bare or in a table under `key`."""
+    value = value.get(key) if isinstance(value, Mapping) else value
+    return None if value is None else str(value)
+
+
+def _numbers(value: Any) -> list[float]:
+    """Every number in a table, however deep."""
+    if isinstance(value, Mapping):
+        return [number for inner in value.values() for number in _numbers(inner)]
+    return [float(value)] if isinstance(value, int | float) and not isinstance(value, bool) else []
+
+
+def _is_simulated(table: Mapping[str, Any]) -> bool:
+    """A flag or a word: the documentation names the feature (3.5), not the field."""
+    words = [table.get(k) for k in ("type", "sub_type", "port", "streaming_mode", "device_type")]
+    words.append((table.get("device_info") or {}).get("device_type"))
+    return any(table.get(k) is True for k in ("simulated", "is_simulated", "virtual")) or any(
+        isinstance(word, str) and ("simul" in word.lower() or "virtual" in word.lower()) for word in words
+    )
+
+
+def number(text: str | bytes) -> float | None:
+    """The number of an answer about one setting: bare, or under `data` and `value`; None where it is none."""
+    try:
+        told = json.loads(text)
+    except ValueError:
+        return None
+    for key in ("data", "value"):
+        told = told.get(key, told) if isinstance(told, Mapping) else told
+    numbers = _numbers({"": told})
+    return numbers[0] if len(numbers) == 1 else None
+
+
+def version(text: str | bytes) -> str:
+    """Of the service, from the answer to GET /version; '' where it does not tell."""
+    try:
+        told = json.loads(text)
+        told = told.get("data") or told
+        return str(told.get("git_tag") or told.get("project_version") or "")
+    except (ValueError, AttributeError):
+        return ""
 
 
 @dataclass(frozen=True)
@@ -109,13 +213,33 @@ def _command(device_id: str, commands: dict[str, Any]) -> str:
     return json.dumps({"inverse3": [{"device_id": device_id, "commands": commands}]}, separators=(",", ":"))
 
 
-def introduction(device_id: str, profile: str) -> str:
-    """The first message: names this program's profile and probes."""
-    body = {
-        "session": {"configure": {"profile": {"name": profile}}},
-        "inverse3": [{"device_id": device_id, "commands": {"probe_position": {}}}],
-    }
-    return json.dumps(body, separators=(",", ":"))
+def introduction(device_id: str, profile: str, told: HaplyConfig | None = None, preset: str = "") -> str:
+    """The first message: names this program's profile, asks for its frame and filters, probes.
+
+    Only what the inventory showed (`told`) is asked for, in this session alone: the basis X right, Y forward,
+    Z up; the mount by `preset`, or, for '', as it is; no damping by the service.
+    """
+    session: dict[str, Any] = {"profile": {"name": profile}}
+    device: dict[str, Any] = {}
+    if told is not None:
+        if told.basis is not None:
+            session["basis"] = {"permutation": BASIS}
+        if told.preset is not None and preset:
+            device["preset"] = {"preset": preset}
+        if told.damping_n_s_per_m:
+            device["damping"] = {"scalar": 0.0}
+    about: dict[str, Any] = {"device_id": device_id, "commands": {"probe_position": {}}}
+    if device:
+        about["configure"] = device
+    return json.dumps({"session": {"configure": session}, "inverse3": [about]}, separators=(",", ":"))
+
+
+def full_state(device_id: str) -> str:
+    """Ask for a state that holds the configuration as well."""
+    about = {"device_id": device_id, "commands": {"probe_position": {}}}
+    return json.dumps(
+        {"session": {"force_render_full_state": {}}, "inverse3": [about]}, separators=(",", ":")
+    )
 
 
 EVENT_FAULTS = {

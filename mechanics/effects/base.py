@@ -98,8 +98,10 @@ class Effect:
     candidates(): start vectors, where the parameters' own are not enough. seek(scene, misfit): start vectors
     found from the data. refine(scene, values): makes its law exact near a fit; forget(scene) undoes that.
     few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
-    shape_rival: what a wrong shape may be taken for. slips: it caps the sideways force, where a fit that
-    trusts the stick may go wrong. only_first: first touches that another effect moved speak for nothing.
+    shape_rival: what a wrong shape may be taken for. any_form: it can take the form of others that differ
+    from place to place, so it is no rival of one of them that gains more. slips: it caps the sideways force,
+    where a fit that trusts the stick may go wrong. only_first: first touches that another effect moved speak
+    for nothing.
     hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
     stands_for_strain: once it is named, finite strain may have been taken for it. costly: a quick diagnosis
     leaves it out.
@@ -132,6 +134,7 @@ class Effect:
     forget: Callable[[Scene], None] | None = None
     few_places: bool = False
     shape_rival: bool = False
+    any_form: bool = False
     slips: bool = False
     only_first: bool = False
     hides_strain: bool = False

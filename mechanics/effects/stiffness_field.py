@@ -1,9 +1,9 @@
 """Stiffness field: Young's modulus differs smoothly from place to place, as tissue does.
 
-ln E is a Gaussian process of few parameters (mechanics.smooth_field). How much it varies, and over what length,
-is what makes the presses' own stiffness likeliest; what a fit moves are the MODES patterns of which these
-presses tell most, each of unit variance before anything is known. The far field answers to first order, the
-dent through the modulus under the tip; the renderer has the field in its elements.
+ln E is a Gaussian process of few parameters (mechanics.smooth_field). How much it varies, and over what
+length, is what makes the presses' own stiffness likeliest; what a fit moves are the MODES patterns of which
+these presses tell most, each of unit variance before anything is known. The far field answers to first order,
+the dent through the modulus under the tip; the renderer has the field in its elements.
 """
 
 from __future__ import annotations
@@ -50,9 +50,7 @@ class Basis:
 def _basis(scene: Scene) -> Basis:
     places = scene.places
     p = len(places.point)
-    return places.stage(
-        _BASIS, lambda: _made(places, _USUAL, np.full(p, _USUAL_ANSWER_M), np.full(p, 1e3))
-    )
+    return places.stage(_BASIS, lambda: _made(places, _USUAL, np.full(p, _USUAL_ANSWER_M), np.full(p, 1e3)))
 
 
 def _made(places: Places, prior: Prior, answer: np.ndarray, weight: np.ndarray) -> Basis:
@@ -109,13 +107,18 @@ def field_of(keys: Keys) -> SmoothField:
     )
 
 
+def keys_of(field: SmoothField) -> dict[str, Any]:
+    """The keys that say a field."""
+    return {
+        "length_m": field.length_m,
+        "places_m": field.places.tolist(),
+        "ratio": np.exp(field.log_ratio).tolist(),
+    }
+
+
 def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
     basis = _basis(scene)
-    return {
-        "length_m": basis.prior.length_m,
-        "places_m": basis.places.tolist(),
-        "ratio": np.exp(values @ basis.patterns).tolist(),
-    }
+    return keys_of(SmoothField(basis.places, values @ basis.patterns, basis.prior.length_m))
 
 
 def _words(keys: Keys) -> str:
@@ -148,5 +151,6 @@ EFFECT = Effect(
     apply=_apply,
     seek=_seek,
     shape_rival=True,
+    any_form=True,
     costly=True,
 )

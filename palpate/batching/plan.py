@@ -16,7 +16,7 @@ from palpate.batching.steps import MODEL, STEPS, THUMBNAIL, content_of
 from palpate.keywords import taken
 from palpate.tasks.graph import Task
 
-MEMORY_BYTES = {"reconstruct": 1_000_000_000, "compare": 1_000_000_000, "diagnose": 1_500_000_000}
+MEMORY_BYTES = {"reconstruct": 1_450_000_000, "compare": 1_300_000_000, "diagnose": 1_300_000_000}
 """What a step takes at most before anything is measured (docs/batch.md has the measured figures)."""
 
 _ENDINGS = (".csv.gz", ".csv", ".toml")
@@ -94,6 +94,19 @@ def _of_source(source: Path, leave: Path) -> Iterable[tuple[Path, Path]]:
             if path.is_dir() or path.name.endswith(_ENDINGS):
                 for found, _ in _of_source(path, leave):
                     yield found, absolute(root)
+
+
+def undescribed(sources: Iterable[str | Path], leave: Path) -> list[Path]:
+    """Tables in the folders that no .toml beside them makes a recording."""
+    return sorted(
+        path
+        for source in map(Path, sources)
+        if source.is_dir()
+        for ending in _ENDINGS[:2]
+        for path in source.rglob(f"*{ending}")
+        if not absolute(path).is_relative_to(leave)
+        and not path.with_name(path.name.removesuffix(ending) + ".toml").is_file()
+    )
 
 
 def _is_recording(description: Path) -> bool:

@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mechanics.errors import OptionError, RecordingError
 from mechanics.files import atomic_file
 from mechanics.progress import Progress
-from palpate.batching.plan import Choice, Found, absolute, find, tasks_of
+from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
 from palpate.batching.summary import Agreement, Entry, agreements, entry_of, write_csv, write_parquet
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
@@ -19,13 +19,15 @@ from palpate.tasks.graph import Graph, Task
 @dataclass(frozen=True)
 class Batch:
     """What came out. entries: one a recording, in the order of their paths; folder: the output; reused: tasks
-    that were finished before; agreements: how far the explorations of one object agree."""
+    that were finished before; agreements: how far the explorations of one object agree; undescribed: tables
+    in the folders that are no recordings, as no .toml lies beside them."""
 
     folder: Path
     entries: tuple[Entry, ...]
     agreements: tuple[Agreement, ...]
     tasks: int
     reused: int
+    undescribed: tuple[Path, ...] = ()
 
 
 def batch(
@@ -47,6 +49,7 @@ def batch(
     folder = absolute(out)
     if folder.is_file():
         raise OptionError(f"'{out}' is a file: name a folder for the output")
+    sources = list(sources)
     found = find(sources, folder)
     folder.mkdir(parents=True, exist_ok=True)
     bad: dict[str, str] = {}
@@ -72,7 +75,9 @@ def batch(
     except KeyboardInterrupt:
         _write(_made(folder, found, choice, tasks, bad, outcomes), choice)
         raise
-    made = _made(folder, found, choice, tasks, bad, outcomes)
+    made = replace(
+        _made(folder, found, choice, tasks, bad, outcomes), undescribed=tuple(undescribed(sources, folder))
+    )
     _write(made, choice)
     return made
 

@@ -127,7 +127,7 @@ def _draw_thumbnail(model: Any, path: Path) -> None:
     draw_object(ax, model, touches=model.presses.point)
     ax.set_axis_off()
     with atomic_file(path) as temporary:
-        figure.savefig(temporary, dpi=150, format="png")
+        figure.savefig(temporary, dpi=150, format="png", transparent=True)
 
 
 @contextlib.contextmanager

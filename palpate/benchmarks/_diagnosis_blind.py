@@ -1,68 +1,154 @@
-"""A case's three steps, each kept in the work folder: sealed recording, model, verdict; then the truth."""
+"""A case as tasks of a graph: its object's touches solved (shared between cases), sealed recording and model,
+verdict. Everything lies in one work folder, which all workers must see; then the truth is opened.
+"""
 
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file
-from palpate.benchmarks._diagnosis_cases import Case
+from palpate.benchmarks._diagnosis_cases import FINITE, Case
+from palpate.tasks.graph import Task
+from palpate.tasks.record import finished
+from scenes.laboratory.specimen import VERSION
+
+_HERE = "palpate.benchmarks._diagnosis_blind"
+_MEMORY = {"solve": 600_000_000, "prepare": 700_000_000, "judge": 900_000_000}
+"""Before any is measured."""
 
 
-class NotSolved(Exception):
+class NotSolved(PalpateError):
     """The touches of a case would have to be solved first."""
 
 
-def prepared(case: Case, work: Path) -> bool:
-    """Whether recording and model are there."""
-    return (work / "models" / case.recording / "model.toml").exists() or _failure(case, work).exists()
+def tasks_of(case: Case, work: Path, *, solve: bool, fast: bool) -> list[Task]:
+    """Solve what the object's cases share (where touches may be solved at all), prepare, judge."""
+    work = work.resolve()
+    own = [_solved(case.number, kind, work) for kind in _kinds(case)] if solve else []
+    own.append(_prepared(case, work, solve, tuple(task.name for task in own)))
+    own.append(_judged(case, work, fast, own[-1].name))
+    return own
 
 
-def prepare(case: Case, work: Path, *, solve: bool) -> None:
-    """Simulate with the truth sealed, and reconstruct. Raises NotSolved unless `solve` allows for hours."""
+def _kinds(case: Case) -> tuple[bool, ...]:
+    """Whether linear (False), neo-Hookean (True) or both: an effect's size is told against what is left
+    without it.
+    """
+    return (False, True) if FINITE in case.effects else (False,)
+
+
+def _solved(number: int, finite: bool, work: Path) -> Task:
+    label = f"{number}-{'neo-hookean' if finite else 'linear'}"
+    return _task("solve", label, {"number": number, "finite": finite}, work, ())
+
+
+def _prepared(case: Case, work: Path, solve: bool, needs: tuple[str, ...]) -> Task:
+    content = {"case": _of(case, ""), "solve": solve}
+    return _task("prepare", case.recording, content, work, needs)
+
+
+def _judged(case: Case, work: Path, fast: bool, prepared: str) -> Task:
+    return _task("judge", case.key, {"case": _of(case, case.without), "fast": fast}, work, (prepared,))
+
+
+def _of(case: Case, without: str) -> dict[str, Any]:
+    """What the work on a case depends on, which is not what is asked."""
+    return {"number": case.number, "seed": case.seed, "effects": dict(case.effects), "kind": case.kind,
+            "tested": list(case.tested), "without": without}  # fmt: skip
+
+
+def _task(stage: str, label: str, content: dict[str, Any], work: Path, needs: tuple[str, ...]) -> Task:
+    return Task(
+        f"{_HERE}:{stage}", {**content, "laboratory": VERSION}, work / "tasks" / stage / f"{label}.json",
+        places={"work": str(work)}, needs=needs, stage=stage, label=label, memory_bytes=_MEMORY[stage],
+    )  # fmt: skip
+
+
+def unfinished(task: Task) -> bool:
+    """Whether its record is missing or of other content; what its needs gave is not looked at."""
+    try:
+        needs = json.loads(task.record.read_text(encoding="utf-8"))["needs"]
+    except (OSError, ValueError, KeyError):
+        return True
+    return finished(task, needs) is None
+
+
+def solve(number: int, finite: bool, work: str, laboratory: int) -> dict[str, Any]:
+    """Solve every touch of an object without effects, linear or neo-Hookean, and keep them in the work
+    folder.
+    """
+    from scenes.laboratory.paths import touch_forces
+    from scenes.variety.objects import specimen, thing
+
+    it = thing(number)
+    touches = [touch for place in it.places for touch in place]
+    solid = replace(specimen(it), finite=finite)
+    touch_forces(it.phantom, solid, touches, workers=1, cache=_touches(Path(work)))
+    return {"touches": len(touches)}
+
+
+def _touches(work: Path) -> Path:
+    return work / "touches"
+
+
+def prepare(case: dict[str, Any], solve: bool, work: str, laboratory: int) -> dict[str, Any]:
+    """Explore with the truth sealed, and reconstruct; what cannot be reconstructed is noted with its reason.
+
+    Raises NotSolved where touches would have to be solved and `solve` does not allow for it.
+    """
     from mechanics.model import write_model
     from mechanics.recording import read_recording
     from reconstruct.pipeline import ReconstructOptions, reconstruct
 
+    this, at = _case(case), Path(work)
     for folder in ("truth", "models", "verdicts"):
-        (work / folder).mkdir(parents=True, exist_ok=True)
-    samples = work / f"{case.recording}.csv.gz"
-    if not samples.exists():
-        _simulate(case, work, samples, solve)
+        (at / folder).mkdir(parents=True, exist_ok=True)
+    samples = _samples(this, at)
+    _explore(this, at, samples, solve)
+    failure = _failure(this, at)
+    failure.unlink(missing_ok=True)
     try:
-        write_model(
-            work / "models" / case.recording, reconstruct(read_recording(samples), ReconstructOptions())
-        )
+        model = reconstruct(read_recording(samples), ReconstructOptions())
     except PalpateError as error:
-        _failure(case, work).write_text(f"{error}\n", encoding="utf-8")
+        failure.write_text(f"{error}\n", encoding="utf-8")
+        return {"refused": str(error)}
+    write_model(at / "models" / this.recording, model)
+    return {"modulus_pa": model.material.young_modulus_pa}
+
+
+def _case(case: dict[str, Any]) -> Case:
+    return Case(**{**case, "tested": tuple(case["tested"])})
+
+
+def _samples(case: Case, work: Path) -> Path:
+    return work / f"{case.recording}.csv.gz"
 
 
 def _failure(case: Case, work: Path) -> Path:
     return work / "models" / f"{case.recording}.failed"
 
 
-def _simulate(case: Case, work: Path, samples: Path, solve: bool) -> None:
-    from scenes.laboratory.hand import cohort_hand
+def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
     from scenes.laboratory.sealing import write_sealed
-    from scenes.laboratory.simulate import SimulateOptions, simulate
-    from scenes.phantoms import phantom
+    from scenes.variety.recorded import explored
+    from scenes.variety.writing import write
 
     def refuse(label: str, share: float) -> None:
         if not solve:
-            raise NotSolved(label)
+            raise NotSolved(f"the laboratory would have to solve touches ({label}): run with --solve")
 
-    options = SimulateOptions(
-        young_modulus_pa=case.modulus_pa, force_noise_std_n=case.noise_n, coloured_share=case.coloured_share,
-        protocol=case.protocol, frame=True,
+    drawn = case.nuisances
+    made = explored(drawn, case.effects, sizes=True, cache=_touches(work), progress=refuse)
+    truth = {**made.simulation.truth, "nuisances": drawn.table()}
+    name = made.recording.object_name
+    write_sealed(
+        samples, made.recording, truth, work / "truth" / f"{case.recording}.json",
+        lambda path, recording: write(path, replace(recording, object_name=name), drawn),
     )  # fmt: skip
-    hand = cohort_hand(case.seed % 997 + 1)
-    made = simulate(
-        phantom(case.phantom), case.effects, options, hand=hand, seed=case.seed, sizes=True, workers=1,
-        progress=refuse,
-    )  # fmt: skip
-    write_sealed(samples, made.recording, made.truth, work / "truth" / f"{case.recording}.json")
 
 
 def verdict_path(case: Case, work: Path) -> Path:
@@ -70,20 +156,21 @@ def verdict_path(case: Case, work: Path) -> Path:
     return work / "verdicts" / f"{case.key}.json"
 
 
-def judge(case: Case, work: Path, *, fast: bool) -> dict[str, Any]:
+def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[str, Any]:
     """Diagnose; the truth stays shut. Errors are a verdict too. The answer is written."""
     from diagnose.baselines import best_by_bic, regressed_gap
     from diagnose.pipeline import DiagnoseOptions, diagnose
     from mechanics.model import read_model
     from mechanics.recording import read_recording
 
+    this, at = _case(case), Path(work)
     answer: dict[str, Any]
     try:
-        if _failure(case, work).exists():
-            raise PalpateError(_failure(case, work).read_text(encoding="utf-8").strip())
-        recording = read_recording(work / f"{case.recording}.csv.gz")
-        model = read_model(work / "models" / case.recording)
-        result = diagnose(recording, model, DiagnoseOptions(fast=fast, without=case.without))
+        if _failure(this, at).exists():
+            raise PalpateError(_failure(this, at).read_text(encoding="utf-8").strip())
+        recording = read_recording(_samples(this, at))
+        model = read_model(at / "models" / this.recording)
+        result = diagnose(recording, model, DiagnoseOptions(fast=fast, without=this.without))
     except PalpateError as error:
         answer = {"kind": "failed", "effects": [], "candidates": [], "why": str(error)}
     else:
@@ -102,9 +189,9 @@ def judge(case: Case, work: Path, *, fast: bool) -> dict[str, Any]:
             "regression_gap_n": regressed_gap(result.forward, result.residual_before),
             "seconds": sum(data["seconds"].values()),
         }  # fmt: skip
-    with atomic_file(verdict_path(case, work)) as temporary:
+    with atomic_file(verdict_path(this, at)) as temporary:
         temporary.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
-    return answer
+    return {"kind": answer["kind"], "effects": answer["effects"], "candidates": answer["candidates"]}
 
 
 def opened_case(case: Case, work: Path) -> dict[str, Any]:

@@ -1,11 +1,20 @@
-"""The cases of the blind benchmark: what is sealed, at which strengths, on which objects, by whose hand."""
+"""The cases of the blind benchmark: what is sealed, at which strengths, on which objects, in whose hand.
+
+Everything that is no question is drawn by the case's seed from `scenes.variety`: frame, hand, presses,
+sampling, noise, what the file states and how it is written.
+"""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, field, replace
 from typing import Any
 
 import numpy as np
+
+from mechanics.errors import OptionError
+from scenes.variety.draws import Draw, draw
+from scenes.variety.shapes import FAMILIES
 
 INSTRUMENT = (
     "time_delay",
@@ -31,8 +40,10 @@ SOLID = (
     "strain_stiffening",
     "mullins_softening",
 )
-"""Effects for which every touch is solved anew (minutes to hours, then kept)."""
+"""Effects for which every touch is solved anew (minutes)."""
 NEED_FINITE = ("strain_stiffening", "mullins_softening", "plasticity", "anisotropy")
+REMEMBERING = ("mullins_softening", "plasticity")
+"""Effects for which every touch of a place is solved in its turn."""
 PAIRS = (
     ("time_delay", "force_bias"),
     ("viscoelasticity", "tool_compliance"),
@@ -43,8 +54,15 @@ PAIRS = (
     ("force_gain", "backlash"),
     ("tool_gravity_inertia", "time_delay"),
 )
-SHAPES = ("cylinder", "block", "half-sphere", "dome")
-MEDIUM_SHAPES = ("cylinder", "half-sphere")
+WEIGHT = ("tool_gravity_inertia", "force_bias")
+"""What a tool's own weight is: the one where its orientation is known, a constant force where it is not."""
+FINITE = "finite_strain"
+POOLS = {"quick": (0, 3), "medium": (0, 1, 2, 3, 4, 5), "full": tuple(range(len(FAMILIES)))}
+"""Objects of `scenes.variety` that the cases of a size choose from, each solved once as it is, ..."""
+NEO_HOOKEAN = {"quick": (), "medium": (0, 2), "full": (0, 1, 2, 3)}
+"""... and those that are solved once more as neo-Hookean solids."""
+FEWER_PRESSES = 14
+"""At most so many presses where the solid remembers them."""
 
 
 @dataclass(frozen=True)
@@ -52,22 +70,21 @@ class Case:
     """One question: `tested` names what is asked for (empty: nothing is wrong), `effects` all that acts.
 
     `effects` is `tested` and, on a neo-Hookean object, finite strain, which belongs in the answer but is no
-    question. without: left out of the library. The hand, the modulus and the noise follow from the seed.
+    question. without: left out of the library. number: of the object. All nuisances follow from the seed.
     """
 
     kind: str
-    phantom: str
+    number: int
     seed: int
     tested: tuple[str, ...] = ()
     effects: dict[str, float] = field(default_factory=dict)
     without: str = ""
-    protocol: str = "ordinary"
 
     @property
     def recording(self) -> str:
         """A file name for what is recorded."""
         effects = "+".join(f"{k}={v:g}" for k, v in self.effects.items()) or "none"
-        return f"{self.phantom}-{self.protocol}-{effects}-{self.seed}"
+        return f"{self.family}-{self.number}-{effects}-{self.seed}"
 
     @property
     def key(self) -> str:
@@ -75,57 +92,76 @@ class Case:
         return self.recording + (f"-without-{self.without}" if self.without else "")
 
     @property
-    def modulus_pa(self) -> float:
-        """Of the object."""
-        return float(self._draws()[0])
+    def family(self) -> str:
+        """Of shapes."""
+        return list(FAMILIES)[self.number % len(FAMILIES)]
 
     @property
-    def noise_n(self) -> float:
-        """Of the force sensor, each axis."""
-        return float(self._draws()[1])
+    def nuisances(self) -> Draw:
+        """What the seed draws. A tool whose weight or bias is the question has no mass of its own beside, and
+        a solid that remembers is pressed less often.
+        """
+        drawn = replace(draw(self.seed), number=self.number)
+        if any(name in WEIGHT for name in self.tested):
+            drawn = replace(drawn, tool_mass_kg=0.0)
+        if any(name in REMEMBERING for name in self.effects):
+            drawn = replace(drawn, presses=min(drawn.presses, FEWER_PRESSES))
+        return drawn
 
     @property
-    def coloured_share(self) -> float:
-        """Of the noise's power that is slow."""
-        return float(self._draws()[2])
-
-    def _draws(self) -> np.ndarray:
-        draw = np.random.default_rng([11, self.seed])
-        return np.array([draw.uniform(12e3, 40e3), draw.uniform(0.008, 0.016), draw.uniform(0.0, 0.25)])
+    def beside(self) -> tuple[str, ...]:
+        """Names that are true of the recording and no question: neither asked for nor false."""
+        found = [name for name in self.effects if name not in self.tested]
+        if self.nuisances.tool_mass_kg > 0:
+            found += WEIGHT
+        return tuple(found)
 
     def as_json(self) -> dict[str, Any]:
         """Plain."""
-        return {**asdict(self), "tested": list(self.tested)}
+        return {**asdict(self), "tested": list(self.tested), "beside": list(self.beside)}
 
 
-def cases(size: str, phantoms: list[str] | None, seed: int) -> list[Case]:
+def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
     """All cases of a size, shuffled, so that a run that stops early is a fair sample of it.
 
-    quick: a few instrument effects on the cylinder. medium: controls, every cheap effect at four strengths,
-    left out, absent, pairs; every cheap effect on neo-Hookean objects of two shapes; solid effects on linear
-    ones of both. full: more controls, four shapes, more strengths, and solid effects on neo-Hookean objects.
+    quick: a few instrument effects. medium: controls, every cheap effect at four strengths, left out, absent,
+    pairs; every cheap effect on two neo-Hookean objects; solid effects on linear ones. full: more controls
+    and strengths, all families, solid effects on neo-Hookean objects. families: of shapes, by default all of
+    the size's pool. Raises OptionError for a family that no shape of the pool has.
     """
+    pool, finite = (_of_families(which[size], families) for which in (POOLS, NEO_HOOKEAN))
+    if not pool:
+        known = ", ".join(list(FAMILIES)[number] for number in POOLS[size])
+        asked = " or ".join(families or ())
+        raise OptionError(f"no object of the {size} size is a {asked}: there are {known}")
     if size == "quick":
-        found = _round(phantoms or ["cylinder"], seed, controls=2, named=CHEAP[:6], strengths=(1.0,))
-        return found
-    shapes = phantoms or list(SHAPES)
+        return _round(pool, seed, controls=2, named=CHEAP[:6], strengths=(1.0,))
     many = size == "full"
     strengths = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0) if many else (0.5, 1.0, 2.0, 4.0)
-    found = _round(shapes[:1], seed, controls=150 if many else 36, named=CHEAP, strengths=strengths)
-    found += _hard(shapes[0], seed + 2000)
-    for i, shape in enumerate(shapes):
-        if not many and phantoms is None and shape not in MEDIUM_SHAPES:
-            continue
-        base = {"finite_strain": 1.0}
-        found += _round([shape], seed + 3000 + 500 * i, controls=12 if many else 3, named=CHEAP,
-                        strengths=(1.0, 2.0, 4.0) if many else (1.0 + i % 2,), base=base)  # fmt: skip
-        found += _solid(shape, seed + 6000 + 500 * i, (0.5, 1.0, 2.0) if many else (1.0,), neo_hookean=many)
+    found = _round(pool, seed, controls=150 if many else 36, named=CHEAP, strengths=strengths)
+    found += _hard(pool, finite, seed + 2000)
+    for i, number in enumerate(finite):
+        levels = (1.0, 2.0, 4.0) if many else (1.0 + i % 2,)
+        found += _round((number,), seed + 3000 + 500 * i, controls=12 if many else 3, named=CHEAP,
+                        strengths=levels, base={FINITE: 1.0})  # fmt: skip
+    for i in range(4 if many else 2):
+        found += _solid(pool, finite, seed + 6000 + 500 * i, (0.5, 1.0, 2.0) if many else (1.0,),
+                        neo_hookean=many)  # fmt: skip
     order = np.random.default_rng(1).permutation(len(found))
     return [found[i] for i in order]
 
 
+def _of_families(numbers: Sequence[int], families: Sequence[str] | None) -> tuple[int, ...]:
+    names = list(FAMILIES)
+    return tuple(n for n in numbers if not families or names[n % len(names)] in families)
+
+
+def _one_of(pool: Sequence[int], seed: int) -> int:
+    return int(np.random.default_rng([13, seed]).choice(pool))
+
+
 def _round(
-    shapes: list[str],
+    pool: Sequence[int],
     seed: int,
     *,
     controls: int,
@@ -133,43 +169,47 @@ def _round(
     strengths: tuple[float, ...],
     base: dict[str, float] | None = None,
 ) -> list[Case]:
-    found: list[Case] = []
-    base = base or {}
-    for shape in shapes:
-        for _ in range(controls):
-            found.append(Case("control", shape, seed + len(found), (), dict(base)))
-        for strength in strengths:
-            for name in named:
-                effects = {**base, name: strength}
-                found.append(Case("single", shape, seed + len(found), (name,), effects))
-    return found
+    wanted: list[tuple[str, tuple[str, ...], dict[str, float]]] = [("control", (), {})] * controls
+    wanted += [("single", (name,), {name: strength}) for strength in strengths for name in named]
+    return [
+        Case(kind, _one_of(pool, seed + i), seed + i, tested, {**(base or {}), **effects})
+        for i, (kind, tested, effects) in enumerate(wanted)
+    ]
 
 
-def _hard(shape: str, seed: int) -> list[Case]:
+def _hard(pool: Sequence[int], finite: Sequence[int], seed: int) -> list[Case]:
     """Left out of the library, absent from it, and two at a time."""
     found: list[Case] = []
+
+    def add(kind: str, tested: tuple[str, ...], effects: dict[str, float], without: str = "") -> None:
+        of = finite if FINITE in effects else pool
+        if of:
+            number = seed + len(found)
+            found.append(Case(kind, _one_of(of, number), number, tested, effects, without))
+
     for name in CHEAP:
         if name != "surface_offset":
-            found.append(Case("left-out", shape, seed + len(found), (name,), {name: 2.0}, name))
+            add("left-out", (name,), {name: 2.0}, name)
     for strength in (1.0, 2.0, 4.0):
-        effects = {"poroelasticity": strength}
-        found.append(Case("absent", shape, seed + len(found), ("poroelasticity",), effects))
+        add("absent", ("poroelasticity",), {"poroelasticity": strength})
     for name in ("plasticity", "anisotropy"):
-        effects = {"finite_strain": 1.0, name: 1.0}
-        found.append(Case("absent", shape, seed + len(found), (name,), effects, protocol="brief"))
+        add("absent", (name,), {FINITE: 1.0, name: 1.0})
     for pair in PAIRS:
-        found.append(Case("pair", shape, seed + len(found), pair, dict.fromkeys(pair, 1.5)))
+        add("pair", pair, dict.fromkeys(pair, 1.5))
     return found
 
 
-def _solid(shape: str, seed: int, strengths: tuple[float, ...], *, neo_hookean: bool) -> list[Case]:
-    """Effects that are solved in the solid, on the linear object and, if asked for, on the neo-Hookean."""
+def _solid(
+    pool: Sequence[int], finite: Sequence[int], seed: int, strengths: tuple[float, ...], *, neo_hookean: bool
+) -> list[Case]:
+    """Effects that are solved in the solid, on a linear object and, if asked for, on a neo-Hookean one."""
     found: list[Case] = []
     for name in SOLID:
         for strength in strengths:
-            for base in ({}, {"finite_strain": 1.0}) if neo_hookean else ({},):
+            for base in ({}, {FINITE: 1.0}) if neo_hookean and finite else ({},):
                 if name in NEED_FINITE and not base:
                     continue
-                effects = {**base, name: strength}
-                found.append(Case("single", shape, seed + len(found), (name,), effects))
+                number = seed + len(found)
+                where = _one_of(finite if base else pool, number)
+                found.append(Case("single", where, number, (name,), {**base, name: strength}))
     return found

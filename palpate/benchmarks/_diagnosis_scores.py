@@ -20,8 +20,9 @@ FINITE = "finite_strain"
 
 @dataclass(frozen=True)
 class Answer:
-    """A verdict read against its case. named: effects asserted, finite strain left out where it acts and is
-    not asked for. first: the first of them, or 'none', 'unknown', 'failed'."""
+    """A verdict read against its case. named: effects asserted, but for those that are true of the recording
+    and no question (finite strain of a neo-Hookean object, the weight of the drawn tool). first: the first
+    of them, or 'none', 'unknown', 'failed'."""
 
     kind: str
     named: tuple[str, ...]
@@ -42,9 +43,8 @@ class Answer:
 def answer_of(item: dict[str, Any]) -> Answer:
     """Read a verdict."""
     case, verdict = item["case"], item["verdict"]
-    beside = FINITE in case["effects"] and FINITE not in case["tested"]
-    named = tuple(n for n in verdict["effects"] if not (beside and n == FINITE))
-    candidates = tuple(n for n in verdict["candidates"] if not (beside and n == FINITE))
+    named = tuple(n for n in verdict["effects"] if n not in case["beside"])
+    candidates = tuple(n for n in verdict["candidates"] if n not in case["beside"])
     kind = verdict["kind"]
     if kind == "failed":
         first = "failed"
@@ -98,7 +98,7 @@ class _Tally:
     def _control(self, item: dict[str, Any], answer: Answer) -> bool:
         self.rates["false alarms (controls)"].append(answer.detected)
         self.rates["BIC baseline: false alarms (controls)"].append(
-            item["verdict"].get("bic") not in (None, "none")
+            item["verdict"].get("bic") not in (None, "none", *item["case"]["beside"])
         )
         return not answer.detected
 

@@ -40,12 +40,12 @@ class Tissue:
 def tissue(
     seed: int, *, log_sd: float = 0.35, raster: int = 8, touch_error_m: float = 0.0, law: str = "neo-hookean"
 ) -> Tissue:
-    """One slab. raster: presses along each side. touch_error_m: standard deviation of first touches as read."""
+    """One slab. raster: presses along each side. touch_error_m: standard error of first touches as read."""
     rng = np.random.default_rng([13, seed])
     spacing = rng.uniform(0.005, 0.009)
     height, tip = rng.uniform(0.020, 0.040), rng.uniform(0.004, 0.006)
     side = (raster - 1) * spacing + 0.030
-    length = rng.uniform(1.5, 6.0) * spacing
+    length = rng.uniform(0.8, 4.0) * spacing
     modulus, noise = np.exp(rng.uniform(np.log(8e3), np.log(40e3))), rng.uniform(0.002, 0.008)
     log_ratio = _field(rng, length, log_sd, height)
     size = (side, side, height)

@@ -19,6 +19,7 @@ from scipy.stats import theilslopes
 
 from mechanics.files import cache_folder
 from mechanics.model import Model, read_model, write_model
+from mechanics.recording import read_recording
 from palpate.benchmarks._servo_load import block_model
 from palpate.benchmarks.timing import table
 from palpate.servo import Servo, exploring_hand
@@ -122,8 +123,7 @@ class Picture:
         self._mesh = pv.PolyData(points.copy(), faces.ravel())
         self._plotter = pv.Plotter(off_screen=True, window_size=(640, 480))
         self._plotter.add_mesh(self._mesh)
-        self._ball = pv.Sphere(model.tool.tip_radius_m)
-        self._actor = self._plotter.add_mesh(self._ball)
+        self._actor = self._plotter.add_mesh(pv.Sphere(radius=model.tool.tip_radius_m))
         self._plotter.show(auto_close=False)
 
     def draw(self, displacement: np.ndarray, tip_m: np.ndarray) -> None:
@@ -142,12 +142,12 @@ class Picture:
 def _session(model: Model, seconds: float, frames_per_s: float) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder:
         record = Path(folder) / "soak.csv"
-        session = TouchSession(model, device=exploring_hand(model), recording=record)
+        session = TouchSession(model, device=exploring_hand(model))
         with session:
             session.start()
+            picture = Picture(model, *session.drawing(session.renderer_name).surface)
+            session.begin_recording(record)
             session.enable()
-            drawing = session.drawing(session.renderer_name)
-            picture = Picture(model, *drawing.surface)
             health, frames, next_sample = Health(session.servo), 0, 0.0
             start = time.perf_counter()
             while (elapsed := time.perf_counter() - start) < seconds and session.servo.alive:
@@ -162,11 +162,13 @@ def _session(model: Model, seconds: float, frames_per_s: float) -> dict[str, Any
             health.sample()
             report = session.report()
             picture.close()
-        lines = sum(1 for _ in record.open("rb"))
-    return _summary(health, report.as_dict(), frames, lines)
+        recorded = read_recording(record)
+    spacing = np.diff(recorded.t) * session.servo.options.rate_hz
+    gaps = {"rows": len(recorded.t), "missing rows": int(np.round(spacing - 1.0).clip(0).sum())}
+    return _summary(health, report.as_dict(), frames, gaps)
 
 
-def _summary(health: Health, report: dict[str, Any], frames: int, lines: int) -> dict[str, Any]:
+def _summary(health: Health, report: dict[str, Any], frames: int, recorded: dict[str, int]) -> dict[str, Any]:
     ahead, phase, utc = (health.column(name) for name in ("ahead_s", "phase_s", "utc_s"))
     last = len(health.rows) - 1
     at = {"start": last // 10, "middle": last // 2, "end": last}
@@ -175,13 +177,15 @@ def _summary(health: Health, report: dict[str, Any], frames: int, lines: int) ->
     return {
         "report": report,
         "frames": frames,
-        "recorded_lines": lines,
+        "recorded": recorded,
         "stages": {stage: {k: v for k, v in health.rows[i].items() if "_" in k} for stage, i in at.items()},
         "slopes": {
             name: health.slope(name)
             for name in ("window_rss_mb", "servo_rss_mb", "window_files", "servo_files", "servo_threads")
         },
         "deadline_ahead_ms": [float(1e3 * v) for v in np.percentile(ahead, [0, 50, 100])],
+        "ahead_first_ms": float(1e3 * np.median(ahead[:half])),
+        "ahead_second_ms": float(1e3 * np.median(ahead[half:])),
         "phase_drift_us": float(1e6 * (phase[-1] - phase[0])),
         "utc_drift_ms": float(1e3 * (utc[-1] - utc[0])),
         "late_first_half": float(late[half] - late[0]),
@@ -199,8 +203,11 @@ def _print_session(seen: dict[str, Any]) -> None:
     print(
         f"{report['ticks']} ticks, {report['missed_ticks']} missed, {report['late_ticks']} late "
         f"({seen['late_first_half']:.0f} in the first half, {seen['late_second_half']:.0f} in the second), "
-        f"{seen['frames']} pictures, {seen['recorded_lines']} lines recorded; ticks against deadlines "
-        f"{seen['phase_drift_us']:.3f} us, wall clock against the loop's {seen['utc_drift_ms']:.2f} ms"
+        f"{seen['frames']} pictures, {seen['recorded']['rows']} rows recorded, "
+        f"{seen['recorded']['missing rows']} missing; ticks against deadlines "
+        f"{seen['phase_drift_us']:.3f} us, the next deadline a median of {seen['ahead_first_ms']:.2f} ms "
+        f"ahead in the first half, {seen['ahead_second_ms']:.2f} in the second; the system's wall clock went "
+        f"{seen['utc_drift_ms']:.2f} ms against the loop's"
     )
 
 

@@ -83,7 +83,7 @@ def _headed(device: Availability, *lines: str) -> list[str]:
 
 def _present(device: Availability, rate: Rate | None) -> list[str]:
     measured = f"measured: {rate.hz:.0f} Hz, jitter {1e6 * rate.jitter_s:.0f} us" if rate else ""
-    return _headed(device, abilities(device.spec), measured)
+    return _headed(device, abilities(device.spec), *device.spec.conditions, measured)
 
 
 def _absent(device: Availability) -> list[str]:
@@ -108,6 +108,8 @@ def _plain(device: Availability, rate: Rate | None) -> dict[str, object]:
         "workspace_radius_m": spec.workspace_radius_m,
         "rate_hz": spec.rate_hz,
         "buttons": spec.buttons,
+        "conditions": spec.conditions,
+        "simulated": spec.simulated,
         "measured_hz": rate.hz if rate else None,
         "measured_jitter_s": rate.jitter_s if rate else None,
     }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote
@@ -13,7 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from palpate.batching.run import Batch
-from palpate.batching.steps import STEPS, THUMBNAIL
+from palpate.batching.steps import THUMBNAIL
 from palpate.batching.summary import Entry
 from palpate.report.page import Page
 
@@ -21,18 +22,35 @@ MOST_OBJECTS = 12
 """That are drawn; the table beside has all."""
 
 _STYLE = """<style>
-body { max-width: 84rem; }
-.wide { overflow-x: auto; } .wide td, .wide th { white-space: nowrap; padding: .3rem .6rem; }
-.wide td.words { white-space: normal; min-width: 9rem; max-width: 22rem; overflow-wrap: anywhere; }
-.wide th button { font: inherit; font-weight: 600; background: none; border: 0; padding: 0; cursor: pointer;
-                  color: inherit; text-align: inherit; }
-.wide th button::after { content: " \\2195"; color: #a3adb8; }
-.wide th[aria-sort=ascending] button::after { content: " \\2191"; color: inherit; }
-.wide th[aria-sort=descending] button::after { content: " \\2193"; color: inherit; }
-.wide img { display: block; width: 5rem; height: 3.75rem; object-fit: contain; }
-.wide small { color: #55606e; } tr.failed td { background: #fdf0ee; } tr.waiting td { background: #f6f7f9; }
+body { max-width: 76rem; } figure img { max-width: min(100%, 46rem); }
+table.sortable { width: 100%; } .sortable td, .sortable th { padding: .3rem .6rem; vertical-align: middle; }
+.sortable td { white-space: nowrap; } .sortable th { vertical-align: bottom; }
+.sortable td.words { white-space: normal; overflow-wrap: anywhere; min-width: 8rem; }
+.sortable button { font: inherit; font-weight: 600; background: none; border: 0; padding: 0; color: inherit;
+                   text-align: inherit; cursor: pointer; }
+.sortable button::after { content: "\\00a0\\2195"; color: #a3adb8; }
+.sortable th[aria-sort=ascending] button::after { content: "\\00a0\\2191"; color: inherit; }
+.sortable th[aria-sort=descending] button::after { content: "\\00a0\\2193"; color: inherit; }
+.sortable img { display: block; width: 5rem; height: 3.75rem; object-fit: contain; }
+.sortable small { color: #55606e; font-size: .86rem; } .sortable td small { display: block; }
+tr.failed { background: #fdf0ee; } tr.waiting { background: #f6f7f9; }
 #find { font: inherit; padding: .35rem .6rem; width: min(100%, 24rem); box-sizing: border-box;
         border: 1px solid #8a96a5; border-radius: 4px; }
+@media (max-width: 48rem) {
+  table.sortable, .sortable thead, .sortable tbody { display: block; }
+  .sortable thead tr { display: flex; flex-wrap: wrap; gap: .2rem .9rem; }
+  .sortable th { border: 0; padding: 0; font-size: .9rem; } .sortable th:empty { display: none; }
+  .sortable tbody tr { display: block; border: 1px solid #d9dee5; border-radius: 4px; margin: .7rem 0;
+                       padding: .4rem .7rem; }
+  .sortable tbody tr[hidden] { display: none; }
+  .sortable td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .12rem 0;
+                 text-align: right; }
+  .sortable td.words { text-align: right; } .sortable td:empty { display: none; }
+  .sortable td::before { content: attr(data-name); color: #55606e; text-align: left; white-space: normal;
+                         overflow-wrap: normal; flex: none; max-width: 60%; }
+  .sortable td.picture::before { content: none; } .sortable td.picture { justify-content: center; }
+  .sortable td.picture img { width: 9rem; height: 6.75rem; }
+}
 </style>"""
 
 _SCRIPT = """<script>
@@ -64,6 +82,15 @@ document.getElementById("find")?.addEventListener("input", event => {
 </script>"""
 
 
+@dataclass(frozen=True)
+class Cell:
+    """text: HTML; by: what its column is sorted by, '' where it is not known; kind: '', words or picture."""
+
+    text: str = ""
+    by: Any = ""
+    kind: str = ""
+
+
 def write_report(path: Path, result: Batch, steps: Sequence[str]) -> Path:
     """Write the page; thumbnails and reports are linked where they lie, below the page's folder."""
     page = Page(f"Batch of {_count(len(result.entries), 'recording')}")
@@ -78,6 +105,8 @@ def write_report(path: Path, result: Batch, steps: Sequence[str]) -> Path:
             'aria-label="find recordings"></p>'
         )
     page.part(_recordings(result, steps))
+    if "compare" in steps:
+        page.paragraph("Errors of FEM and of the best 1D model: rms force at touches that no fit has seen.")
     _cost(page, result, steps)
     page.part(_SCRIPT)
     return page.write(path)
@@ -109,22 +138,16 @@ def _agreement(page: Page, result: Batch) -> None:
             else ""
         ),
     )
-    heads = [
-        ("object", True),
-        ("recordings", False),
-        ("mean modulus [kPa]", False),
-        ("spread between them [%]", False),
-        ("95 % interval of it", False),
-        ("expected of their own intervals [%]", False),
-    ]
+    heads = ["object", "recordings", "mean modulus [kPa]", "spread between them [%]", "95 % interval of it",
+             "expected of their own intervals [%]"]  # fmt: skip
     rows = [
         [
-            _cell(html.escape(a.object), a.object, words=True),
-            _cell(str(a.count), a.count),
-            _cell(f"{a.young_modulus_pa / 1e3:.2f}", a.young_modulus_pa),
-            _cell(f"{100 * a.spread:.1f}", a.spread),
-            _cell("{:.1f} to {:.1f}".format(*(100 * v for v in a.spread_ci95)), a.spread_ci95[0]),
-            _cell(f"{100 * a.expected:.1f}", a.expected),
+            Cell(html.escape(a.object), a.object, "words"),
+            Cell(str(a.count), a.count),
+            Cell(f"{a.young_modulus_pa / 1e3:.2f}", a.young_modulus_pa),
+            Cell(f"{100 * a.spread:.1f}", a.spread),
+            Cell("{:.1f} to {:.1f}".format(*(100 * v for v in a.spread_ci95)), a.spread_ci95[0]),
+            Cell(f"{100 * a.expected:.1f}", a.expected),
         ]
         for a in result.agreements
     ]
@@ -139,7 +162,7 @@ def _agreement(page: Page, result: Batch) -> None:
 def agreement_figure(result: Batch) -> Figure:
     """Moduli of the explorations of every object with their intervals, over the object's mean."""
     count = min(len(result.agreements), MOST_OBJECTS)
-    figure = Figure(figsize=(9, 1.2 + 0.55 * count), layout="constrained")
+    figure = Figure(figsize=(7, 1.1 + 0.55 * count), layout="constrained")
     draw_agreement(figure.subplots(), result)
     return figure
 
@@ -164,44 +187,62 @@ def draw_agreement(ax: Axes, result: Batch) -> Axes:
     labels = [f"{a.object}\n{a.young_modulus_pa / 1e3:.1f} kPa" for a in shown]
     ax.set_yticks(range(len(shown)), labels, fontsize=9)
     ax.invert_yaxis()
-    ax.set_xlabel("modulus over the mean of its object; band: one standard deviation between explorations")
+    ax.set_xlabel("modulus over the mean of its object; band: one standard deviation")
     return ax
 
 
 def _recordings(result: Batch, steps: Sequence[str]) -> str:
-    heads = [("", False), ("recording", True), ("object", True), ("status", True), ("presses", False),
-             ("modulus [kPa]", False), ("95 % interval", False)]  # fmt: skip
-    heads += [("held-out error: FEM, 1D [mN]", False)] if "compare" in steps else []
-    heads += [("verdict", True), ("gap before [mN]", False), ("after", False)] if "diagnose" in steps else []
-    heads += [("CPU s", False)]
-    return _table(heads, [(e.row.status, _row(result, e, steps)) for e in result.entries], "recordings")
+    heads = ["", "recording", "object", "presses", "modulus [kPa]"]
+    heads += ["verdict", "gap before [mN]", "gap after [mN]"] if "diagnose" in steps else ["status"]
+    heads += ["error of FEM [mN]", "of best 1D [mN]"] if "compare" in steps else []
+    rows = [(e.row.status, _row(result, e, steps)) for e in result.entries]
+    return _table([*heads, "CPU [s]"], rows, "recordings")
 
 
-def _row(result: Batch, entry: Entry, steps: Sequence[str]) -> list[str]:
+def _row(result: Batch, entry: Entry, steps: Sequence[str]) -> list[Cell]:
     row, values = entry.row, entry.values
     cells = [
         _thumbnail(result, row.recording),
-        _cell(_link(result, row.recording, "reconstruct", row.recording), row.recording, words=True),
-        _cell(html.escape(entry.object or ""), entry.object or "", words=True),
-        _cell(_status(result, entry), row.status, words=True),
-        _cell(*_number(values.get("reconstruct", {}).get("presses"), 1, 0)),
-        _cell(*_number(row.young_modulus_pa, 1e-3, 2)),
-        _interval(row.young_modulus_lo_pa, row.young_modulus_hi_pa),
+        Cell(_link(result, row.recording, "reconstruct", row.recording), row.recording, "words"),
+        Cell(html.escape(entry.object or ""), entry.object or "", "words"),
+        _number(values.get("reconstruct", {}).get("presses"), 1, 0),
+        _modulus(entry),
+        _verdict(result, entry),
     ]
+    if "diagnose" in steps:
+        cells += [_number(value, 1e3, 0) for value in (row.gap_before_n, row.gap_after_n)]
     if "compare" in steps:
         rmse = values.get("compare", {}).get("rmse_n")
         if rmse is None:
-            cells.append(_cell("", ""))
+            cells += [Cell(), Cell()]
         else:
             best = min(value for name, value in rmse.items() if name != "fem")
-            text = f"{1e3 * rmse['fem']:.0f}, {1e3 * best:.0f}"
-            cells.append(_cell(_link(result, row.recording, "compare", text), rmse["fem"]))
-    if "diagnose" in steps:
-        said = verdict_words(entry)
-        cells.append(_cell(_link(result, row.recording, "diagnose", said), said, words=True))
-        cells += [_cell(*_number(value, 1e3, 0)) for value in (row.gap_before_n, row.gap_after_n)]
+            fem = _link(result, row.recording, "compare", f"{1e3 * rmse['fem']:.0f}")
+            cells += [Cell(fem, rmse["fem"]), _number(best, 1e3, 0)]
     cpu = sum(seconds for seconds, _ in entry.cost.values())
-    return [*cells, _cell(*_number(cpu or None, 1, 0))]
+    return [*cells, _number(cpu or None, 1, 0)]
+
+
+def _verdict(result: Batch, entry: Entry) -> Cell:
+    """What was found, or why it was not."""
+    row = entry.row
+    said = verdict_words(entry) or row.status
+    text = _link(result, row.recording, "diagnose", said)
+    if row.status != "done":
+        said = row.status
+        text = f"{row.status}<small>{html.escape(row.reason)}</small>" if row.reason else row.status
+    if entry.trace:
+        text += f' <a href="{quote(row.recording)}/error.txt">trace</a>'
+    return Cell(text, said, "words")
+
+
+def _modulus(entry: Entry) -> Cell:
+    e, low, high = (getattr(entry.row, f"young_modulus_{end}pa") for end in ("", "lo_", "hi_"))
+    if e is None:
+        return Cell()
+    known = low is not None and high is not None and low == low and high == high
+    interval = f"<small>{low / 1e3:.2f} to {high / 1e3:.2f}</small>" if known else ""
+    return Cell(f"<span>{e / 1e3:.2f}{interval}</span>", e)
 
 
 def verdict_words(entry: Entry) -> str:
@@ -217,19 +258,10 @@ def verdict_words(entry: Entry) -> str:
     return " and ".join(said) or str(found["kind"])
 
 
-def _status(result: Batch, entry: Entry) -> str:
-    text = html.escape(entry.row.status)
-    if entry.row.reason:
-        text += f"<br><small>{html.escape(entry.row.reason)}</small>"
-    if entry.trace:
-        text += f' <a href="{quote(entry.row.recording)}/error.txt">trace</a>'
-    return text
-
-
-def _thumbnail(result: Batch, name: str) -> str:
+def _thumbnail(result: Batch, name: str) -> Cell:
     if not (result.folder / name / THUMBNAIL).exists():
-        return "<td></td>"
-    return f'<td><img loading="lazy" alt="" src="{quote(name)}/{THUMBNAIL}"></td>'
+        return Cell(kind="picture")
+    return Cell(f'<img loading="lazy" alt="" src="{quote(name)}/{THUMBNAIL}">', "", "picture")
 
 
 def _link(result: Batch, name: str, step: str, text: str) -> str:
@@ -237,47 +269,46 @@ def _link(result: Batch, name: str, step: str, text: str) -> str:
     return f'<a href="{quote(name)}/{step}.html">{html.escape(text)}</a>' if there else html.escape(text)
 
 
-def _interval(low: float | None, high: float | None) -> str:
-    if low is None or high is None or low != low or high != high:
-        return _cell("", "")
-    return _cell(f"{low / 1e3:.2f} to {high / 1e3:.2f}", (high - low) / (high + low))
-
-
-def _number(value: Any, scale: float, digits: int) -> tuple[str, Any]:
+def _number(value: Any, scale: float, digits: int) -> Cell:
     known = isinstance(value, int | float) and value == value
-    return (f"{value * scale:.{digits}f}", value) if known else ("", "")
+    return Cell(f"{value * scale:.{digits}f}", value) if known else Cell()
 
 
-def _cell(text: str, by: Any, *, words: bool = False) -> str:
-    """text: HTML; by: what the column is sorted by."""
-    kind = ' class="words"' if words else ""
-    return f'<td{kind} data-by="{html.escape(str(by))}">{text}</td>'
-
-
-def _table(
-    heads: Sequence[tuple[str, bool]], rows: Sequence[tuple[str, Sequence[str]]], name: str = ""
-) -> str:
-    """heads: (words, whether its cells are words); '' cannot be sorted. rows: (class, cells)."""
+def _table(heads: Sequence[str], rows: Sequence[tuple[str, Sequence[Cell]]], name: str = "") -> str:
+    """heads: '' cannot be sorted by; rows: (class, cells)."""
+    wordy = [any(cells[k].kind == "words" for _, cells in rows) for k in range(len(heads))]
     top = "".join(
         f"<th{' class=words' if words else ''}>"
         + (f'<button type="button">{html.escape(text)}</button>' if text else "")
         + "</th>"
-        for text, words in heads
+        for text, words in zip(heads, wordy, strict=True)
     )
-    body = "\n".join(f'<tr class="{kind}">{"".join(cells)}</tr>' for kind, cells in rows)
-    return (
-        f'<div class="wide"><table class="sortable" id="{name}"><thead><tr>{top}</tr></thead>'
-        f"<tbody>{body}</tbody></table></div>"
+    body = "\n".join(
+        f'<tr class="{kind}">' + "".join(map(_cell, cells, heads)) + "</tr>" for kind, cells in rows
     )
+    return f'<table class="sortable" id="{name}"><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>'
+
+
+def _cell(cell: Cell, name: str) -> str:
+    kind = f' class="{cell.kind}"' if cell.kind else ""
+    return f'<td{kind} data-name="{html.escape(name)}" data-by="{html.escape(str(cell.by))}">{cell.text}</td>'
 
 
 def _cost(page: Page, result: Batch, steps: Sequence[str]) -> None:
-    known = {step: [e.cost[step] for e in result.entries if step in e.cost] for step in STEPS}
     rows = []
     for step in steps:
-        if known[step]:
-            cpu, peak = np.array(known[step], dtype=float).T
-            rows.append([step, len(cpu), float(np.median(cpu)), float(cpu.max()), float(peak.max() / 1e6)])
+        known = [e.cost[step] for e in result.entries if step in e.cost]
+        if known:
+            cpu, peak = np.array(known, dtype=float).T
+            rows.append(
+                [
+                    Cell(step, step, "words"),
+                    Cell(str(len(known)), len(known)),
+                    *(_number(value, 1, 0) for value in (float(np.median(cpu)), float(cpu.max()))),
+                    _number(float(peak.max()), 1e-6, 0),
+                ]
+            )
     if rows:
         page.heading("What it cost")
-        page.table(["step", "recordings", "CPU s, median", "most", "memory, most [MB]"], rows)
+        heads = ["step", "recordings", "CPU, median [s]", "CPU, most [s]", "memory, most [MB]"]
+        page.part(_table(heads, [("", row) for row in rows]))

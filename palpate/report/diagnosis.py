@@ -6,10 +6,17 @@ from pathlib import Path
 
 import numpy as np
 
+from diagnose.apply import improved
 from diagnose.result import Diagnosis
 from mechanics.model import Model
 from mechanics.recording import Recording
-from palpate.report.diagnosis_figures import curves_picture, first_picture, gap_of, presses_picture
+from palpate.report.diagnosis_figures import (
+    curves_picture,
+    first_picture,
+    gap_of,
+    modulus_picture,
+    presses_picture,
+)
 from palpate.report.diagnosis_words import (
     AXIS_WORDS,
     ERROR_WORDS,
@@ -37,6 +44,7 @@ def write_report(path: Path | str, recording: Recording, model: Model, result: D
     page.figure(first_picture(model, result), _caption(result))
     _next_touch(page, result)
     _how_large(page, result)
+    _moduli(page, model, result)
     _tried(page, result)
     _follows(page, result)
     _own_errors(page, result)
@@ -87,6 +95,15 @@ def _how_large(page: Page, result: Diagnosis) -> None:
                 for k, (a, b) in result.held_out_n.items()
             )
             + "."
+        )
+
+
+def _moduli(page: Page, model: Model, result: Diagnosis) -> None:
+    better, _ = improved(model, result)
+    if np.ptp(better.surface_ratio) > 0:
+        page.figure(
+            modulus_picture(better, result),
+            "Young's modulus right under the surface, with what was found (dots: places touched).",
         )
 
 

@@ -69,6 +69,22 @@ def _object(ax: Any, model: Model, result: Diagnosis) -> None:
     ax.set_title("on the object (dots: places touched, ring: largest)", fontsize=11)
 
 
+def modulus_picture(better: Model, result: Diagnosis) -> Any:
+    """Young's modulus right under the surface, in the model with what was found."""
+    from matplotlib.figure import Figure
+
+    mesh = better.mesh
+    modulus = better.material.young_modulus_pa * better.surface_ratio[mesh.touchable_elements]
+    centres = mesh.points[mesh.touchable_surface[:, :3]].mean(axis=1)
+    near = np.exp(-((cdist(felt_surface(better).points, centres) / better.mesh_size_m) ** 2)) + 1e-12
+    figure = Figure(figsize=(6, 3.9), layout="constrained")
+    draw_object(
+        figure.subplots(), better, near @ modulus / near.sum(axis=1) / 1e3, label="Young's modulus (kPa)",
+        colour_map="viridis", touches=sites_of(result),
+    )  # fmt: skip
+    return figure
+
+
 def _press(ax: Any, result: Diagnosis, press: int) -> None:
     t, before, after = gap_of(result)
     rows = (t.press == press) & t.counted

@@ -202,6 +202,10 @@ def _how_far(result: Diagnosis, force_rms_n: float) -> tuple[str, str, str]:
     return question, f"It stays at {before}", text + " With no effect found, nothing of it is gone."
 
 
+MOST_NUMBERS = 12
+"""Of a list that are written out; of longer ones the least and the greatest."""
+
+
 def plain_key(key: str) -> tuple[str, float, str]:
     """(words, factor from SI, unit) of a parameter's key, in units that a hand knows."""
     suffix, factor, unit = next((u for u in UNITS if key.endswith(u[0])), ("", 1.0, ""))
@@ -212,6 +216,9 @@ def number(value: Any, factor: float = 1.0) -> str:
     """A parameter's value, or a list of values, to three digits."""
     if isinstance(value, list) and len(value) == 1:
         return number(value[0], factor)
+    if isinstance(value, list) and len(value) > MOST_NUMBERS:
+        least, most = (number(float(f(value)), factor) for f in (np.min, np.max))
+        return f"{least} to {most} ({len(value)} values)"
     if isinstance(value, list):
         return "(" + ", ".join(number(v, factor) for v in value) + ")"
     if isinstance(value, bool):

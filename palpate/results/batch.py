@@ -76,6 +76,10 @@ class Batch(Result, room.Batch):
                 f"{a.object}: {a.count} explorations, {a.young_modulus_pa / 1e3:.2f} kPa, spread "
                 f"{100 * a.spread:.1f} %, of their own intervals {100 * a.expected:.1f} %"
             )
+        if self.undescribed:
+            names = ", ".join(path.name for path in self.undescribed[:3])
+            more = f" and {len(self.undescribed) - 3} more" if len(self.undescribed) > 3 else ""
+            lines.append(f"left aside, as no .toml beside describes them: {names}{more}")
         return [*lines, f"written to {self.folder / 'index.html'}"]
 
     def as_json(self) -> dict[str, Any]:

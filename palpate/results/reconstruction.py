@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.results.base import Result, dressed
+from palpate.results.check import finding_json
 from palpate.results.model import Model, model_of
 from palpate.results.recording import Recording, recording_of
 from reconstruct import pipeline as room
@@ -66,6 +67,7 @@ class Reconstruction(Result, room.Reconstruction):
             f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
             f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
         ]
+        lines += [f.line() for f in self.findings]
         if self.modulus:
             misfit = float((self.modulus.press.rms_n**2).mean() ** 0.5)
             lines.append(f"  {self.modulus.reason}; misfit of a press {misfit:.3f} N")
@@ -93,6 +95,7 @@ class Reconstruction(Result, room.Reconstruction):
             "poisson_ratio": model.material.poisson_ratio,
             "palpations": len(exploration.presses),
             "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
+            "findings": [finding_json(f) for f in self.findings],
             "noise_n": exploration.noise_n,
             "force_delay_s": exploration.delay_s,
             "force_delay_sd_s": exploration.delay_error_s,

@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.files import memory_folder, temporary_prefix, writing
 from palpate.servo.histogram import BINS
 
 RING_ROWS = 8192
@@ -101,6 +102,20 @@ def views(buffer: mmap.mmap | bytearray) -> SharedArrays:
     return SharedArrays(**arrays)
 
 
+def _take(descriptor: int, path: str) -> None:
+    """Give the file its room now: where there is none, writing through the map would kill the process."""
+    with writing(path):
+        try:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(descriptor, 0, total_bytes())
+            else:
+                os.ftruncate(descriptor, total_bytes())
+        except OSError:
+            os.close(descriptor)
+            os.unlink(path)
+            raise
+
+
 class SharedBlock:
     """The block: a file in memory, made by the parent, mapped by its path in the servo.
 
@@ -111,11 +126,8 @@ class SharedBlock:
     def __init__(self, path: str | None = None) -> None:
         self._owner = path is None
         if path is None:
-            memory = "/dev/shm"
-            descriptor, path = tempfile.mkstemp(
-                prefix="palpate-servo-", dir=memory if os.access(memory, os.W_OK) else None
-            )
-            os.ftruncate(descriptor, total_bytes())
+            descriptor, path = tempfile.mkstemp(prefix=temporary_prefix("servo-"), dir=memory_folder())
+            _take(descriptor, path)
         else:
             descriptor = os.open(path, os.O_RDWR)
         try:

@@ -127,13 +127,20 @@ class ServoProcess:
         for word in self.job.options.loosened:
             self._tell({"word": word})
         self._progress("loading the model", 0.0)
-        scene = self._scene(*self._source.make(self._progress))
+        renderer, model = self._source.make(self._progress)
+        kind = self._device.spec
+        scene = self._scene(renderer, model)
         self._progress("compiling the loop", 0.95)
         program = make_program(scene, self._arrays, self._parameters())
         locked = lock_memory()
         if locked:
             self._tell({"word": locked})
         self._device.open()
+        for condition in self._device.spec.conditions:
+            self._tell({"word": f"{self._device.spec.title}: {condition}"})
+        if self._device.spec != kind:
+            # the device that is there may be able to do less than its kind
+            program = program._replace(scene=self._scene(renderer, model), parameters=self._parameters())
         priority = self.job.options.priority
 
         def begin_loop() -> None:

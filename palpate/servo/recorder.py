@@ -16,8 +16,8 @@ from palpate.servo.layout import ROW
 class Recorder:
     """Call `collect` at least every few seconds, then `write`.
 
-    Recorded are the first tip's centre and the rendered force on the tool (support included), scene frame. Rows
-    wait in a file without a name, so that an hour of them takes no memory and nothing is left behind.
+    Recorded are the first tip's centre and the rendered force on the tool (support included), scene frame.
+    Rows wait in a file without a name, so that an hour of them takes no memory and nothing is left behind.
     """
 
     def __init__(self, servo: Servo) -> None:
@@ -26,15 +26,15 @@ class Recorder:
         self._next = int(servo.arrays.ring_head[0])
 
     def collect(self) -> np.ndarray:
-        """Take what came since the last time, and return those rows; RecordingError where they find no room."""
+        """Take what came since the last time, and return it; raises RecordingError where it finds no room."""
         rows, self._next = self._servo.history(self._next)
         try:
             self._spool.write(rows.tobytes())
             self._spool.flush()
         except OSError as error:
             raise RecordingError(
-                f"the recording finds no room in {tempfile.gettempdir()} ({error.strerror}): free some, or set "
-                "TMPDIR to another place"
+                f"the recording finds no room in {tempfile.gettempdir()} ({error.strerror}): free some, "
+                "or set TMPDIR to another place"
             ) from error
         return rows
 

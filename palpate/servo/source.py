@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from mechanics.files import sweep, temporary_prefix
 from mechanics.model import Model, read_model, write_model
 from mechanics.progress import Progress
 
@@ -72,7 +73,8 @@ class ModelFolder:
             if model.path is not None:
                 self.path = model.path
                 return
-            self._temporary = tempfile.TemporaryDirectory(prefix="palpate-")
+            sweep(Path(tempfile.gettempdir()))
+            self._temporary = tempfile.TemporaryDirectory(prefix=temporary_prefix())
             self.path = write_model(Path(self._temporary.name) / "model", model)
         else:
             self.path = Path(model)

@@ -16,7 +16,7 @@ from palpate.tasks.worker import THREADS
 
 
 class Child:
-    """A worker process (`palpate.tasks.worker`). `do` is for one thread; `kill` for any."""
+    """A worker process (`palpate.tasks.worker`). `do` is for one thread, the rest for any."""
 
     def __init__(self) -> None:
         self._lock = threading.Lock()
@@ -38,12 +38,16 @@ class Child:
                 return dict(json.loads(answer))
         return {"state": "crashed", "reason": self._buried(process)}
 
-    def kill(self) -> None:
-        """End the worker, what it started, and every later call of `do`."""
+    def stop(self) -> None:
+        """End the worker and what it started; the next job starts another."""
         with self._lock:
-            self._closed = True
             if self._process is not None:
                 _kill(self._process)
+
+    def close(self) -> None:
+        """End it for good."""
+        self._closed = True
+        self.stop()
 
     def _started(self) -> subprocess.Popen[str] | None:
         with self._lock:

@@ -12,6 +12,7 @@ import itertools
 import queue
 import threading
 import time
+import uuid
 from collections.abc import Sequence
 from typing import Any, Self
 
@@ -26,18 +27,31 @@ waits for the driver, also where they are short."""
 _CONNECT_S = 10.0
 _COUNT_S = 2.0
 _own = threading.local()
+_busy: dict[int, tuple[str, Child]] = {}
 
 
-def do(job: dict[str, Any]) -> Answer:
-    """Runs on a Dask worker: hands the job to this thread's own process."""
+def do(job: dict[str, Any], run: str) -> Answer:
+    """Runs on a Dask worker: hands a run's job to this thread's own process."""
     if not hasattr(_own, "child"):
         _own.child = Child()
-    answer: Answer = _own.child.do(job)
-    return answer
+    thread = threading.get_ident()
+    _busy[thread] = run, _own.child
+    try:
+        answer: Answer = _own.child.do(job)
+        return answer
+    finally:
+        del _busy[thread]
+
+
+async def stop(run: str) -> None:
+    """Runs on every Dask worker: ends what it does for a run. (Dask itself stops nothing that has begun.)"""
+    for whose, child in list(_busy.values()):
+        if whose == run:
+            child.stop()
 
 
 class DaskExecutor:
-    """Use as `with DaskExecutor(address) as executor`; leaving the block cancels what still runs.
+    """Use as `with DaskExecutor(address) as executor`; leaving the block ends what still runs.
 
     address: of the scheduler, "tcp://HOST:PORT". patience_s: how long a scheduler that went away is waited
     for. Raises OptionError where Dask is not installed or no scheduler answers.
@@ -48,8 +62,10 @@ class DaskExecutor:
     def __init__(self, address: str, patience_s: float = 900.0) -> None:
         self.address, self.patience_s = address, patience_s
         self._given: dict[str, tuple[str, Any]] = {}
+        self._unsent: list[str] = []
         self._ended: queue.SimpleQueue[str] = queue.SimpleQueue()
         self._number = itertools.count()
+        self._run = uuid.uuid4().hex
         self._threads, self._counted_at = 0, -_COUNT_S
         self._client = self._connected(_CONNECT_S)
 
@@ -57,8 +73,10 @@ class DaskExecutor:
         return self
 
     def __exit__(self, *_: object) -> None:
-        if self._client.status == "running":
+        if self._given and self._client.status == "running":
             self._client.cancel([future for _, future in self._given.values()], force=True)
+            with contextlib.suppress(OSError, TimeoutError):
+                self._client.run(stop, self._run, wait=False)
         self._client.close(timeout=2)
 
     def _connected(self, within_s: float) -> Any:
@@ -92,10 +110,18 @@ class DaskExecutor:
 
     def submit(self, jobs: Sequence[tuple[str, dict[str, Any]]]) -> None:
         """Take on jobs, by name."""
-        keys = [f"palpate-{job['key'][:16]}-{next(self._number)}" for _, job in jobs]
+        # equal jobs of two runs are two: they may write to different places
+        keys = [f"palpate-{self._run}-{next(self._number)}" for _ in jobs]
         given = [job for _, job in jobs]
         # what finishes a recording goes before what begins one
-        futures = self._client.map(do, given, key=keys, pure=False, priority=-given[0]["order"])
+        priority = -given[0]["order"]
+        try:
+            futures = self._client.map(do, given, run=self._run, key=keys, pure=False, priority=priority)
+        except Exception:
+            if self._client.status != "closed":
+                raise
+            self._unsent += [name for name, _ in jobs]  # the scheduler went away: collect waits for it
+            return
         for (name, _), key, future in zip(jobs, keys, futures, strict=True):
             self._given[key] = name, future
             future.add_done_callback(lambda f: self._ended.put(f.key))
@@ -108,8 +134,9 @@ class DaskExecutor:
             while True:
                 keys.append(self._ended.get_nowait())
         if self._client.status == "closed":
-            lost = [name for name, _ in self._given.values()]
+            lost = [*self._unsent, *(name for name, _ in self._given.values())]
             self._given.clear()
+            self._unsent.clear()
             self._client = self._connected(self.patience_s)
             return [(name, {"state": "lost"}) for name in lost]
         ended = {key: self._given.pop(key) for key in keys if key in self._given}

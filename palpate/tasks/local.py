@@ -32,7 +32,7 @@ class LocalExecutor:
 
     def __exit__(self, *_: object) -> None:
         for child in self._children:
-            child.kill()
+            child.close()
         for _child in self._children:
             self._jobs.put(None)
 

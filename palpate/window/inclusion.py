@@ -16,6 +16,7 @@ import scipy.sparse as sp
 
 from mechanics import inclusion
 from mechanics.effects.hold import base_hold
+from mechanics.files import memory_folder, temporary_prefix
 from mechanics.model import Model
 from mechanics.moduli import balls_ratio
 from mechanics.near_field import contact_width
@@ -111,10 +112,7 @@ class InclusionMover:
         self._model = model
         self._moving: MovingInclusion | None = None
         self._change: FieldChange | None = None
-        shared = Path("/dev/shm")  # where files cost no disk
-        self._folder = Path(
-            tempfile.mkdtemp(prefix="palpate-touch-", dir=shared if shared.is_dir() else None)
-        )
+        self._folder = Path(tempfile.mkdtemp(prefix=temporary_prefix("touch-"), dir=memory_folder()))
         self._count = 0
 
     @property

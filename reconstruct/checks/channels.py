@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.ndimage import label, median_filter
+from scipy.ndimage import label, maximum, median_filter
 
 from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
@@ -17,9 +17,10 @@ from reconstruct.checks.sight import CHANNELS, Sight
 
 _WINDOW_S, _LEAST_WINDOW = 0.25, 10
 _STUCK_S = 1.5
-_MOVED = 10.0
+_MOVED, _FELT = 10.0, 30.0
 _COARSE = 0.05
-_SPIKE_S, _SPIKES, _AROUND_S = 0.02, 8.0, 0.04
+_SPIKE_S, _SPIKES, _AROUND_S = 0.006, 8.0, 0.04
+_STEEP = 0.6
 _SIGNAL = 5.0
 _GAP = 5.0
 
@@ -47,7 +48,9 @@ def _dead(sight: Sight) -> Iterator[Finding]:
         signal = np.sqrt(np.mean(sight.net[touching] ** 2, axis=0)) / noise
         expected = np.sqrt(np.mean((sight.touches.travel**2), axis=0)) if len(sight.touches) else np.zeros(3)
         expected = expected / max(float(np.linalg.norm(expected)), 1e-12) * np.linalg.norm(signal)
-        dead += [3 + k for k in range(3) if signal[k] < 1.5 and expected[k] > 2 * _SIGNAL and 3 + k not in dead]
+        dead += [
+            3 + k for k in range(3) if signal[k] < 1.5 and expected[k] > 2 * _SIGNAL and 3 + k not in dead
+        ]
     if not dead:
         return
     names = tuple(CHANNELS[k] for k in dead)
@@ -88,7 +91,7 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         still = (spread[:, k] < 0.5 * least[k]) & ~limit[:, k]
         if k < 3:
             others = move[:, [j for j in range(3) if j != k]].max(axis=1) > _MOVED * resolution
-            active = others | (felt > _MOVED * sight.spread_n)
+            active = others | (felt > _FELT * sight.spread_n)
         else:  # noise alone keeps a force channel moving
             active = np.ones(count, dtype=bool)
         row = active & still
@@ -153,7 +156,15 @@ def _limited(sight: Sight) -> Iterator[Finding]:
         if not step and same > 3:
             decades = max(decades, 2.0 * same)
         if sure(decades) and (worst is None or decades > worst[0]):
-            worst = (decades, words, int(at[: len(sight.spans)].sum()), len(sight.spans), top, int(np.argmax(tops)), names)
+            worst = (
+                decades,
+                words,
+                int(at[: len(sight.spans)].sum()),
+                len(sight.spans),
+                top,
+                int(np.argmax(tops)),
+                names,
+            )
     if worst is None:
         return
     decades, words, count, among, top, touch, names = worst
@@ -173,11 +184,10 @@ def _limited(sight: Sight) -> Iterator[Finding]:
 
 def _coarse(sight: Sight) -> Iterator[Finding]:
     """Steps of a channel against what a press makes of it; a channel whose noise hides its steps has none."""
-    touches = sight.touches
-    if not len(touches):
+    depths, peaks = (np.linalg.norm(v, axis=1) for v in (sight.touches.travel, sight.touches.push))
+    if not (moved := depths > sight.step[:3].max()).any():
         return
-    depth = float(np.median(np.linalg.norm(touches.travel, axis=1)))
-    peak = float(np.median(np.linalg.norm(touches.push, axis=1)))
+    depth, peak = float(np.median(depths[moved])), float(np.median(peaks[moved]))
     # a moving tip passes its steps and averages them; a force's first rise hides within one
     off = np.concatenate([sight.step[:3] / np.sqrt(12) / max(depth, 1e-9), sight.step[3:] / max(peak, 1e-9)])
     coarse = [k for k in range(6) if off[k] > _COARSE]
@@ -199,7 +209,7 @@ def _coarse(sight: Sight) -> Iterator[Finding]:
 
 
 def _spiky(sight: Sight) -> Iterator[Finding]:
-    """Readings that leave the running median by far and are back within 20 ms: noise hardly does, no touch is
+    """Readings that leave the running median by far and are back within 6 ms: noise hardly does, no touch is
     so short."""
     if sight.rate_hz < 200:
         return
@@ -216,7 +226,11 @@ def _spiky(sight: Sight) -> Iterator[Finding]:
             continue
         length = np.bincount(away)[1:]
         first = np.concatenate([[0], np.flatnonzero(np.diff(away) > 0) + 1])[-count:]
-        short = (length < _SPIKE_S * sight.rate_hz) & (first > 2)
+        last = np.minimum(first + length, len(values) - 1)
+        top = maximum(np.abs(off), away, np.arange(1, count + 1))
+        # a spike steps up and down; what swings, as a hand with a heavy tool does, only turns
+        steep = np.minimum(np.abs(values[first] - values[first - 1]), np.abs(values[last] - values[last - 1]))
+        short = (length <= max(1, _SPIKE_S * sight.rate_hz)) & (first > 2) & (steep > _STEEP * top)
         found += [(k, int(i), float(abs(off[i])) / scale) for i in first[short]]
     if len(found) < 3:
         return

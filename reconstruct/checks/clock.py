@@ -11,7 +11,7 @@ from reconstruct.checks.base import Finding
 from reconstruct.checks.sight import Sight
 
 _TOLD = 0.02
-_GAP, _GAP_S = 5.0, 0.05
+_GAP, _GAP_S, _PAUSE_S = 5.0, 0.05, 1.0
 _SPAN_S = 0.1
 _PHASE_RAD = 0.25
 _RISE_SAMPLES = (8, 20)
@@ -55,18 +55,22 @@ def _gaps(sight: Sight) -> Iterator[Finding]:
     if not len(wide):
         return
     longest = int(wide[np.argmax(dt[wide])])
-    lost = float((dt[wide] - typical).sum())
-    # what was sampled is the recording: a gap matters by the touches that it cuts, and beyond its own length
-    span = float(typical * len(dt))
-    cut = sum(any(a - 2 <= i <= b + 1 for a, b in sight.spans) for i in wide)
-    share = max(lost / (span + lost) if lost > 1.0 else 0.0, cut / max(len(sight.spans), 1))
+    missing = dt[wide] - typical
+    lost, span = float(missing.sum()), float(typical * len(dt))
+    inside = np.array([any(a - 2 <= i <= b + 1 for a, b in sight.spans) for i in wide])
+    touched = sum(b - a for a, b in sight.spans) * typical
+    # a gap matters by the touches that it cuts, and by its length where it is no pause of a moment
+    share = max(
+        lost / (span + lost) if lost > _PAUSE_S else 0.0, float(missing[inside].sum()) / max(touched, typical)
+    )
     if share < 0.05:
         return
     at = sight.recording.t[longest], sight.recording.t[longest + 1]
+    many = "a gap" if len(wide) == 1 else f"{len(wide)} gaps"
     yield Finding(
         "gap",
-        f"{len(wide)} gaps in time, {lost:.3g} s without samples of {span + lost:.3g} s, the longest "
-        f"{dt[longest]:.3g} s after {sight.t[longest]:.2f} s; {cut} within one of {len(sight.spans)} touches",
+        f"{many} in time, {lost:.3g} s without samples of {span + lost:.3g} s, the longest "
+        f"{dt[longest]:.3g} s after {sight.t[longest]:.2f} s; {inside.sum()} within touches",
         f"{dt[longest] / typical:.3g} times the usual interval",
         "record anew, or cut the recording at the gap",
         float(share),

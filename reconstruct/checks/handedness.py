@@ -76,7 +76,9 @@ def _maps() -> dict[str, np.ndarray]:
         for sign in product((1, -1), repeat=3):
             matrix = np.zeros((3, 3))
             matrix[range(3), order] = sign
-            found[" ".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, sign, strict=True))] = matrix
+            found[" ".join(f"{'-' if s < 0 else ''}{'xyz'[k]}" for k, s in zip(order, sign, strict=True))] = (
+                matrix
+            )
     del found["x y z"]
     return found
 

@@ -3,25 +3,39 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.presses import Presses
 from reconstruct.checks.base import Finding
+from reconstruct.modulus import ModulusFit
 
 LEAST_PA, MOST_PA = 500.0, 5e6
 _MISFIT = 0.5
 
 
-class Result(Protocol):
-    """What is looked at of a reconstruction: modulus and interval Pa; misfit and force rms N of each press
-    (k,), t of their first touches (k,) s; NaN where unknown."""
+@dataclass(frozen=True)
+class Result:
+    """What is looked at of a reconstruction: modulus and its 95 % interval, Pa; of each press (k,) the misfit
+    rms (NaN where unknown) and the force rms, N, and first touch, s."""
 
     modulus_pa: float
     ci95_pa: tuple[float, float]
     misfit_n: np.ndarray
     force_n: np.ndarray
     onset_s: np.ndarray
+
+
+def result_of(
+    presses: Presses, modulus_pa: float, ci95_pa: tuple[float, float], fit: ModulusFit | None
+) -> Result:
+    """Of fitted presses; the paper's method (no fit) states no misfit."""
+    net, touched = presses.net, presses.press[presses.counted]
+    squared = np.bincount(touched, (net.force[presses.counted] ** 2).sum(axis=1), len(presses))
+    force = np.sqrt(squared / np.maximum(np.bincount(touched, minlength=len(presses)), 1))
+    misfit = np.full(len(presses), np.nan) if fit is None else fit.press.rms_n
+    return Result(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
 
 
 def outcome(result: Result) -> Iterator[Finding]:

@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator
 
 import numpy as np
 
-from mechanics.errors import ContactError, RecordingError
+from mechanics.errors import ContactError, NoBaseError, RecordingError
 from mechanics.recording import Recording
 from reconstruct.checks.air import air, delay
 from reconstruct.checks.base import Finding
@@ -19,17 +19,20 @@ from reconstruct.checks.handedness import handedness
 from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
-from reconstruct.checks.units import settled
+from reconstruct.checks.units import QUANTITIES, measured, settled
 from reconstruct.contacts import Exploration, explore
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
 OF_RESULTS: tuple[Callable[[Result], Iterator[Finding]], ...] = (outcome,)
+REFUSALS = ("no base", "no presses")
+"""Findings that say where reconstruction itself stops, fault or not."""
+_LEAST_SAMPLES = 100
 
 
 def checked_samples(recording: Recording) -> tuple[Finding, ...]:
     """What the samples alone show."""
-    if len(recording.t) < 100:
+    if len(recording.t) < _LEAST_SAMPLES:
         return (_too_short(recording),)
     sight, found = settled(recording)
     return ordered([*found, *(f for check in OF_SAMPLES for f in check(sight))])
@@ -52,33 +55,72 @@ def check(recording: Recording) -> tuple[Finding, ...]:
         return found
     try:
         exploration = explore(recording)
+    except NoBaseError as error:
+        if recording.base_model is not None:
+            return found
+        return ordered([*found, _refused(recording, "no base", error)])
     except ContactError as error:
-        return ordered([*found, _no_presses(recording, error)])
+        return ordered([*found, _refused(recording, "no presses", error)])
     return ordered([*found, *checked_presses(exploration)])
 
 
-def refuse(found: Iterable[Finding], force: bool) -> None:
-    """Raises RecordingError that names the first grave finding, unless `force`."""
-    grave = [f for f in found if f.grave]
-    if grave and not force:
-        first = grave[0]
-        more = f" (and {len(grave) - 1} more: palpate check REC)" if len(grave) > 1 else ""
-        raise RecordingError(f"{first.name}: {first.saw}; {first.todo}{more}; --force goes on despite it")
+def seen(recording: Recording) -> tuple[tuple[str, float, float], ...]:
+    """What the checks measure on the way: words with the unit, value, and what is usual (NaN: anything)."""
+    if len(recording.t) < _LEAST_SAMPLES:
+        return ()
+    sight, _ = settled(recording)
+    rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
+    late, error = sight.lag_s
+    free = np.linalg.norm(sight.air, axis=1)
+    return (
+        *rows,
+        ("rate by the times of the samples [Hz]", sight.rate_hz, np.nan),
+        ("touches after the trace", float(len(sight.spans)), np.nan),
+        ("the force reads late [s]", late if np.isfinite(error) else np.nan, 0.0),
+        ("force in free air, mean [N]", float(free.mean()), np.nan),
+        ("force in free air, change over the recording [N]", float(np.ptp(sight.air, axis=0).max()), np.nan),
+        ("steps of the force [N]", float(sight.step[3:].max()), 0.0),
+    )
 
 
-def widened(
-    modulus_pa: float, ci95_pa: tuple[float, float], found: Iterable[Finding]
-) -> tuple[float, float]:
+class Checkup:
+    """The check-up beside a reconstruction: each stage refuses what is grave, unless `force`.
+
+    found: what the stages so far have found. Every stage raises RecordingError.
+    """
+
+    def __init__(self, recording: Recording, force: bool = False) -> None:
+        self._force = force
+        self.found = self._judged(checked_samples(recording))
+
+    def presses(self, exploration: Exploration) -> None:
+        """Before a surface is made."""
+        self.found = ordered([*self.found, *self._judged(checked_presses(exploration))])
+
+    def interval(self, result: Result) -> tuple[float, float]:
+        """Before the modulus is believed: its 95 % interval, Pa, as wide as the findings make it."""
+        self.found = ordered([*self.found, *self._judged(checked_results(result))])
+        return widened(result.modulus_pa, result.ci95_pa, self.found)
+
+    def _judged(self, found: tuple[Finding, ...]) -> tuple[Finding, ...]:
+        grave = [f for f in found if f.grave]
+        if grave and not self._force:
+            first, more = grave[0], f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
+            raise RecordingError(
+                f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows where, "
+                "`palpate reconstruct --force` goes on despite it"
+            )
+        return found
+
+
+def widened(modulus_pa: float, ci95_pa: tuple[float, float], found: Iterable[Finding]) -> tuple[float, float]:
     """The 95 % interval, Pa, with what the findings add to the error of ln modulus; grave ones add none, as
     their error is not known."""
     added = 1.96 * float(np.sqrt(sum(f.error**2 for f in found if not f.grave)))
     if not added or not min(modulus_pa, *ci95_pa) > 0:
         return ci95_pa
-    low, high = (float(np.log(end / modulus_pa)) for end in ci95_pa)
-    return (
-        modulus_pa * float(np.exp(-np.hypot(low, added))),
-        modulus_pa * float(np.exp(np.hypot(high, added))),
-    )
+    low, high = (float(np.hypot(np.log(end / modulus_pa), added)) for end in ci95_pa)
+    return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
 
 
 def ordered(found: Iterable[Finding]) -> tuple[Finding, ...]:
@@ -98,9 +140,9 @@ def _too_short(recording: Recording) -> Finding:
     )
 
 
-def _no_presses(recording: Recording, error: ContactError) -> Finding:
+def _refused(recording: Recording, name: str, error: ContactError) -> Finding:
     return Finding(
-        "no presses",
+        name,
         str(error),
         "reconstruction stops there",
         "see docs/recording-format.md for what a recording holds",

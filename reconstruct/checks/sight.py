@@ -22,12 +22,13 @@ from reconstruct.tool_weight import tool_weight
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples
-_LOW, _HIGH, _PEAK = 5.0, 10.0, 20.0
+_LOW, _HIGH, _PEAK, _FEEBLE = 5.0, 10.0, 20.0, 0.15
 _LEAST_S = 0.05
 _SLIDE = 8.0
 _TIPS_M = (1e-3, 0.02)
 _GAP_S = 1.0
 _BLOCK = 32
+_STILL_S, _SLOW = 0.5, 5.0
 _SHIFTS_S = np.arange(-0.5, 0.5001, 0.004)
 
 
@@ -118,14 +119,20 @@ class Sight:
     @cached_property
     def _air(self) -> tuple[np.ndarray, float]:
         filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
-        weight = tool_weight(self.recording, filtered, self.cutoff_hz, self.spread_n)
+        weight, _ = tool_weight(self.recording, filtered, self.cutoff_hz)
         air, share = free_air_force(self.t, filtered - weight, self.spread_n)
         return weight + air, share
 
     @cached_property
     def spread_n(self) -> float:
-        """N an axis, noise of the filtered force."""
-        return self.noise_n * noise_gain(self.rate_hz, self.cutoff_hz)
+        """N an axis, noise of the filtered force, white or slow: that of the stillest fifth of half seconds."""
+        size = max(4, round(_STILL_S * self.rate_hz))
+        filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
+        still = filtered[: len(filtered) // size * size].reshape(-1, size, 3).std(axis=1)
+        white = self.noise_n * noise_gain(self.rate_hz, self.cutoff_hz)
+        if not len(still):
+            return white
+        return max(white, min(float(np.percentile(still.mean(axis=1), 20)), _SLOW * white))
 
     @cached_property
     def net(self) -> np.ndarray:
@@ -161,7 +168,12 @@ class Sight:
         found = [(a, b) for a, b in runs(contact) if b - a >= least and a > 0 and b < len(self.t)]
         reach = _SLIDE * float(np.clip(self.tip_radius_m, *_TIPS_M))
         found = [(a, b) for a, b in found if np.ptp(self.path[a:b], axis=0).max() < reach]
-        return [(a, b) for a, b in found if self.size[a:b].max() > _PEAK * self.spread_n]
+        peaks = np.array([self.size[a:b].max() for a, b in found])
+        if not len(peaks):
+            return []
+        # a brisk hand with a heavy tool makes many feeble contacts in the air
+        least = max(_PEAK * self.spread_n, _FEEBLE * float(np.percentile(peaks, 90)))
+        return [span for span, peak in zip(found, peaks, strict=True) if peak > least]
 
     @cached_property
     def touches(self) -> Touches:
@@ -215,5 +227,9 @@ def _lattice(values: np.ndarray) -> float:
     if len(steps) < 20:
         return 0.0
     step = float(np.percentile(steps, 2))
-    off = np.abs(steps / step - np.round(steps / step))
+    for reach in (4, 40, 400):  # rounding in the file makes the least increments a coarse scale
+        few = steps[steps < (reach + 0.5) * step]
+        step = float(few.sum() / np.round(few / step).sum())
+    multiple = steps / step
+    off = np.abs(multiple - np.round(multiple))[multiple < 1000]
     return step if np.mean(off < _LATTICE) > 0.98 else 0.0

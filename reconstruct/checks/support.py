@@ -14,6 +14,8 @@ _BELOW = 6.0
 _SCALE = 1.35
 _LEAST = 4
 _CERTAIN = 4.0
+_PRESS_S, _FEEBLE = 0.5, 0.2
+"""A contact that stays below this share of the usual press's force in its first half second was none."""
 _STEEP = 0.85
 """A wall's normal rises from the horizontal by less than this cosine."""
 
@@ -124,6 +126,13 @@ def dropped(exploration: Exploration) -> Iterator[Finding]:
     used, lost = len(exploration.presses), exploration.rejected
     # what is over in an instant was never meant as a press
     lost = tuple((t, why) for t, why in lost if not why.startswith("lasts only"))
+    t, size = exploration.recording.t, np.linalg.norm(exploration.force, axis=1)
+
+    def peak(start: float) -> float:
+        return float(size[slice(*np.searchsorted(t, [start, start + _PRESS_S]))].max(initial=0.0))
+
+    least = _FEEBLE * float(np.median([peak(at) for at in exploration.presses.onset_s]))
+    lost = tuple((at, why) for at, why in lost if peak(at) > least)
     if len(lost) < 3 or len(lost) < 0.25 * (used + len(lost)):
         return
     why = [_kind(reason) for _, reason in lost]

@@ -84,7 +84,9 @@ def settled(recording: Recording) -> tuple[Sight, tuple[Finding, ...]]:
         sight = Sight(recording, Units(time=READINGS["time"][known["time"]]))
     seen = measured(sight)
     known, odds = _best(seen)
-    wrong = [kind for kind in ("position", "force", "tip") if known[kind] not in _PLAIN and odds[kind] > SURE_ODDS]
+    wrong = [
+        kind for kind in ("position", "force", "tip") if known[kind] not in _PLAIN and odds[kind] > SURE_ODDS
+    ]
     if wrong:
         found += [_finding(sight, kind, known[kind], odds[kind], seen) for kind in wrong]
         factors = {kind: READINGS[kind][known[kind]] for kind in wrong}

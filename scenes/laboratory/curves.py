@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import hashlib
 import os
+import signal
 import sys
 import zipfile
+import zlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
@@ -17,7 +19,7 @@ from typing import TypedDict
 
 import numpy as np
 
-from mechanics.files import atomic_file
+from mechanics.files import atomic_file, check_room
 from mechanics.progress import Progress, silent
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import coarse_mesh, laboratory_cache
@@ -27,6 +29,9 @@ from scenes.phantoms import Phantom
 
 LOADING = np.array([0.0, 0.03, 0.08, 0.16, 0.26, 0.38, 0.51, 0.64, 0.78, 0.9, 1.0])
 """States that are kept of a straight press, as shares of its greatest depth."""
+
+ROOM_BYTES = 1 << 24
+"""That solved touches and a mesh may need in the cache."""
 
 LINEAR_STEP_MM = 0.2
 """Longest load step on the condensed object, where a step costs milliseconds."""
@@ -154,10 +159,10 @@ def _work(
 
 def _load(path: Path) -> Curve | None:
     try:
-        with np.load(path) as stored:
+        with np.load(path, allow_pickle=False) as stored:
             times = stored["times"] if "times" in stored else None
             return Curve(stored["travel"], stored["force"], stored["stiffness"], stored["energy"], times)
-    except (OSError, ValueError, KeyError, zipfile.BadZipFile):
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
         return None
 
 
@@ -182,6 +187,7 @@ def curves(
     paths = [cache / "curves" / shape / f"{job.key(shape, specimen, fineness)}.npz" for job in jobs]
     missing = [k for k, path in enumerate(paths) if _load(path) is None]
     if missing:
+        check_room(cache, ROOM_BYTES)
         coarse_mesh(phantom, cache)
         failures = []
         places: dict[bytes, list[int]] = {}
@@ -223,12 +229,25 @@ def workers_of_ours(count: int) -> Iterator[ProcessPoolExecutor]:
     would begin anew in each of them. Our workers need nothing of it: while they start, it is hidden.
     """
     main = sys.modules["__main__"]
-    with _one_thread_each(), ProcessPoolExecutor(count, get_context("spawn")) as pool:
+    context = get_context("spawn")
+    with _one_thread_each(), ProcessPoolExecutor(count, context, initializer=_follow_parent) as pool:
         sys.modules["__main__"] = ModuleType("__main__")
         try:
             yield pool
+        except BaseException:
+            # what is left to do is for nothing: do not wait for it
+            working = list((pool._processes or {}).values())
+            pool.shutdown(wait=False, cancel_futures=True)
+            for process in working:
+                process.terminate()
+            raise
         finally:
             sys.modules["__main__"] = main
+
+
+def _follow_parent() -> None:
+    """In a worker: Ctrl-C is the parent's business, which then ends this process."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
 
 
 @contextmanager

@@ -7,13 +7,13 @@ import numpy as np
 from scenes.laboratory.surface import Surface
 
 Field = tuple[tuple[tuple[float, ...], ...], tuple[tuple[float, float], ...], float]
-"""waves: (amplitude of ln E, wave vector x, y, z in rad/mm, phase). layers: (thickness mm, ln of the modulus) from
-the touchable surface inwards, the last one the rest's thickness. width: mm, over which layers pass into one
+"""waves: (amplitude of ln E, wave vector x, y, z in rad/mm, phase). layers: (thickness mm, ln of the modulus)
+from the touchable surface inwards, the last one to the bottom. width: mm, over which layers pass into one
 another."""
 
 
 def log_ratio(field: Field, points: np.ndarray, depth: np.ndarray) -> np.ndarray:
-    """(k,) ln of the modulus over the matrix's at points (k, 3) mm that lie `depth` (k,) mm under the surface."""
+    """(k,) ln of the modulus over the matrix's at points (k, 3) mm, `depth` (k,) mm under the surface."""
     waves, layers, width = field
     total = np.zeros(len(points))
     for amplitude, x, y, z, phase in waves:
@@ -28,7 +28,7 @@ def log_ratio(field: Field, points: np.ndarray, depth: np.ndarray) -> np.ndarray
 
 
 def ratio_at(field: Field, at: np.ndarray, vertices: np.ndarray, faces: np.ndarray) -> np.ndarray:
-    """(m, 4) modulus over the matrix's at Gauss points (m, 4, 3) mm of an object (vertices mm, base at z = 0)."""
+    """(m, 4) modulus over the matrix's at Gauss points (m, 4, 3) mm of an object that stands on z = 0."""
     points = at.reshape(-1, 3)
     depth = np.zeros(len(points))
     if field[1]:

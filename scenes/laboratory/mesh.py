@@ -6,14 +6,15 @@ from __future__ import annotations
 
 import contextlib
 import hashlib
-import tempfile
+import zipfile
+import zlib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from mechanics.errors import MeshError
-from mechanics.files import atomic_file, cache_folder
+from mechanics.files import atomic_file, cache_folder, temporary_folder
 from scenes.laboratory.refine import boundary_faces, refine
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
@@ -44,9 +45,8 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
     """
     folder = (cache or laboratory_cache()) / "meshes"
     path = folder / f"{surface_key(phantom)}-{COARSE_MM:g}.npz"
-    if path.is_file():
-        with np.load(path) as stored:
-            return stored["points"], stored["tetrahedra"]
+    if (kept := _kept(path)) is not None:
+        return kept
     import pytetwild
     import pyvista
 
@@ -57,7 +57,7 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
     if wanted < len(phantom.faces):
         shell = shell.decimate(1 - wanted / len(phantom.faces))
     # the mesher leaves a file of its own in the working directory
-    with tempfile.TemporaryDirectory() as scratch, contextlib.chdir(scratch):
+    with temporary_folder("mesh-") as scratch, contextlib.chdir(scratch):
         points, tetrahedra = pytetwild.tetrahedralize(
             np.asarray(shell.points, dtype=float),
             shell.faces.reshape(-1, 4)[:, 1:].astype(np.int32),
@@ -71,6 +71,19 @@ def coarse_mesh(phantom: Phantom, cache: Path | None = None) -> tuple[np.ndarray
     with atomic_file(path) as temporary:
         np.savez(temporary, points=points, tetrahedra=tetrahedra)
     return points, tetrahedra
+
+
+def _kept(path: Path) -> tuple[np.ndarray, np.ndarray] | None:
+    """A mesh of the cache; None where it is absent or damaged, and made anew."""
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            points, tetrahedra = stored["points"], stored["tetrahedra"]
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile, zlib.error):
+        return None
+    whole = points.ndim == tetrahedra.ndim == 2 and points.shape[1] == 3 and tetrahedra.shape[1] == 4
+    inside = whole and len(tetrahedra) > 0 and 0 <= tetrahedra.min() and tetrahedra.max() < len(points)
+    sound = inside and np.isfinite(points).all() and (_volumes(points, tetrahedra) > 0).all()
+    return (points, tetrahedra) if sound else None
 
 
 def _volumes(points: np.ndarray, tetrahedra: np.ndarray) -> np.ndarray:

@@ -10,7 +10,7 @@ from __future__ import annotations
 import hashlib
 import json
 import secrets
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -31,17 +31,22 @@ def digest(truth: Mapping[str, Any], salt: str) -> str:
 
 
 def write_sealed(
-    path: Path | str, recording: Recording, truth: Mapping[str, Any], truth_path: Path | str
+    path: Path | str,
+    recording: Recording,
+    truth: Mapping[str, Any],
+    truth_path: Path | str,
+    write: Callable[[Path, Recording], Path] = write_recording,
 ) -> Path:
     """Write the recording without truth, `NAME.sealed` beside it, and truth with salt to `truth_path`
     (JSON).
 
-    Raises RecordingError where the truth would lie beside the recording under its name.
+    write: writes a recording as `NAME.csv.gz` and `NAME.toml`. Raises RecordingError where the truth would
+    lie beside the recording under its name.
     """
     path, truth_path = Path(path), Path(truth_path)
     salt = secrets.token_hex(32)
     plain = json.loads(canonical(truth))
-    samples = write_recording(path, replace(recording, truth=None, object_name="object"))
+    samples = write(path, replace(recording, truth=None, object_name="object"))
     stem = samples.name.removesuffix(".gz").removesuffix(".csv")
     seal = samples.with_name(f"{stem}.sealed")
     if truth_path.resolve() == seal.resolve():

@@ -42,18 +42,21 @@ class Material:
 
 
 class History:
-    """What the material remembers from the last converged state, per Gauss point (m, 4)."""
+    """What the material remembers from the last converged state, per Gauss point (m, 4), and the elements'
+    pressures (m,).
+    """
 
     def __init__(self, cells: int, branches: int) -> None:
         self.stress = np.zeros((cells, 4, 6))
         self.overstress = np.zeros((cells, 4, branches, 6))
         self.plastic = np.zeros((cells, 4, 6))
         self.greatest = np.zeros((cells, 4))
+        self.pressure = np.zeros(cells)
 
     def copy(self) -> History:
         """An independent copy."""
         twin = History(0, 0)
-        for name in ("stress", "overstress", "plastic", "greatest"):
+        for name in ("stress", "overstress", "plastic", "greatest", "pressure"):
             setattr(twin, name, getattr(self, name).copy())
         return twin
 
@@ -82,12 +85,18 @@ class Solid:
         return History(len(self.mesh.cells), len(self.material.prony))
 
     def evaluate(
-        self, displacement: np.ndarray, history: History, step_s: float, tangent: bool
+        self,
+        displacement: np.ndarray,
+        history: History,
+        step_s: float,
+        tangent: bool,
+        pressure: np.ndarray | None = None,
     ) -> tuple[np.ndarray, np.ndarray, float, History]:
         """(element forces (m, 30), element stiffness (m, 30, 30) or empty, elastic energy, new history).
 
         displacement: (n, 3) mm. step_s: time since `history`, s (0 or less: infinitely slow, branches
-        relaxed).
+        relaxed). pressure: (m,) what the stiffness is to believe of each element's pressure instead of what
+        its volume says; the forces do not.
         """
         material, cells = self.material, self.mesh.cells
         new = History(len(cells), len(material.prony))
@@ -97,8 +106,8 @@ class Solid:
             cells, displacement, self.gradients, self.weights, material.shear, material.bulk,
             float(material.stiffening), material.fibre, material.prony, material.plastic, material.mullins,
             history.stress, history.overstress, history.plastic, history.greatest,
-            new.stress, new.overstress, new.plastic, new.greatest,
-            float(step_s), tangent, forces, stiffness,
+            new.stress, new.overstress, new.plastic, new.greatest, new.pressure,
+            float(step_s), tangent, np.empty(0) if pressure is None else pressure, forces, stiffness,
         )  # fmt: skip
         return forces, stiffness, energy, new
 
@@ -107,8 +116,8 @@ class Solid:
 def _evaluate(
     cells, u, gradients, weights, shear, bulk, c20, fibre, prony, plastic, mullins,
     old_stress, old_over, old_plastic, old_greatest,
-    new_stress, new_over, new_plastic, new_greatest,
-    step, tangent, forces, stiffness,
+    new_stress, new_over, new_plastic, new_greatest, new_pressure,
+    step, tangent, believed, forces, stiffness,
 ):  # fmt: skip
     total = 0.0
     branches = len(prony)
@@ -228,6 +237,7 @@ def _evaluate(
                     trial[p] += new_plastic[e, g, p]
             for p in range(6):
                 stress[p] += trial[p] + pressure * j * inverse[p]
+            new_pressure[e] = pressure
             for r in range(30):
                 value, slope_volume = 0.0, 0.0
                 for p in range(6):
@@ -236,9 +246,13 @@ def _evaluate(
                 forces[e, r] += w * value
                 q[r] += w * j * slope_volume
             if tangent:
+                if len(believed):
+                    for p in range(6):
+                        stress[p] += (believed[e] - pressure) * j * inverse[p]
+                bulky = believed[e] if len(believed) else pressure
                 for p in range(6):
                     for s in range(6):
-                        moduli[p, s] = factor * moduli[p, s] + pressure * j * (
+                        moduli[p, s] = factor * moduli[p, s] + bulky * j * (
                             inverse[p] * inverse[s] - 2 * circled(inverse, p, s)
                         )
                 big[:] = b_store[g]

@@ -1,5 +1,8 @@
-"""The quasi-static path of a tip through a solid: Newton's method on one factorisation pattern. Units: mm, E
-mm^2.
+"""The quasi-static path of a tip through a solid at finite strain. Units: mm, E mm^2.
+
+One tangent of the solid serves many iterations (modified Newton). It is condensed onto the nodes that tip and
+floor may press, where the contact is solved exactly for the linearised solid, so that only the solid's own
+nonlinearity, which is smooth, is left to iterate.
 """
 
 from __future__ import annotations
@@ -7,16 +10,39 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import scipy.sparse as sp
 
 from mechanics.errors import PalpateError
+from scenes.laboratory.assembly import Assembly
 from scenes.laboratory.contact import Grip, SphereContact
-from scenes.laboratory.factor import Factor
+from scenes.laboratory.factor import Condensation
 from scenes.laboratory.solid import History, Solid
+from scenes.laboratory.touching import Touching
+
+MOST_ITERATIONS = 40
+SLOW = 0.7
+"""A tangent is taken anew where an iteration leaves more than this share of the residual."""
 
 
 class LabError(PalpateError):
     """A load step of the virtual laboratory found no equilibrium."""
+
+
+class Mixing:
+    """Anderson's acceleration (1965) of a fixed-point iteration: the step that its last steps foretell."""
+
+    def __init__(self, most: int = 4) -> None:
+        self._most = most
+        self._x: list[np.ndarray] = []
+        self._g: list[np.ndarray] = []
+
+    def __call__(self, x: np.ndarray, g: np.ndarray) -> np.ndarray:
+        """The step to take from x where the iteration alone would step by g."""
+        self._x, self._g = [*self._x[-self._most :], x], [*self._g[-self._most :], g]
+        if len(self._x) == 1:
+            return g
+        dx, dg = np.diff(self._x, axis=0).T, np.diff(self._g, axis=0).T
+        share = np.linalg.lstsq(dg, g, rcond=1e-8)[0]
+        return g - (dx + dg) @ share
 
 
 @dataclass(frozen=True)
@@ -29,8 +55,6 @@ class State:
     energy: float
     history: History
     grip: Grip
-    stiffness: np.ndarray | None = None
-    iterations: int = 0
 
 
 @dataclass
@@ -38,8 +62,7 @@ class Problem:
     """A solid on its support and a sphere; built once for a site, then driven along paths.
 
     free: (3 n,) bool, degrees of freedom that may move. springs: (3 n,) support stiffness on the diagonal;
-    floor: (3 n,) the same, but resisting negative displacement only. linear: small strains instead of
-    finite ones.
+    floor: (3 n,) the same, but resisting negative displacement only.
     """
 
     solid: Solid
@@ -47,102 +70,28 @@ class Problem:
     free: np.ndarray
     springs: np.ndarray | None = None
     floor: np.ndarray | None = None
-    linear: bool = False
     tolerance: float = 1e-4
 
     def __post_init__(self) -> None:
-        mesh = self.solid.mesh
-        self._number = np.full(self.free.size, -1)
-        self._number[self.free] = np.arange(self.free.sum())
-        self._cell_dofs = (3 * mesh.cells[:, :, None] + np.arange(3)).reshape(len(mesh.cells), 30)
-        self._face_dofs = (3 * self.contact.faces[:, :, None] + np.arange(3)).reshape(-1, 18)
-        self._pattern()
-        self._factor = Factor()
-        self._factored: State | None = None
-        if self.linear:
-            rest = np.zeros_like(mesh.points)
-            self._constant = self.solid.evaluate(rest, self.solid.new_history(), 0.0, True)[1]
-
-    def _pattern(self) -> None:
-        """Where every element entry goes in the upper triangle of the free stiffness, found once."""
-        n = int(self.free.sum())
-        keys, places = [], []
-        for dofs in (self._cell_dofs, self._face_dofs):
-            number = self._number[dofs]
-            row = np.repeat(number, number.shape[1], axis=1)
-            column = np.tile(number, (1, number.shape[1]))
-            use = (row >= 0) & (column >= row)
-            keys.append((row * np.int64(n) + column)[use])
-            places.append(use)
-        diagonal = np.arange(n) * np.int64(n + 1)
-        unique, inverse = np.unique(np.concatenate([*keys, diagonal]), return_inverse=True)
-        cut = np.cumsum([len(keys[0]), len(keys[1])])
-        self._into = inverse[: cut[0]], inverse[cut[0] : cut[1]], inverse[cut[1] :]
-        self._use = places
-        indptr = np.searchsorted(unique // n, np.arange(n + 1))
-        self._indices, self._indptr = (unique % n).astype(np.int32), indptr.astype(np.int32)
-        self._entries, self._size = len(unique), n
-
-    def _evaluate(
-        self, u: np.ndarray, history: History, step_s: float, tangent: bool = True
-    ) -> tuple[np.ndarray, np.ndarray, float, History]:
-        if not self.linear:
-            return self.solid.evaluate(u, history, step_s, tangent)
-        local = u.ravel()[self._cell_dofs]
-        forces = np.einsum("eij,ej->ei", self._constant, local)
-        return forces, self._constant, 0.5 * float((forces * local).sum()), history
-
-    def _assemble(self, cell_k: np.ndarray, face_k: np.ndarray, u: np.ndarray) -> sp.csr_matrix:
-        # the factorisation is symmetric: friction's other half is left to Newton's further iterations
-        face_k = (face_k + face_k.transpose(0, 2, 1)) / 2
-        data = np.bincount(
-            self._into[0], cell_k.reshape(len(cell_k), -1)[self._use[0]], minlength=self._entries
-        )
-        data += np.bincount(
-            self._into[1], face_k.reshape(len(face_k), -1)[self._use[1]], minlength=self._entries
-        )
-        if self.springs is not None:
-            data[self._into[2]] += self.springs[self.free]
-        if self.floor is not None:
-            data[self._into[2]] += (self.floor * (u.ravel() < 0))[self.free]
-        return sp.csr_matrix((data, self._indices, self._indptr), shape=(self._size, self._size))
-
-    def _residual(self, cell_f: np.ndarray, face_f: np.ndarray, u: np.ndarray) -> np.ndarray:
-        r = np.bincount(self._cell_dofs.ravel(), cell_f.ravel(), minlength=self.free.size)
-        r += np.bincount(self._face_dofs.ravel(), face_f.ravel(), minlength=self.free.size)
-        if self.springs is not None:
-            r += self.springs * u.ravel()
-        if self.floor is not None:
-            r += self.floor * np.minimum(u.ravel(), 0.0)
-        return r[self.free]
+        self._assembly = Assembly(self.solid.mesh.cells, self.free, self.springs)
+        self._touching = Touching(self.contact, self.free, self.floor)
+        self._factor = Condensation(self._touching.kept)
+        self._compliance: np.ndarray | None = None
+        self._kept = np.flatnonzero(self.free)[self._touching.kept]
 
     def rest(self, centre: np.ndarray) -> State:
         """The untouched object with the tip's centre at `centre`."""
         u = np.zeros_like(self.solid.mesh.points)
-        return State(
-            u,
-            np.asarray(centre, float),
-            np.zeros(3),
-            0.0,
-            self.solid.new_history(),
-            self.contact.start(centre),
-        )
+        grip = self._touching.contact.start(centre)
+        return State(u, np.asarray(centre, float), np.zeros(3), 0.0, self.solid.new_history(), grip)
 
-    def advance(
-        self, state: State, centre: np.ndarray, step_s: float = 0.0, guess: np.ndarray | None = None
-    ) -> State:
+    def advance(self, state: State, centre: np.ndarray, step_s: float = 0.0, depth: int = 0) -> State:
         """Move the tip's centre to `centre` within `step_s` seconds; halves the step where Newton fails.
 
         A sticking tip that finds no equilibrium in a quarter of a step loses its hold.
         """
-        return self._advance(state, np.asarray(centre, float), step_s, guess, 0)
-
-    def _advance(
-        self, state: State, centre: np.ndarray, step_s: float, guess: np.ndarray | None, depth: int
-    ) -> State:
-        found = self._newton(state, centre, step_s, guess)
-        if found is None and guess is not None:
-            found = self._newton(state, centre, step_s, None)
+        centre = np.asarray(centre, float)
+        found = self._newton(state, centre, step_s)
         if found is not None:
             return found
         if depth == 2 and self.contact.friction < 0.0 and state.grip.active.any():
@@ -154,88 +103,82 @@ class Problem:
                 f"no equilibrium with the tip at {np.round(centre, 2).tolist()} mm: press less deep or "
                 f"refine the mesh"
             )
-        middle = self._advance(state, (state.centre + centre) / 2, step_s / 2, None, depth + 1)
-        return self._advance(middle, centre, step_s / 2, None, depth + 1)
+        middle = self.advance(state, (state.centre + centre) / 2, step_s / 2, depth + 1)
+        return self.advance(middle, centre, step_s / 2, depth + 1)
 
     def _pressed_anew(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
         """The tip has lost its hold: the dragged surface springs back and meets it afresh at `centre`."""
-        away = self.contact.clear_of(centre, state.grip)
+        away = self._touching.contact.clear_of(centre, state.grip)
         found: State | None = replace(self.rest(away), history=state.history)
         for share in np.linspace(0, 1, 1 + int(np.ceil(np.linalg.norm(away - centre) / 0.5))):
-            found = found and self._newton(found, away + share * (centre - away), step_s, None)
+            found = found and self._newton(found, away + share * (centre - away), step_s)
             step_s = 0.0
         return found
 
-    def _newton(
-        self, state: State, centre: np.ndarray, step_s: float, guess: np.ndarray | None
-    ) -> State | None:
-        contact = self.contact
-        u = state.displacement if guess is None else guess
-        # without a guess the points already held carry the object along before new ones may arrive
-        held = state.grip.copy()
-        # what holds and sticks is as stiff at the step's start as where the tip's stiffness was asked for
-        known = self._factored is state and guess is None and contact.friction < 0.0
-        self._factored = None
-        arrivals = guess is not None or not held.active.any()
-        if arrivals:
-            contact.expect(u, centre, held)
-        last, cut, last_norm, touching, close = u, 1.0, np.inf, held.active, False
-        step = np.zeros_like(u)
-        for iteration in range(40):
-            # close to the end a tangent is seldom needed, and costs more than the forces
-            cell_f, cell_k, energy, history = self._evaluate(u, state.history, step_s, not close)
-            if not np.isfinite(energy):
-                # an element turned inside out: take less of the last step
-                cut *= 0.4
-                if cut < 0.05 or iteration == 0:
-                    return None
-                u = last + cut * step
-                continue
-            face_f, face_k, force, grip = contact.evaluate(u, centre, held, True, arrivals)
-            r = self._residual(cell_f, face_f, u)
-            norm = float(np.linalg.norm(r))
-            scale = max(np.abs(face_f).sum(), 1e-3)
-            if arrivals and iteration > 0 and norm < 0.02 * scale:
-                if held.let_go(grip):
-                    continue
-                if norm < self.tolerance * scale:
-                    return State(u, centre.copy(), force, energy, history, grip, None, iteration)
-            if iteration > 12:
-                held.settle(grip)
-            # close to the end the last tangent serves once more, where the contact has settled
-            reuse = arrivals and norm < 0.02 * last_norm and np.array_equal(grip.active, touching)
-            last_norm, touching = norm, grip.active
-            if not (reuse or (known and iteration == 0)):
-                if not len(cell_k):
-                    cell_k = self._evaluate(u, state.history, step_s)[1]
-                self._factor.refresh(self._assemble(cell_k, face_k, u))
-            close = arrivals and norm < 0.02 * scale
+    def _linearise(self, u: np.ndarray, history: History, step_s: float) -> np.ndarray:
+        """Take the solid's tangent at u; the compliance (m, m) of the nodes that are pressed.
+
+        The elements' pressures in it are those of `history`: where u is a prediction its volumes are off to
+        second order, and a bulk modulus makes pressures of that which would spoil the tangent.
+        """
+        elements = self.solid.evaluate(u, history, step_s, True, history.pressure)[1]
+        self._compliance = np.linalg.inv(self._factor.refresh(self._assembly.stiffness(elements)))
+        return self._compliance
+
+    def _newton(self, state: State, centre: np.ndarray, step_s: float) -> State | None:
+        held, u, kept = state.grip.copy(), state.displacement, self._touching.kept
+        compliance, mixing = self._compliance, Mixing()
+        elements, _, energy, history = self.solid.evaluate(u, state.history, step_s, False)
+        last, before, near = 0.0, np.inf, False
+        for iteration in range(MOST_ITERATIONS):
+            # the old tangent predicts the step; the one that is taken there usually serves to the end
+            if compliance is None or iteration == 1 or last > SLOW * before:
+                compliance = self._linearise(u, state.history, step_s)
+                mixing, before = Mixing(), np.inf
+            r = self._assembly.residual(elements, u)
+            half = self._factor.forward(-r)
+            start, active = u.ravel()[self._kept], held.active
+            alone = start + compliance @ half[kept]
+            # a held point may pull while the solid is off: it is let go once the rest has settled
+            now = self._touching.settle(
+                compliance, alone, start, centre, held, predict=iteration == 0, release=near
+            )
+            if now is None:
+                return None
+            r[kept] += now.load
+            norm, scale = float(np.linalg.norm(r)), max(now.scale, 1e-3)
+            if near and norm < self.tolerance * scale:
+                return State(u, centre.copy(), now.force, energy, history, now.grip)
+            near = norm < 0.02 * scale
+            last, before = norm, last if iteration else np.inf
+            if not np.array_equal(held.active, active):
+                # another contact: what the last steps foretold is void
+                mixing, before = Mixing(), np.inf
             step = np.zeros(self.free.size)
-            step[self.free] = self._factor.solve(-r)
+            step[self.free] = mixing(u.ravel()[self.free], self._factor.backward(half, now.u - start))
             step = step.reshape(-1, 3)
-            longest = np.abs(step).max()
+            longest = float(np.abs(step).max())
             if not np.isfinite(longest):
                 return None
-            last, cut = u, 1.0
-            u = u + step * (3.0 / max(longest, 3.0))
-            if not arrivals:
-                arrivals = True
-                contact.expect(u, centre, held)
+            cut = 3.0 / max(longest, 3.0)
+            while True:
+                found = self.solid.evaluate(u + cut * step, state.history, step_s, False)
+                if np.isfinite(found[2]):
+                    break
+                # an element turned inside out: take less of the step
+                cut *= 0.4
+                if cut < 0.05:
+                    return None
+            u, (elements, _, energy, history) = u + cut * step, found
         return None
 
     def tip_stiffness(self, state: State) -> np.ndarray:
-        """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative."""
-        contact, u = self.contact, state.displacement
-        _, cell_k, _, _ = self._evaluate(state.displacement, state.history, 1e-6)
-        _, face_k, _, _ = contact.evaluate(state.displacement, state.centre, state.grip, True)
-        self._factor.refresh(self._assemble(cell_k, face_k, u))
-        self._factored = state
-        # translating the tip is translating every face node back: coupling = - K_face applied to unit
-        # translations
-        units = np.tile(np.eye(3), (6, 1))
-        per_face = face_k @ units
-        coupling = np.zeros((self.free.size, 3))
-        np.add.at(coupling, self._face_dofs.ravel(), per_face.reshape(-1, 3))
-        own = np.einsum("ai,faj->ij", units, per_face)
-        inner = coupling[self.free]
-        return -(own - inner.T @ self._factor.solve(inner))
+        """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative.
+
+        With the tangent that the last load step took on its way: within some 1 % of the one at its end.
+        """
+        compliance = self._compliance
+        if compliance is None:
+            compliance = self._linearise(state.displacement, state.history, 0.0)
+        kept = state.displacement.ravel()[self._kept]
+        return self._touching.tip_stiffness(compliance, kept, state.centre, state.grip)

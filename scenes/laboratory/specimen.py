@@ -20,11 +20,11 @@ from scenes.laboratory.field import Field, ratio_at
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import QuadraticMesh, graded_mesh, surface_key
 from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.solver import LabError, Problem
+from scenes.laboratory.solver import Problem
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom
 
-VERSION = 5
+VERSION = 6
 """Raised whenever solved curves would change."""
 
 
@@ -38,10 +38,10 @@ class Specimen:
     model.
 
     finite: finite strain (neo-Hookean) instead of linear. balls: (x, y, z, radius, ratio) mm. gradient:
-    modulus ratios (base, top). skin: (thickness mm, ratio). field: of scenes.laboratory.field. base: None bonded; ("unbonded", bonded
-    fraction, direction angle rad); ("springs", k_normal, k_tangential) in E per mm. friction: None sticks.
-    fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m). plastic: (share, yield strain
-    measure). prony: ((g, tau s), ...).
+    modulus ratios (base, top). skin: (thickness mm, ratio). field: of scenes.laboratory.field.
+    base: None bonded; ("unbonded", bonded fraction, direction angle rad); ("springs", k_normal, k_tangential)
+    in E per mm. friction: None sticks. fibre: (stiffness over shear modulus, x, y, z). mullins: (r, m).
+    plastic: (share, yield strain measure). prony: ((g, tau s), ...).
     """
 
     poisson_ratio: float = 0.49
@@ -151,13 +151,8 @@ def build(
     )
     contact = SphereContact(mesh.points, mesh.faces[near], specimen.tip_radius, specimen.friction)
     free, springs, floor = _support(mesh, specimen)
-    if specimen.prony and floor is not None and not specimen.finite:
-        raise LabError(
-            "a relaxing solid on an unbonded base is solved at finite strain only: add finite_strain"
-        )
-    if specimen.finite or floor is not None:
-        return Problem(solid, contact, free, springs, floor, linear=not specimen.finite)
-    return LinearProblem(solid, contact, free, springs)
+    kind = Problem if specimen.finite else LinearProblem
+    return kind(solid, contact, free, springs, floor)
 
 
 def _place(solid: Solid, specimen: Specimen, phantom: Phantom) -> None:

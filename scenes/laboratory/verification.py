@@ -9,7 +9,6 @@ from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.mesh import QuadraticMesh, quadratic
 from scenes.laboratory.refine import refine
 from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.solver import Problem
 from scenes.laboratory.specimen import Fineness, Specimen, build
 from scenes.phantoms import Phantom
 
@@ -70,7 +69,7 @@ def hertz_ratio(depth: float = 0.5, radius: float = 50.0, finest: float = 0.5) -
     top = np.array([0.0, 0.0, height])
     near = np.linalg.norm(mesh.points[mesh.faces].mean(axis=1) - top, axis=1) < 3 * contact_radius
     contact = SphereContact(mesh.points, mesh.faces[near], radius, 0.0)
-    problem = Problem(solid, contact, ~np.repeat(mesh.fixed, 3), linear=True)
+    problem = LinearProblem(solid, contact, ~np.repeat(mesh.fixed, 3))
     start = top + [0.0, 0.0, radius]
     state = problem.rest(start)
     for share in (0.3, 0.65, 1.0):

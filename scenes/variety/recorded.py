@@ -50,6 +50,23 @@ def record(
     The truth is the laboratory's, with the nuisances beside ([truth.nuisances]). What was solved before is
     not solved again. Raises OptionError, LabError.
     """
+    varied = explored(draw, effects, it=it, sizes=sizes, workers=workers, progress=progress)
+    name = "+".join([f"variety-{draw.seed:05d}", *(f"{k}={v:g}" for k, v in (effects or {}).items())])
+    path = write(folder / f"{name}.csv.gz", varied.recording, draw)
+    return replace(varied, recording=read_recording(path))
+
+
+def explored(
+    draw: Draw,
+    effects: Mapping[str, float] | None = None,
+    *,
+    it: Thing | None = None,
+    sizes: bool = False,
+    workers: int | None = 1,
+    cache: Path | None = None,
+    progress: Progress = silent,
+) -> Varied:
+    """The same, with nothing written. cache: where solved touches are kept, by default the user's."""
     it = it or thing(draw.number)
     options = SimulateOptions(
         young_modulus_pa=draw.young_modulus_pa,
@@ -64,7 +81,7 @@ def record(
     )
     simulation = simulate(
         it.phantom, effects, options, hand=hand(draw), seed=draw.seed, sizes=sizes,
-        workers=workers, progress=progress, staging=staging,
+        workers=workers, cache=cache, progress=progress, staging=staging,
     )  # fmt: skip
     truth = {**simulation.truth, "poisson_ratio": it.phantom.poisson_ratio, "nuisances": draw.table()}
     stated = draw.poisson_ratio_stated or it.phantom.poisson_ratio != 0.49
@@ -79,9 +96,7 @@ def record(
         poisson_ratio=it.phantom.poisson_ratio if stated else None,
         truth=truth,
     )
-    name = "+".join([f"variety-{draw.seed:05d}", *(f"{k}={v:g}" for k, v in (effects or {}).items())])
-    path = write(folder / f"{name}.csv.gz", recording, draw)
-    return Varied(draw, it, read_recording(path), simulation)
+    return Varied(draw, it, recording, simulation)
 
 
 def touches(it: Thing, draw: Draw) -> list[Touch]:

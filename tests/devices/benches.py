@@ -27,7 +27,7 @@ from devices.simulated import SimulatedHand
 from devices.spacemouse import make as make_spacemouse
 
 from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit
-from .fake_inverse import FakeInverse
+from .fake_inverse import Chain, FakeInverse
 from .kernel.uhid import KernelUnit
 
 STUBS = Path(__file__).parent / "vendor_stubs.c"
@@ -131,9 +131,9 @@ class StickBench(HidBench):
 
 
 class HaplyBench(Bench):
-    def __init__(self, key: str = "vector") -> None:
+    def __init__(self, key: str = "vector", chain: Chain | None = None) -> None:
         self.key = key
-        self.service = FakeInverse(key)
+        self.service = FakeInverse(key, chain=chain)
         state, events = self.ports = self.service.ports
         # the emulator shares this process and a machine with noisy neighbours: it may well pause for 0.1 s,
         # and a link lost to that needs a new enable_force, as it should
@@ -154,7 +154,8 @@ class HaplyBench(Bench):
         self.running = False
 
     def replug(self) -> None:
-        self.service, self.running = FakeInverse(self.key, *self.ports), True
+        self.service = FakeInverse(self.key, *self.ports, chain=self.service.chain)
+        self.running = True
 
     def zeroed(self) -> bool:
         # over a socket, which delivers what was sent before it was closed
@@ -173,13 +174,14 @@ class HaplyBench(Bench):
 class VendorBench(Bench):
     """A vendor library compiled from the stubs."""
 
-    def __init__(self, folder: Path, kind: str, name: str = "omega.3") -> None:
+    def __init__(self, folder: Path, kind: str, name: str = "omega.3", old: bool = False) -> None:
         compiler = shutil.which("cc")
         if compiler is None:
             pytest.skip("no C compiler to build the stand-in for the vendor's library")
         stem = {"dhd": "dhd", "hd": "HD"}[kind]
         library = folder / f"lib{stem}.so"
         defines = ["-DSTUB_DHD", f'-DSTUB_NAME="{name}"'] if kind == "dhd" else []
+        defines += ["-DSTUB_OLD"] if old else []
         command = [compiler, "-shared", "-fPIC", "-pthread", *defines, "-o", str(library), str(STUBS)]
         subprocess.run(command, check=True)
         self.library = ctypes.CDLL(str(library))
@@ -191,6 +193,10 @@ class VendorBench(Bench):
 
     def number(self, name: str) -> ctypes.c_int:
         return ctypes.c_int.in_dll(self.library, f"stub_{name}")
+
+    def limit_force(self, most_n: float) -> None:
+        """What the library says that it allows; negative: no limit, or not told."""
+        ctypes.c_double.in_dll(self.library, "stub_most_n").value = most_n
 
     def vector(self, name: str) -> ctypes.Array:
         return (ctypes.c_double * 3).in_dll(self.library, f"stub_{name}")
@@ -221,6 +227,7 @@ MAKERS: dict[str, Callable[[Path], Bench]] = {
     "pid-ffb": lambda folder: StickBench(),
     "pid-ffb-wheel": lambda folder: StickBench(ids=OTHER_IDS, axes=1, control_bits=False),
     "haply": lambda folder: HaplyBench("vector"),
+    "haply-3.5": lambda folder: HaplyBench(chain=Chain(force_scale=0.5, damping=2.0, basis="X-YZ")),
     "haply-older": lambda folder: HaplyBench("values"),
     "forcedimension": lambda folder: VendorBench(folder, "dhd"),
     "openhaptics": lambda folder: VendorBench(folder, "hd"),

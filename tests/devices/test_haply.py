@@ -7,13 +7,14 @@ import json
 import numpy as np
 import pytest
 
+from devices import mapper
 from devices.codecs import haply as codec
-from devices.haply import HaplyOptions, find
+from devices.haply import SPEC, HaplyOptions, find
 from devices.haply import make as make_haply
 from mechanics.errors import DeviceError
 
 from .benches import HaplyBench, eventually
-from .fake_inverse import FakeInverse
+from .fake_inverse import Chain, FakeInverse
 
 STATE = {
     "inverse3": [
@@ -149,3 +150,111 @@ def test_service_without_a_device_and_no_service() -> None:
     service.stop()
     absent = find(HaplyOptions(uri=uri, events_uri=""))[0]
     assert not absent.present and "does not answer" in absent.why_not and "start it" in absent.remedy
+
+
+def chained(**settings: object) -> HaplyBench:
+    bench = HaplyBench(chain=Chain(**settings))
+    bench.device.open()
+    return bench
+
+
+@pytest.mark.parametrize("envelope", [False, True])
+@pytest.mark.parametrize(("scale", "most_n"), [(1.0, 10.0), (0.5, 5.0), (2.0, 10.0)])
+def test_a_newton_here_is_one_at_the_hand_whatever_the_force_scale(
+    scale: float, most_n: float, envelope: bool
+) -> None:
+    bench = chained(force_scale=scale, envelope=envelope, preset="custom", damping=3.0, basis="X-YZ")
+    try:
+        spec, chain = bench.device.spec, bench.service.chain
+        assert spec.max_force_n == most_n and spec.max_damping_n_s_per_m == SPEC.max_damping_n_s_per_m
+        assert (chain.basis, chain.preset, chain.damping) == ("XYZ", "arm_front_centered", 0.0)
+        told = " ".join(spec.conditions)
+        assert "3.5.0" in told and "force gate (gain 0.3)" in told
+        assert ("force scale" in told) == (scale != 1.0) and "damping" not in told
+        bench.service.velocity = [0.5, 0.0, 0.0]
+        assert eventually(lambda: bench.device.read().sequence >= 0)
+        bench.device.enable_force()
+        push = np.array([0.0, 1.0, most_n - 1.0])
+        assert eventually(
+            lambda: (bench.device.send_force(push), np.allclose(bench.service.force_n(), push, atol=1e-9))[1]
+        )
+    finally:
+        bench.close()
+
+
+def test_what_the_service_keeps_to_itself_is_declared_and_taken_off_the_limits() -> None:
+    bench = chained(stubborn=True, damping=3.0, force_scale=None)
+    try:
+        spec, told = bench.device.spec, " ".join(bench.device.spec.conditions)
+        assert "damping filter of 3 N s/m" in told and "force scale is not told" in told
+        assert spec.max_damping_n_s_per_m == SPEC.max_damping_n_s_per_m - 3.0
+    finally:
+        bench.close()
+
+
+@pytest.mark.parametrize(
+    ("settings", "says"),
+    [
+        ({"basis": "X-YZ"}, "basis at X-YZ"),
+        ({"mount_scale": 2.0}, "scales lengths"),
+        ({"force_scale": 0.0}, "scales forces by 0"),
+        ({"force_scale": -1.0}, "scales forces by -1"),
+        ({"force_scale": float("nan")}, "scales forces by nan"),
+        ({"force_scale": 1e9}, "scales forces by 1e"),
+        ({"more": {"mount": {"scale": {"x": "wide"}}}}, "cannot be read"),
+    ],
+)
+def test_what_cannot_be_undone_is_refused(settings: dict, says: str) -> None:
+    bench = HaplyBench(chain=Chain(stubborn=True, **settings))
+    try:
+        with pytest.raises(DeviceError, match=says):
+            bench.device.open()
+        assert not bench.device.read().connected
+    finally:
+        bench.close()
+
+
+@pytest.mark.parametrize(
+    "more", [{"type": "inverse3_simulator"}, {"port": "virtual"}, {"simulated": True}, {}]
+)
+def test_a_simulated_device_of_the_service_is_recognised(more: dict) -> None:
+    bench = chained(more=more)
+    try:
+        assert bench.device.spec.simulated == bool(more)
+        assert any("simulated device" in word for word in bench.device.spec.conditions) == bool(more)
+    finally:
+        bench.close()
+
+
+def test_an_older_service_is_driven_as_before_and_says_what_it_does_not_tell() -> None:
+    bench = HaplyBench()
+    try:
+        bench.device.open()
+        spec = bench.device.spec
+        assert spec.max_force_n == SPEC.max_force_n
+        assert "does not tell its filters" in " ".join(spec.conditions)
+        assert "configure" not in bench.service.messages[0]["inverse3"][0]
+    finally:
+        bench.close()
+
+
+def test_another_force_scale_after_a_reconnection_is_no_silent_change() -> None:
+    bench = chained(force_scale=0.5)
+    try:
+        assert eventually(lambda: bench.device.read().sequence >= 0)
+        bench.unplug()
+        assert eventually(lambda: not bench.device.read().connected)
+        bench.service.chain.force_scale = 1.0
+        bench.replug()
+        assert eventually(lambda: "start anew" in bench.device.read().fault)
+        with pytest.raises(DeviceError, match="start anew"):
+            bench.device.enable_force()
+    finally:
+        bench.close()
+
+
+def test_one_message_of_a_huge_place_is_no_place(bench: HaplyBench) -> None:
+    bench.service.position = [1e200, 0.0, 0.0]
+    assert eventually(lambda: bench.device.read().position_m[0] == 1e200)
+    state, tip = mapper.step(mapper.Mapping(), mapper.start(mapper.Mapping()), bench.device.read())
+    assert np.isnan(tip.position_m).all() and state.position_m is None

@@ -5,6 +5,8 @@
 
 volatile double stub_position[3], stub_velocity[3], stub_force[3];
 volatile int stub_plugged = 1, stub_calibrated = 1, stub_buttons, stub_error, stub_opens;
+volatile double stub_most_n = -1;
+volatile int stub_gravity, stub_ramping;
 volatile int stub_force_on, stub_watchdog, stub_stalled;
 
 #ifdef STUB_DHD
@@ -25,6 +27,10 @@ int dhdSetForce(double x, double y, double z, signed char id) {
     (void)id; if (!stub_plugged) return -1;
     stub_force[0] = x; stub_force[1] = y; stub_force[2] = z; return 0;
 }
+#ifndef STUB_OLD
+double dhdGetMaxForce(signed char id) { (void)id; return stub_most_n; }
+int dhdSetGravityCompensation(int on, signed char id) { (void)id; stub_gravity = on; return 0; }
+#endif
 unsigned dhdGetButtonMask(signed char id) { (void)id; return stub_buttons; }
 int dhdGetStatus(int *status, signed char id) {
     (void)id; memset(status, 0, 16 * sizeof(int)); status[0] = 1; status[3] = stub_calibrated; return gone();
@@ -38,7 +44,10 @@ unsigned hdInitDevice(const char *name) {
 }
 void hdDisableDevice(unsigned h) { (void)h; }
 void hdEnable(unsigned what) { if (what == 0x4000) stub_force_on = 1; }
-void hdDisable(unsigned what) { if (what == 0x4000) stub_force_on = 0; }
+void hdDisable(unsigned what) { if (what == 0x4000) stub_force_on = 0; if (what == 0x4002) stub_ramping = 0; }
+#ifndef STUB_OLD
+unsigned char hdIsEnabled(unsigned what) { return what == 0x4002 ? stub_ramping : 0; }
+#endif
 static void *loop(void *_) {
     (void)_; while (running) { if (scheduled && !stub_stalled) scheduled(0); usleep(1000); } return 0;
 }
@@ -53,6 +62,7 @@ void hdEndFrame(unsigned h) { (void)h; if (!stub_plugged) stub_error = 0x0302; }
 void hdGetDoublev(unsigned what, double *v) {
     if (what == 0x2050) memcpy(v, (void *)stub_position, 24);
     else if (what == 0x2051) memcpy(v, (void *)stub_velocity, 24);
+    else if (what == 0x2603) v[0] = stub_most_n;
     else if (what == 0x2052) { memset(v, 0, 128); v[0] = v[5] = v[10] = v[15] = 1; }
 }
 void hdGetIntegerv(unsigned what, int *v) { if (what == 0x2000) *v = stub_buttons; }

@@ -20,6 +20,7 @@ from mechanics.compliance import load_or_condense
 from mechanics.effects.registry import effect, effects
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.frames import tangents
+from mechanics.near_field import surface_softness
 from mechanics.places import solve_places
 from mechanics.press_making import of_paths
 from mechanics.sites import touch_solver
@@ -114,11 +115,15 @@ def predicted_and_rendered(names, model, places, compliance, seed=0):
     options = RenderOptions(
         surface_edge_m=COARSE_M, snap_to_touches=False, friction=None if "friction_slip" in names else np.inf
     )
-    renderer = FemRenderer(with_effects(model, keys), options, compliance=compliance)
+    better = with_effects(model, keys)
+    renderer = FemRenderer(better, options, compliance=compliance)
     vertices = len(renderer.parameters.far)
-    # a plane without end: the coarse block's edges are rounded into its middle
+    # a plane without end, of one place: the coarse block's edges and corners are rounded into its middle
     flat = renderer.parameters.surface._replace(normals=np.tile(UP, (vertices, 1)))
-    renderer = renderer._with(surface=flat, curvature=np.zeros(vertices))
+    softness = surface_softness(better.mesh, better.surface_ratio, POINT[None], better.tool.tip_radius_m)
+    renderer = renderer._with(
+        surface=flat, curvature=np.zeros(vertices), softness=np.tile(softness, vertices)
+    )
     renderer = renderer.with_field(np.tile(frame.T @ settings.far[0] @ frame, (vertices, 1, 1)))
     centre = POINT + model.tool.tip_radius_m * UP
     tips = centre - forward.touches.travel @ frame

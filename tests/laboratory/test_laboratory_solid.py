@@ -11,11 +11,11 @@ import scipy.sparse as sp
 from mechanics.dent import dent_law
 from scenes.laboratory.contact import SphereContact
 from scenes.laboratory.effects.contact import relaxed
-from scenes.laboratory.factor import Factor
+from scenes.laboratory.factor import Condensation
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.refine import boundary_faces
 from scenes.laboratory.solid import Material, Solid
-from scenes.laboratory.solver import Problem
+from scenes.laboratory.solver import Mixing, Problem
 from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.laboratory.verification import (
     box,
@@ -101,14 +101,41 @@ def test_rotation_costs_nothing() -> None:
 
 
 @pytest.mark.parametrize("smallest", [1.0, -1.0])
-def test_factor_solves_definite_and_indefinite_matrices_in_turn(smallest: float) -> None:
+def test_condensation_solves_definite_and_indefinite_matrices_in_turn(smallest: float) -> None:
     rng = np.random.default_rng(2)
     turn = np.linalg.qr(rng.normal(size=(40, 40)))[0]
-    factor, b = Factor(), rng.normal(size=40)
+    kept = rng.random(40) < 0.2
+    factor, b = Condensation(kept), rng.normal(size=40)
     for low in (1.0, smallest, 1.0):
         matrix = turn @ np.diag(np.concatenate([[low], np.linspace(2, 9, 39)])) @ turn.T
-        factor.refresh(sp.csr_matrix(np.triu(matrix)))
-        assert matrix @ factor.solve(b) == pytest.approx(b, abs=1e-9)
+        schur = factor.refresh(sp.csr_matrix(np.triu(matrix)))
+        assert np.linalg.inv(schur) == pytest.approx(np.linalg.inv(matrix)[np.ix_(kept, kept)], abs=1e-9)
+        half = factor.forward(b)
+        x = factor.backward(half, np.linalg.solve(schur, half[kept]))
+        assert matrix @ x == pytest.approx(b, abs=1e-9)
+
+
+def test_condensation_is_the_same_without_pardiso(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(3)
+    matrix = (lambda a: a @ a.T + np.eye(30))(rng.normal(size=(30, 30)))
+    kept, b, found = rng.random(30) < 0.3, rng.normal(size=30), []
+    for there in (True, False):
+        if not there:
+            monkeypatch.setattr("scenes.laboratory.factor.PyPardisoSolver", None)
+        factor = Condensation(kept)
+        schur, half = factor.refresh(sp.csr_matrix(np.triu(matrix))), factor.forward(b)
+        found.append((schur, half[kept], factor.backward(half, half[kept])))
+    for one, other in zip(*found, strict=True):
+        assert one == pytest.approx(other, abs=1e-9)
+
+
+def test_mixing_finds_a_fixed_point_that_plain_iteration_flees() -> None:
+    rng = np.random.default_rng(4)
+    flees = np.diag([-1.6, 0.9, 0.5])
+    goal, x, mixing = rng.normal(size=3), np.zeros(3), Mixing()
+    for _ in range(7):
+        x = x + mixing(x, (flees - np.eye(3)) @ (x - goal))
+    assert x == pytest.approx(goal, abs=1e-8)
 
 
 def test_refined_mesh_fills_the_box_and_grows_away_from_the_touch() -> None:

@@ -17,6 +17,7 @@ from contextlib import suppress
 from pathlib import Path
 
 import pytest
+from distributed import Client
 
 import palpate as pp
 from mechanics.recording import recording_files
@@ -26,6 +27,8 @@ from palpate.tasks.driver import run
 from palpate.tasks.graph import Graph, Task
 from palpate.tasks.local import LocalExecutor
 from scenes.embedded import embedded_recording
+
+from .test_batch_local import alive, wait_for
 
 pytestmark = pytest.mark.slow
 
@@ -77,6 +80,8 @@ def cluster(tmp_path, monkeypatch) -> Iterator[Cluster]:
     for _ in range(2):
         made.start_worker()
     try:
+        with Client(made.address, timeout=30, set_as_default=False) as client:
+            client.wait_for_workers(2, timeout=60)
         yield made
     finally:
         made.close()
@@ -167,6 +172,37 @@ def test_an_error_and_a_crash_on_a_dask_worker_cost_their_task_alone(tmp_path, c
     assert value["process"] not in [worker.pid for worker in cluster.workers]
 
 
+def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_other(tmp_path, cluster):
+    said = [tmp_path / "ours.txt", tmp_path / "theirs.txt"]
+    runs = [Graph([Task("errands:linger", {}, path.with_suffix(""), {"path": str(path)})]) for path in said]
+
+    def processes(path: Path) -> list[int]:
+        return list(map(int, path.read_text().split())) if path.exists() else []
+
+    def stop_when_both_work(status) -> None:
+        if all(len(processes(path)) == 2 for path in said):
+            raise KeyboardInterrupt
+
+    def theirs() -> None:
+        with suppress(KeyboardInterrupt), DaskExecutor(cluster.address) as other:
+            run(runs[1], other, tmp_path, tell=stop_when_ours_ended)
+
+    def stop_when_ours_ended(status) -> None:
+        if ended.is_set():
+            raise KeyboardInterrupt
+
+    ended = threading.Event()
+    neighbour = threading.Thread(target=theirs)
+    neighbour.start()
+    with pytest.raises(KeyboardInterrupt), DaskExecutor(cluster.address) as executor:
+        run(runs[0], executor, tmp_path, tell=stop_when_both_work)
+    wait_for(lambda: not any(map(alive, processes(said[0]))))
+    assert all(map(alive, processes(said[1])))
+    ended.set()
+    neighbour.join(10)
+    wait_for(lambda: not any(map(alive, processes(said[1]))))
+
+
 def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_model_on(tmp_path, cluster):
     """Two recordings of one name, in two folders; the third is broken. Replay, compare and diagnose."""
     source, description = recording_files(embedded_recording("silicone-1-cylinder"))
@@ -177,9 +213,8 @@ def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_mode
     (tmp_path / "in" / "broken.csv").write_text("t,x\n0,1\n")
     shutil.copy(tmp_path / "in" / "day1" / "cylinder.toml", tmp_path / "in" / "broken.toml")
     options = {"diagnose": {"fast": True, "bootstrap": 50}}
-    made = pp.batch(
-        tmp_path / "in", tmp_path / "one", do="reconstruct", options=options, workers=2, progress=False
-    )
+    given = {"options": options, "reports": False, "progress": False}
+    made = pp.batch(tmp_path / "in", tmp_path / "one", do="reconstruct", workers=2, **given)
     assert [row.status for row in made] == ["failed", "done", "done"]
     assert made.agreements[0].count == 2
     answers = {}
@@ -191,16 +226,17 @@ def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_mode
         out = tmp_path / name
         if name != "one":
             shutil.copytree(tmp_path / "one", out, ignore=shutil.ignore_patterns("compare*", "diagnose*"))
-        result = pp.batch(tmp_path / "in", out, options=options, progress=False, **engine)
+        result = pp.batch(tmp_path / "in", out, **given, **engine)
         assert [row.status for row in result] == ["failed", "done", "done"]
         assert result.reused >= 2  # the models are those of the first
-        answers[name] = [_answers(out / row.recording, _graph_executor(engine), source) for row in result][1:]
+        done = result.rows[1:]
+        answers[name] = [_answers(out / row.recording, _executor(engine), source) for row in done]
     assert answers["one"] == answers["two"] == answers["dask"]
-    page = (tmp_path / "dask" / "index.html").read_text()
-    assert "day1-cylinder/diagnose.html" in page and "day2-cylinder/thumbnail.png" in page
+    result.show(screenshot=tmp_path / "objects.png")
+    assert "day2-cylinder/thumbnail.png" in (tmp_path / "dask" / "index.html").read_text()
 
 
-def _graph_executor(engine):
+def _executor(engine):
     if "scheduler" in engine:
         return lambda: DaskExecutor(engine["scheduler"])
     return lambda: LocalExecutor(engine["workers"])

@@ -166,12 +166,15 @@ def test_it_goes_on_where_it_stopped_and_does_again_what_changed(tmp_path, quick
 
 
 def test_the_result_prints_draws_and_is_a_table(tmp_path, quick):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "forgotten.csv").write_text("t,x,y,z,fx,fy,fz\n")
     for k, e in enumerate((20e3, 21e3, 19e3, 40e3)):
         recording(tmp_path / "in" / f"{k}.csv", e, name=None if k == 3 else "bean")
     result = pp.batch(tmp_path / "in", tmp_path / "out", do=("reconstruct", "diagnose"), progress=False)
     words = str(result)
     assert "4 of 4 recordings done" in words and "bean: 3 explorations" in words
     assert "viscoelasticity and time delay, gap 200 to 50 mN" in words
+    assert "left aside, as no .toml beside describes them: forgotten.csv" in words
     assert result.table["young_modulus_pa"] == [20e3, 21e3, 19e3, 40e3]
     assert set(result.table) == set(COLUMNS) and len(result) == 4
     assert "<img" in result._repr_html_()

@@ -118,7 +118,7 @@ def test_fem_predicts_the_left_out_top_and_the_1d_models_do_not(shared_recording
         main(["compare", recording, "--json", str(tmp_path / "c.json"), "-o", str(tmp_path / "c.html")]) == 0
     )
     result = json.loads((tmp_path / "c.json").read_text())
-    assert set(result["rmse_n"]) == {"fem", "kelvin-voigt", "hunt-crossley"}
+    assert set(result["rmse_n"]) == {"fem", "fem-homogeneous", "kelvin-voigt", "hunt-crossley"}
     top = next(r for r in result["regions"] if r["name"] == "top")
     assert abs(top["bias"]["fem"]) < 0.06
     assert top["bias"]["kelvin-voigt"] < -0.25 and top["bias"]["hunt-crossley"] < -0.25

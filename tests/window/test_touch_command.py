@@ -149,3 +149,24 @@ def test_what_was_rendered_is_reconstructed(block: Model, tmp_path: Path) -> Non
     assert recording.base_model is None, "the base was traced, so nothing stands in for it"
     model = reconstruct(recording)
     assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("words", "says"),
+    [
+        (["--hand-mass", "0"], "mass_kg is 0"),
+        (["--stale", "1e9"], "stale_s is"),
+        (["--jump-m", "1e9"], "jump_m is"),
+        (["--slew", "1e300"], "slew_n_per_s is"),
+        (["--ramp", "1e-300"], "ramp_s is"),
+        (["--silence-s", "1e9"], "silence_s is"),
+        (["--support-damping-n-s-per-m=-1e6"], "support_damping_n_s_per_m is"),
+        (["--support-friction=-5"], "support_friction is"),
+    ],
+)
+def test_no_option_disarms_the_hand(
+    block: Model, words: list[str], says: str, capsys: pytest.CaptureFixture
+) -> None:
+    assert main(["touch", str(block.path), "--headless", "--seconds", "1", *words]) == 2
+    error = capsys.readouterr().err.strip()
+    assert says in error and "allowed is" in error and "\n" not in error

@@ -1,0 +1,30 @@
+"""
+A force-response test for pytest
+================================
+
+A model that people feel is worth a test: that the top gives as it did last week, that a change of material
+is felt where it should be. ``palpate.testing`` brings a fixture; here the same call is made by hand.
+"""
+
+from pathlib import Path
+from tempfile import mkdtemp
+
+import palpate as pp
+
+folder = Path(mkdtemp()) / "my-model"
+pp.reconstruct("silicone-1-cylinder", save=folder)
+curve = pp.press(folder, at=(0, 0, 0.08), depth_m=0.004)
+curve.plot()
+
+# %%
+# In a test file::
+#
+#     from palpate.testing import press_model
+#
+#     def test_top_is_soft(press_model):
+#         curve = press_model("my-model", at=(0, 0, 0.08), depth_m=0.004)
+#         assert 0.7 < curve.force_at(0.004)[2] < 0.9
+
+force = curve.force_at(0.004)
+print(force)
+assert 0.7 < force[2] < 0.9

@@ -1,0 +1,171 @@
+"""Tissue that is not one modulus: who predicts presses that were held out, and how true is the map?
+
+Slabs with a random field of the modulus (in half of all cases with a layer on top), pressed once a place on a
+raster of 5 to 9 mm, are solved exactly on fine elements (palpate.benchmarks._tissue). Held out, by folds over
+places: the finite-element model with the field that the other presses ask for, with one modulus, both
+interpolated 1D models, and each place's own modulus in the finite-element model of one modulus, interpolated.
+Then the same with first touches that are read 0.3 mm wrong: as read, and moved by what that error allows, for
+every model alike. Errors beyond noise are sqrt(rms^2 - noise^2).
+
+The map: ln E at the touched places against the truth right under the tip (correlation, rms error, contrast:
+slope of found on true) and the share of places whose 95 % interval holds the truth. Homogeneous slabs are
+among the cases: there no field must be found.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import RBFInterpolator
+
+from palpate.arguments import progress_bar
+from palpate.benchmarks._tissue import Tissue, tissue
+from palpate.benchmarks.timing import table
+from palpate.comparison import (
+    HOMOGENEOUS,
+    RIVALS,
+    CompareOptions,
+    Comparison,
+    as_touched,
+    compare_presses,
+)
+from reconstruct.modulus_field import LEVEL_BIAS, asked_for, fit_field, with_field
+
+SUMMARY = "held-out presses of tissue: FEM with a field against one modulus, 1D models and moduli by place"
+PER_PLACE = "modulus-by-place"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """How many slabs, how large, how different."""
+    parser.add_argument("--cases", type=int, default=4, help="slabs with a field (default: 4)")
+    parser.add_argument("--homogeneous", type=int, default=1, help="slabs without (default: 1)")
+    parser.add_argument("--raster", type=int, default=6, help="presses along a side (default: 6)")
+    parser.add_argument("--log-sd", type=float, default=0.35, help="standard deviation of ln E")
+    parser.add_argument("--touch-error", type=float, default=3e-4, help="of first touches", metavar="M")
+    parser.add_argument("--seed", type=int, default=0, help="of the first slab")
+
+
+def per_place(result: Comparison, options: CompareOptions) -> np.ndarray:
+    """(n, 3) N: every press by the modulus of one-modulus fits of single presses, interpolated to it."""
+    prepared, presses = result.prepared, result.presses
+    law = min(prepared.own, key=lambda name: prepared.own[name].fit.cost.sum())
+    log = np.log(prepared.own[law].fit.modulus_pa)
+    out = np.zeros_like(presses.force)
+    whole = with_field(prepared.sites, prepared.places, None)
+    for k in np.unique(result.fold):
+        held, seen = result.fold == k, result.fold != k
+        given = RBFInterpolator(presses.point[seen], log[seen], kernel="linear", degree=0)
+        modulus = np.exp(np.clip(given(presses.point), log[seen].min(), log[seen].max()))
+
+        def force(moved: np.ndarray, modulus: np.ndarray = modulus) -> np.ndarray:
+            return modulus[presses.press][:, None] * whole.unit_forces(presses, law, moved)
+
+        rows = presses.rows(np.flatnonzero(held))
+        out[rows] = as_touched(force, presses, options.first_touch)[rows]
+    return out
+
+
+def errors(slab: Tissue, first_touch: str) -> tuple[dict[str, float], Comparison]:
+    """(rms error, N, of each model over held-out presses, the comparison)."""
+    options = CompareOptions(first_touch=first_touch)
+    result = compare_presses(slab.presses, slab.model, options)
+    apart = per_place(result, options) - result.presses.force
+    return {**result.rmse_n, PER_PLACE: float(np.sqrt((apart**2).sum(axis=1).mean()))}, result
+
+
+def beyond(error_n: float, noise_n: float) -> float:
+    """N."""
+    return float(np.sqrt(max(error_n**2 - noise_n**2, 1e-12)))
+
+
+def map_of(slab: Tissue, result: Comparison) -> dict[str, float]:
+    """How true the field of all presses is at the touched places."""
+    own = min(result.prepared.own.values(), key=lambda o: o.fit.cost.sum())
+    found = fit_field(own, np.arange(len(slab.presses)))
+    if found is None:
+        return {}
+    if not asked_for(found):
+        return {"asked_for": 0.0, "gain": found.gain, "explained": found.explained}
+    touched = len(np.unique(own.site))
+    places = found.field.places[:touched]
+    true = slab.log_ratio(places) + np.log(slab.modulus_pa)
+    told = found.level + found.field.log_ratio[:touched]
+    return {
+        "asked_for": float(asked_for(found)),
+        "gain": found.gain,
+        "explained": found.explained,
+        "true_sd": float(true.std()),
+        "rms_error": float(np.sqrt(np.mean((told - true) ** 2))),
+        "correlation": float(np.corrcoef(told, true)[0, 1]) if true.std() > 0 else float("nan"),
+        "contrast": float(np.polyfit(true, told, 1)[0]) if true.std() > 0 else float("nan"),
+        "coverage": float(np.mean(np.abs(told - true) < 1.96 * np.hypot(found.sd[:touched], LEVEL_BIAS))),
+    }
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure; print a table a setting; return the figures."""
+    found: dict[str, Any] = {"cases": []}
+    count = arguments.cases + arguments.homogeneous
+    progress = progress_bar("slabs")
+    for k in range(count):
+        sd = arguments.log_sd if k < arguments.cases else 0.0
+        seed = arguments.seed + k
+        for error, ways in ((0.0, ("read",)), (arguments.touch_error, ("read", "moved"))):
+            slab = tissue(seed, log_sd=sd, raster=arguments.raster, touch_error_m=error)
+            for way in ways:
+                rms, result = errors(slab, way)
+                noise = result.noise_n
+                best = min(rms[name] for name in RIVALS)
+                row = {
+                    "seed": seed, "log_sd": sd, "touch_error_m": error, "first_touch": way, **slab.about,
+                    "rmse_n": rms, "vector_noise_n": noise, "fem_over_best_1d": rms["fem"] / best,
+                    "beyond_noise": {name: beyond(value, noise) for name, value in rms.items()},
+                    "fem_over_best_1d_beyond_noise": beyond(rms["fem"], noise) / beyond(best, noise),
+                    "folds_with_a_field": sum(field is not None for field in result.fields),
+                }  # fmt: skip
+                if way == ways[0]:
+                    row["map"] = map_of(slab, result)
+                found["cases"].append(row)
+                _say(row)
+        progress("slabs", (k + 1) / count)
+    progress.close()
+    found["summary"] = _summary(found["cases"])
+    print(table(["setting", *_COLUMNS], [[name, *row] for name, row in found["summary"].items()]))
+    return found
+
+
+def _say(row: dict[str, Any]) -> None:
+    rms = row["rmse_n"]
+    print(
+        f"slab {row['seed']} sd {row['log_sd']:g}, touches {1e3 * row['touch_error_m']:g} mm "
+        f"{row['first_touch']}: "
+        + ", ".join(f"{name} {1e3 * value:.1f}" for name, value in rms.items())
+        + f" mN (noise {1e3 * row['vector_noise_n']:.1f}); FEM over the better 1D model "
+        f"{row['fem_over_best_1d']:.2f}, beyond noise {row['fem_over_best_1d_beyond_noise']:.2f}; a field in "
+        f"{row['folds_with_a_field']} folds"
+        + "".join(f"; {key} {value:.2f}" for key, value in row.get("map", {}).items()),
+        flush=True,
+    )
+
+
+_COLUMNS = ("cases", "over 1D", "worst", "over 1D beyond noise", "over one modulus", "over by place")
+
+
+def _summary(rows: list[dict[str, Any]]) -> dict[str, list[str]]:
+    """Medians over the slabs with a field, a setting of first touches a row."""
+    out = {}
+    for error, way in sorted({(r["touch_error_m"], r["first_touch"]) for r in rows if r["log_sd"] > 0}):
+        some = [r for r in rows if r["log_sd"] > 0 and (r["touch_error_m"], r["first_touch"]) == (error, way)]
+        over = [r["fem_over_best_1d"] for r in some]
+        beyond_noise = [r["fem_over_best_1d_beyond_noise"] for r in some]
+        others = [
+            np.median([r["beyond_noise"]["fem"] / r["beyond_noise"][name] for r in some])
+            for name in (HOMOGENEOUS, PER_PLACE)
+        ]
+        out[f"first touch {1e3 * error:g} mm, {way}"] = [
+            str(len(some)),
+            *(f"{v:.2f}" for v in (np.median(over), max(over), np.median(beyond_noise), *others)),
+        ]
+    return out

@@ -1,0 +1,51 @@
+"""Random tissue of the laboratory: as different as its strength says, layers where they are drawn."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+from scenes.laboratory.effects import effect
+from scenes.laboratory.effects.stiffness_field import LOG_SD, field_of
+from scenes.laboratory.field import log_ratio
+from scenes.laboratory.specimen import Specimen
+from scenes.phantoms import phantom
+
+BLOCK = phantom("block")
+
+
+def _keys(seed: int, strength: float = 1.0) -> dict:
+    bench = SimpleNamespace(phantom=BLOCK, rng=np.random.default_rng(seed))
+    return effect("stiffness_field").parameters(strength, bench)
+
+
+def test_smooth_fields_scatter_as_the_strength_says():
+    points = np.random.default_rng(0).uniform(-300, 300, (2000, 3))
+    spread = []
+    for seed in range(8):
+        keys = {**_keys(seed), "layers": []}
+        spread.append(log_ratio(field_of(keys), points, np.zeros(len(points))).std() / keys["log_sd"])
+    assert np.mean(spread) == pytest.approx(1.0, rel=0.1)
+    assert _keys(0, 2.0)["log_sd"] == pytest.approx(2 * _keys(0)["log_sd"])
+    assert max(_keys(seed)["log_sd"] for seed in range(4)) <= LOG_SD
+
+
+def test_layers_follow_the_depth():
+    field = ((), ((4.0, 0.5), (6.0, -0.3)), 0.5)
+    depth = np.array([0.0, 2.0, 4.0, 8.0, 30.0])
+    found = log_ratio(field, np.zeros((5, 3)), depth)
+    np.testing.assert_allclose(found, [0.5, 0.5, 0.1, -0.3, -0.3], atol=0.01)
+
+
+def test_half_of_all_cases_have_layers():
+    layered = [bool(_keys(seed)["layers"]) for seed in range(40)]
+    assert 10 < sum(layered) < 30
+
+
+def test_the_specimen_knows_its_field_and_others_keep_their_key():
+    changed = effect("stiffness_field").in_solid(Specimen(), _keys(1))
+    assert changed.field is not None and changed.key() != Specimen().key()
+    # the key of solved curves from before there were fields
+    assert Specimen().key() == "b201adbbdccc3f6bea62"

@@ -1,0 +1,60 @@
+"""The blind benchmark's cases, the tasks they become, and what counts as an answer."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+from mechanics.errors import OptionError
+from palpate.benchmarks._diagnosis_blind import tasks_of, unfinished
+from palpate.benchmarks._diagnosis_cases import FINITE, WEIGHT, Case, cases
+from palpate.benchmarks._diagnosis_scores import answer_of
+from palpate.tasks.graph import Graph
+
+KNOWN = {"quick": 8, "medium": 142, "full": 640}
+
+
+@pytest.mark.parametrize("size", KNOWN)
+def test_every_case_is_another_and_the_same_next_time(size: str) -> None:
+    found = cases(size, None, 40000)
+    assert len(found) == len({case.key for case in found}) == KNOWN[size]
+    assert found == cases(size, None, 40000)
+    assert len({case.seed for case in found}) == len(found)
+
+
+def test_nuisances_vary_from_case_to_case_and_are_no_second_tool_weight() -> None:
+    found = cases("medium", None, 40000)
+    drawn = [case.nuisances for case in found]
+    assert len({d.rate_hz for d in drawn}) == 4 and len({d.orientation for d in drawn}) == 3
+    assert max(d.tool_mass_kg for d in drawn) > 0.09
+    for case, d in zip(found, drawn, strict=True):
+        asked = any(name in WEIGHT for name in case.tested)
+        assert d.number == case.number
+        assert not (asked and d.tool_mass_kg) and (FINITE in case.beside) == (FINITE in case.effects)
+
+
+def test_a_family_that_no_object_has_is_refused() -> None:
+    assert {case.family for case in cases("medium", ["dome"], 0)} == {"dome"}
+    with pytest.raises(OptionError, match="cylinder"):
+        cases("medium", ["torus"], 0)
+
+
+def test_touches_of_an_object_are_solved_once_for_all_its_cases(tmp_path: Path) -> None:
+    linear = [Case("control", 0, seed) for seed in (1, 2)]
+    finite = Case("single", 0, 3, ("time_delay",), {FINITE: 1.0, "time_delay": 1.0})
+    tasks = [t for case in (*linear, finite) for t in tasks_of(case, tmp_path, solve=True, fast=False)]
+    graph = Graph({task.name: task for task in tasks}.values())
+    stages = Counter(task.stage for task in graph.tasks.values())
+    assert stages == {"solve": 2, "prepare": 3, "judge": 3}
+    assert [len(t.needs) for t in tasks if t.stage == "prepare"] == [1, 1, 2]
+    assert all(unfinished(task) for task in tasks)
+
+
+def test_what_a_drawn_tool_weighs_is_no_false_alarm_and_another_name_is() -> None:
+    seed = next(s for s in range(20) if Case("control", 0, s).nuisances.tool_mass_kg > 0)
+    case = Case("control", 0, seed).as_json()
+    for name, alarm in (("tool_gravity_inertia", False), ("force_bias", False), ("backlash", True)):
+        verdict = {"kind": "effect", "effects": [name], "candidates": []}
+        assert answer_of({"case": case, "verdict": verdict}).detected == alarm

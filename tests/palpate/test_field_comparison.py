@@ -1,0 +1,81 @@
+"""Held-out presses of tissue: the finite-element model with a field, and what it is compared with."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.press_making import of_paths
+from palpate.benchmarks._tissue import tissue
+from palpate.comparison import HOMOGENEOUS, RIVALS, CompareOptions, as_touched, compare_presses
+from reconstruct.modulus_field import asked_for, fit_field
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def _presses(late_m: np.ndarray, stated_m: float):
+    """Straight presses on a place that answers with 1 kN/m, read to begin late_m (p,) too late."""
+    into = np.linspace(0.0, 4e-3, 50)
+    p = len(late_m)
+    starts = np.arange(p + 1) * len(into)
+    centre = np.column_stack([np.arange(p) * 0.02, np.zeros(p), np.zeros(p)])
+    position = np.concatenate([c - into[:, None] * UP for c in centre])
+    force = np.tile(1e3 * into, p)[:, None] * UP
+    read = centre - late_m[:, None] * UP
+    return of_paths(
+        starts, position, force, read, np.tile(UP, (p, 1)), tip_radius_m=0.005, sample_rate_hz=100.0,
+        onset_error_m=stated_m,
+    )  # fmt: skip
+
+
+def _spring(presses):
+    def force(moved: np.ndarray) -> np.ndarray:
+        depth = np.maximum(presses.depth + moved[presses.press], 0.0)
+        return 1e3 * depth[:, None] * UP
+
+    return force
+
+
+def test_a_held_out_first_touch_is_moved_by_what_its_error_allows():
+    late = np.array([3e-4, -2e-4, 0.0])
+    presses = _presses(late, 3e-4)
+    force = _spring(presses)
+    rows = presses.depth > 3e-4
+
+    def error(how: str) -> float:
+        return float(np.abs(as_touched(force, presses, how) - presses.force)[rows].max())
+
+    assert error("read") == pytest.approx(0.3, rel=0.05)
+    assert error("moved") < 0.06
+
+
+def test_a_first_touch_that_is_sure_stays():
+    presses = _presses(np.array([3e-4, -2e-4]), 0.0)
+    np.testing.assert_array_equal(
+        as_touched(_spring(presses), presses, "moved"), as_touched(_spring(presses), presses, "read")
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("error", "how"), [(0.0, "read"), (3e-4, "moved")])
+def test_a_field_predicts_tissue_better_than_springs(error, how):
+    """Beyond the noise by a third at least."""
+    slab = tissue(1, raster=6, touch_error_m=error)
+    result = compare_presses(slab.presses, slab.model, CompareOptions(first_touch=how))
+
+    def beyond(name: str) -> float:
+        return float(np.sqrt(max(result.rmse_n[name] ** 2 - result.noise_n**2, 0.0)))
+
+    assert all(field is not None for field in result.fields)
+    assert beyond("fem") < 2 / 3 * min(beyond(name) for name in RIVALS)
+    assert beyond("fem") < 0.5 * beyond(HOMOGENEOUS)
+
+
+@pytest.mark.slow
+def test_one_modulus_stays_one_modulus():
+    slab = tissue(1, raster=6, log_sd=0.0)
+    result = compare_presses(slab.presses, slab.model)
+    assert all(field is None for field in result.fields)
+    assert result.rmse_n["fem"] == result.rmse_n[HOMOGENEOUS]
+    own = result.prepared.own["neo-hookean"]
+    assert not asked_for(fit_field(own, np.arange(len(slab.presses))))
