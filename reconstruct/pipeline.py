@@ -92,8 +92,8 @@ class Reconstruction:
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless options.force);
-    ContactError, SurfaceError or MeshError where a step cannot be done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless
+    options.force); ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
