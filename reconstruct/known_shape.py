@@ -46,8 +46,10 @@ from reconstruct.surface import Surface
 POSES = ("auto", "given")
 _MARGIN, _CELLS = 2.0, 40
 """A slab reaches this many thicknesses beyond the touches, in at most so many cells a side."""
-_DEEP, _GRADED, _GRADE = 25.0, (14, 14, 7), 1.6
-"""A half-space is so many contact radii deep, in cells that are finer towards the middle of its top."""
+_DEEP, _SPREAD, _WIDE = 16.0, 2.0, 1.2
+"""A half-space is a block so many contact radii deep, at least so many times as deep as the touches spread,
+and so many times as wide as deep: its held base stiffens by what its free sides give back, to 2 % of the
+contact's own compliance."""
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be told from it."""
 _FAR = 0.1
@@ -317,7 +319,8 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
     else:
         up, top, covariance, residual = _plane(presses)
     contact = float(np.sqrt(radius * max(presses.depth_m.max(), 0.1 * radius)))
-    thickness = options.slab_m or _DEEP * contact
+    spread = float(np.ptp(presses.point @ support_axes(up)[:2].T, axis=0).max())
+    thickness = options.slab_m or max(_DEEP * contact, _SPREAD * spread)
     if options.pose == "given" and np.median(np.abs(residual)) > 0.5 * thickness:
         raise SurfaceError(
             f"first touches lie {1e3 * np.median(residual):.1f} mm over z = 0, where --pose given has the "
@@ -326,16 +329,14 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
     axes = support_axes(up)
     flat = (presses.point - top) @ axes.T
     low, high = flat[:, :2].min(axis=0), flat[:, :2].max(axis=0)
-    reach = _MARGIN * thickness if options.slab_m else thickness
     middle = top + ((low + high) / 2) @ axes[:2]
-    size = np.append(high - low + 2 * reach, thickness)
-    if options.half_space:
-        box = box_mesh(_GRADED, tuple(size), _GRADE)
-    else:
-        # as fine at its surface as touches need, so that nothing is halved again
-        edge = max(min(mesh_size_m, SURFACE_EDGE_M, thickness / 3), size[:2].max() / _CELLS)
-        nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
-        box = box_mesh((nx, ny, nz), tuple(size))
+    wide = high - low + 2 * _MARGIN * thickness if options.slab_m else np.full(2, _WIDE * thickness)
+    size = np.append(wide, thickness)
+    # as fine at its surface as touches need, so that nothing is halved again
+    most = _CELLS if options.slab_m else _CELLS / 2
+    edge = max(min(mesh_size_m, SURFACE_EDGE_M, thickness / 3), size[:2].max() / most)
+    nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
+    box = box_mesh((nx, ny, nz), tuple(size))
     points = (box.points - [0, 0, thickness]) @ axes + middle
     mesh = TetMesh(points, box.tetrahedra, box.fixed, box.touchable)
     vertices, triangles = _shell(mesh)

@@ -72,7 +72,6 @@ class Reconstruction:
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     findings: of the check-up, grave ones first; the interval is as wide as they make it.
-    normals: (k, 3), of the surface at the contacts. seconds: wall time of each step.
     """
 
     model: Model
