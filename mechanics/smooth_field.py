@@ -1,6 +1,6 @@
 """A smooth field of stiffness: a Gaussian process of the logarithm of Young's modulus over an object.
 
-Few numbers say how it varies: standard deviation, and length over which places are alike (Matern 3/2). What
+Few numbers say how it varies: standard deviation, and length over which places are alike (Matern 5/2). What
 is unknown are its values at places that are spread over the object, the touched ones first; between them it
 is kriged. A press tells of a weighted mean of the field, by the share of its compliance that lies in each
 element and under its tip (`Shares`), so that depth is told as far as presses tell it. Standard deviation,
@@ -94,9 +94,9 @@ class Estimate:
 
 
 def correlation(a: np.ndarray, b: np.ndarray, length_m: float) -> np.ndarray:
-    """(n, k) of points a (n, 3) and b (k, 3) m: Matern 3/2."""
-    r = np.sqrt(3.0) * cdist(a, b) / length_m
-    return (1 + r) * np.exp(-r)
+    """(n, k) of points a (n, 3) and b (k, 3) m: Matern 5/2."""
+    r = np.sqrt(5.0) * cdist(a, b) / length_m
+    return (1 + r + r**2 / 3) * np.exp(-r)
 
 
 def kriging(points: np.ndarray, places: np.ndarray, length_m: float) -> np.ndarray:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.effects import stiffness_field
-from mechanics.field_response import changed, shares_of
+from mechanics.field_response import changed, shares_of, tips_of
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.places import Places
@@ -80,7 +80,7 @@ def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
     sites, first = np.unique(own.site[seen], return_index=True)
     if len(sites) < LEAST_SITES:
         return None
-    touched = own.places.point[seen[first]]
+    touched = tips_of(own.places)[seen[first]]
     nodes = own.shares.nodes
     elements = nodes[: own.shares.weight.shape[1] - len(own.site)]
     shares = Shares(nodes, own.shares.weight[seen])

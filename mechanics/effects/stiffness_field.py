@@ -16,7 +16,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Misfit, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields
-from mechanics.field_response import far_of, shares_in_elements
+from mechanics.field_response import far_of, shares_in_elements, tips_of
 from mechanics.model import Model
 from mechanics.places import Places
 from mechanics.smooth_field import (
@@ -69,7 +69,7 @@ def _made(places: Places, prior: Prior, answer: np.ndarray, weight: np.ndarray) 
 
 
 def _places(places: Places) -> np.ndarray:
-    return places_of(places.point[places.first], energy_fields(places).centroid)
+    return places_of(tips_of(places)[places.first], energy_fields(places).centroid)
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

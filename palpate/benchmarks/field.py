@@ -7,9 +7,9 @@ interpolated 1D models, and each place's own modulus in the finite-element model
 Then the same with first touches that are read 0.3 mm wrong: as read, and moved by what that error allows, for
 every model alike. Errors beyond noise are sqrt(rms^2 - noise^2).
 
-The map: ln E at the touched places against the truth right under the tip (correlation, rms error, contrast:
-slope of found on true) and the share of places whose 95 % interval holds the truth. Homogeneous slabs are
-among the cases: there no field must be found.
+The map: ln E half a tip radius under the touched places against the truth there (correlation, rms error,
+contrast: slope of found on true) and the share of places whose 95 % interval holds the truth. Homogeneous
+slabs are among the cases: there no field must be found.
 """
 
 from __future__ import annotations
