@@ -163,7 +163,7 @@ def _boundary(grid: Any) -> trimesh.Trimesh:
         grid = grid.combine()
     if isinstance(grid, pyvista.UnstructuredGrid):
         solid = np.isin(grid.celltypes, _SOLID)
-        grid = grid.extract_cells(np.flatnonzero(solid)) if solid.any() else grid
+        grid = grid.extract_cells(np.flatnonzero(solid).tolist()) if solid.any() else grid
         grid = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0)
     shell = grid.triangulate()
     if shell.n_cells == 0 or not len(shell.faces):

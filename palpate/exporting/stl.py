@@ -14,11 +14,11 @@ HEADER = b"Palpate model"
 
 def write(path: Path, subject: Subject, unit: str = "m") -> tuple[str, ...]:
     """Write the surface with lengths in `unit`; what it cannot say."""
-    import trimesh
+    import trimesh.exchange.stl
 
     mesh = subject.mesh.linear()
     used, index = np.unique(mesh.surface, return_inverse=True)
     shell = trimesh.Trimesh(mesh.points[used] / UNITS[unit], index.reshape(-1, 3), process=False)
-    binary = bytes(shell.export(file_type="stl"))
+    binary = trimesh.exchange.stl.export_stl(shell)
     path.write_bytes(HEADER.ljust(80) + binary[80:])
     return (f"lengths in {unit}: read it with --unit {unit}", "a shape alone: no modulus, no support")
