@@ -81,7 +81,9 @@ class _Tally:
         self.rates["no answer: the reconstruction or the diagnosis refused"].append(answer.first == "failed")
         excluded = case["without"]
         self.calibration += [
-            (p, name in case["effects"]) for name, p in verdict.get("probability", {}).items()
+            (p, name in case["effects"])
+            for name, p in verdict.get("probability", {}).items()
+            if name in case["effects"] or name not in case["beside"]
         ]
         size = item["truth"].get("sizes", {}).get(FINITE)
         if FINITE not in case["effects"]:

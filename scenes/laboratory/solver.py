@@ -177,7 +177,8 @@ class Problem:
     def tip_stiffness(self, state: State) -> np.ndarray:
         """(3, 3) d(force on the tip) / d(tip position) with the contact as it is; symmetric, negative.
 
-        With the tangent that the last load step took on its way: within some 1 % of the one at its end.
+        With the tangent that the last load step took on its way: within some 1 % of the one at its end,
+        3 % with damage.
         """
         compliance = self._compliance
         if compliance is None:
