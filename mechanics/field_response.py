@@ -33,7 +33,7 @@ def shares_in_elements(places: Places, answer: np.ndarray) -> Shares:
     fields = energy_fields(places)
     weight = answer[:, None] * fields.energy[:, :, 0, 0][places.place]
     own = np.maximum(1 - weight.sum(axis=1), 0.0)
-    np.add.at(weight, (slice(None), places.model.mesh.touchable_elements), own[:, None] * places.under_tip)
+    np.add.at(weight.T, places.model.mesh.touchable_elements, (own[:, None] * places.under_tip).T)
     return Shares(fields.centroid, weight / weight.sum(axis=1, keepdims=True))
 
 

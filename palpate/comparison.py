@@ -23,7 +23,7 @@ import numpy as np
 from mechanics.errors import ContactError
 from mechanics.model import Model
 from mechanics.options import option
-from mechanics.places import Places, solve_places
+from mechanics.places import Places
 from mechanics.press_making import of_paths
 from mechanics.press_sites import sites_of
 from mechanics.presses import MARGIN_S, Presses
@@ -39,6 +39,7 @@ from reconstruct.modulus_field import (
     PressModuli,
     asked_for,
     fit_field,
+    places_at,
     press_moduli,
     with_field,
 )
@@ -278,8 +279,7 @@ def prepare(
     }
     fitted = columns(fit_robust(smooth.window(0.0, 0.0), table.noise.raw_n), np.zeros(len(table)))
     one, none = np.ones(len(table)), np.zeros(len(table))
-    places = solve_places(model, table.point, table.normal, table.frame)
-    own = {}
+    places, own = places_at(model, table, solved), {}
     if field != "homogeneous":
         own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
     return Prepared(
@@ -424,7 +424,7 @@ def stiffness_along(
     )  # fmt: skip
     result = {}
     for name, fem in (("fem", _fem(prepared, train)), (HOMOGENEOUS, _homogeneous(prepared, train))):
-        there = solve_places(model, places, solved.normals, pressed.frame)
+        there = places_at(model, pressed, solved)
         force = replace(fem, sites=with_field(solved, there, fem.field)).forces(pressed)
         deepest = force.reshape(len(places), len(steps), 3)[:, -1]
         result[name] = (deepest * solved.normals).sum(axis=1)

@@ -17,7 +17,7 @@ from mechanics.effects import stiffness_field
 from mechanics.field_response import changed, shares_of
 from mechanics.model import Model
 from mechanics.options import option
-from mechanics.places import Places, solve_places
+from mechanics.places import Places
 from mechanics.presses import Presses
 from mechanics.sites import TouchSites
 from mechanics.smooth_field import Estimate, Shares, SmoothField, estimate, lengths_of, places_of
@@ -55,6 +55,13 @@ class PressModuli:
     def usable(self) -> np.ndarray:
         e, error = self.fit.modulus_pa, self.fit.relative_error
         return np.isfinite(e) & (e > 0) & np.isfinite(error) & (error < 1) & (self.fit.rows > 10)
+
+
+def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
+    """The presses' places on a model of one modulus, where they are solved as touch sites already."""
+    frame = presses.frame
+    far = np.einsum("pij,pjk,plk->pil", frame, sites.far, frame)
+    return Places(model, presses.point, presses.normal, frame, far, sites.curvature)
 
 
 def press_moduli(
@@ -144,7 +151,7 @@ def fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Estimate | 
     """The likeliest field of the model's presses, which touch at `sites`, by the model's dent law; None where
     they ask for none. noise_n: N, of a raw force component."""
     presses = model.presses
-    places = solve_places(model, presses.point, presses.normal, presses.frame)
+    places = places_at(model, presses, sites)
     own = press_moduli(presses, sites, places, model.material.dent_law, noise_n)
     found = fit_field(own, np.arange(len(presses)))
     return found if asked_for(found) else None

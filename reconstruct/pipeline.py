@@ -92,8 +92,8 @@ class Reconstruction:
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless
-    options.force); ContactError, SurfaceError or MeshError where a step cannot be done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave, unless
+    options.force; ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -107,8 +107,8 @@ def reconstruct_fully(
     _check_timed(recording)
     clock = _Clock()
     progress("contacts", 0.02)
-    checkup = Checkup(recording, options.force)
     geometry = stated_geometry(recording, options.geometry)
+    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
     placed = None
     if geometry.known:
         exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))

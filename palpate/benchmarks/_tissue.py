@@ -18,6 +18,7 @@ from mechanics.patch import half_space_compliance
 from mechanics.press_making import of_paths
 from mechanics.presses import Presses
 from mechanics.sites import TouchSites, touch_sites
+from mechanics.tetmesh import TetMesh
 from mechanics.touch import forces_at
 
 NU, RATE_HZ, UP = 0.49, 200.0, np.array([0.0, 0.0, 1.0])
@@ -49,8 +50,7 @@ def tissue(
     modulus, noise = np.exp(rng.uniform(np.log(8e3), np.log(40e3))), rng.uniform(0.002, 0.008)
     log_ratio = _field(rng, length, log_sd, height)
     size = (side, side, height)
-    fine = box_mesh(tuple(max(3, round(x / FINE_M)) for x in size), size)
-    coarse = box_mesh(tuple(max(3, round(x / COARSE_M)) for x in size), size)
+    fine, coarse = _slab(size, FINE_M), _slab(size, COARSE_M)
     at = (np.arange(raster) - (raster - 1) / 2) * spacing
     points = np.array([[x, y, height] for x in at for y in at]) + 0.0
     points[:, :2] += rng.normal(0, 0.0003, (len(points), 2))
@@ -78,6 +78,11 @@ def tissue(
     return Tissue(presses, model, log_ratio, float(modulus), {k: float(v) for k, v in drawn.items()})
 
 
+def _slab(size: tuple[float, float, float], edge_m: float) -> TetMesh:
+    x, y, z = (max(3, round(length / edge_m)) for length in size)
+    return box_mesh((x, y, z), size)
+
+
 def _field(
     rng: np.random.Generator, length: float, log_sd: float, height: float
 ) -> Callable[[np.ndarray], np.ndarray]:
@@ -93,7 +98,12 @@ def _field(
 
 
 def _solved(
-    mesh, points: np.ndarray, normals: np.ndarray, tip: float, log_ratio, rng: np.random.Generator
+    mesh: TetMesh,
+    points: np.ndarray,
+    normals: np.ndarray,
+    tip: float,
+    log_ratio: Callable[[np.ndarray], np.ndarray],
+    rng: np.random.Generator,
 ) -> tuple[TouchSites, np.ndarray]:
     """(sites whose far field is over the modulus under each tip, that modulus over the slab's (p,))."""
     ratio = np.exp(log_ratio(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 from scenes.laboratory.effects import effect
 from scenes.laboratory.effects.stiffness_field import LOG_SD, field_of
 from scenes.laboratory.field import log_ratio
-from scenes.laboratory.specimen import Specimen
+from scenes.laboratory.specimen import Fineness, Specimen, build
 from scenes.phantoms import phantom
 
 BLOCK = phantom("block")
@@ -49,3 +50,20 @@ def test_the_specimen_knows_its_field_and_others_keep_their_key():
     assert changed.field is not None and changed.key() != Specimen().key()
     # the key of solved curves from before there were fields
     assert Specimen().key() == "b201adbbdccc3f6bea62"
+
+
+@pytest.mark.slow
+def test_a_solid_twice_as_stiff_everywhere_answers_with_twice_the_force(tmp_path):
+    point = np.array([0.0, 0.0, 1e3 * BLOCK.height_m])
+    twice = replace(Specimen(), field=((), ((100.0, float(np.log(2.0))),), 0.5))
+    forces = []
+    for specimen in (Specimen(), twice):
+        problem = build(
+            BLOCK, specimen, point, travel=0.5, fineness=Fineness(finest=6.0, growth=1.0), cache=tmp_path
+        )
+        up = np.array([0.0, 0.0, 1.0])
+        state = problem.rest(point + specimen.tip_radius * up)
+        for deep in (0.5, 1.0):
+            state = problem.advance(state, point + (specimen.tip_radius - deep) * up)
+        forces.append(state.force[2])
+    assert forces[1] == pytest.approx(2 * forces[0], rel=1e-6)
