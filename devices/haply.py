@@ -27,8 +27,7 @@ from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.codecs import haply as codec
 from devices.io_thread import ForcefulDevice, Reading, found
 from mechanics.errors import DeviceError
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges
+from mechanics.options import check_ranges, option
 
 SPEC = DeviceSpec(
     name="haply",
@@ -61,7 +60,14 @@ class HaplyOptions:
     uri: str = option("ws://localhost:10001", "state and command socket", flag="--haply-uri")
     events_uri: str = option("ws://localhost:10020", "event socket; '' for none", flag="--haply-events-uri")
     device_id: str = option("", "which Inverse3; '' for the first", flag="--haply-device")
-    answer_s: float = option(0.1, "silence after which it counts as gone", unit="s", flag="--haply-answer")
+    answer_s: float = option(
+        0.1,
+        "silence after which it counts as gone",
+        unit="s",
+        flag="--haply-answer",
+        low=0.002,
+        high=10.0,
+    )
     preset: str = option(
         "arm_front_centered",
         "the service's mount (3.5 or later): origin in the workspace's middle; '' keeps the one that it has",
@@ -69,7 +75,7 @@ class HaplyOptions:
     )
 
     def __post_init__(self) -> None:
-        check_ranges(self, {"answer_s": Range(0.002, 10.0)})
+        check_ranges(self)
 
 
 class HaplyWire:

@@ -17,8 +17,7 @@ from scipy.spatial.transform import Rotation
 
 from mechanics.bounds import FARTHEST_M, FASTEST_M_PER_S
 from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges
+from mechanics.options import check_ranges, option
 from mechanics.state import TipState
 
 LONGEST_RATE_STEP_S = 0.05
@@ -33,18 +32,12 @@ class MapperOptions:
     scale: float = option(1.0, "scene metres a device metre", flag="--motion-scale")
     force_scale: float = option(1.0, "device newtons a scene newton")
     clutch_button: int = option(-1, "button that lifts the tool off the mapping; -1: none")
-    reach_m: float = option(0.25, "how far from the scene's centre a rate device moves", unit="m")
+    reach_m: float = option(
+        0.25, "how far from the scene's centre a rate device moves", unit="m", low=0.001, high=10.0
+    )
 
     def __post_init__(self) -> None:
-        check_ranges(self, RANGES)
-
-
-RANGES = {
-    "scale": Range(1e-3, 1e3),
-    "force_scale": Range(0.0, 100.0),
-    "clutch_button": Range(-1, 62),
-    "reach_m": Range(1e-3, 10.0),
-}
+        check_ranges(self)
 
 
 def axis_matrix(axes: str) -> np.ndarray:

@@ -20,8 +20,7 @@ from devices.hid_port import HidPort, enumerate_devices, load, may_open, opened,
 from devices.io_thread import ForcefulDevice, Reading
 from devices.velocity import VelocityEstimate
 from mechanics.errors import DeviceError
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges
+from mechanics.options import check_ranges, option
 
 SPEC = DeviceSpec(
     name="pid-ffb",
@@ -47,14 +46,16 @@ _JOYSTICK_USAGES = ((1, 4), (1, 5), (1, 8), (2, 2))
 class PidOptions:
     """What turns shares of full scale into metres and newtons at the handle."""
 
-    full_scale_n: float = option(8.0, "measured force at full scale", unit="N", flag="--ffb-full-scale")
+    full_scale_n: float = option(
+        8.0, "measured force at full scale", unit="N", flag="--ffb-full-scale", low=0.01, high=200.0
+    )
     stroke_m: float = option(
-        0.05, "travel of the handle from the middle to an end", unit="m", flag="--ffb-stroke"
+        0.05, "travel of the handle from the middle to an end", unit="m", flag="--ffb-stroke", low=0.001
     )
     device_path: str = option("", "which device, as 'palpate devices' lists it", flag="--ffb-path")
 
     def __post_init__(self) -> None:
-        check_ranges(self, {"full_scale_n": Range(0.01, 200.0), "stroke_m": Range(0.001, 1.0)})
+        check_ranges(self)
 
 
 class PidWire:
@@ -104,6 +105,8 @@ class PidWire:
     def _create_effects(self, port: HidPort) -> None:
         layout = self._layout
         self._blocks: dict[str, int] = {}
+        # what a program that was killed left there would in the end leave no room
+        port.write(layout.control(pid.RESET))
         for axis in layout.force_axes:
             port.set_feature(layout.create_constant())
             self._blocks[axis] = layout.loaded_block(port.get_feature(*layout.block_load()))
@@ -173,6 +176,10 @@ class PidWire:
         try:
             self._running = True
             self._stop()
+            for block in self._blocks.values():
+                free = self._layout.free(block)
+                if free is not None:
+                    self._port.write(free)
             self._port.write(self._layout.control(pid.STOP_ALL))
         except (OSError, DeviceError):
             pass  # unplugged: the effects end by themselves within EFFECT_MS

@@ -22,8 +22,7 @@ from numba import njit
 from devices.base import DeviceSpec
 from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges
+from mechanics.options import check_ranges, option
 
 OFF, NOT_FINITE, STALE, OUTSIDE, DISCONNECTED, UNCALIBRATED, FAULT, OVER_SPEED, JUMP, CLOCK = (
     1 << k for k in range(10)
@@ -62,28 +61,47 @@ def reason_words(reasons: int) -> str:
 class SafetyOptions:
     """What the filter allows; the device's own specification is never exceeded."""
 
-    max_force_n: float | None = option(None, "greatest force; the device's own limit if lower", unit="N")
-    slew_n_per_s: float = option(2000.0, "fastest rise of the force", unit="N/s", flag="--slew")
-    ramp_s: float = option(0.5, "time over which force rises after it is enabled", unit="s", flag="--ramp")
-    stale_s: float = option(0.02, "a pose older than this gives zero force", unit="s", flag="--stale")
-    max_speed_m_per_s: float | None = option(None, "faster than this trips the filter", unit="m/s")
-    jump_m: float = option(0.005, "a jump of the pose beyond what the greatest speed explains", unit="m")
-    workspace_radius_m: float | None = option(None, "no force outside this radius", unit="m")
+    max_force_n: float | None = option(
+        None, "greatest force; the device's own limit if lower", unit="N", low=0.01, high=200.0
+    )
+    slew_n_per_s: float = option(
+        2000.0, "fastest rise of the force", unit="N/s", flag="--slew", low=1.0, high=1e4, looser="higher"
+    )
+    ramp_s: float = option(
+        0.5,
+        "time over which force rises after it is enabled",
+        unit="s",
+        flag="--ramp",
+        low=0.05,
+        high=60.0,
+        looser="lower",
+    )
+    stale_s: float = option(
+        0.02,
+        "a pose older than this gives zero force",
+        unit="s",
+        flag="--stale",
+        low=0.002,
+        high=2.0,
+        looser="higher",
+    )
+    max_speed_m_per_s: float | None = option(
+        None, "faster than this trips the filter", unit="m/s", low=0.001, high=10.0
+    )
+    jump_m: float = option(
+        0.005,
+        "a jump of the pose beyond what the greatest speed explains",
+        unit="m",
+        low=1e-4,
+        high=0.05,
+        looser="higher",
+    )
+    workspace_radius_m: float | None = option(
+        None, "no force outside this radius", unit="m", low=0.001, high=10.0
+    )
 
     def __post_init__(self) -> None:
-        check_ranges(self, RANGES)
-
-
-RANGES = {
-    "max_force_n": Range(0.01, 200.0),
-    "slew_n_per_s": Range(1.0, 10_000.0, "higher"),
-    "ramp_s": Range(0.05, 60.0, "lower"),
-    "stale_s": Range(0.002, 2.0, "higher"),
-    "max_speed_m_per_s": Range(0.001, 10.0),
-    "jump_m": Range(1e-4, 0.05, "higher"),
-    "workspace_radius_m": Range(0.001, 10.0),
-}
-"""Of the options; those that default to the device's own limit can only tighten it."""
+        check_ranges(self)
 
 
 class SafetyParameters(NamedTuple):

@@ -31,7 +31,7 @@ _BY_NAME = {
     "coloured_share": (0.0, 1.0),
     "hold_share": (0.0, 1.0),
     "folds": (2, 1000),
-    "bootstraps": (10, 100_000),
+    "bootstraps": (20, 100_000),
     "bootstrap": (10, 100_000),
     "sites": (1, 1000),
     "repeats": (1, 1000),
@@ -72,16 +72,18 @@ def option(
     choices: Sequence[str] | None = None,
     low: float | None = None,
     high: float | None = None,
+    looser: str = "",
 ) -> Any:
     """A dataclass field with the words that the command line prints for it.
 
     `flag` defaults to `--field-name`; `choices` restricts a string. A boolean becomes `--flag/--no-flag`.
     A field whose default is None takes a float unless `choices` is given. `low` and `high`, both allowed,
-    default to the sane range of its name or unit (`span_of`); a `high` of inf allows inf.
+    default to the sane range of its name or unit (`span_of`); a `high` of inf allows inf. `looser`: 'higher'
+    or 'lower' where that way from the default protects a hand less (`loosened`).
     """
     metadata = {
         "help": help, "unit": unit, "flag": flag, "choices": tuple(choices) if choices else None,
-        "low": low, "high": high,
+        "low": low, "high": high, "looser": looser,
     }  # fmt: skip
     return dataclasses.field(default=default, metadata=metadata)
 
@@ -97,7 +99,26 @@ def check_range(field: dataclasses.Field[Any], value: Any, name: str | None = No
     """Raise OptionError for a number outside what the option takes; other values pass."""
     if not isinstance(value, Real) or isinstance(value, bool):
         return
+    number: Any = value
     low, high = span_of(field)
-    if not low <= value <= high:
+    if not low <= number <= high:
         words = span(low, high, field.metadata["unit"])
-        raise OptionError(f"{name or field.name} is {value:g}; allowed are numbers{words}")
+        raise OptionError(f"{name or field.name} is {str(number)[:30]}; allowed are numbers{words}")
+
+
+def check_ranges(options: Any) -> None:
+    """Raise OptionError for the first field of an options dataclass that is outside its range."""
+    for field in dataclasses.fields(options):
+        if "help" in field.metadata:
+            check_range(field, getattr(options, field.name))
+
+
+def loosened(options: Any) -> tuple[str, ...]:
+    """What protects less than its default does, in plain words with the flag that set it."""
+    words = []
+    for field in dataclasses.fields(options):
+        looser, value = field.metadata.get("looser"), getattr(options, field.name)
+        if looser and (value > field.default if looser == "higher" else value < field.default):
+            flag = field.metadata["flag"] or "--" + field.name.replace("_", "-")
+            words.append(f"protection loosened: {flag} is {value:g} (default {field.default:g})")
+    return tuple(words)

@@ -19,7 +19,7 @@ _SHOWN = 60
 class Key:
     """One key: its type, the values allowed, and how many where it is a list (0: as many as one likes).
 
-    unknown: nan is allowed, for what nobody knows.
+    unknown: nan and inf are allowed, for what nobody knows.
     """
 
     kind: type = float
@@ -59,7 +59,7 @@ class Key:
         except OverflowError:
             return False
         inside = math.isfinite(number) and self.low <= number <= self.high
-        return inside or (self.unknown and math.isnan(number))
+        return inside or (self.unknown and (math.isnan(number) or number == math.inf))
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,8 @@ from mechanics.surface_files import ClosedSurface
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 """Directions out of the support along the axes of the file's frame."""
 _LOW, _FACING, _LEAST_FOOT = 0.01, 0.98, 0.01
-"""Of the size: how high a foot's triangles may lie; cosine of their lean; their least share of the surface."""
+"""Of the size: how high a foot's triangles may lie; cosine of their lean; their least share of the
+surface."""
 
 
 @dataclass(frozen=True)
@@ -27,8 +28,8 @@ class Standing:
 
 
 def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Standing:
-    """Put a surface on its support. up: one of UPS or a direction "X,Y,Z"; sink_m: so much is cut off flat at the bottom, for an
-    object that settles or has no flat foot.
+    """Put a surface on its support. up: one of UPS or a direction "X,Y,Z"; sink_m: so much is cut off flat
+    at the bottom, for an object that settles or has no flat foot.
 
     Raises SurfaceError where there is no flat foot.
     """

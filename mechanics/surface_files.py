@@ -30,7 +30,8 @@ UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 LEAST_M, GREATEST_M = 0.002, 2.0
 """An object that a hand explores is so large across."""
 _SMALL, _FLAT = 0.1, 0.01
-"""Of the object's size: how wide a hole may be that is closed, how far off its plane the rim of a wider one."""
+"""Of the object's size: how wide a hole may be that is closed, how far off its plane the rim of a wider
+one."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +73,8 @@ def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
 
 
 def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
-    """The closed surface of a file, or of a triangle mesh that has `vertices` (n, 3) in `unit` and `faces` (m, 3).
+    """The closed surface of a file, or of a triangle mesh that has `vertices` (n, 3) in `unit` and `faces`
+    (m, 3).
 
     Raises SurfaceError as `read_surface` does, and for what is neither.
     """
@@ -82,7 +84,7 @@ def surface_of(shape: Any, unit: str = "m") -> ClosedSurface:
         return read_surface(shape, unit)
     if not (hasattr(shape, "vertices") and hasattr(shape, "faces")):
         raise SurfaceError(
-            f"a {type(shape).__name__} is no surface: give a file, or a mesh with vertices (n, 3) and faces (m, 3)"
+            f"a {type(shape).__name__} is no surface: give a file, or a mesh with vertices and faces"
         )
     if unit not in UNITS:
         raise SurfaceError(f"unit is '{unit}'; allowed are {', '.join(UNITS)}")
@@ -193,7 +195,8 @@ def _check_size(name: str, size: float, unit: str) -> None:
 
 
 def _close(shell: trimesh.Trimesh, name: str, metres: float) -> tuple[str, ...]:
-    """Close small and flat holes of the shell in place; what was done. Raises SurfaceError for other holes."""
+    """Close small and flat holes of the shell in place; what was done. Raises SurfaceError for other
+    holes."""
     if shell.is_watertight:
         _wind(shell)
         return ()

@@ -59,8 +59,8 @@ if TYPE_CHECKING:
 
 _DOOR = {
     "palpate.api": (
-        "read_recording read_table import_table check load model_of reconstruct renderer replay press compare "
-        "diagnose simulate export batch"
+        "read_recording read_table import_table check load model_of reconstruct renderer replay press "
+        "compare diagnose simulate export batch"
     ),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",

@@ -92,12 +92,14 @@ def check(recording: RecordingLike, *, full: bool = False, progress: bool | Prog
 
 
 def import_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Imported:
-    """What other programs' files hold, as a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS bag, MCAP.
+    """What other programs' files hold, as a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS
+    bag, MCAP.
 
-    mapping: a TOML file that says what the columns are (docs/import-export.md); said: the same by keyword, which
-    count before it: columns {role: name}, units {kind: unit}, tip_radius_m, force_on ("tool", "object"), frame
-    ("device", "tool"), rotation (3, 3), flange_to_tip_m (3,), mass_kg, tare_s (start, end), offset_s, rate_hz,
-    thing (what [object] of the recording is to say). Raises RecordingError where something needed is missing.
+    mapping: a TOML file that says what the columns are (docs/import-export.md); said: the same by keyword,
+    which count before it: columns {role: name}, units {kind: unit}, tip_radius_m, force_on ("tool",
+    "object"), frame ("device", "tool"), rotation (3, 3), flange_to_tip_m (3,), mass_kg, tare_s (start,
+    end), offset_s, rate_hz, thing (what [object] of the recording is to say). Raises RecordingError where
+    something needed is missing.
     """
     import dataclasses as classes
 
@@ -123,8 +125,8 @@ def import_table(*files: str | Path, mapping: str | Path | None = None, **said: 
 
 
 def read_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Recording:
-    """The recording in other programs' files; what may be said is as for `import_table`, which also tells and draws
-    what it understood."""
+    """The recording in other programs' files; what may be said is as for `import_table`, which also tells
+    and draws what it understood."""
     return import_table(*files, mapping=mapping, **said).recording
 
 
@@ -172,11 +174,11 @@ def model_of(
 ) -> Model:
     """The model of an object whose shape is known, in the frame of its file.
 
-    shape: an STL, OBJ, PLY, glTF, VTP, VTU, MSH or INP file with lengths in `unit` ("m", "cm", "mm", "um", "in"),
-    or a triangle mesh with `vertices` and `faces` (trimesh's). young_modulus_pa: None takes 20 kPa. up: out of
-    the support, "+z", "-x", ... or "X,Y,Z" in the file's frame; sink_m: cut off flat at the bottom.
-    poisson_ratio: None takes 0.49; tip_radius_m: 5 mm; mesh_size_m: 10 mm, or an eighth of the object. save:
-    MODEL folder to write. Raises SurfaceError where the surface is open or has no flat foot.
+    shape: an STL, OBJ, PLY, glTF, VTP, VTU, MSH or INP file with lengths in `unit` ("m", "cm", "mm", "um",
+    "in"), or a triangle mesh with `vertices` and `faces` (trimesh's). young_modulus_pa: None takes 20 kPa.
+    up: out of the support, "+z", "-x", ... or "X,Y,Z" in the file's frame; sink_m: cut off flat at the
+    bottom. poisson_ratio: None takes 0.49; tip_radius_m: 5 mm; mesh_size_m: 10 mm, or an eighth of the
+    object. save: MODEL folder to write. Raises SurfaceError where the surface is open or has no flat foot.
     """
     from dataclasses import replace as changed
 
@@ -479,9 +481,10 @@ def export(
 ) -> tuple[str, ...]:
     """Write a model for another program: a minimal scene that runs there, or its mesh.
 
-    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl". at: (3,) m, where the scene's tip
-    presses, None is the middle of the top; depth_m: how deep, None is half the tip's radius. unit: of an STL's
-    lengths; all else is in SI units and the model's frame. Returns what the format cannot say, one line each.
+    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl". at: (3,) m, where the
+    scene's tip presses, None is the middle of the top; depth_m: how deep, None is half the tip's radius.
+    unit: of an STL's lengths; all else is in SI units and the model's frame. Returns what the format cannot
+    say, one line each.
     """
     import numpy as np
 

@@ -13,7 +13,7 @@ import types
 import typing
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, ClassVar, Protocol, Self, TypeVar
+from typing import Any, ClassVar, NoReturn, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -21,7 +21,6 @@ from mechanics.errors import OptionError, PalpateError
 from mechanics.files import JSON, FolderKind, Kind, atomic_file, check_target
 from mechanics.options import check_range
 from mechanics.recording import recording_files
-from mechanics.schema import span
 from palpate.keywords import kinds, options
 
 
@@ -32,6 +31,14 @@ class Options(Protocol):
 
 
 T = TypeVar("T", bound=Options)
+
+
+class OneLineParser(argparse.ArgumentParser):
+    """Wrong words are an OptionError, which the command line prints in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        """Raise it."""
+        raise OptionError(f"{message}; '{self.prog} --help' tells all options")
 
 
 def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[str] = ()) -> None:
@@ -115,18 +122,6 @@ def natural(text: str) -> int:
     if not 0 <= value < 1 << 63:
         raise argparse.ArgumentTypeError(f"'{text}' must be a whole number, 0 or greater")
     return value
-
-
-def between(low: float, high: float) -> Callable[[str], float]:
-    """argparse type: a number of that range, ends included."""
-
-    def number(text: str) -> float:
-        value = float(text)
-        if not low <= value <= high:
-            raise argparse.ArgumentTypeError(f"'{text}' must be a number{span(low, high, '')}")
-        return value
-
-    return number
 
 
 def vector(text: str) -> np.ndarray:
@@ -286,10 +281,3 @@ class Bar:
 
     def __exit__(self, *_: object) -> None:
         self.close()
-
-
-def positive(value: float, name: str) -> float:
-    """`value`, or OptionError where it is not greater than 0."""
-    if not value > 0:
-        raise OptionError(f"{name} is {value}; it must be greater than 0")
-    return value

@@ -46,11 +46,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     before = _listen(_leave)
     try:
         # nothing is open yet, and libraries that are half loaded do not bear an exception: leave at once
-        command, module, arguments = _parsed(list(sys.argv[1:] if argv is None else argv))
+        words = list(sys.argv[1:] if argv is None else argv)
+        command, module, code = _loaded(words)
         if module is None:
-            return arguments
+            return code
         _listen(_interrupt)
-        return _run(command, module, arguments)
+        return _run(command, module, words[1:])
     except KeyboardInterrupt as how:
         print(f"{command.prog}: interrupted", file=sys.stderr)
         code = 143 if isinstance(how, Ended) else 130
@@ -62,8 +63,8 @@ def main(argv: Sequence[str] | None = None) -> int:
             signal.signal(number, handler)
 
 
-def _parsed(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, Any]:
-    """(parser, the command's module, its arguments); without a module, the exit code instead of these."""
+def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, int]:
+    """(parser, the command's module or None, then the exit code)."""
     import argparse
     import importlib
 
@@ -82,16 +83,19 @@ def _parsed(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, Any]:
             raise
         print(f"palpate {name}: not in this version yet; see CHANGELOG.md for what is", file=sys.stderr)
         return parser, None, 2
-    command = argparse.ArgumentParser(
+
+    from palpate.arguments import OneLineParser
+
+    command = OneLineParser(
         prog=f"palpate {name}",
         description=module.__doc__,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_arguments(command)
-    return command, module, command.parse_args(argv[1:])
+    return command, module, 0
 
 
-def _run(command: argparse.ArgumentParser, module: Any, arguments: argparse.Namespace) -> int:
+def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
     import warnings
 
@@ -115,6 +119,7 @@ def _run(command: argparse.ArgumentParser, module: Any, arguments: argparse.Name
     with warnings.catch_warnings():
         warnings.showwarning = warned
         try:
+            arguments = command.parse_args(words)
             check_paths(command, arguments)
             return int(module.run(arguments) or 0)
         except PalpateError as error:
@@ -135,7 +140,8 @@ def _listen(handler: Any) -> dict[int, Any]:
     names = ("SIGINT", "SIGTERM", "SIGHUP")
     try:
         numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-        return {n: signal.signal(n, handler) for n in numbers if signal.getsignal(n) != signal.SIG_IGN}
+        ours = [n for n in numbers if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+        return {n: signal.signal(n, handler) for n in ours}
     except ValueError:  # in a thread: signals are the main one's business
         return {}
 

@@ -1,4 +1,5 @@
-"""What a command is given as an object: a scene, a MODEL folder, or a surface's file with its unit and modulus."""
+"""What a command is given as an object: a scene, a MODEL folder, or a surface's file with its unit and
+modulus."""
 
 from __future__ import annotations
 
@@ -49,8 +50,8 @@ def given_scene(arguments: argparse.Namespace, name: str) -> Scene:
 
 
 def given_model(arguments: argparse.Namespace, name: str | None) -> str | Scene | None:
-    """What `pp.load` is to load: a scene for a surface's file or where something of it was given, else the name
-    itself."""
+    """What `pp.load` is to load: a scene for a surface's file or where something of it was given, else the
+    name itself."""
     said = [key for key in ("modulus", "nu", *_MESH) if getattr(arguments, key) is not None]
     if name is None:
         if said:

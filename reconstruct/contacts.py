@@ -30,8 +30,6 @@ PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
-_PULL_S, _AGAINST = 0.15, -0.5
-"""A force so soon after a press, against it by this cosine, is the surface that holds on to the tip."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -208,13 +206,29 @@ def _speed(signals: Signals, contact: Found) -> float:
 
 
 def _searched(recording: Recording, given: _Given) -> _Found:
+    signals, free_air, spread = signals_of(recording, given.cutoff_hz)
+    try:
+        return _found(recording, given, signals, free_air, spread)
+    except ContactError as error:
+        if recording.quaternion is not None or spread.min() < signals.noise_n:
+            raise
+        raise type(error)(
+            f"{error}. In free motion the force wanders by {spread.min():.2g} N an axis, louder than its "
+            f"noise ({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation "
+            "(qw, qx, qy, qz), or hold it one way"
+        ) from error
+
+
+def _found(
+    recording: Recording, given: _Given, signals: Signals, free_air: np.ndarray, spread: np.ndarray
+) -> _Found:
+    """spread: (n,) noise of the filtered force, N an axis."""
     method, options, boundary = given.method, given.contact, given.known_base
-    signals, free_air, spread = _signals(recording, given.cutoff_hz)
     least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
     high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
     high = options.contact_threshold_n or high
     gap = round(0.25 * recording.sample_rate_hz / given.cutoff_hz)
-    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, gap)
+    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, signals.force, gap)
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -231,24 +245,22 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     contacts: list[Found] = []
     unused: list[tuple[int, int, str]] = []
     touches = runs(touching)
-    left, last = 0, np.zeros(3)
     for a, b in touches:
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
             contact = (paper_contact if method == "paper" else fitted_contact)(signals, a, b)
             reason = "" if contact else "shows no rise of force with depth"
-        if contact and contact.normal @ last < _AGAINST and recording.t[a] - recording.t[left] < _PULL_S:
-            contact, reason = None, "pulls at the surface that it has just left (adhesion)"
         if contact:
             contacts.append(contact)
-            left, last = b - 1, contact.normal
         else:
             unused.append((a, b, reason))
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
-        hint = "lower --contact-threshold or press harder" if method == "paper" else "press at more places"
-        if touches and np.median([boundary.height(signals.position[a]) for a, _ in touches]) < 0:
+        hint = f"press at more places, and until the force is above {high:.2g} N"
+        if method == "paper":
+            hint = "lower --contact-threshold or press harder"
+        elif touches and np.median([boundary.height(signals.position[a]) for a, _ in touches]) < 0:
             hint = (
                 "they lie below the support, so forces have the wrong sign; state the other force_on in the "
                 "recording's TOML"
@@ -260,7 +272,7 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
 
 
-def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
+def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
     """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis."""
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
@@ -285,15 +297,18 @@ def _signals(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarra
     return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
 
 
-def hysteresis(magnitude: np.ndarray, low: float, high: float, gap: int = 0) -> np.ndarray:
+def hysteresis(
+    magnitude: np.ndarray, low: float, high: float, force: np.ndarray | None = None, gap: int = 0
+) -> np.ndarray:
     """(n,) bool: the state machine's contacts, each back-tracked: runs above `low` that reach `high`.
 
-    gap: samples; a shorter fall below `low` ends no contact.
+    gap: samples; a shorter fall below `low` ends no contact whose force (n, 3) has not turned round by then.
     """
     state, above = np.zeros(len(magnitude), dtype=bool), magnitude > low
-    for a, b in runs(~above):
-        if 0 < a and b < len(above) and b - a < gap:
-            above[a:b] = True
+    if force is not None:
+        for a, b in runs(~above):
+            if 0 < a and b < len(above) and b - a < gap and force[a - 1] @ force[b] > 0:
+                above[a:b] = True
     for a, b in runs(above):
         if magnitude[a:b].max() > high:
             state[a:b] = True

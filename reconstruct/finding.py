@@ -8,10 +8,13 @@ from typing import NamedTuple
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.onset import fit_rise
+from reconstruct.onset import contact_law, fit_rise
 
 _LEAD_S = 0.15
 _FIT_SAMPLES = 250
+_TELLS = 0.7
+"""A press's force rises and falls with its depth, which explains this share of it at least; of what passes in
+free motion it explains less (half of a bump on an even way)."""
 
 
 class Found(NamedTuple):
@@ -88,8 +91,16 @@ def fitted_contact(signals: Signals, a: int, b: int) -> Found | None:
     start = first + int(touched[0])
     here = -(signals.position[start] - signals.position[a]) @ normal
     centre = signals.position[start] - (rise.u0_m - here) * normal
-    deepest = float((-(signals.position[start:b] - centre) @ normal).max())
-    return Found(start, peak, b, centre, normal, rise.u0_error_m) if deepest > 0 else None
+    depth = -(signals.position[first:b] - centre) @ normal
+    law = contact_law(depth, rise.hertz, rise.compliance)
+    if _explained(signals.force[first:b] @ normal, law) < _TELLS or depth.max() < rise.u0_error_m:
+        return None
+    return Found(start, peak, b, centre, normal, rise.u0_error_m)
+
+
+def _explained(push: np.ndarray, law: np.ndarray) -> float:
+    """Share of a force (n,) that a law (n,) of the depth makes up, at its best scale."""
+    return float((push @ law) * abs(push @ law) / max((push @ push) * (law @ law), 1e-300))
 
 
 def initial_normal(signals: Signals, a: int, peak: int) -> np.ndarray | None:

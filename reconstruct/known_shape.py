@@ -1,4 +1,5 @@
-"""A geometry that is known: a file's shape, a slab of known thickness, a half-space; registered or as it stands.
+"""A geometry that is known: a file's shape, a slab of known thickness, a half-space; registered or as it
+stands.
 
 No tracing is needed and no more of the surface than was touched. What the registration leaves uncertain goes
 into the modulus's interval (reconstruct.shape_error).
@@ -21,6 +22,7 @@ from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.robust import biweight
+from mechanics.sites import SURFACE_EDGE_M
 from mechanics.standing import Standing, standing
 from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -42,9 +44,10 @@ from reconstruct.shapes.polyhedron import refine
 from reconstruct.surface import Surface
 
 POSES = ("auto", "given")
-_MARGIN, _CELLS, _DEEP = 3.0, 44, 25.0
-"""A slab reaches this many thicknesses beyond the touches, in at most so many cells a side; a half-space is so
-many contact radii deep."""
+_MARGIN, _CELLS = 2.0, 40
+"""A slab reaches this many thicknesses beyond the touches, in at most so many cells a side."""
+_DEEP, _GRADED, _GRADE = 25.0, (14, 14, 7), 1.6
+"""A half-space is so many contact radii deep, in cells that are finer towards the middle of its top."""
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be told from it."""
 _FAR = 0.1
@@ -107,7 +110,9 @@ def stated_geometry(recording: Recording, options: GeometryOptions) -> GeometryO
     try:
         return dataclasses.replace(options, **keys)
     except TypeError as error:
-        raise OptionError(f"[object] of '{recording.name}' holds a value of the wrong kind: {error}") from error
+        raise OptionError(
+            f"[object] of '{recording.name}' holds a value of the wrong kind: {error}"
+        ) from error
 
 
 @dataclass(frozen=True)
@@ -115,9 +120,9 @@ class Placed:
     """A known geometry in the device frame.
 
     surface: closed, its uncertainty that of pose and file together. local_sd_m: of the file alone. pose: its
-    error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base: as a
-    tracing would have told it. residual_m: (k,) of the first touches. about: what model.toml keeps, [geometry].
-    notes: what the user should know, one line each.
+    error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base:
+    as a tracing would have told it. residual_m: (k,) of the first touches. about: what model.toml keeps,
+    [geometry]. notes: what the user should know, one line each.
     """
 
     surface: Surface
@@ -324,9 +329,13 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
     reach = _MARGIN * thickness if options.slab_m else thickness
     middle = top + ((low + high) / 2) @ axes[:2]
     size = np.append(high - low + 2 * reach, thickness)
-    edge = max(min(mesh_size_m, thickness / 3), size[:2].max() / _CELLS)
-    cells = [max(3, int(np.ceil(length / edge))) for length in size[:2]]
-    box = box_mesh((cells[0], cells[1], max(3, int(np.ceil(thickness / edge)))), tuple(size))
+    if options.half_space:
+        box = box_mesh(_GRADED, tuple(size), _GRADE)
+    else:
+        # as fine at its surface as touches need, so that nothing is halved again
+        edge = max(min(mesh_size_m, SURFACE_EDGE_M, thickness / 3), size[:2].max() / _CELLS)
+        nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
+        box = box_mesh((nx, ny, nz), tuple(size))
     points = (box.points - [0, 0, thickness]) @ axes + middle
     mesh = TetMesh(points, box.tetrahedra, box.fixed, box.touchable)
     vertices, triangles = _shell(mesh)
@@ -406,4 +415,3 @@ def _shell(mesh: TetMesh) -> tuple[np.ndarray, np.ndarray]:
     """The mesh's boundary as a surface of its own: vertices and triangles."""
     used, index = np.unique(mesh.surface[:, :3], return_inverse=True)
     return mesh.points[used], index.reshape(-1, 3)
-

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 
-from mechanics.errors import NoBaseError, OptionError
+from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.linear_range import linear_range
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
@@ -92,8 +93,8 @@ class Reconstruction:
 def reconstruct(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Model:
-    """The model of a recording. Raises RecordingError for what the check-up finds grave (unless options.force);
-    ContactError, SurfaceError or MeshError where a step cannot be done."""
+    """The model of a recording. Raises RecordingError for what the check-up finds grave, unless
+    options.force; ContactError, SurfaceError or MeshError where a step cannot be done."""
     return reconstruct_fully(recording, options, progress).model
 
 
@@ -104,10 +105,11 @@ def reconstruct_fully(
     options = options or ReconstructOptions()
     paper = options.method == "paper"
     nu = _poisson_ratio(recording, options)
+    _check_timed(recording)
     clock = _Clock()
     progress("contacts", 0.02)
-    checkup = Checkup(recording, options.force)
     geometry = stated_geometry(recording, options.geometry)
+    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
     placed = None
     if geometry.known:
         exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
@@ -199,6 +201,16 @@ def reconstruct_fully(
         placed=placed,
         findings=checkup.found,
     )
+
+
+def _check_timed(recording: Recording) -> None:
+    """Raises ContactError for rows that are no path: their first touches and noise cannot be told yet."""
+    about = recording.description.get("recording", {})
+    if isinstance(about, Mapping) and about.get("quasi_static"):
+        raise ContactError(
+            f"'{recording.name}' holds quasi-static points without a time, and presses are read off "
+            "paths from free air: if its rows are in order of time, import it with --rate HZ"
+        )
 
 
 def _surface_options(options: ReconstructOptions) -> SurfaceOptions:

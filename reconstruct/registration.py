@@ -2,9 +2,10 @@
 
 At first touch the tip's centre is one tip radius off the surface, and the force says roughly which way the
 surface faces. Pose p = (shift, turn) about a pivot is moved by Gauss-Newton steps on
-    (signed distance of the centre - radius) / sigma,      (normal of the surface - direction of the force) / 15 deg
-with Tukey's biweight, from many starts; each start's shift follows from its turn by the support function of the
-shape, h(n) = max n . x, which a touch of normal n fixes: n . shift = n . centre - radius - h(n).
+    (signed distance of the centre - radius) / sigma,      (normal of the surface - direction of the force)
+    / 15 deg
+with Tukey's biweight, from many starts; each start's shift follows from its turn by the support function of
+the shape, h(n) = max n . x, which a touch of normal n fixes: n . shift = n . centre - radius - h(n).
 Source: point-to-plane registration after Chen and Medioni (1992); starts and weights are our own.
 """
 
@@ -21,7 +22,8 @@ from mechanics.tetmesh import vertex_normals
 DIRECTION_RAD = np.radians(15.0)
 """Standard deviation of a first force's direction about the normal."""
 SURFACE_SD_M, SUPPORT_SD_M = 2e-4, 3e-4
-"""Of a shape of 0.1 m: how true a file is, and how true a traced support; both grow with the object's size."""
+"""Of a shape of 0.1 m: how true a file is, and how true a traced support; both grow with the object's
+size."""
 _STARTS, _SHORT, _LONG, _KEPT = 72, 8, 60, 6
 _ALIKE_M = 0.02
 """Of the size: poses whose surfaces lie nearer than this are one."""
@@ -29,9 +31,9 @@ _ALIKE_M = 0.02
 
 @dataclass(frozen=True)
 class Touched:
-    """What the registration goes by; device frame. centres: (k, 3) m of the tip; normals: (k, 3) outward, from
-    the force; error_m: (k,) standard deviation along it; site: (k,). support: (point (3,), normal (3,)) of a
-    traced support, or None."""
+    """What the registration goes by; device frame. centres: (k, 3) m of the tip; normals: (k, 3) outward,
+    from the force; error_m: (k,) standard deviation along it; site: (k,). support: (point (3,), normal
+    (3,)) of a traced support, or None."""
 
     centres: np.ndarray
     normals: np.ndarray
@@ -110,8 +112,8 @@ class _Pose:
 
 @dataclass(frozen=True)
 class _Fit:
-    """cost; normal (6, 6) and gradient (6,) of the weighted squares; known (6, 6): of distances alone, since a
-    round body's normals do not turn with it; residual_m, weight (k,); rms m."""
+    """cost; normal (6, 6) and gradient (6,) of the weighted squares; known (6, 6): of distances alone,
+    since a round body's normals do not turn with it; residual_m, weight (k,); rms m."""
 
     cost: float
     normal: np.ndarray
@@ -196,7 +198,9 @@ class _Solver:
         away = inside - foot
         length = np.linalg.norm(away, axis=1)
         side = np.where(np.einsum("ki,ki->k", away, facing) < 0, -1.0, 1.0)
-        along = np.where(length[:, None] > 1e-9, side[:, None] * away / np.maximum(length, 1e-12)[:, None], facing)
+        along = np.where(
+            length[:, None] > 1e-9, side[:, None] * away / np.maximum(length, 1e-12)[:, None], facing
+        )
         normal, spot = along @ pose.rotation.T, foot @ pose.rotation.T + pose.shift
         residual = side * length - touched.tip_radius_m
         lever = np.cross(spot - self.pivot, normal)
@@ -250,9 +254,7 @@ class _Solver:
         _, foot = self.shell.find_closest_cell(back, return_closest_point=True)
         return bool(np.sqrt(np.mean((back - foot) ** 2) * 3) > _ALIKE_M * self.size)
 
-    def result(
-        self, pose: _Pose, fit: _Fit, covariance: np.ndarray, rival_m: float = np.inf
-    ) -> Registration:
+    def result(self, pose: _Pose, fit: _Fit, covariance: np.ndarray, rival_m: float = np.inf) -> Registration:
         """Its pose, errors and residuals."""
         return Registration(
             rotation=pose.rotation,

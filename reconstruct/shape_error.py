@@ -3,8 +3,8 @@
 Moving a free surface outward by v (m) changes the compliance under a unit load by -integral of (sigma : eps)
 v dS (Hadamard; sigma : eps is twice the strain energy density of that load). With the surface's standard
 deviation place by place and a correlation length, this gives the covariance of the errors of all presses,
-without meshing again. A clamped base moved outward adds as much. With both, an object that is moved as a whole
-(a known shape whose pose is uncertain) is told too.
+without meshing again. A clamped base moved outward adds as much. With both, an object that is moved as a
+whole (a known shape whose pose is uncertain) is told too.
 """
 
 from __future__ import annotations
@@ -25,7 +25,8 @@ _BATCH = 16
 
 @dataclass(frozen=True)
 class PoseError:
-    """covariance: (6, 6) of a shift (m) and a turn (rad) of the whole object about pivot (3,), device frame."""
+    """covariance: (6, 6) of a shift (m) and a turn (rad) of the whole object about pivot (3,), device
+    frame."""
 
     covariance: np.ndarray
     pivot: np.ndarray

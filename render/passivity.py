@@ -25,8 +25,7 @@ from numba import njit
 
 from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges
+from mechanics.options import check_ranges, option
 
 LONGEST_DELAY_TICKS = 64
 MOST_OWED_J = 2e-3
@@ -37,25 +36,37 @@ class PassivityOptions:
     """How strictly energy is kept, and what it may cost."""
 
     passivity: bool = option(True, "time-domain passivity observer and controller")
-    allowance_j: float = option(1e-4, "energy that may be owed before the guard cuts in", unit="J")
-    payback_s: float = option(0.005, "time over which owed energy is damped away", unit="s")
-    velocity_time_s: float = option(0.002, "time constant of the velocity that damping uses", unit="s")
-    most_damping_n_s_per_m: float = option(10.0, "the damper's limit; the device's if lower", unit="N s/m")
-    least_mass_kg: float = option(0.05, "the least mass that the device moves", unit="kg")
-    forgiven_w: float = option(5e-5, "power at which spent allowance comes back", unit="W")
+    allowance_j: float = option(
+        1e-4,
+        "energy that may be owed before the guard cuts in",
+        unit="J",
+        low=1e-7,
+        high=0.01,
+        looser="higher",
+    )
+    payback_s: float = option(
+        0.005, "time over which owed energy is damped away", unit="s", low=1e-4, high=1.0, looser="higher"
+    )
+    velocity_time_s: float = option(
+        0.002, "time constant of the velocity that damping uses", unit="s", low=1e-4, high=0.1
+    )
+    most_damping_n_s_per_m: float = option(
+        10.0, "the damper's limit; the device's if lower", unit="N s/m", low=0.01, high=100.0
+    )
+    least_mass_kg: float = option(
+        0.05, "the least mass that the device moves", unit="kg", low=0.001, high=10.0, looser="higher"
+    )
+    forgiven_w: float = option(
+        5e-5,
+        "power at which spent allowance comes back",
+        unit="W",
+        low=1e-8,
+        high=0.01,
+        looser="higher",
+    )
 
     def __post_init__(self) -> None:
-        check_ranges(self, RANGES)
-
-
-RANGES = {
-    "allowance_j": Range(1e-7, 0.01, "higher"),
-    "payback_s": Range(1e-4, 1.0, "higher"),
-    "velocity_time_s": Range(1e-4, 0.1),
-    "most_damping_n_s_per_m": Range(0.01, 100.0),
-    "least_mass_kg": Range(0.001, 10.0, "higher"),
-    "forgiven_w": Range(1e-8, 0.01, "higher"),
-}
+        check_ranges(self)
 
 
 class PassivityParameters(NamedTuple):

@@ -13,8 +13,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.model import Model
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges
+from mechanics.options import check_ranges, option
 
 CREEP_M_PER_S = 0.005
 """Below this speed friction falls off linearly, so that it does not chatter at rest."""
@@ -25,19 +24,16 @@ class SupportOptions:
     """What the plane beside the object feels like, in every command that renders a model."""
 
     support: bool = option(True, "the support is felt as a rigid plane beside the object")
-    support_stiffness_n_per_m: float = option(1500.0, "the support's stiffness, or the device's", unit="N/m")
-    support_damping_n_s_per_m: float = option(2.0, "the support's damping", unit="N s/m")
-    support_friction: float = option(0.2, "friction on the support")
+    support_stiffness_n_per_m: float = option(
+        1500.0, "the support's stiffness, or the device's", unit="N/m", high=1e5, looser="higher"
+    )
+    support_damping_n_s_per_m: float = option(
+        2.0, "the support's damping", unit="N s/m", high=100.0, looser="higher"
+    )
+    support_friction: float = option(0.2, "friction on the support", high=10.0)
 
     def __post_init__(self) -> None:
-        check_ranges(self, RANGES)
-
-
-RANGES = {
-    "support_stiffness_n_per_m": Range(0.0, 100_000.0, "higher"),
-    "support_damping_n_s_per_m": Range(0.0, 100.0, "higher"),
-    "support_friction": Range(0.0, 10.0),
-}
+        check_ranges(self)
 
 
 class SupportParameters(NamedTuple):

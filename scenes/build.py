@@ -137,7 +137,8 @@ def _from_mesh(scene: Scene, progress: Progress) -> Model:
 
 
 def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Model:
-    """The model of a surface's file, or of a mesh with `vertices` and `faces` in the scene's unit, in its own frame.
+    """The model of a surface's file, or of a mesh with `vertices` and `faces` in the scene's unit, in its
+    own frame.
 
     Raises SurfaceError where it is open or has no flat foot.
     """

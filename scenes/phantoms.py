@@ -241,7 +241,8 @@ DEFAULT_MODULUS_PA = 20e3
 
 
 def phantom(name: str | Path) -> Phantom:
-    """A phantom by its name, or the closed surface in a file (metres, z up), its base's middle put on the origin.
+    """A phantom by its name, or the closed surface in a file (metres, z up), its base's middle put on the
+    origin.
 
     Raises SceneError for an unknown name, SurfaceError for a surface that is open or has no flat foot.
     """

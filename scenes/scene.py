@@ -3,9 +3,10 @@
 A TOML file whose keys carry their units. Allowed tables and keys:
 
     title, about
-    [object]     one of phantom (a name, or a closed surface, put with its base's centre on the origin), mesh (a
-                 surface or mesh file in its own frame; unit, up, sink_m), model (a MODEL folder) or recording;
-                 young_modulus_pa, poisson_ratio, mesh_size_m, finite_strain
+    [object]     one of phantom (a name, or a closed surface, put with its base's centre on the origin),
+    mesh (a
+                 surface or mesh file in its own frame; unit, up, sink_m), model (a MODEL folder) or
+                 recording; young_modulus_pa, poisson_ratio, mesh_size_m, finite_strain
     [[inclusion]] name, centre_m, radius_m, modulus_ratio       (object frame: base's centre, z up; the file's
                  frame for a mesh)
     [tool]       tip_radius_m
@@ -133,8 +134,8 @@ def load_scene(name: str | Path) -> Scene:
         return Scene(path.stem, "phantom", str(name), title=path.stem)
     raise SceneError(
         f"'{name}' is no scene: allowed are {', '.join(scene_names())}, a scene's .toml, a MODEL folder, a "
-        f"recording ({', '.join(embedded_names())} or a file), a phantom ({', '.join(PHANTOMS)}), or a file of "
-        f"a surface or mesh ({', '.join(SUFFIXES)})"
+        f"recording ({', '.join(embedded_names())} or a file), a phantom ({', '.join(PHANTOMS)}), or a "
+        f"file of a surface or mesh ({', '.join(SUFFIXES)})"
     )
 
 

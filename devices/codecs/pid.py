@@ -28,7 +28,8 @@ DURATION, GAIN, AXES, DIRECTION_ENABLE, DIRECTION = (
 )
 TRIGGER_BUTTON, MAGNITUDE, LOOPS, DEVICE_GAIN = PAGE | 0x53, PAGE | 0x70, PAGE | 0x7C, PAGE | 0x7E
 OPERATION_KIND, START, STOP = PAGE | 0x78, PAGE | 0x79, PAGE | 0x7B
-CONTROL_KIND, ENABLE_ACTUATORS, STOP_ALL = PAGE | 0x96, PAGE | 0x97, PAGE | 0x99
+CONTROL_KIND, ENABLE_ACTUATORS, STOP_ALL, RESET = PAGE | 0x96, PAGE | 0x97, PAGE | 0x99, PAGE | 0x9A
+BLOCK_FREE = PAGE | 0x90
 LOAD_STATUS, LOADED, POOL_FULL = PAGE | 0x8B, PAGE | 0x8C, PAGE | 0x8D
 ACTUATORS_ENABLED, SAFETY_SWITCH, ACTUATOR_POWER = PAGE | 0xA0, PAGE | 0xA4, PAGE | 0xA6
 NO_TRIGGER_BUTTON = 255
@@ -125,8 +126,14 @@ class PidLayout:
             )
         return self._find("feature", BLOCK_LOAD, BLOCK_INDEX).get(report[1:])
 
+    def free(self, block: int) -> bytes | None:
+        """Output report: give the effect's room back; None where the device has no such report."""
+        if self.descriptor.find("output", BLOCK_FREE, BLOCK_INDEX) is None:
+            return None
+        return self._report("output", BLOCK_FREE, [(BLOCK_INDEX, block, None)])
+
     def control(self, usage: int) -> bytes:
-        """Output report: ENABLE_ACTUATORS or STOP_ALL."""
+        """Output report: ENABLE_ACTUATORS, STOP_ALL or RESET, which forgets every effect."""
         return self._report("output", CONTROL, [self._choice("output", CONTROL, CONTROL_KIND, usage)])
 
     def device_gain(self) -> bytes | None:

@@ -17,9 +17,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the tip is larger or smaller than stated",
     parameters=(Parameter("ratio", "1", 0.4, 2.5, 1.0, (0.8, 1.25), 0.02),),
-    report=lambda values, scene, modulus_pa: {
-        "tip_radius_m": float(values[0] * scene.tip_radius)
-    },
+    report=lambda values, scene, modulus_pa: {"tip_radius_m": float(values[0] * scene.tip_radius)},
     touch=_touch,
     apply=unchanged,
     hides_strain=True,

@@ -49,6 +49,8 @@ class Choice:
         for step, values in (self.options or {}).items():
             if step not in STEPS:
                 raise OptionError(f"options of '{step}': allowed are those of {', '.join(STEPS)}")
+            if "seed" in values:
+                raise OptionError(f"{step}.seed: one seed is for all steps; give --seed, or seed=")
             taken(step, values)
 
     def of(self, step: str) -> dict[str, Any]:
@@ -150,8 +152,11 @@ def _stem(path: Path) -> str:
 
 def tasks_of(found: Found, choice: Choice, out: Path) -> list[Task]:
     """The recording's tasks, in order; raises RecordingError where its files cannot be read."""
-    sha256, folder = content_of(found.path), out / found.name
-    places = {"recording": str(found.path), "folder": str(folder)}
+    options = {step: choice.of(step) for step in choice.steps}
+    shape = options["reconstruct"].pop("shape", "")  # a place: what counts is what the file holds
+    shape = str(absolute(shape)) if shape else ""
+    sha256, folder = content_of(found.path, shape), out / found.name
+    places = {"recording": str(found.path), "shape": shape, "folder": str(folder)}
     made: list[Task] = []
     for step in choice.steps:
         first = step == "reconstruct"
@@ -161,7 +166,7 @@ def tasks_of(found: Found, choice: Choice, out: Path) -> list[Task]:
                 function=f"palpate.batching.steps:{step}",
                 content={
                     "sha256": sha256,
-                    "options": choice.of(step),
+                    "options": options[step],
                     "seed": choice.seed,
                     "reports": choice.reports,
                 },

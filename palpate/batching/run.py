@@ -6,14 +6,16 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from mechanics.errors import OptionError, RecordingError
-from mechanics.files import atomic_file
+from mechanics.errors import PalpateError
+from mechanics.files import Kind, atomic_file, sole_writer
 from mechanics.progress import Progress
 from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
 from palpate.batching.summary import Agreement, Entry, agreements, entry_of, write_csv, write_parquet
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
 from palpate.tasks.graph import Graph, Task
+
+_TRACE = Kind("a trace", (b"Traceback",))
 
 
 @dataclass(frozen=True)
@@ -43,42 +45,39 @@ def batch(
 ) -> Batch:
     """Do what is not finished of all recordings; the summary is written when the user stops it, too.
 
-    Raises OptionError for sources that lead to nothing, an output that is a file, and what
-    `tasks.engine.executor` refuses.
+    Raises OptionError for sources that lead to nothing and what `tasks.engine.executor` refuses, FileError
+    for an output that cannot be written or where another batch writes.
     """
     folder = absolute(out)
-    if folder.is_file():
-        raise OptionError(f"'{out}' is a file: name a folder for the output")
     sources = list(sources)
     found = find(sources, folder)
-    folder.mkdir(parents=True, exist_ok=True)
     bad: dict[str, str] = {}
     tasks: dict[str, list[Task]] = {}
     for recording in found:
         try:
             tasks[recording.name] = tasks_of(recording, choice, folder)
-        except (RecordingError, OSError) as error:
+        except PalpateError as error:
             bad[recording.name] = " ".join(str(error).split())
     outcomes: dict[str, Outcome] = {}
     graph = Graph(task for own in tasks.values() for task in own)
-    try:
-        run_with_bar(
-            graph,
-            folder,
-            workers=workers,
-            scheduler=scheduler,
-            memory_bytes=memory_bytes,
-            force=force,
-            progress=progress,
-            outcomes=outcomes,
-        )
-    except KeyboardInterrupt:
-        _write(_made(folder, found, choice, tasks, bad, outcomes), choice)
-        raise
-    made = replace(
-        _made(folder, found, choice, tasks, bad, outcomes), undescribed=tuple(undescribed(sources, folder))
-    )
-    _write(made, choice)
+    with sole_writer(folder):
+        try:
+            run_with_bar(
+                graph,
+                folder,
+                workers=workers,
+                scheduler=scheduler,
+                memory_bytes=memory_bytes,
+                force=force,
+                progress=progress,
+                outcomes=outcomes,
+            )
+        except KeyboardInterrupt:
+            _write(_made(folder, found, choice, tasks, bad, outcomes), choice)
+            raise
+        made = _made(folder, found, choice, tasks, bad, outcomes)
+        made = replace(made, undescribed=tuple(undescribed(sources, folder)))
+        _write(made, choice)
     return made
 
 
@@ -105,7 +104,7 @@ def _write(made: Batch, choice: Choice) -> None:
     for entry in made.entries:
         log = made.folder / entry.row.recording / "error.txt"
         if entry.trace:
-            with atomic_file(log) as temporary:
+            with atomic_file(log, _TRACE) as temporary:
                 temporary.write_text(entry.trace, encoding="utf-8")
         else:
             log.unlink(missing_ok=True)

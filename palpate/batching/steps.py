@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import RecordingError
-from mechanics.files import atomic_file, sha256_of_file
+from mechanics.files import PNG, atomic_file, read_toml, reading, sha256_of_file
 from mechanics.recording import recording_files
 from palpate import api
 from palpate.arguments import emit_json
@@ -22,22 +22,22 @@ STEPS = ("reconstruct", "compare", "diagnose")
 MODEL, THUMBNAIL = "model", "thumbnail.png"
 
 
-def content_of(recording: str | Path) -> dict[str, str]:
-    """SHA-256 of each of a recording's files: samples, description, and the surface that it names.
+def content_of(recording: str | Path, shape: str = "") -> dict[str, str]:
+    """SHA-256 of each of a recording's files: samples, description, and what stands in for the geometry: the
+    shape or the model that the description names, or the shape that the options do.
 
-    Raises RecordingError where one is missing or no TOML.
+    Raises RecordingError where the recording is missing or its description no TOML.
     """
-    import tomllib
-
     samples, description = recording_files(recording)
-    files = {"samples": samples, "description": description}
-    try:
-        base = tomllib.loads(description.read_text(encoding="utf-8")).get("object", {}).get("model")
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, AttributeError) as error:
-        raise RecordingError(f"'{description}' is no valid TOML: {error}") from error
-    if base is not None and (description.parent / str(base)).is_file():
-        files["model"] = description.parent / str(base)
-    return {name: sha256_of_file(path) for name, path in files.items()}
+    about = read_toml(description, RecordingError).get("object", {})
+    named = [about.get(key) for key in ("shape", "model")] if isinstance(about, dict) else []
+    files = {"samples": samples, "description": description, "stated shape": Path(shape)}
+    for key, value in zip(("shape", "model"), named, strict=False):
+        if isinstance(value, str):
+            place = description.parent / value
+            files |= {key: place, **{f"{key}/{name}": place / name for name in ("model.toml", "mesh.vtu")}}
+    with reading(samples, RecordingError):
+        return {name: sha256_of_file(path) for name, path in files.items() if path.is_file()}
 
 
 def reconstruct(
@@ -47,6 +47,7 @@ def reconstruct(
     seed: int,
     reports: bool,
     recording: str,
+    shape: str,
     folder: str,
 ) -> dict[str, Any]:
     """The model. What an older model gave is removed first."""
@@ -54,8 +55,9 @@ def reconstruct(
     for step in STEPS[1:]:
         for name in (f"{step}.json", f"{step}.html"):
             (place / name).unlink(missing_ok=True)
-    measured = _read(recording, sha256)
-    result = api.reconstruct(measured, save=place / MODEL, seed=seed, progress=False, **options)
+    measured = _read(recording, shape, sha256)
+    given = {**options, **({"shape": shape} if shape else {})}
+    result = api.reconstruct(measured, save=place / MODEL, seed=seed, progress=False, **given)
     emit_json({"model": place / MODEL, **result.as_json()}, str(place / "reconstruct.json"))
     with _closing_figures():
         _draw_thumbnail(result.model, place / THUMBNAIL)
@@ -77,11 +79,12 @@ def compare(
     seed: int,
     reports: bool,
     recording: str,
+    shape: str,
     folder: str,
 ) -> dict[str, Any]:
     """FEM against the 1D models, on the model's geometry."""
     place = Path(folder)
-    result = api.compare(_read(recording, sha256), place / MODEL, seed=seed, progress=False, **options)
+    result = api.compare(_read(recording, shape, sha256), place / MODEL, seed=seed, progress=False, **options)
     emit_json(result.as_json(), str(place / "compare.json"))
     with _closing_figures():
         if reports:
@@ -96,11 +99,14 @@ def diagnose(
     seed: int,
     reports: bool,
     recording: str,
+    shape: str,
     folder: str,
 ) -> dict[str, Any]:
     """The gap, its cause, and how far it shrinks."""
     place = Path(folder)
-    result = api.diagnose(_read(recording, sha256), place / MODEL, seed=seed, progress=False, **options)
+    result = api.diagnose(
+        _read(recording, shape, sha256), place / MODEL, seed=seed, progress=False, **options
+    )
     found = result.as_json()
     emit_json(found, str(place / "diagnose.json"))
     with _closing_figures():
@@ -110,9 +116,9 @@ def diagnose(
     return {**found["verdict"], **{key: found[key] for key in keys}}
 
 
-def _read(recording: str, sha256: Mapping[str, str]) -> Recording:
+def _read(recording: str, shape: str, sha256: Mapping[str, str]) -> Recording:
     """The recording, which must still be the one that was planned for."""
-    if content_of(recording) != dict(sha256):
+    if content_of(recording, shape) != dict(sha256):
         raise RecordingError(f"'{recording}' changed after the batch began: run it again")
     return api.read_recording(recording)
 
@@ -126,7 +132,7 @@ def _draw_thumbnail(model: Any, path: Path) -> None:
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     draw_object(ax, model, touches=model.presses.point)
     ax.set_axis_off()
-    with atomic_file(path) as temporary:
+    with atomic_file(path, PNG) as temporary:
         figure.savefig(temporary, dpi=150, format="png", transparent=True)
 
 

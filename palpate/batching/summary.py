@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.files import atomic_file
+from mechanics.files import Kind, atomic_file
 from palpate.tasks.driver import Outcome
 
 _Z95 = 1.959964
@@ -38,6 +38,7 @@ class Row:
 
 
 COLUMNS = tuple(field.name for field in fields(Row))
+SUMMARY = Kind("a batch's summary", (",".join(COLUMNS[:3]).encode(),))
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def agreement(name: str, rows: Sequence[Row]) -> Agreement:
 
 def write_csv(path: Path, rows: Sequence[Row]) -> None:
     """summary.csv: COLUMNS; empty where nothing is known."""
-    with atomic_file(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with atomic_file(path, SUMMARY) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
         writer = csv.DictWriter(file, COLUMNS)
         writer.writeheader()
         writer.writerows(asdict(row) for row in rows)
@@ -154,6 +155,6 @@ def write_parquet(path: Path, rows: Sequence[Row]) -> bool:
         [(name, pyarrow.string() if name in words else pyarrow.float64()) for name in COLUMNS]
     )
     table = pyarrow.Table.from_pylist([asdict(row) for row in rows], schema)
-    with atomic_file(path) as temporary:
+    with atomic_file(path, Kind("Parquet", (b"PAR1",))) as temporary:
         parquet.write_table(table, temporary)
     return True

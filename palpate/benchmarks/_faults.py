@@ -55,8 +55,9 @@ def _dead(r: Recording, random: np.random.Generator) -> Recording:
 def _stuck(what: str, seconds: float) -> Change:
     def change(r: Recording, random: np.random.Generator) -> Recording:
         values = np.array(getattr(r, what))
-        start = random.uniform(0.2, 0.8) * max(r.t[-1] - r.t[0] - seconds, 0.0) + r.t[0]
-        rows = (r.t >= start) & (r.t < start + seconds)
+        length = min(seconds, 0.6 * float(r.t[-1] - r.t[0]))
+        start = random.uniform(0.2, 0.8) * (r.t[-1] - r.t[0] - length) + r.t[0]
+        rows = (r.t >= start) & (r.t < start + length)
         axes = slice(None) if random.random() < 0.5 else random.integers(3)
         values[rows, axes] = values[np.argmax(rows), axes]
         return replace(r, **{what: values})

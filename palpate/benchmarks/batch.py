@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.errors import OptionError
 from mechanics.progress import Progress
 from mechanics.recording import recording_files
 from palpate.arguments import progress_bar
@@ -50,7 +51,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--recordings", nargs="+", metavar="SOURCE", help="default: copies of the embedded one"
     )
     parser.add_argument("--copies", type=int, default=4, help="of the embedded recording (default: 4)")
-    parser.add_argument("--repeats", type=int, default=3, help="pairs of 1 and 2 workers (default: 3)")
+    parser.add_argument("--repeats", type=int, default=2, help="pairs of 1 and 2 workers (default: 2)")
     parser.add_argument("--tasks", type=int, nargs="+", default=[10_000, 100_000], help="that do nothing")
     parser.add_argument(
         "--engines", nargs="+", choices=("local", "dask"), default=["local", "dask"], help="(default: both)"
@@ -63,7 +64,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     made: dict[str, Any] = {}
     with tempfile.TemporaryDirectory(prefix="palpate-bench-") as folder:
         place = Path(folder)
-        sources = arguments.recordings or [copies(place / "recordings", arguments.copies)]
+        sources = arguments.recordings or copies(place / "recordings", arguments.copies)
         if "cost" in parts:
             made["cost"] = cost(sources, place)
         if "workers" in parts:
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return made
 
 
-def copies(folder: Path, count: int) -> Path:
+def copies(folder: Path, count: int) -> list[Path]:
     """The embedded recording so many times, each of other bytes."""
     from scenes.embedded import embedded_recording
 
@@ -83,7 +84,7 @@ def copies(folder: Path, count: int) -> Path:
     for k in range(count):
         shutil.copy(samples, folder / f"{k}.csv.gz")
         (folder / f"{k}.toml").write_text(f"# copy {k}\n{words}", encoding="utf-8")
-    return folder
+    return sorted(folder.glob("*.toml"))
 
 
 def cost(sources: Sequence[str | Path], place: Path) -> dict[str, Any]:
@@ -92,6 +93,7 @@ def cost(sources: Sequence[str | Path], place: Path) -> dict[str, Any]:
     rows: list[list[Any]] = []
     for reports in (True, False):
         result = batch(sources, place / f"cost-{reports}", Choice(reports=reports))
+        _all_done(result)
         total = 0.0
         words = "with reports" if reports else "without"
         for step in ("reconstruct", "compare", "diagnose"):
@@ -116,22 +118,19 @@ def workers(
     """Wall seconds with 1 and with 2 workers, in turns; their ratio, median and spread."""
     made: dict[str, Any] = {}
     rows: list[list[Any]] = []
+    _batch_seconds(sources[:1], place / "first", "local", 1)  # compiles kernels, and does not count
     for engine in engines:
         seconds: dict[int, list[float]] = {1: [], 2: []}
         loads = []
-        for turn in range(-1, repeats):  # the first compiles kernels and does not count
+        for turn in range(repeats):
             loads.append(os.getloadavg()[0])
             for count in (1, 2) if turn % 2 else (2, 1):
                 out = place / "throughput"
                 shutil.rmtree(out, ignore_errors=True)
-                spent = _batch_seconds(sources, out, engine, count)
-                if turn >= 0:
-                    seconds[count].append(spent)
+                seconds[count].append(_batch_seconds(sources, out, engine, count))
         ratio = np.array(seconds[1]) / np.array(seconds[2])
         one, two, usual = (float(np.median(v)) for v in (seconds[1], seconds[2], ratio))
-        rows.append(
-            [engine, repeats, one, two, usual, float(ratio.min()), float(ratio.max()), max(loads[1:])]
-        )
+        rows.append([engine, repeats, one, two, usual, float(ratio.min()), float(ratio.max()), max(loads)])
         made[engine] = {"one_s": seconds[1], "two_s": seconds[2], "ratio": ratio.tolist(), "load": loads}
     heads = ["engine", "pairs", "1 worker [s]", "2 workers [s]", "ratio, median (limit 2)", "least", "most"]
     print(table([*heads, "greatest load before a pair"], rows))
@@ -145,9 +144,14 @@ def _batch_seconds(sources: Sequence[str | Path], out: Path, engine: str, count:
         chosen: dict[str, Any] = {"scheduler": address} if address else {"workers": count}
         result: Batch = batch(sources, out, choice, **chosen)
         spent = time.perf_counter() - began
-    failed = [e.row.reason for e in result.entries if e.row.status != "done"]
-    assert not failed, f"not all recordings came through: {failed[0]}"
+    _all_done(result)
     return spent
+
+
+def _all_done(result: Batch) -> None:
+    for row in (entry.row for entry in result.entries):
+        if row.status != "done":
+            raise OptionError(f"{row.recording} did not come through: {row.reason}")
 
 
 def nothing(number: int) -> int:
@@ -164,7 +168,7 @@ def empty_graph(count: int, root: Path) -> Graph:
             Task(
                 "palpate.benchmarks.batch:nothing",
                 {"number": k},
-                root / f"{k // 3000}" / f"{k}.json",
+                root / f"{k // 300}" / f"{k}.json",
                 needs=() if first else (made[k - k % 3].name,),
                 stage=("reconstruct", "compare", "diagnose")[k % 3],
             )

@@ -8,6 +8,7 @@ found where the check-up finds anything, named rightly where the first finding i
 from __future__ import annotations
 
 import argparse
+import sys
 import tempfile
 from collections import Counter
 from collections.abc import Iterator
@@ -45,13 +46,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Check the sound recordings, then each fault in some of them; print both tables."""
     with tempfile.TemporaryDirectory() as folder:
         recordings = list(_sound(arguments, Path(folder)))
-    warned = {r.name: [f for f in check(r) if f.name not in REFUSALS] for r in recordings}
-    refused = [r.name for r in recordings if any(f.name in REFUSALS for f in check(r))]
+    findings = {r.name: check(r) for r in recordings}
+    warned = {name: [f for f in found if f.name not in REFUSALS] for name, found in findings.items()}
+    refused = [name for name, found in findings.items() if any(f.name in REFUSALS for f in found)]
     usable = [r for r in recordings if r.name not in refused and not warned[r.name]]
     false = {name: found for name, found in warned.items() if found}
     print(
         f"{len(recordings)} sound recordings: {len(false)} with a warning "
-        f"({100 * len(false) / max(len(recordings), 1):.1f} %); {len(refused)} that reconstruction refuses too"
+        f"({100 * len(false) / max(len(recordings), 1):.1f} %); {len(refused)} that reconstruction refuses"
     )
     for name, found in false.items():
         print(f"- {name}: " + "; ".join(f.line() for f in found))
@@ -60,6 +62,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     for fault in arguments.fault or FAULTS:
         chosen = [usable[i] for i in random.permutation(len(usable))[: arguments.each]]
         result[fault] = _tried(fault, chosen, random)
+        print(f"{fault}: {result[fault]}", file=sys.stderr, flush=True)
         rows.append([fault, *(result[fault][k] for k in ("of", "found", "named", "grave")),
                      ", ".join(f"{n} ({k})" for n, k in result[fault]["otherwise"].items())])  # fmt: skip
     print(table(["fault", "of", "found", "named rightly", "grave", "first named otherwise"], rows))

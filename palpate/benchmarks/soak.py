@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import theilslopes
 
+from devices.safety import LATCHING, WORDS
 from mechanics.files import cache_folder
 from mechanics.model import Model, read_model, write_model
 from mechanics.recording import read_recording
@@ -28,6 +29,7 @@ from palpate.window.session import TouchSession
 
 SUMMARY = "a long session: memory, clocks and late ticks beside a window and a recording; models swapped"
 SAMPLES = 120
+LATCHED = tuple(word for bit, word in WORDS.items() if bit & LATCHING)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -148,13 +150,17 @@ def _session(model: Model, seconds: float, frames_per_s: float) -> dict[str, Any
             picture = Picture(model, *session.drawing(session.renderer_name).surface)
             session.begin_recording(record)
             session.enable()
-            health, frames, next_sample = Health(session.servo), 0, 0.0
+            health, frames, enablings, next_sample = Health(session.servo), 0, 1, 0.0
             start = time.perf_counter()
             while (elapsed := time.perf_counter() - start) < seconds and session.servo.alive:
                 frame = session.frame()
                 if frame is not None:
                     picture.draw(frame.views[0].displacement_m, frame.tip_m)
                     frames += 1
+                    if any(word in frame.reason for word in LATCHED):
+                        # as a person does, who wants to go on
+                        session.enable()
+                        enablings += 1
                 if elapsed >= next_sample:
                     health.sample()
                     next_sample += seconds / SAMPLES
@@ -164,8 +170,12 @@ def _session(model: Model, seconds: float, frames_per_s: float) -> dict[str, Any
             picture.close()
         recorded = read_recording(record)
     spacing = np.diff(recorded.t) * session.servo.options.rate_hz
-    gaps = {"rows": len(recorded.t), "missing rows": int(np.round(spacing - 1.0).clip(0).sum())}
-    return _summary(health, report.as_dict(), frames, gaps)
+    kept = {
+        "enablings": enablings,
+        "rows": len(recorded.t),
+        "missing rows": int(np.round(spacing - 1.0).clip(0).sum()),
+    }
+    return _summary(health, report.as_dict(), frames, kept)
 
 
 def _summary(health: Health, report: dict[str, Any], frames: int, recorded: dict[str, int]) -> dict[str, Any]:
@@ -204,10 +214,10 @@ def _print_session(seen: dict[str, Any]) -> None:
         f"{report['ticks']} ticks, {report['missed_ticks']} missed, {report['late_ticks']} late "
         f"({seen['late_first_half']:.0f} in the first half, {seen['late_second_half']:.0f} in the second), "
         f"{seen['frames']} pictures, {seen['recorded']['rows']} rows recorded, "
-        f"{seen['recorded']['missing rows']} missing; ticks against deadlines "
-        f"{seen['phase_drift_us']:.3f} us, the next deadline a median of {seen['ahead_first_ms']:.2f} ms "
-        f"ahead in the first half, {seen['ahead_second_ms']:.2f} in the second; the system's wall clock went "
-        f"{seen['utc_drift_ms']:.2f} ms against the loop's"
+        f"{seen['recorded']['missing rows']} missing, enabled {seen['recorded']['enablings']} times; "
+        f"ticks against deadlines {seen['phase_drift_us']:.3f} us, the next deadline a median of "
+        f"{seen['ahead_first_ms']:.2f} ms ahead in the first half, {seen['ahead_second_ms']:.2f} in the "
+        f"second; the system's wall clock went {seen['utc_drift_ms']:.2f} ms against the loop's"
     )
 
 

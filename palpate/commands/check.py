@@ -9,18 +9,23 @@ from __future__ import annotations
 import argparse
 
 from palpate import api
-from palpate.arguments import add_json, emit_json, say
+from palpate.arguments import add_input, add_json, add_output, emit_json, say
+from palpate.report.page import PAGE
 
 SUMMARY = "what may be wrong with a recording, before it is believed"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, --full, --report, --json."""
-    parser.add_argument("recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    parser.add_argument(
-        "--full", action="store_true", help="reconstruct too, and check the modulus (some 20 s)"
+    add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
+    parser.add_argument("--full", action="store_true", help="reconstruct too, and check the modulus")
+    add_output(
+        parser,
+        "--report",
+        kind=PAGE,
+        metavar="HTML",
+        help="write the findings with pictures as one HTML page",
     )
-    parser.add_argument("--report", metavar="HTML", help="write the findings with pictures as one HTML page")
     add_json(parser)
 
 

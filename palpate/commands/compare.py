@@ -47,7 +47,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> int:
     """Compare, print, report."""
     options = given_for(arguments, "compare")
-    result = api.compare(arguments.recording, given_model(arguments, arguments.model), seed=arguments.seed, **options)
+    result = api.compare(
+        arguments.recording, given_model(arguments, arguments.model), seed=arguments.seed, **options
+    )
     say(arguments, *result.lines())
     if arguments.report:
         say(arguments, f"report: {result.report(arguments.report)}")

@@ -56,7 +56,9 @@ def run(arguments: argparse.Namespace) -> int:
     """Diagnose, say it, and write what was asked for."""
     if arguments.corrected and not arguments.corrected.endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{arguments.corrected}' must end in .csv or .csv.gz")
-    result = api.diagnose(arguments.recording, given_model(arguments, arguments.model), **given_for(arguments, "diagnose"))
+    result = api.diagnose(
+        arguments.recording, given_model(arguments, arguments.model), **given_for(arguments, "diagnose")
+    )
     say(arguments, *result.lines())
     if arguments.apply:
         better = result.improved().save(arguments.apply)

@@ -1,8 +1,8 @@
 """A MODEL for other programs: a minimal scene that runs there, or its mesh.
 
-mujoco (.xml): a flex on its base and the tip as a mocap sphere. sofa (.scn): tetrahedra, base, a sphere's force.
-abaqus (.inp): hybrid tetrahedra, base, a rigid sphere that is pressed in. gmsh (.msh): mesh, groups, moduli.
-stl: the boundary. Metres, newtons, pascals, the model's frame (an STL's lengths as --unit says).
+mujoco (.xml): a flex on its base and the tip as a mocap sphere. sofa (.scn): tetrahedra, base, a sphere's
+force. abaqus (.inp): hybrid tetrahedra, base, a rigid sphere that is pressed in. gmsh (.msh): mesh, groups,
+moduli. stl: the boundary. Metres, newtons, pascals, the model's frame (an STL's lengths as --unit says).
 """
 
 from __future__ import annotations
@@ -22,9 +22,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--to", choices=tuple(FORMATS), required=True, help="the program")
     parser.add_argument("-o", "--output", metavar="PATH", required=True, help="file to write")
     parser.add_argument(
-        "--at", type=vector, metavar="X,Y,Z", help="where the scene's tip presses (default: middle of the top) [m]"
+        "--at",
+        type=vector,
+        metavar="X,Y,Z",
+        help="where the scene's tip presses (default: middle of the top) [m]",
     )
-    parser.add_argument("--depth", type=finite, metavar="M", help="how deep (default: half the tip's radius) [m]")
+    parser.add_argument(
+        "--depth", type=finite, metavar="M", help="how deep (default: half the tip's radius) [m]"
+    )
     parser.add_argument("--unit", default="m", metavar="UNIT", help="of an STL's lengths (default: m)")
     add_json(parser)
 

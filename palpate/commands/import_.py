@@ -1,10 +1,11 @@
 """Other programs' files become a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS bags, MCAP.
 
-Columns are guessed from their names, and said by --column ROLE=NAME where that fails (roles: t, x, y, z, fx, fy, fz,
-qw, qx, qy, qz; '#3' is the third column, '-NAME' its negative, '=0' a constant in SI, 'TOPIC:NAME' one of several
-tables), or by a --mapping file. Units come from the names ('Load (uN)', 'x_mm') or --units position=mm,force=N,time=ms.
-A picture of what was understood is drawn before anything is written. Several FILEs have clocks of their own, which
-are joined. Rows without a time are quasi-static points. Libraries beyond the program's own: palpate[import].
+Columns are guessed from their names, and said by --column ROLE=NAME where that fails (roles: t, x, y, z,
+fx, fy, fz, qw, qx, qy, qz; '#3' is the third column, '-NAME' its negative, '=0' a constant in SI,
+'TOPIC:NAME' one of several tables), or by a --mapping file. Units come from the names ('Load (uN)', 'x_mm')
+or --units position=mm,force=N,time=ms. A picture of what was understood is drawn before anything is
+written. Several FILEs have clocks of their own, which are joined. Rows without a time are quasi-static
+points. Libraries beyond the program's own: palpate[import].
 """
 
 from __future__ import annotations
@@ -34,7 +35,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--force-on", choices=("tool", "object"), help="whose force it is (default: tool)")
     parser.add_argument("--frame", choices=("device", "tool"), help="of the force (default: device)")
     parser.add_argument("--flange-to-tip", type=vector, metavar="X,Y,Z", help="in the tool's frame [m]")
-    parser.add_argument("--tool-mass", type=finite, metavar="KG", help="beyond the sensor; its weight is taken off")
+    parser.add_argument(
+        "--tool-mass", type=finite, metavar="KG", help="beyond the sensor; its weight is taken off"
+    )
     parser.add_argument("--tare", metavar="START,END", help="take off the mean force of this time [s]")
     parser.add_argument("--offset", metavar="S", help="of the force's clock [s], or auto (cross-correlation)")
     parser.add_argument("--rate", type=finite, metavar="HZ", help="to resample to, or of rows without a time")

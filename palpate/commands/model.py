@@ -1,8 +1,8 @@
 """A MODEL from the shape of an object: STL, OBJ, PLY, glTF, VTP, VTU, MSH or INP, and a modulus.
 
-The object keeps its file's frame, in metres, and stands on its flat foot (--up says which). Small and flat holes
-are closed. MODEL is a folder that 'palpate touch', 'press', 'compare --model' and 'diagnose --model' take; with a
-recording of the object, 'palpate reconstruct REC --shape FILE' finds the modulus instead.
+The object keeps its file's frame, in metres, and stands on its flat foot (--up says which). Small and flat
+holes are closed. MODEL is a folder that 'palpate touch', 'press', 'compare --model' and 'diagnose --model'
+take; with a recording of the object, 'palpate reconstruct REC --shape FILE' finds the modulus instead.
 """
 
 from __future__ import annotations
@@ -21,12 +21,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILE, -o MODEL, how the file is meant, --json."""
     add_input(parser, "shape", metavar="FILE", help="surface or mesh of the object")
     add_output(
-        parser, "-o", "--output", kind=MODEL, metavar="MODEL", required=True, help="folder of the model to write"
+        parser,
+        "-o",
+        "--output",
+        kind=MODEL,
+        metavar="MODEL",
+        required=True,
+        help="folder of the model to write",
     )
     add_mesh_arguments(parser)
     parser.add_argument("--tip-radius", type=finite, metavar="M", help="of the tool (default: 0.005) [m]")
     parser.add_argument(
-        "--mesh-size", type=finite, metavar="M", help="edge of the tetrahedra (default: 0.010 or an eighth) [m]"
+        "--mesh-size",
+        type=finite,
+        metavar="M",
+        help="edge of the tetrahedra (default: 0.010 or an eighth) [m]",
     )
     add_json(parser)
 

@@ -1,5 +1,5 @@
-"""Abaqus: an input deck with nodes, hybrid tetrahedra, material by ranges of modulus, base held, and a rigid sphere
-that is pressed in."""
+"""Abaqus: an input deck with nodes, hybrid tetrahedra, material by ranges of modulus, base held, and a
+rigid sphere that is pressed in."""
 
 from __future__ import annotations
 

@@ -34,7 +34,18 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
             number += 1
             lines.append(f"{number} {kind} 2 {tag} {tag} " + " ".join(map(str, row)))
     moduli = np.concatenate([subject.element_modulus_pa, np.zeros(len(mesh.surface))])
-    lines += ["$EndElements", "$ElementData", "1", '"young_modulus_pa"', "1", "0.0", "3", "0", "1", str(number)]
+    lines += [
+        "$EndElements",
+        "$ElementData",
+        "1",
+        '"young_modulus_pa"',
+        "1",
+        "0.0",
+        "3",
+        "0",
+        "1",
+        str(number),
+    ]
     lines += [f"{i} {value:.9g}" for i, value in enumerate(moduli, 1)]
     lines += ["$EndElementData", ""]
     path.write_text("\n".join(lines), encoding="ascii")

@@ -30,7 +30,8 @@ def text_of(subject: Subject) -> str:
 <light pos="{_row(middle + 3 * span * subject.model.support.normal)}"/>
 <body name="tip" mocap="true" pos="{_row(subject.start)}">
 <geom name="tip" type="sphere" size="{subject.radius_m:.6g}" condim="3" friction="0.5"/></body>
-<flexcomp name="object" type="direct" dim="3" mass="{DENSITY_KG_M3 * float(mesh.volumes.sum()):.6g}" radius="1e-4"
+<flexcomp name="object" type="direct" dim="3" mass="{DENSITY_KG_M3 * float(mesh.volumes.sum()):.6g}"
+radius="1e-4"
  point="{_row(mesh.points.ravel())}"
  element="{" ".join(map(str, mesh.tetrahedra.ravel()))}">
 <contact condim="3" selfcollide="none" friction="0.5"/>

@@ -20,10 +20,15 @@ FORMATS: dict[str, tuple[str, Writer, Kind]] = {
     "mujoco": (".xml", mujoco.write, Kind("a scene of palpate export", (b"<!-- Palpate model",))),
     "sofa": (".scn", sofa.write, Kind("a scene of palpate export", (b"<?xml",), holds=b"<!-- Palpate model")),
     "abaqus": (".inp", abaqus.write, Kind("a deck of palpate export", (b"*Heading\n Palpate model",))),
-    "gmsh": (".msh", gmsh.write, Kind("a mesh of palpate export", (b"$MeshFormat",), holds=b"young_modulus_pa")),
+    "gmsh": (
+        ".msh",
+        gmsh.write,
+        Kind("a mesh of palpate export", (b"$MeshFormat",), holds=b"young_modulus_pa"),
+    ),
     "stl": (".stl", stl.write, Kind("an STL of palpate export", (stl.HEADER,))),
 }
-"""Name -> the file's suffix, its writer, which returns what the format cannot say, and how such a file begins."""
+"""Name -> the file's suffix, its writer, which returns what the format cannot say, and how such a file
+begins."""
 
 
 def write(
@@ -37,8 +42,8 @@ def write(
 ) -> tuple[str, ...]:
     """Write a model for another program; what its format cannot say, one line each.
 
-    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. Raises OptionError for
-    a program or suffix that does not fit.
+    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. Raises OptionError
+    for a program or suffix that does not fit.
     """
     if to not in FORMATS:
         raise OptionError(f"--to is '{to}'; allowed are {', '.join(FORMATS)}")

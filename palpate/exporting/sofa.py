@@ -41,7 +41,8 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
     <TetrahedronFEMForceField template="Vec3" method="large" topology="@topology" computeGlobalMatrix="false"
      poissonRatio="{model.material.poisson_ratio:.6g}" youngModulus="{young}"/>
     <FixedProjectiveConstraint indices="{" ".join(map(str, np.flatnonzero(mesh.fixed)))}"/>
-    <SphereForceField name="tip" template="Vec3" center="{_row(subject.pressed)}" radius="{subject.radius_m:.6g}"
+    <SphereForceField name="tip" template="Vec3" center="{_row(subject.pressed)}"
+    radius="{subject.radius_m:.6g}"
      stiffness="{stiffness:.6g}" damping="0.1"/>
   </Node>
 </Node>

@@ -17,8 +17,8 @@ DENSITY_KG_M3 = 1000.0
 
 @dataclass(frozen=True)
 class Subject:
-    """A model in the device frame, SI units, and one press: from `start` the tip's centre goes by `depth_m` beyond
-    first touch along `direction` (3,).
+    """A model in the device frame, SI units, and one press: from `start` the tip's centre goes by `depth_m`
+    beyond first touch along `direction` (3,).
 
     element_modulus_pa: (m,). top: (3,) where it touches; normal: (3,) outward there.
     """
@@ -72,8 +72,8 @@ _MATERIAL = ("inclusion", "modulus_gradient", "skin_layer", "poisson_ratio", "fi
 
 
 def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None = None) -> Subject:
-    """The press of a model that shows that it works: at: (3,) m, the surface point nearest to it is pressed; None:
-    the middle of the top. depth_m: None is half the tip's radius."""
+    """The press of a model that shows that it works: at: (3,) m, the surface point nearest to it is
+    pressed; None: the middle of the top. depth_m: None is half the tip's radius."""
     up, mesh = model.support.normal, model.mesh
     surface = mesh.touchable_surface[:, :3]
     if at is None:

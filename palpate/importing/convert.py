@@ -1,8 +1,9 @@
-"""From tables and what is said of them to a recording: one clock, one frame, the tip's centre, the force at the tip.
+"""From tables and what is said of them to a recording: one clock, one frame, the tip's centre, the force at
+the tip.
 
-Frames: a sensor's reading is turned by `rotation` (sensor to tool, or to device where frame = "device"), a tool frame
-by the orientation; the tip's centre is the stated position plus the orientation's turn of `flange_to_tip_m`. The
-weight of `mass_kg` beyond the sensor acts along -z of the device frame.
+Frames: a sensor's reading is turned by `rotation` (sensor to tool, or to device where frame = "device"), a
+tool frame by the orientation; the tip's centre is the stated position plus the orientation's turn of
+`flange_to_tip_m`. The weight of `mass_kg` beyond the sensor acts along -z of the device frame.
 """
 
 from __future__ import annotations
@@ -38,7 +39,8 @@ class Understood:
 
 
 def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
-    """The recording that the tables hold. Raises RecordingError where something needed is missing or impossible."""
+    """The recording that the tables hold. Raises RecordingError where something needed is missing or
+    impossible."""
     if said.tip_radius_m is None:
         raise RecordingError("the tip's radius is in no table: give --tip-radius M (or [tool] tip_radius_m)")
     columns = find_columns(tables, said)
@@ -52,7 +54,8 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     rows = {len(s.values) for s in streams.values()}
     if not timed and len(rows) > 1:
         raise RecordingError(
-            f"tables of {', '.join(map(str, sorted(rows)))} rows without a time cannot be joined: say --column t=NAME"
+            f"tables of {', '.join(map(str, sorted(rows)))} rows without a time cannot be joined: "
+            "say --column t=NAME"
         )
     if not timed and said.rate_hz:
         steps = np.arange(rows.pop()) / said.rate_hz
@@ -62,7 +65,9 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     if timed:
         t, position, force, quaternion, rate = _one_clock(streams, said, notes)
     else:
-        notes.append("no column of time: quasi-static points, which tell no rates and no delay (else give --rate)")
+        notes.append(
+            "no column of time: quasi-static points, which tell no rates and no delay (else give --rate)"
+        )
         t, rate = np.arange(rows.pop()) / POINTS_HZ, POINTS_HZ
         position, force = streams["position"].values, streams["force"].values
         quaternion = streams["orientation"].values if "orientation" in streams else None
@@ -96,7 +101,12 @@ class _Stream:
 
 
 def _stream(
-    part: str, held: list[Column], columns: dict[str, Column], tables: Sequence[Table], said: Said, notes: list[str]
+    part: str,
+    held: list[Column],
+    columns: dict[str, Column],
+    tables: Sequence[Table],
+    said: Said,
+    notes: list[str],
 ) -> _Stream:
     """The columns of one part, finite rows in order of time."""
     sources = {id(c.table): c.table for c in held if c.table is not None}
@@ -142,17 +152,22 @@ def _clock_of(table: Table, columns: dict[str, Column], said: Said) -> Column | 
         return Column("t", table, found.name, found.factor, found.unit, found.guessed)
     alone = time_of(table, said)
     if alone is None:
-        raise RecordingError(f"'{table.name}' has no column of time: its rows cannot be put beside the others'")
+        raise RecordingError(
+            f"'{table.name}' has no column of time: its rows cannot be put beside the others'"
+        )
     return alone
 
 
 def _one_clock(
     streams: dict[str, _Stream], said: Said, notes: list[str]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray | None, float]:
-    """All on one clock from 0 s: the position's own where all share it, else even steps over what they share."""
+    """All on one clock from 0 s: the position's own where all share it, else even steps over what they
+    share."""
     place, push, turn = streams["position"], streams["force"], streams.get("orientation")
     times = {part: np.asarray(s.t) for part, s in streams.items()}
-    together = all(len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values())
+    together = all(
+        len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values()
+    )
     if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz:
         t = times["position"] - times["position"][0]
         rate = float(1 / np.median(np.diff(t)))
@@ -193,10 +208,12 @@ def _offset(place: _Stream, push: _Stream, said: Said, notes: list[str]) -> floa
     lag, sure = cross_correlated(place.t, place.values, push.t + rough, push.values)
     if sure < _SURE:
         raise RecordingError(
-            f"the clocks of position and force cannot be joined: pressing and force correlate by {sure:.2f} at "
-            "best: give --offset S"
+            f"the clocks of position and force cannot be joined: pressing and force correlate by {sure:.2f} "
+            "at best: give --offset S"
         )
-    notes.append(f"force's clock moved by {rough + lag:.4f} s: depth and force correlate best there ({sure:.2f})")
+    notes.append(
+        f"force's clock moved by {rough + lag:.4f} s: depth and force correlate best there ({sure:.2f})"
+    )
     return rough + lag
 
 
@@ -205,7 +222,8 @@ def cross_correlated(
 ) -> tuple[float, float]:
     """(lag s to add to t_force, correlation): where force and motion against it agree best, within 3 s.
 
-    position (n, 3) m at t, force (m, 3) N at t_force. The motion is that along the mean direction of the force.
+    position (n, 3) m at t, force (m, 3) N at t_force. The motion is that along the mean direction of the
+    force.
     """
     step = max(float(np.median(np.diff(t))), float(np.median(np.diff(t_force))))
     size = np.linalg.norm(force - np.median(force, axis=0), axis=1)
@@ -256,7 +274,9 @@ def _framed(
         if said.flange_to_tip_m is not None:
             arm = np.asarray(said.flange_to_tip_m, dtype=float)
             if arm.shape != (3,):
-                raise RecordingError(f"flange_to_tip_m is {said.flange_to_tip_m}; it must be three numbers X,Y,Z")
+                raise RecordingError(
+                    f"flange_to_tip_m is {said.flange_to_tip_m}; it must be three numbers X,Y,Z"
+                )
             position = position + turned.apply(arm)
             notes.append(f"tip's centre {1e3 * np.linalg.norm(arm):.4g} mm off the stated position")
     if said.mass_kg:
@@ -277,12 +297,18 @@ def _signs(position: np.ndarray, force: np.ndarray) -> list[str]:
     together = float(np.corrcoef(path, size)[0, 1])
     if together < 0.5:
         return []
-    return [f"WARNING: the force grows as the tip moves along it ({together:.2f}): is a sign or force_on wrong?"]
+    return [
+        f"WARNING: the force grows as the tip moves along it ({together:.2f}): is a sign or force_on wrong?"
+    ]
 
 
 def _matrix(value: Any) -> np.ndarray:
     turn = np.asarray(value, dtype=float)
-    if turn.shape != (3, 3) or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) or np.linalg.det(turn) < 0:
+    if (
+        turn.shape != (3, 3)
+        or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)
+        or np.linalg.det(turn) < 0
+    ):
         raise RecordingError("rotation must be a right-handed 3 x 3 rotation matrix, sensor to frame")
     return turn
 
@@ -294,7 +320,9 @@ def _tared(t: np.ndarray, force: np.ndarray, said: Said, notes: list[str]) -> np
     begin, end = said.tare_s
     inside = (t >= begin) & (t <= end)
     if inside.sum() < 3:
-        raise RecordingError(f"tare from {begin:g} to {end:g} s holds {int(inside.sum())} samples; 3 are needed")
+        raise RecordingError(
+            f"tare from {begin:g} to {end:g} s holds {int(inside.sum())} samples; 3 are needed"
+        )
     level = force[inside].mean(axis=0)
     notes.append(f"tared by {np.linalg.norm(level):.4g} N, the mean from {begin:g} to {end:g} s")
     return force - level

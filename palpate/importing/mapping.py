@@ -1,8 +1,10 @@
-"""What the columns of other people's tables are: said by name, number or a mapping file, else guessed from names.
+"""What the columns of other people's tables are: said by name, number or a mapping file, else guessed from
+names.
 
 A mapping file is TOML:
 
-    [columns]   t, x, y, z, fx, fy, fz, qw, qx, qy, qz: a column's name, '#3' its number, 'topic:name' of one of
+    [columns]   t, x, y, z, fx, fy, fz, qw, qx, qy, qz: a column's name, '#3' its number, 'topic:name' of
+    one of
                 several tables, '-name' its negative, '=0' a constant
     [units]     time, position, force: where the columns' names do not tell
     [tool]      tip_radius_m, mass_kg, flange_to_tip_m = [x, y, z] (tool frame)
@@ -37,7 +39,8 @@ _TABLES = {
     "clock": ("offset_s", "rate_hz"),
     "tare": ("start_s", "end_s"),
     "object": (
-        "name", "poisson_ratio", "shape", "shape_unit", "shape_pose", "shape_up", "shape_sink_m", "slab_m", "half_space"
+        "name", "poisson_ratio", "shape", "shape_unit", "shape_pose", "shape_up", "shape_sink_m",
+        "slab_m", "half_space",
     ),
 }  # fmt: skip
 
@@ -103,7 +106,8 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
 
 @dataclass(frozen=True)
 class Column:
-    """One column found: its table, its name there, factor to SI (with its sign), and the unit it was taken in."""
+    """One column found: its table, its name there, factor to SI (with its sign), and the unit it was taken
+    in."""
 
     role: str
     table: Table | None
@@ -128,14 +132,17 @@ class Column:
 
 _AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
 _BEFORE = {
-    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose pose"
-    " poseposition poseposeposition translation transformtranslation ee eepos probe probepos end loc location",
+    "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose"
+    " pose poseposition poseposeposition translation transformtranslation ee eepos probe probepos"
+    " loc location",
     "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque",
-    "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation transformrotation rot",
+    "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation"
+    " transformrotation rot",
 }
 _TIME = "t time times timestamp timestamps stamp ts sec secs seconds elapsed elapsedtime clock"
 _ALONG = (
-    "depth displacement travel indentation indent extension compression crosshead stroke position z piezo height gap"
+    "depth displacement travel indentation indent extension compression crosshead stroke position z piezo"
+    " height gap"
 )
 _PUSH = "force load fn normalforce f reaction reactionforce fz push"
 
@@ -160,8 +167,8 @@ def find_columns(tables: Sequence[Table], said: Said) -> dict[str, Column]:
         missing = [role for role in roles if role not in found]
         if missing:
             raise RecordingError(
-                f"which columns are {kind} ({', '.join(missing)}) cannot be told from their names; say it with "
-                f"--column {missing[0]}=NAME (or '#3', '=0'): there are {_listed(tables)}"
+                f"which columns are {kind} ({', '.join(missing)}) cannot be told from their names; say it "
+                f"with --column {missing[0]}=NAME (or '#3', '=0'): there are {_listed(tables)}"
             )
     if any(q in found for q in ROLES[7:]) and not all(q in found for q in ROLES[7:]):
         found = {role: column for role, column in found.items() if not role.startswith("q")}

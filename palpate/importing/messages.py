@@ -1,4 +1,5 @@
-"""ROS bags and MCAP: every topic a table of its messages' numbers, with the time of its stamp or of its log."""
+"""ROS bags and MCAP: every topic a table of its messages' numbers, with the time of its stamp or of its
+log."""
 
 from __future__ import annotations
 

@@ -15,7 +15,8 @@ from mechanics.errors import RecordingError
 
 @dataclass(frozen=True)
 class Table:
-    """Columns (n,) by name, in the file's own units; name: of the topic, group or file that they come from."""
+    """Columns (n,) by name, in the file's own units; name: of the topic, group or file that they come
+    from."""
 
     name: str
     columns: Mapping[str, np.ndarray]
@@ -44,8 +45,8 @@ SUFFIXES = tuple(_READERS)
 def read_tables(path: Path | str) -> list[Table]:
     """Every table of a file, or of a ROS 2 bag's folder.
 
-    Raises RecordingError where the file is not there, is of no known kind, is damaged, holds no numbers, or needs a
-    library that is not installed.
+    Raises RecordingError where the file is not there, is of no known kind, is damaged, holds no numbers, or
+    needs a library that is not installed.
     """
     path = Path(path)
     if not path.exists():
@@ -53,7 +54,9 @@ def read_tables(path: Path | str) -> list[Table]:
     suffix = ".bag" if path.is_dir() else path.suffix.lower()
     if suffix not in _READERS:
         allowed = ", ".join(s.removeprefix(".") for s in SUFFIXES)
-        raise RecordingError(f"'{path}' is of no kind that can be read: allowed are {allowed}, a ROS 2 bag's folder")
+        raise RecordingError(
+            f"'{path}' is of no kind that can be read: allowed are {allowed}, a ROS 2 bag's folder"
+        )
     home, libraries = _READERS[suffix]
     module, _, function = home.partition(":")
     reader: Callable[[Path], list[Table]] = getattr(import_module(module), function or "read")
@@ -99,7 +102,8 @@ def flattened(name: str, value: Any) -> dict[str, float]:
 
 
 def of_messages(name: str, times_s: list[float], messages: list[dict[str, float]]) -> Table:
-    """A table of flattened messages: a column for what every message has, `stamp` the time where it has one."""
+    """A table of flattened messages: a column for what every message has, `stamp` the time where it has
+    one."""
     common = set(messages[0]).intersection(*messages[1:]) if messages else set()
     columns = {key: np.array([m[key] for m in messages]) for key in messages[0] if key in common}
     seconds = next((k for k in columns if k.endswith("stamp.sec")), None)

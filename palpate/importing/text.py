@@ -1,4 +1,5 @@
-"""Text tables as instruments write them: any separator, decimal comma, lines before the header, a line of units."""
+"""Text tables as instruments write them: any separator, decimal comma, lines before the header, a line of
+units."""
 
 from __future__ import annotations
 
@@ -84,7 +85,8 @@ def _run(lines: list[str], separator: str | None, comma: bool) -> tuple[int, int
 
 
 def _names(lines: list[str], start: int, separator: str | None, width: int) -> list[str]:
-    """The columns' names, with their units in brackets where a line of units follows them; else their numbers."""
+    """The columns' names, with their units in brackets where a line of units follows them; else their
+    numbers."""
     above = [line for line in lines[:start] if line.strip()]
     header = _split(above[-1].lstrip("#%"), separator) if above else []
     if len(header) == width and len(above) > 1 and all(not h or is_unit(h.strip("[]()")) for h in header):

@@ -8,7 +8,8 @@ SI: dict[str, dict[str, float]] = {
     "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
     "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
     "force": {
-        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665, "lbf": 4.4482216,
+        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665,
+        "lbf": 4.4482216,
         "newton": 1.0, "g": 9.80665e-3, "kg": 9.80665,
     },
 }  # fmt: skip

@@ -16,9 +16,11 @@ from mechanics.recording import DESCRIPTION, QUATERNION_COLUMNS, REQUIRED_COLUMN
 from palpate.importing.convert import Understood
 
 
-def write_imported(path: Path | str, understood: Understood, thing: Mapping[str, Any], sources: list[str]) -> Path:
-    """Write NAME.csv.gz (or .csv) with nine digits, whatever the scale, and NAME.toml, which says where it came
-    from; returns the samples' path."""
+def write_imported(
+    path: Path | str, understood: Understood, thing: Mapping[str, Any], sources: list[str]
+) -> Path:
+    """Write NAME.csv.gz (or .csv) with nine digits, whatever the scale, and NAME.toml, which says where it
+    came from; returns the samples' path."""
     path = Path(path)
     if path.suffix == ".toml":
         path = path.with_suffix(".csv.gz")
@@ -33,7 +35,9 @@ def write_imported(path: Path | str, understood: Understood, thing: Mapping[str,
     with atomic_file(path, SAMPLES) as temporary:
         opener = gzip.open if path.suffix == ".gz" else open
         with opener(temporary, "wt", encoding="utf-8", newline="\n") as file:
-            np.savetxt(file, np.hstack(columns), fmt="%.9g", delimiter=",", header=",".join(names), comments="")
+            np.savetxt(
+                file, np.hstack(columns), fmt="%.9g", delimiter=",", header=",".join(names), comments=""
+            )
     about: dict[str, Any] = {"sample_rate_hz": recording.sample_rate_hz, "force_on": "tool"}
     if understood.quasi_static:
         about["quasi_static"] = True
@@ -54,7 +58,8 @@ def write_imported(path: Path | str, understood: Understood, thing: Mapping[str,
 
 
 def picture(understood: Understood) -> Figure:
-    """Position and force over time, the path from the side coloured by force, and what each column was taken for."""
+    """Position and force over time, the path from the side coloured by force, and what each column was
+    taken for."""
     from matplotlib import pyplot as plt
 
     recording = understood.recording

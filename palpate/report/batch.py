@@ -155,7 +155,7 @@ def _agreement(page: Page, result: Batch) -> None:
     page.paragraph(
         "Spread: standard deviation of ln E between explorations, about the relative one. Where it is larger "
         "than what the recordings' own intervals let expect, something differs between the explorations that "
-        "no single one of them can see."
+        "no single one of them can see. Objects are told apart by the names that the recordings give them."
     )
 
 

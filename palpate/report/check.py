@@ -26,7 +26,7 @@ _MARGIN = 0.35
 
 
 def write_report(path: Path | str, checkup: Checkup) -> Path:
-    """Write the page, and its figures as PNGs into the folder PATH without suffix; returns the page's path."""
+    """Write the page, and its figures as PNGs into the folder PATH without suffix; returns its path."""
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
     figures = {

@@ -72,6 +72,7 @@ class Result(ABC):
         view); screenshot: write this PNG instead, which needs no screen. Raises OptionError where there is no
         screen to show it on.
         """
+        from mechanics.files import PNG, atomic_file
         from palpate.results.scenery import new_plotter
 
         if plotter is not None:
@@ -82,7 +83,8 @@ class Result(ABC):
         if screenshot is None:
             plotter.show()
         else:
-            plotter.screenshot(str(screenshot))
+            with atomic_file(screenshot, PNG) as temporary:
+                plotter.screenshot(str(temporary))
         return plotter
 
 

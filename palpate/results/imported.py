@@ -52,7 +52,8 @@ class Imported:
         greatest = float(np.linalg.norm(recording.force_on_tool, axis=1).max())
         how = "quasi-static points" if self.understood.quasi_static else f"{np.ptp(recording.t):.4g} s"
         return [
-            f"{len(recording.t)} samples, {how}; path within {_row(1e3 * span)} mm; force up to {greatest:.4g} N",
+            f"{len(recording.t)} samples, {how}; path within {_row(1e3 * span)} mm; "
+            f"force up to {greatest:.4g} N",
             *(f"  {column}" for column in self.understood.columns.values()),
             *(f"  {note}" for note in self.understood.notes),
         ]

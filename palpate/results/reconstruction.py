@@ -78,6 +78,7 @@ class Reconstruction(Result, room.Reconstruction):
             )
         lines += [
             f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
+            *(f"  {note}" for note in (self.placed.notes if self.placed else ())),
             f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
             f"l = {model.mesh_size_m * 1e3:g} mm; radius-edge ratio {_spread(quality.radius_edge_ratio)}, "
             f"distance to the surface {_spread(1e3 * quality.surface_distance_m)} mm (50, 95, 100 %)",
@@ -103,6 +104,7 @@ class Reconstruction(Result, room.Reconstruction):
                 "reason": self.surface.reason,
                 "volume_m3": self.surface.volume_m3,
             },
+            "geometry": {**self.placed.about, "notes": list(self.placed.notes)} if self.placed else None,
             "mesh": {
                 "radius_edge_ratio": _percentiles(self.meshing.report.radius_edge_ratio),
                 "surface_distance_m": _percentiles(self.meshing.report.surface_distance_m),

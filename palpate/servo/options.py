@@ -6,14 +6,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from devices.safety import RANGES as SAFETY_RANGES
 from devices.safety import SafetyOptions
 from mechanics.errors import OptionError
-from mechanics.options import option
-from mechanics.ranges import Range, check_ranges, loosened
-from render.passivity import RANGES as PASSIVITY_RANGES
+from mechanics.options import check_ranges, loosened, option
 from render.passivity import PassivityOptions
-from render.support import RANGES as SUPPORT_RANGES
 from render.support import SupportOptions
 
 
@@ -24,22 +20,29 @@ class ServoOptions:
     tip_offsets_m: (m, 3), the tips' centres in the tool's frame (turned by the device's orientation).
     """
 
-    rate_hz: float = option(1000.0, "ticks a second", unit="Hz", flag="--rate")
+    rate_hz: float = option(1000.0, "ticks a second", unit="Hz", flag="--rate", low=10.0, high=1e4)
     on_orphan: str = option(
         "stop", "when the window dies: stop with zero force, or go on", choices=("stop", "continue")
     )
     coupling: bool = option(True, "soften stiffness beyond what the device renders stably")
     read_ahead_s: float = option(250e-6, "how long before a tick the device is read", unit="s")
-    silence_s: float = option(1.0, "the window may be silent for so long; then no force", unit="s")
+    silence_s: float = option(
+        1.0,
+        "the window may be silent for so long; then no force",
+        unit="s",
+        low=0.1,
+        high=60.0,
+        looser="higher",
+    )
     late_s: float = option(200e-6, "a tick that starts later than this counts as late", unit="s")
-    priority: int = option(60, "real-time priority where permitted, 0 for none")
+    priority: int = option(60, "real-time priority where permitted, 0 for none", high=98)
     tip_offsets_m: tuple[tuple[float, float, float], ...] = ((0.0, 0.0, 0.0),)
     support_plane: SupportOptions = field(default_factory=SupportOptions)
     safety: SafetyOptions = field(default_factory=SafetyOptions)
     passivity: PassivityOptions = field(default_factory=PassivityOptions)
 
     def __post_init__(self) -> None:
-        check_ranges(self, RANGES)
+        check_ranges(self)
         if self.on_orphan not in ("stop", "continue"):
             raise OptionError(f"on_orphan is '{self.on_orphan}'; allowed are stop, continue")
         if not 0.0 <= self.read_ahead_s < 1.0 / self.rate_hz:
@@ -56,9 +59,8 @@ class ServoOptions:
     @property
     def loosened(self) -> tuple[str, ...]:
         """What protects less than by default, in plain words."""
-        words = loosened(self, RANGES)
-        words += loosened(self.safety, SAFETY_RANGES) + loosened(self.passivity, PASSIVITY_RANGES)
-        words += loosened(self.support_plane, SUPPORT_RANGES)
+        parts = (self, self.safety, self.passivity, self.support_plane)
+        words = tuple(word for part in parts for word in loosened(part))
         if not self.coupling:
             words += ("protection loosened: --no-coupling",)
         if not self.passivity.passivity:
@@ -66,11 +68,3 @@ class ServoOptions:
         if self.on_orphan != "stop":
             words += (f"protection loosened: --on-orphan is {self.on_orphan} (default stop)",)
         return words
-
-
-RANGES = {
-    "rate_hz": Range(10.0, 10_000.0),
-    "silence_s": Range(0.1, 60.0, "higher"),
-    "late_s": Range(1e-6, 1.0),
-    "priority": Range(0, 98),
-}

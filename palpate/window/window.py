@@ -14,6 +14,7 @@ import pyvista
 import vtk
 
 from devices.channel import PoseChannel
+from mechanics.files import PNG, atomic_file
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
 from palpate.window.frames import Frame
@@ -213,7 +214,8 @@ class TouchWindow:
         if self.closed:
             self._ended = True
             if screenshot is not None:
-                self.plotter.screenshot(str(screenshot))
+                with atomic_file(screenshot, PNG) as temporary:
+                    self.plotter.screenshot(str(temporary))
             self.controls.interactor.TerminateApp()
 
     def close(self) -> None:

@@ -8,8 +8,9 @@ import numpy as np
 
 from reconstruct.checks.base import Finding
 from reconstruct.checks.sight import Sight
+from reconstruct.filtering import noise_gain
 
-_STEADY = 0.35
+_SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S = 0.075
 """A force that reads later than this is not corrected reliably (reconstruct.delay)."""
 _CERTAIN = 5.0
@@ -18,21 +19,22 @@ _ALIKE_S = 0.01
 
 
 def air(sight: Sight) -> Iterator[Finding]:
-    """A reading in free air that does not stand still long enough to be taken off."""
-    if sight.steady > _STEADY or not len(sight.t) > 8 * sight.rate_hz:
+    """What is left in free air, weight, inertia and steady drift taken off, against the presses."""
+    pushes = np.linalg.norm(sight.touches.push, axis=1)
+    peak = float(np.median(pushes)) if len(pushes) else float(np.percentile(sight.size, 99))
+    white = sight.noise_n * noise_gain(sight.rate_hz, sight.cutoff_hz)
+    # a fifth of the samples at least is of a tip in the air, whatever the rest is
+    wander = float(np.percentile(sight.size, 20))
+    share, loud = wander / max(peak, 1e-9), wander / white
+    if share < _SEEN or loud < _LOUD:
         return
-    size = max(1, round(sight.rate_hz))
-    means = sight.force[: len(sight.force) // size * size].reshape(-1, size, 3).mean(axis=1)
-    step = float(np.median(np.linalg.norm(np.diff(means, axis=0), axis=1)))
     yield Finding(
         "drift",
-        f"the force has no steady reading in free air: only {100 * sight.steady:.0f} % of the stretches of "
-        f"8 s have one within {5 * sight.spread_n:.2g} N; its mean over a second changes by {step:.2g} N to "
-        "the next",
-        f"{step / sight.spread_n:.0f} standard deviations of the filtered force; above {100 * _STEADY:.0f} % "
-        "of the stretches is usual",
+        f"with weight, inertia and a steady drift taken off, the force is above {wander:.2g} N in four "
+        f"fifths of the samples, {100 * share:.0f} % of what a press peaks at ({peak:.2g} N)",
+        f"{loud:.0f} times what its white noise makes of it; up to {_LOUD:g} is usual",
         "let the sensor warm up, lift the tip for a second between presses, log the tool's orientation",
-        np.inf,
+        float(share) if share < _LOST else np.inf,
         np.inf,
         (float(sight.recording.t[0]), float(sight.recording.t[-1])),
         ("fx", "fy", "fz"),

@@ -19,7 +19,7 @@ _WINDOW_S, _LEAST_WINDOW = 0.25, 10
 _STUCK_S = 1.5
 _MOVED, _FELT = 10.0, 30.0
 _COARSE = 0.05
-_SPIKE_S, _SPIKES, _AROUND_S = 0.006, 8.0, 0.04
+_SPIKE_S, _SPIKES, _AROUND_S, _LEAST_SPIKES = 0.006, 12.0, 0.04, 5
 _STEEP = 0.6
 _SIGNAL = 5.0
 _GAP = 5.0
@@ -232,7 +232,7 @@ def _spiky(sight: Sight) -> Iterator[Finding]:
         steep = np.minimum(np.abs(values[first] - values[first - 1]), np.abs(values[last] - values[last - 1]))
         short = (length <= max(1, _SPIKE_S * sight.rate_hz)) & (first > 2) & (steep > _STEEP * top)
         found += [(k, int(i), float(abs(off[i])) / scale) for i in first[short]]
-    if len(found) < 3:
+    if len(found) < _LEAST_SPIKES:
         return
     names = tuple(CHANNELS[k] for k in sorted({k for k, _, _ in found}))
     places = np.array([i for _, i, _ in found])

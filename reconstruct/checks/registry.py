@@ -21,6 +21,7 @@ from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
 from reconstruct.contacts import Exploration, explore
+from reconstruct.known_shape import GeometryOptions, stated_geometry
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
@@ -30,8 +31,16 @@ REFUSALS = ("no base", "no presses")
 _LEAST_SAMPLES = 100
 
 
-def checked_samples(recording: Recording) -> tuple[Finding, ...]:
-    """What the samples alone show."""
+def checked_samples(recording: Recording, by_hand: bool = True) -> tuple[Finding, ...]:
+    """What the samples alone show; nothing of points that have no clock (quasi-static).
+
+    by_hand: a hand explored a whole object. Otherwise (a slab under an indenter) only the force's direction
+    is looked at, as sizes, speeds and channels that stand still may be anything.
+    """
+    if recording.description.get("recording", {}).get("quasi_static"):
+        return ()
+    if not by_hand:
+        return ordered(handedness(Sight(recording))) if len(recording.t) >= _LEAST_SAMPLES else ()
     if len(recording.t) < _LEAST_SAMPLES:
         return (_too_short(recording),)
     sight, found = settled(recording)
@@ -50,8 +59,9 @@ def checked_results(result: Result) -> tuple[Finding, ...]:
 
 def check(recording: Recording) -> tuple[Finding, ...]:
     """What samples and presses show, the gravest first; the presses are looked for only in sound samples."""
-    found = checked_samples(recording)
-    if any(f.grave for f in found):
+    known = stated_geometry(recording, GeometryOptions()).known
+    found = checked_samples(recording, by_hand=not known)
+    if known or any(f.grave for f in found):
         return found
     try:
         exploration = explore(recording)
@@ -66,7 +76,7 @@ def check(recording: Recording) -> tuple[Finding, ...]:
 
 def seen(recording: Recording) -> tuple[tuple[str, float, float], ...]:
     """What the checks measure on the way: words with the unit, value, and what is usual (NaN: anything)."""
-    if len(recording.t) < _LEAST_SAMPLES:
+    if recording.description.get("recording", {}).get("quasi_static") or len(recording.t) < _LEAST_SAMPLES:
         return ()
     sight, _ = settled(recording)
     rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
@@ -89,9 +99,9 @@ class Checkup:
     found: what the stages so far have found. Every stage raises RecordingError.
     """
 
-    def __init__(self, recording: Recording, force: bool = False) -> None:
+    def __init__(self, recording: Recording, force: bool = False, by_hand: bool = True) -> None:
         self._force = force
-        self.found = self._judged(checked_samples(recording))
+        self.found = self._judged(checked_samples(recording, by_hand))
 
     def presses(self, exploration: Exploration) -> None:
         """Before a surface is made."""
@@ -107,8 +117,8 @@ class Checkup:
         if grave and not self._force:
             first, more = grave[0], f" (and {len(grave) - 1} more)" if len(grave) > 1 else ""
             raise RecordingError(
-                f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows where, "
-                "`palpate reconstruct --force` goes on despite it"
+                f"{first.name}: {first.saw}{more}; {first.todo}; `palpate check REC --report PAGE` shows "
+                "where, `palpate reconstruct --force` goes on despite it"
             )
         return found
 

@@ -5,7 +5,7 @@ Nothing here relies on the stated rate, on the force's direction or on a base, a
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -14,11 +14,10 @@ from mechanics.errors import ContactError
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
-from reconstruct.baseline import free_air_force
 from reconstruct.boundary import find_interval
-from reconstruct.contacts import hysteresis
-from reconstruct.filtering import FilterOptions, low_pass, noise_gain, white_noise_std
-from reconstruct.tool_weight import tool_weight
+from reconstruct.contacts import hysteresis, signals_of
+from reconstruct.filtering import FilterOptions, white_noise_std
+from reconstruct.finding import Signals
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples
@@ -28,7 +27,6 @@ _SLIDE = 8.0
 _TIPS_M = (1e-3, 0.02)
 _GAP_S = 1.0
 _BLOCK = 32
-_STILL_S, _SLOW = 0.5, 5.0
 _SHIFTS_S = np.arange(-0.5, 0.5001, 0.004)
 
 
@@ -102,52 +100,48 @@ class Sight:
         return FilterOptions().cutoff_hz
 
     @cached_property
-    def path(self) -> np.ndarray:
-        """(n, 3) m, low-passed position."""
-        return low_pass(self.position, self.rate_hz, self.cutoff_hz)
-
-    @cached_property
-    def air(self) -> np.ndarray:
-        """(n, 3) N, what is read in free air."""
-        return self._air[0]
+    def _signals(self) -> tuple[Signals, np.ndarray, np.ndarray]:
+        """As reconstruction reads them, at the rate and in the units that are believed."""
+        believed = replace(
+            self.recording,
+            t=self.t,
+            position=self.position,
+            force_on_tool=self.force,
+            sample_rate_hz=self.rate_hz,
+        )
+        return signals_of(believed, self.cutoff_hz)
 
     @property
-    def steady(self) -> float:
-        """Share of the stretches of 8 s in which the reading in free air was found."""
-        return self._air[1]
+    def path(self) -> np.ndarray:
+        """(n, 3) m, low-passed position."""
+        return self._signals[0].position
 
-    @cached_property
-    def _air(self) -> tuple[np.ndarray, float]:
-        filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
-        weight = tool_weight(self.recording, filtered, self.cutoff_hz, self.spread_n)
-        air, share = free_air_force(self.t, filtered - weight, self.spread_n)
-        return weight + air, share
+    @property
+    def air(self) -> np.ndarray:
+        """(n, 3) N, what is read in free air."""
+        return self._signals[1]
 
     @cached_property
     def spread_n(self) -> float:
-        """N an axis, noise of the filtered force, white or slow: that of the stillest fifth of half seconds."""
-        size = max(4, round(_STILL_S * self.rate_hz))
-        filtered = low_pass(self.force, self.rate_hz, self.cutoff_hz)
-        still = filtered[: len(filtered) // size * size].reshape(-1, size, 3).std(axis=1)
-        white = self.noise_n * noise_gain(self.rate_hz, self.cutoff_hz)
-        if not len(still):
-            return white
-        return max(white, min(float(np.percentile(still.mean(axis=1), 20)), _SLOW * white))
+        """N an axis, noise of the filtered force of a tip that is not moved."""
+        return float(self._signals[2].min())
 
-    @cached_property
+    @property
     def net(self) -> np.ndarray:
         """(n, 3) N, low-passed, free air taken off."""
-        return low_pass(self.force, self.rate_hz, self.cutoff_hz) - self.air
+        return self._signals[0].force
 
-    @cached_property
+    @property
     def size(self) -> np.ndarray:
         """(n,) N, length of the net force."""
-        return np.linalg.norm(self.net, axis=1)
+        return self._signals[0].magnitude
 
     @cached_property
     def contact(self) -> np.ndarray:
         """(n,) bool, whether something is touched."""
-        return hysteresis(self.size, _LOW * self.spread_n, _HIGH * self.spread_n)
+        return hysteresis(
+            self.size / self._signals[2], _LOW, _HIGH, round(0.25 * self.rate_hz / self.cutoff_hz)
+        )
 
     @cached_property
     def traced(self) -> tuple[int, int]:

@@ -111,9 +111,9 @@ def _size(exploration: Exploration) -> Iterator[Finding]:
     t, (a, b) = exploration.recording.t, boundary.interval
     yield Finding(
         "base size",
-        f"the walls that were pressed stand {np.exp(centre):.2f} times as far out as the base that was traced",
+        f"the walls that were pressed stand {np.exp(centre):.2f} times as far out as the traced base",
         f"{abs(centre) / error:.0f} standard errors, {wall.sum()} presses on walls",
-        "trace the base of the same object in the same units, or leave the trace out and give [object] model",
+        "trace the base of the same object in the same units, or give [object] model instead of the trace",
         np.inf,
         float(min(0.5 * (centre / error) ** 2 / np.log(10), 300)),
         (float(t[a]), float(t[b - 1])),

@@ -31,6 +31,8 @@ READINGS = {
 COLUMNS = {"time": ("t",), "position": ("x", "y", "z"), "force": ("fx", "fy", "fz"), "tip": ("tip_radius_m",)}
 _SI = {"time": "seconds", "position": "metres", "force": "newtons", "tip": "metres"}
 _SHOWN = 3
+_LEAST_M = 1e-7
+"""Rounding moves a tip that stands still by less."""
 _PRIOR = 1e-2
 """Odds on a reading other than SI before anything is seen."""
 _ELSE = 1e-3
@@ -40,7 +42,8 @@ _ELSE = 1e-3
 @dataclass(frozen=True)
 class Quantity:
     """What a hand's exploration gives: median of what is usual, the factor of one standard deviation, and how
-    the value goes with the units of time, position, force and tip. stated: a ratio to what the recording says."""
+    the value goes with the units of time, position, force and tip. stated: a ratio to what the recording
+    says."""
 
     words: str
     usual: float
@@ -184,7 +187,7 @@ def measured(sight: Sight, of_touches: bool = True) -> dict[str, float]:
     touches = sight.touches
     depth, peak = (np.linalg.norm(v, axis=1) for v in (touches.travel, touches.push))
     rise = sight.t[touches.peak] - sight.t[touches.start]
-    good = (depth > 3 * sight.step[:3].max()) & (rise > 0) & (depth > 0)
+    good = (depth > max(3 * float(sight.step[:3].max()), _LEAST_M)) & (rise > 0)
     if good.sum() > 3:
         plane = 4 / 3 * np.sqrt(radius) * depth[good] ** 1.5
         found |= {

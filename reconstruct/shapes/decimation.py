@@ -1,4 +1,5 @@
-"""A given surface drawn with fewer triangles, no more than its tetrahedra need: the mesher takes minutes on a scan.
+"""A given surface drawn with fewer triangles, no more than its tetrahedra need: the mesher takes minutes on
+a scan.
 
 Quadric error edge collapses (Hoppe 1999, by VTK), then the volume is put right.
 """
@@ -17,8 +18,9 @@ _FINER = 2.0
 
 
 def decimated(stood: Standing, edge_m: float) -> tuple[np.ndarray, np.ndarray]:
-    """A standing surface, in its own frame, with triangles of about `edge_m`, smaller where it bends: vertices
-    (n, 3) m and triangles (m, 3); itself where it has no more than that, or where it cannot be thinned."""
+    """A standing surface, in its own frame, with triangles of about `edge_m`, smaller where it bends:
+    vertices (n, 3) m and triangles (m, 3); itself where it has no more than that, or where it cannot be
+    thinned."""
     import pyvista
     import trimesh
 

@@ -81,6 +81,7 @@ class Problem:
 
     def rest(self, centre: np.ndarray) -> State:
         """The untouched object with the tip's centre at `centre`."""
+        self._compliance = None
         u = np.zeros_like(self.solid.mesh.points)
         grip = self._touching.contact.start(centre)
         return State(u, np.asarray(centre, float), np.zeros(3), 0.0, self.solid.new_history(), grip)
@@ -132,9 +133,10 @@ class Problem:
         last, before, near = 0.0, np.inf, False
         for iteration in range(MOST_ITERATIONS):
             # the old tangent predicts the step; the one that is taken there usually serves to the end
-            if compliance is None or iteration == 1 or last > SLOW * before:
+            anew = compliance is None or iteration == 1 or last > SLOW * before
+            if anew:
                 compliance = self._linearise(u, state.history, step_s)
-                mixing, before = Mixing(), np.inf
+                mixing = Mixing()
             r = self._assembly.residual(elements, u)
             half = self._factor.forward(-r)
             start, active = u.ravel()[self._kept], held.active
@@ -150,13 +152,12 @@ class Problem:
             if near and norm < self.tolerance * scale:
                 return State(u, centre.copy(), now.force, energy, history, now.grip)
             near = norm < 0.02 * scale
-            last, before = norm, last if iteration else np.inf
+            last, before = norm, np.inf if anew else last
             if not np.array_equal(held.active, active):
                 # another contact: what the last steps foretold is void
                 mixing, before = Mixing(), np.inf
-            step = np.zeros(self.free.size)
-            step[self.free] = mixing(u.ravel()[self.free], self._factor.backward(half, now.u - start))
-            step = step.reshape(-1, 3)
+            step = np.zeros_like(u)
+            step.ravel()[self.free] = mixing(u.ravel()[self.free], self._factor.backward(half, now.u - start))
             longest = float(np.abs(step).max())
             if not np.isfinite(longest):
                 return None

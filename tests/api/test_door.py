@@ -35,10 +35,11 @@ def test_import_loads_nothing_heavy():
 
 def test_door_is_what_was_promised():
     promised = "read_recording reconstruct load renderer replay press compare diagnose simulate batch "
-    promised += "options"
+    promised += "check options"
     assert set(FUNCTIONS) == set(promised.split())
     assert set(RESULTS) == set(
-        "Recording Model Reconstruction ReplayResult Curve Comparison Diagnosis Simulation Batch".split()
+        "Recording Model Reconstruction ReplayResult Curve Comparison Diagnosis Simulation Batch "
+        "Checkup".split()
     )
     assert all(issubclass(getattr(pp, name), pp.PalpateError) for name in ERRORS)
     with pytest.raises(AttributeError, match="no attribute 'replay_recording'.*replay"):

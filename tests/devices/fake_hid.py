@@ -253,6 +253,7 @@ def stick_descriptor(ids: dict[str, int], *, axes: int = 2, control_bits: bool =
     b.usage(0x22).shape(8, 1, 1, 40).output()
     b.usage(0x78).collection(2).usage(0x79, 0x7A, 0x7B).shape(8, 1, 1, 3).output(0).end()
     b.usage(0x7C).shape(8, 1, 0, 255).output().end()
+    b.usage(0x90).collection(2).report(ids["free"]).usage(0x22).shape(8, 1, 1, 40).output().end()
     b.usage(0x95).collection(2).report(ids["control"])
     b.usage(0x96).collection(2).usage(0x97, 0x98, 0x99, 0x9A, 0x9B, 0x9C)
     if control_bits:
@@ -276,6 +277,7 @@ OPENFFBOARD_IDS = {
     "effect": 0x01,
     "constant": 0x05,
     "operation": 0x0A,
+    "free": 0x0B,
     "control": 0x0C,
     "gain": 0x0D,
     "create": 0x11,
@@ -287,6 +289,7 @@ OTHER_IDS = {
     "effect": 0x31,
     "constant": 0x15,
     "operation": 0x1A,
+    "free": 0x1B,
     "control": 0x0B,
     "gain": 0x1D,
     "create": 0x05,
@@ -326,7 +329,7 @@ class StickUnit(Unit):
     def feature(self, report_id: int, data: bytes | None) -> bytes:
         if data is not None and report_id == self.ids["create"]:
             assert data[1] == 1 and len(data) == 4  # constant force
-            self.created += 1
+            self.created = next(k for k in range(1, self.room + 2) if k not in self.effects)
             if self.created <= self.room:
                 self.effects[self.created] = {"magnitude": 0, "until": float("-inf"), "duration_ms": 0}
             return b""
@@ -354,9 +357,13 @@ class StickUnit(Unit):
                 effect["until"] = self.clock() + duration * loops
             elif operation == 3:
                 effect["until"] = float("-inf")
+        elif kind == self.ids["free"]:
+            del self.effects[body[0]]
         elif kind == self.ids["control"]:
             if body[0] == 1:
                 self.actuators = True
+            elif body[0] == (8 if self.control_bits else 4):
+                self.effects.clear()
             elif body[0] == (4 if self.control_bits else 3):
                 for effect in self.effects.values():
                     effect["until"] = float("-inf")

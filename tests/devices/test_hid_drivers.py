@@ -39,9 +39,10 @@ def stick() -> tuple[pid_ffb.PidWire, StickUnit, Clock]:
 
 def test_documented_start_sequence(stick) -> None:
     _, unit, _ = stick
-    assert unit.writes[0] == bytes.fromhex("0c01")
+    # reset, so that what a killed program left takes no room; then actuators on
+    assert unit.writes[:2] == [bytes.fromhex("0c08"), bytes.fromhex("0c01")]
     kinds = [w[0] for w in unit.writes]
-    assert kinds == [0x0C, 0x0D, 0x01, 0x05, 0x01, 0x05]
+    assert kinds == [0x0C, 0x0C, 0x0D, 0x01, 0x05, 0x01, 0x05]
     assert [e["direction"] for e in unit.effects.values()] == [9000, 18000]
 
 

@@ -77,7 +77,9 @@ def test_sofa_holds_mesh_base_and_moduli(tmp_path):
     linear = model.mesh.linear()
     topology = root.find(".//TetrahedronSetTopologyContainer")
     assert np.allclose(np.fromstring(topology.get("position"), sep=" "), linear.points.ravel())
-    assert np.array_equal(np.fromstring(topology.get("tetrahedra"), sep=" ", dtype=int), linear.tetrahedra.ravel())
+    assert np.array_equal(
+        np.fromstring(topology.get("tetrahedra"), sep=" ", dtype=int), linear.tetrahedra.ravel()
+    )
     fixed = root.find(".//FixedProjectiveConstraint").get("indices")
     assert np.array_equal(np.fromstring(fixed, sep=" ", dtype=int), np.flatnonzero(linear.fixed))
     moduli = np.fromstring(root.find(".//TetrahedronFEMForceField").get("youngModulus"), sep=" ")

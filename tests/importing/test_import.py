@@ -1,4 +1,5 @@
-"""Other programs' files: the same exploration in every format comes out the same, and what is missing is told."""
+"""Other programs' files: the same exploration in every format comes out the same, and what is missing is
+told."""
 
 from __future__ import annotations
 
@@ -58,7 +59,9 @@ def test_matlab_hdf5_parquet_and_numpy_hold_the_same(tmp_path, world):
     h5py, pa = pytest.importorskip("h5py"), pytest.importorskip("pyarrow")
     import pyarrow.parquet as pq
 
-    names = dict(zip(("t", "x", "y", "z", "fx", "fy", "fz"), (world["t"], *world["p"].T, *world["f"].T), strict=True))
+    names = dict(
+        zip(("t", "x", "y", "z", "fx", "fy", "fz"), (world["t"], *world["p"].T, *world["f"].T), strict=True)
+    )
     savemat(tmp_path / "a.mat", {"log": {"time": world["t"], "pos": world["p"], "force": world["f"]}})
     with h5py.File(tmp_path / "b.h5", "w") as file:
         file["robot/time"], file["robot/position"] = world["t"], world["p"]
@@ -66,7 +69,9 @@ def test_matlab_hdf5_parquet_and_numpy_hold_the_same(tmp_path, world):
     pq.write_table(pa.table(names), tmp_path / "c.parquet")
     np.savez(tmp_path / "d.npz", **names)
     columns = {"t": "log.time"}
-    columns |= {a: f"log.pos[{k}]" for k, a in enumerate("xyz")} | {f"f{a}": f"log.force[{k}]" for k, a in enumerate("xyz")}
+    columns |= {a: f"log.pos[{k}]" for k, a in enumerate("xyz")} | {
+        f"f{a}": f"log.force[{k}]" for k, a in enumerate("xyz")
+    }
     check(pp.read_table(tmp_path / "a.mat", columns=columns, tip_radius_m=TIP), world)
     check(pp.read_table(tmp_path / "b.h5", tip_radius_m=TIP), world)
     check(pp.read_table(tmp_path / "c.parquet", tip_radius_m=TIP), world)
@@ -83,7 +88,10 @@ def test_topics_of_a_ros_bag_have_clocks_of_their_own(tmp_path, world):
 
     def header(t: float):
         whole = int(t)
-        return bare(stamp=kinds["builtin_interfaces/msg/Time"](sec=whole, nanosec=int(round((t - whole) * 1e9))), frame_id="")
+        return bare(
+            stamp=kinds["builtin_interfaces/msg/Time"](sec=whole, nanosec=int(round((t - whole) * 1e9))),
+            frame_id="",
+        )
 
     vector, point = kinds["geometry_msgs/msg/Vector3"], kinds["geometry_msgs/msg/Point"]
     with rosbags.Writer(tmp_path / "bag", version=9) as writer:
@@ -95,7 +103,9 @@ def test_topics_of_a_ros_bag_have_clocks_of_their_own(tmp_path, world):
             message = kinds["geometry_msgs/msg/PoseStamped"](header=header(100 + t), pose=pose)
             writer.write(poses, int(1e9 * t), store.serialize_cdr(message, poses.msgtype))
             if k % 2 == 0:
-                wrench = kinds["geometry_msgs/msg/Wrench"](force=vector(*world["f"][k]), torque=vector(0.0, 0.0, 0.0))
+                wrench = kinds["geometry_msgs/msg/Wrench"](
+                    force=vector(*world["f"][k]), torque=vector(0.0, 0.0, 0.0)
+                )
                 message = kinds["geometry_msgs/msg/WrenchStamped"](header=header(100 + t), wrench=wrench)
                 writer.write(pushes, int(1e9 * t), store.serialize_cdr(message, pushes.msgtype))
     made = pp.import_table(tmp_path / "bag", tip_radius_m=TIP)
@@ -136,16 +146,20 @@ def test_clocks_that_share_no_time_are_joined_by_cross_correlation(tmp_path, wor
 
 
 def test_sensor_frame_flange_weight_and_tare_are_undone(tmp_path, world):
-    spin = Rotation.from_rotvec(np.column_stack([0.2 * np.sin(world["t"]), 0.3 * np.cos(world["t"]), world["t"]]))
+    spin = Rotation.from_rotvec(
+        np.column_stack([0.2 * np.sin(world["t"]), 0.3 * np.cos(world["t"]), world["t"]])
+    )
     arm, weight = np.array([0.0, 0.02, 0.15]), np.array([0, 0, -0.2 * 9.80665])
     mounted = Rotation.from_euler("z", 30, degrees=True)
     told = mounted.inv().apply(spin.inv().apply(world["f"] + weight))
-    columns = np.column_stack([world["t"], world["p"] - spin.apply(arm), told, spin.as_quat()[:, [3, 0, 1, 2]]])
+    columns = np.column_stack(
+        [world["t"], world["p"] - spin.apply(arm), told, spin.as_quat()[:, [3, 0, 1, 2]]]
+    )
     header = "t x y z fx fy fz qw qx qy qz".replace(" ", "\t")
     np.savetxt(tmp_path / "log.tsv", columns, delimiter="\t", header=header, comments="", fmt="%.12g")
     rotation = mounted.as_matrix().tolist()
     (tmp_path / "map.toml").write_text(
-        f'[tool]\ntip_radius_m = {TIP}\nmass_kg = 0.2\nflange_to_tip_m = [0, 0.02, 0.15]\n'
+        f"[tool]\ntip_radius_m = {TIP}\nmass_kg = 0.2\nflange_to_tip_m = [0, 0.02, 0.15]\n"
         f'[sensor]\nframe = "tool"\nrotation = {rotation}\n[tare]\nstart_s = 0.6\nend_s = 0.8\n'
     )
     made = pp.read_table(tmp_path / "log.tsv", mapping=tmp_path / "map.toml")
@@ -156,10 +170,21 @@ def test_rows_without_a_time_are_points(tmp_path, world):
     table = np.column_stack([1e3 * world["p"][::100], world["f"][::100]])
     np.savetxt(tmp_path / "raster.txt", table, header="x_mm y_mm z_mm fx_n fy_n fz_n", comments="# ")
     out = tmp_path / "raster.csv.gz"
-    words = ["import", str(tmp_path / "raster.txt"), "-o", str(out), "--tip-radius", str(TIP), "--slab", "0.02"]
+    words = [
+        "import",
+        str(tmp_path / "raster.txt"),
+        "-o",
+        str(out),
+        "--tip-radius",
+        str(TIP),
+        "--slab",
+        "0.02",
+    ]
     assert cli.main(words) == 0
     back = pp.read_recording(out)
-    assert back.description["recording"]["quasi_static"] is True and back.description["object"]["slab_m"] == 0.02
+    assert (
+        back.description["recording"]["quasi_static"] is True and back.description["object"]["slab_m"] == 0.02
+    )
     assert np.allclose(back.position, world["p"][::100], atol=1e-8)
     assert (tmp_path / "raster.png").stat().st_size > 10_000
 
@@ -167,7 +192,13 @@ def test_rows_without_a_time_are_points(tmp_path, world):
 def test_tiny_scales_keep_their_digits(tmp_path):
     t = np.arange(400) / 100
     load = 0.05 * np.sin(t) ** 2
-    np.savetxt(tmp_path / "afm.txt", np.column_stack([t, load, 5000 * np.sin(t) ** 2]), header="Time (s)\tLoad (uN)\tIndentation (nm)", delimiter="\t", comments="")
+    np.savetxt(
+        tmp_path / "afm.txt",
+        np.column_stack([t, load, 5000 * np.sin(t) ** 2]),
+        header="Time (s)\tLoad (uN)\tIndentation (nm)",
+        delimiter="\t",
+        comments="",
+    )
     out = tmp_path / "afm.csv.gz"
     pp.import_table(tmp_path / "afm.txt", tip_radius_m=3e-6).save(out)
     held = np.loadtxt(out, delimiter=",", skiprows=1)
@@ -180,11 +211,23 @@ def test_tiny_scales_keep_their_digits(tmp_path):
     [
         ("a,b,c\n1,2,3\n2,3,4\n", {"tip_radius_m": TIP}, "--column x=NAME .*there are a, b, c"),
         ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {}, "--tip-radius"),
-        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "columns": {"fx": "load"}}, "'load' is not there"),
-        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "units": {"force": "mm"}}, "no unit of force"),
+        (
+            "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
+            {"tip_radius_m": TIP, "columns": {"fx": "load"}},
+            "'load' is not there",
+        ),
+        (
+            "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
+            {"tip_radius_m": TIP, "units": {"force": "mm"}},
+            "no unit of force",
+        ),
         ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "force_on": "me"}, "tool and object"),
         ("hello\nworld\n", {"tip_radius_m": TIP}, "is it a table"),
-        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "frame": "tool"}, "needs the orientation"),
+        (
+            "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
+            {"tip_radius_m": TIP, "frame": "tool"},
+            "needs the orientation",
+        ),
     ],
 )
 def test_what_is_missing_is_one_line(tmp_path, content, said, words):

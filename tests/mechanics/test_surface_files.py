@@ -1,4 +1,5 @@
-"""Surfaces of other programs: every format to the same solid, holes closed or refused with their place, units."""
+"""Surfaces of other programs: every format to the same solid, holes closed or refused with their place,
+units."""
 
 from __future__ import annotations
 
@@ -90,7 +91,9 @@ def test_triangles_wound_at_random_come_out_outward(tmp_path):
     assert volume(read_surface(tmp_path / "mixed.obj", "mm")) == pytest.approx(1.2e-4)
 
 
-@pytest.mark.parametrize(("unit", "words"), [("m", "these look like mm: give --unit mm"), ("um", "--unit mm")])
+@pytest.mark.parametrize(
+    ("unit", "words"), [("m", "these look like mm: give --unit mm"), ("um", "--unit mm")]
+)
 def test_units_that_make_no_object_for_a_hand_are_named(tmp_path, unit, words):
     with pytest.raises(SurfaceError, match=words):
         read_surface(written(tmp_path, "block.stl"), unit)

@@ -34,7 +34,7 @@ def alive(process: int) -> bool:
         return False
 
 
-def wait_for(condition, seconds: float = 5.0) -> None:
+def wait_for(condition, seconds: float = 60.0) -> None:
     until = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < until
@@ -99,7 +99,7 @@ with LocalExecutor(2) as executor:
     if end != "left":
         parent.send_signal(signal.SIGKILL if end == "killed" else signal.SIGINT)
     began = time.monotonic()
-    parent.communicate(timeout=5)
+    parent.communicate(timeout=30)
     wait_for(lambda: not any(map(alive, processes)))
-    assert time.monotonic() - began < 5
+    assert time.monotonic() - began < 20  # what was begun would take a minute
     assert not (tmp_path / "slow").exists() and (tmp_path / "quick").exists()

@@ -38,10 +38,10 @@ def quick(monkeypatch):
     did: list[tuple[str, str]] = []
 
     def step(name):
-        def run(*, sha256, options, seed, reports, recording, folder):
+        def run(*, sha256, options, seed, reports, recording, shape, folder):
             import tomllib
 
-            assert steps.content_of(recording) == dict(sha256)
+            assert steps.content_of(recording, shape) == dict(sha256)
             place, about = Path(folder), tomllib.loads(Path(recording).with_suffix(".toml").read_text())
             if about["e"] < 0:
                 raise pp.ContactError("it holds no\npresses")
@@ -114,6 +114,12 @@ def test_a_key_is_of_bytes_options_and_seed_and_not_of_places(tmp_path):
     fast = keys(tmp_path / "a" / "bean.csv", Choice(options={"diagnose": {"fast": True}}))
     assert [a == b for a, b in zip(first, fast, strict=True)] == [True, True, False]
     assert not set(first) & set(keys(tmp_path / "a" / "bean.csv", Choice(seed=1)))
+    shapes = []
+    for name, text in (("1.stl", "solid"), ("2.stl", "solid"), ("3.stl", "other")):
+        (tmp_path / name).write_text(text)
+        choice = Choice(options={"reconstruct": {"shape": str(tmp_path / name)}})
+        shapes.append(keys(tmp_path / "a" / "bean.csv", choice))
+    assert shapes[0] == shapes[1] != first and not set(shapes[1]) & set(shapes[2])
 
 
 def test_one_bad_recording_stops_no_other_and_has_its_reason(tmp_path, quick, capsys):
@@ -227,6 +233,7 @@ def test_an_interruption_leaves_a_summary_that_says_what_waits(tmp_path, quick, 
     [
         (["--do", "judge"], "allowed are reconstruct, compare, diagnose"),
         (["--set", "diagnose.quick=true"], "pp.diagnose has no option 'quick'"),
+        (["--set", "diagnose.seed=1"], "give --seed"),
         (["--set", "fast=true"], "must be STEP.OPTION=VALUE"),
         (["--set", "judge.fast=true"], "options of 'judge'"),
         (["--workers", "0"], "allowed are 1 and more"),
@@ -291,7 +298,13 @@ def test_steps_hand_every_option_to_the_doors_own_functions(tmp_path, monkeypatc
     for name in ("compare", "diagnose"):
         monkeypatch.setattr(f"palpate.api.{name}", listening(name))
     monkeypatch.setattr("palpate.api.read_recording", lambda path: path)
-    given = {"sha256": steps.content_of(path), "seed": 3, "recording": str(path), "folder": str(tmp_path)}
+    given = {
+        "sha256": steps.content_of(path),
+        "seed": 3,
+        "recording": str(path),
+        "folder": str(tmp_path),
+        "shape": "",
+    }
     steps.compare(options={"folds": 4}, reports=False, **given)
     steps.diagnose(options={"fast": True}, reports=True, **given)
     model = (tmp_path / "model",)

@@ -314,3 +314,18 @@ def test_a_parent_that_falls_silent_takes_the_force_with_it():
     assert "silent" in servo.reasons
     control[BEAT] += 1
     assert 0 < servo.press(0.002, 1)[2] < 0.01, "ramps in anew"
+
+
+def test_a_thousand_swaps_while_touching_keep_the_force_within_clamp_and_slew():
+    servo, random = FakeServo(), np.random.default_rng(5)
+    planes = [in_the_air(ElasticPlane(k)) for k in (200.0, 500.0, 3000.0, 20_000.0)]
+    forces = [servo.press(0.002, 1) for _ in range(600)]
+    for _ in range(1000):
+        scene = planes[random.integers(len(planes))]
+        servo.program = servo.program._replace(scene=scene)
+        forces += [servo.press(0.002, 1) for _ in range(random.integers(1, 4))]
+    sizes = np.array(forces)[:, 2]
+    safety = servo.program.parameters.safety
+    assert sizes.max() <= safety.max_force_n and sizes[600:].min() > 0
+    assert np.diff(sizes).max() <= safety.slew_n_per_s * 1e-3 * (1 + 1e-9)
+    assert len(np.unique(sizes[600:].round(6))) > 4, "the planes are felt"

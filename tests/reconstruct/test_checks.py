@@ -1,0 +1,103 @@
+"""The check-up: each fault is found under its name in a sound exploration, which itself gives no finding."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+from exploration_of_cylinder import explore_cylinder
+
+from mechanics.errors import PalpateError, RecordingError
+from palpate.benchmarks._faults import FAULTS
+from reconstruct.checks.base import Finding, decades_of_tail
+from reconstruct.checks.outcome import Result, outcome
+from reconstruct.checks.registry import Checkup, check, checked_samples, widened
+from reconstruct.checks.sight import Sight
+
+NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_sound_exploration_gives_no_finding(seed):
+    recording, _ = explore_cylinder(seed=seed, noise=0.006 * (seed + 1), unlike_speeds=bool(seed))
+    assert check(recording) == ()
+
+
+def test_a_heavy_tool_and_a_bias_are_no_faults():
+    recording, _ = explore_cylinder(tool_mass_kg=0.06, bias=(0.3, -0.2, 0.5), drift_n_per_s=0.002)
+    assert checked_samples(recording) == ()
+
+
+@pytest.mark.parametrize("fault", [f for f in FAULTS if f not in NEED_PRESSES])
+def test_a_fault_is_found_under_its_name(cylinder, fault):
+    it = FAULTS[fault]
+    try:
+        found = checked_samples(it.change(cylinder[0], np.random.default_rng(0)))
+    except PalpateError:  # refused where it is read
+        return
+    assert found and found[0].name in it.names, [f.line() for f in found]
+
+
+@pytest.mark.parametrize("fault", NEED_PRESSES)
+def test_a_base_that_does_not_fit_the_presses_is_found(cylinder, fault):
+    it = FAULTS[fault]
+    found = check(it.change(cylinder[0], np.random.default_rng(0)))
+    assert found and found[0].name in it.names and found[0].grave
+
+
+def test_what_is_found_says_where_and_how_sure(cylinder):
+    recording = cylinder[0]
+    position = np.array(recording.position)
+    rows = (recording.t > 20.0) & (recording.t < 28.0)
+    position[rows] = position[np.argmax(rows)]
+    found = checked_samples(dataclasses.replace(recording, position=position))[0]
+    assert found.name == "stuck channel" and found.channels == ("x", "y", "z")
+    assert found.stretch == pytest.approx((20.0, 28.0), abs=0.5)
+    assert "p = 1e-" in found.sure and found.decades > 6
+
+
+def test_the_delay_of_the_force_is_read_off_places_passed_twice(cylinder):
+    for late_s in (-0.04, 0.0, 0.15):
+        force = np.roll(cylinder[0].force_on_tool, round(late_s * 1000), axis=0)
+        seen, error = Sight(dataclasses.replace(cylinder[0], force_on_tool=force)).lag_s
+        assert seen == pytest.approx(late_s, abs=0.006) and error < 0.003
+
+
+def test_grave_findings_refuse_unless_forced(cylinder):
+    flipped = dataclasses.replace(cylinder[0], force_on_tool=-cylinder[0].force_on_tool)
+    with pytest.raises(RecordingError, match="force sign: .*force_on.*--force"):
+        Checkup(flipped)
+    assert Checkup(flipped, force=True).found[0].name == "force sign"
+
+
+def test_lesser_findings_widen_the_interval():
+    note = Finding("coarse steps", "", "", "", error=0.1, decades=9.0)
+    grave = dataclasses.replace(note, error=np.inf)
+    assert grave.grave and not note.grave
+    assert widened(30e3, (29e3, 31e3), []) == (29e3, 31e3)
+    assert widened(30e3, (29e3, 31e3), [grave]) == (29e3, 31e3)
+    low, high = widened(30e3, (29e3, 31e3), [note])
+    assert np.log(high / 30e3) == pytest.approx(np.hypot(np.log(31 / 30), 0.196))
+    assert np.log(30e3 / low) == pytest.approx(np.hypot(np.log(30 / 29), 0.196))
+
+
+@pytest.mark.parametrize(
+    ("modulus", "interval", "misfit", "name"),
+    [
+        (30e3, (np.nan, np.nan), 0.01, "no interval"),
+        (29e6, (28e6, 30e6), 0.01, "modulus"),
+        (100.0, (90.0, 110.0), 0.01, "modulus"),
+        (30e3, (29e3, 31e3), 0.9, "misfit"),
+    ],
+)
+def test_an_outcome_that_is_none_is_an_error(modulus, interval, misfit, name):
+    ones = np.ones(5)
+    found = list(outcome(Result(modulus, interval, misfit * ones, ones, ones)))
+    assert [f.name for f in found] == [name] and found[0].grave
+    assert not list(outcome(Result(30e3, (29e3, 31e3), 0.02 * ones, ones, ones)))
+
+
+def test_the_probability_of_a_tail_is_the_binomial_one():
+    assert decades_of_tail(3, 3, 0.01) == pytest.approx(6.0)
+    assert decades_of_tail(0, 10, 0.5) == 0.0

@@ -1,0 +1,150 @@
+"""Crashes that others' recordings met, and known geometry through the door: rasters, slabs, one line each."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+import trimesh
+from flat_ground import MODULUS_PA, TIP_M, raster
+
+import palpate as pp
+from diagnose.leave_one_out import held_out
+from mechanics.effects.registry import effect
+from mechanics.errors import ContactError, OptionError, SurfaceError
+from mechanics.press_sites import sites_of
+from palpate import cli
+from reconstruct.contacts import explore
+from reconstruct.known_shape import GeometryOptions, nowhere, place, stated_geometry
+from reconstruct.shapes.evidence import Evidence
+from reconstruct.shapes.fit import Seen
+from reconstruct.shapes.implicit import implicit_held_out
+from reconstruct.slides import without_slides
+
+
+@pytest.mark.parametrize(("pitch_m", "count"), [(0.005, 5), (0.003, 15), (0.002, 9)])
+def test_a_raster_is_many_places(pitch_m, count):
+    grid = np.arange(count) * pitch_m
+    points = np.array([[x, y, 0.0] for x in grid for y in grid])
+    points += 2e-4 * np.random.default_rng(0).standard_normal(points.shape)
+    assert len(set(sites_of(points, np.tile([0, 0, 1.0], (len(points), 1))))) == count**2
+
+
+@pytest.fixture(scope="module")
+def ground():
+    recording = raster()
+    return recording, without_slides(explore(recording, boundary=nowhere(recording)), 4)
+
+
+def test_presses_are_found_without_tracing_in_any_frame(ground):
+    recording, found = ground
+    assert len(found.presses) == 25 and found.presses.sites == 25
+
+
+def test_a_slabs_top_goes_through_the_first_touches(ground):
+    recording, found = ground
+    put = place(recording, found, GeometryOptions(slab_m=0.02), mesh_size_m=0.01, spacing_m=0.003)
+    up = put.base.support_normal
+    truth = found.presses.contact_normal.mean(axis=0)
+    assert up @ truth / np.linalg.norm(truth) > np.cos(np.radians(1.0))
+    height = (found.presses.centre - put.base.support_point) @ up
+    assert np.allclose(height, 0.02 + TIP_M, atol=2e-4)
+    assert put.about["kind"] == "slab" and put.about["residual_rms_m"] < 1e-4
+    assert put.mesh is not None and put.mesh.volumes.sum() == pytest.approx(put.surface.volume_m3)
+
+
+def test_touches_at_one_place_leave_nothing_out_and_crash_nothing():
+    centres = np.array([[0, 0, 0.05], [1e-4, 0, 0.05], [0, 1e-4, 0.05], [1e-4, 1e-4, 0.05]])
+    angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    rim = 0.03 * np.column_stack([np.cos(angle), np.sin(angle), np.zeros(40)])
+    evidence = Evidence(
+        support_point=np.zeros(3),
+        support_normal=np.array([0, 0, 1.0]),
+        outline=rim,
+        outline_centres=rim * (0.034 / 0.03) + [0, 0, TIP_M],
+        centres=centres,
+        normals=np.tile([0, 0, 1.0], (4, 1)),
+        centre_error_m=np.full(4, 1e-4),
+        tip_radius_m=TIP_M,
+        site=np.zeros(4, dtype=int),
+    )
+    assert implicit_held_out(evidence, Seen.of(evidence)) == np.inf
+
+
+def test_a_parameter_that_no_motion_shows_is_left_where_it_is():
+    """Purely normal presses: friction's column is zero, which was a singular matrix."""
+    slip = effect("friction_slip")
+    size = 2 + len(slip.parameters)
+    gram = np.zeros((4, size, size))
+    gram[:, :2, :2] = [[2.0, 1.0], [1.0, 3.0]]
+    values = np.array([0.0, *(p.ideal if np.isfinite(p.ideal) else 1.0 for p in slip.parameters)])
+    values[1:] = [
+        np.clip(v, p.low + 0.1, p.high - 0.1) for v, p in zip(values[1:], slip.parameters, strict=True)
+    ]
+    zeros = np.zeros(size - 1)
+    fit = SimpleNamespace(gram=gram, raw=gram.copy(), effects=(slip,), values=values, prior=zeros, pull=zeros)
+    loss, plain = held_out(fit)
+    assert np.isfinite(loss).all() and np.isfinite(plain).all()
+
+
+def test_one_line_for_units_open_meshes_unregistered_shapes_and_points(tmp_path, ground, capsys):
+    recording, _ = ground
+    far = trimesh.creation.box(extents=(60, 50, 40))
+    far.apply_translation([500, 0, 0])
+    far.export(tmp_path / "far.stl")
+    ball = trimesh.creation.icosphere(subdivisions=3, radius=30)
+    ball.update_faces((ball.triangles_center[:, :2] < 8).any(axis=1))
+    ball.export(tmp_path / "open.stl")
+    for options, error, words in (
+        ({"shape": str(tmp_path / "far.stl")}, SurfaceError, "--unit mm"),
+        ({"shape": str(tmp_path / "open.stl"), "unit": "mm"}, SurfaceError, "is open: a hole"),
+        ({"shape": str(tmp_path / "far.stl"), "unit": "mm", "pose": "given"}, SurfaceError, "--pose auto"),
+        ({"shape": "gone.stl"}, SurfaceError, "does not exist"),
+        ({"slab_m": 0.02, "half_space": True}, OptionError, "exclude one another"),
+        ({"slab_m": -1.0}, OptionError, "slab_m is -1"),
+    ):
+        with pytest.raises(error, match=words) as refused:
+            pp.reconstruct(recording, progress=False, **options)
+        assert len(str(refused.value).splitlines()) == 1
+    points = raster()
+    object.__setattr__(points, "description", {"recording": {"quasi_static": True}})
+    with pytest.raises(ContactError, match="--rate HZ"):
+        pp.reconstruct(points, half_space=True, progress=False)
+    capsys.readouterr()
+    assert (
+        cli.main(["press", "block", "--unit", "mm", *"--at 0,0,1 --direction 0,0,-1 --depth 0.001".split()])
+        == 2
+    )
+    assert "--unit is for the file of a surface" in capsys.readouterr().err
+
+
+def test_a_recording_states_its_geometry_itself():
+    recording = raster((2, 2))
+    object.__setattr__(recording, "description", {"object": {"slab_m": 0.03, "shape_pose": "given"}})
+    assert stated_geometry(recording, GeometryOptions()) == GeometryOptions(slab_m=0.03, pose="given")
+    asked = GeometryOptions(half_space=True)
+    assert stated_geometry(recording, asked) is asked
+
+
+@pytest.mark.slow
+def test_a_mesh_is_a_model_in_its_own_frame(tmp_path):
+    block = trimesh.creation.box(extents=(60, 50, 40))
+    block.apply_translation([200, -100, 70])
+    block.export(tmp_path / "part.ply")
+    model = pp.model_of(tmp_path / "part.ply", 12e3, unit="mm", save=tmp_path / "MODEL", progress=False)
+    assert model.material.young_modulus_pa == 12e3
+    assert model.support.point == pytest.approx([0.2, -0.1, 0.05], abs=1e-6)
+    assert model.mesh.volumes.sum() == pytest.approx(1.2e-4, rel=0.01)
+    curve = pp.press(tmp_path / "MODEL", (0.2, -0.1, 0.09), (0, 0, -1), 0.002, progress=False)
+    hertz = 4 / 3 * 12e3 / (1 - 0.49**2) * np.sqrt(model.tool.tip_radius_m) * 0.002**1.5
+    assert hertz < curve.peak_force_n < 1.6 * hertz
+
+
+@pytest.mark.slow
+def test_the_modulus_of_a_half_space_needs_no_tracing():
+    made = pp.reconstruct(raster(), half_space=True, progress=False)
+    low, high = made.young_modulus_ci95_pa
+    assert (
+        made.young_modulus_pa == pytest.approx(MODULUS_PA, rel=0.06) and low < MODULUS_PA * 1.02 < high * 1.04
+    )
