@@ -30,6 +30,8 @@ PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
+_CLEAR = 3.0
+"""Where free motion wanders, presses must stand out by so many thresholds: weaker ones were lost."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -207,16 +209,22 @@ def _speed(signals: Signals, contact: Found) -> float:
 
 def _searched(recording: Recording, given: _Given) -> _Found:
     signals, free_air, spread = signals_of(recording, given.cutoff_hz)
+    wanders = recording.quaternion is None and spread.min() > signals.noise_n
+    hint = (
+        f"in free motion the force wanders by {spread.min():.2g} N an axis, louder than its noise "
+        f"({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation (qw, qx, qy, "
+        "qz), or hold it one way"
+    )
     try:
-        return _found(recording, given, signals, free_air, spread)
+        found = _found(recording, given, signals, free_air, spread)
     except ContactError as error:
-        if recording.quaternion is not None or spread.min() < signals.noise_n:
+        if not wanders:
             raise
-        raise type(error)(
-            f"{error}. In free motion the force wanders by {spread.min():.2g} N an axis, louder than its "
-            f"noise ({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation "
-            "(qw, qx, qy, qz), or hold it one way"
-        ) from error
+        raise type(error)(f"{error}; {hint}") from error
+    peaks = signals.magnitude[[c.peak for c in found.contacts]]
+    if wanders and np.median(peaks) < _CLEAR * found.threshold_n:
+        raise ContactError(f"{len(peaks)} presses stand out by {np.median(peaks):.2g} N only: {hint}")
+    return found
 
 
 def _found(
