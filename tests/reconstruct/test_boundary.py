@@ -78,3 +78,19 @@ def test_the_plane_ignores_samples_far_off_it():
     _, normal, rms = fit_plane(points)
     assert abs(normal[2]) > 1 - 1e-6
     assert rms < 3e-5
+
+
+def test_a_trace_that_was_broken_off_for_seconds_is_detected_whole():
+    """Two long gaps in the clock of contact: all contacts in the plane belong to it until one leaves it."""
+    recording, _ = explore_cylinder(state_phase=False)
+    first, last = explore(recording).boundary.interval
+    force = recording.force_on_tool.copy()
+    for share in (0.3, 0.6):
+        at = int(first + share * (last - first))
+        force[at : at + 60] = 0.0
+    t = recording.t.copy()
+    for share in (0.3, 0.6):
+        t[int(first + share * (last - first)) + 30 :] += 3.0
+    found = explore(dataclasses.replace(recording, t=t, force_on_tool=force)).boundary.interval
+    assert abs(found[0] - first) < 100
+    assert abs(found[1] - last) < 100
