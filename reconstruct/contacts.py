@@ -30,8 +30,8 @@ PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
-_CLEAR = 3.0
-"""Where free motion wanders, presses must stand out by so many thresholds: weaker ones were lost."""
+_CLEAR = 1.5
+"""Presses must reach so many thresholds in the middle: else most were lost, and the loudest mislead."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -222,8 +222,12 @@ def _searched(recording: Recording, given: _Given) -> _Found:
             raise
         raise type(error)(f"{error}; {hint}") from error
     peaks = signals.magnitude[[c.peak for c in found.contacts]]
-    if wanders and np.median(peaks) < _CLEAR * found.threshold_n:
-        raise ContactError(f"{len(peaks)} presses stand out by {np.median(peaks):.2g} N only: {hint}")
+    automatic = given.method == "noise" and given.contact.contact_threshold_n is None
+    if automatic and np.median(peaks) < _CLEAR * found.threshold_n:
+        raise ContactError(
+            f"the presses reach {np.median(peaks):.2g} N in the middle, where free motion alone reaches "
+            f"{found.threshold_n:.2g} N: weaker ones are lost; {hint if wanders else 'press deeper'}"
+        )
     return found
 
 
