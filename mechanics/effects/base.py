@@ -152,6 +152,11 @@ class Effect:
         return self.apply is not None
 
     @property
+    def in_material(self) -> bool:
+        """Whether a model that has it says so by its typed material."""
+        return self.apply is not None and self.apply is not unchanged
+
+    @property
     def ideal(self) -> np.ndarray:
         """(k,) values at which the effect is absent."""
         return np.array([p.ideal for p in self.parameters])

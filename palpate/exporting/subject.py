@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.effects.registry import effect
 from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.nearest import closest
@@ -65,10 +66,7 @@ class Subject:
     @property
     def left_out(self) -> tuple[str, ...]:
         """Effects of the model that no file states."""
-        return tuple(name for name in self.model.effects if name not in _MATERIAL)
-
-
-_MATERIAL = ("inclusion", "modulus_gradient", "skin_layer", "poisson_ratio", "finite_strain")
+        return tuple(name for name in self.model.effects if not effect(name).in_material)
 
 
 def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None = None) -> Subject:
