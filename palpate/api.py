@@ -98,8 +98,8 @@ def import_table(*files: str | Path, mapping: str | Path | None = None, **said: 
     mapping: a TOML file that says what the columns are (docs/import-export.md); said: the same by keyword,
     which count before it: columns {role: name}, units {kind: unit}, tip_radius_m, force_on ("tool",
     "object"), frame ("device", "tool"), rotation (3, 3), flange_to_tip_m (3,), mass_kg, tare_s (start,
-    end), offset_s, rate_hz, thing (what [object] of the recording is to say). Raises RecordingError where
-    something needed is missing.
+    end), offset_s, rate_hz, thing (what [object] of the recording is to say). The recording is in m, s and N,
+    forces on the tool. Raises RecordingError where something needed is missing.
     """
     import dataclasses as classes
 
@@ -125,8 +125,8 @@ def import_table(*files: str | Path, mapping: str | Path | None = None, **said: 
 
 
 def read_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Recording:
-    """The recording in other programs' files; what may be said is as for `import_table`, which also tells
-    and draws what it understood."""
+    """The recording in other programs' files, in m, s and N; files, mapping and said are as for
+    `import_table`, which also tells and draws what it understood. Raises RecordingError."""
     return import_table(*files, mapping=mapping, **said).recording
 
 
@@ -481,10 +481,11 @@ def export(
 ) -> tuple[str, ...]:
     """Write a model for another program: a minimal scene that runs there, or its mesh.
 
-    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl". at: (3,) m, where the
+    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl"; path: the file to write. at: (3,) m, where the
     scene's tip presses, None is the middle of the top; depth_m: how deep, None is half the tip's radius.
     unit: of an STL's lengths; all else is in SI units and the model's frame. Returns what the format cannot
-    say, one line each.
+    say, one line each. progress: a bar while a scene is built. Raises OptionError for an unknown format or a
+    place that misses the object, FileError where the file cannot be written.
     """
     import numpy as np
 

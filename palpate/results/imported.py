@@ -5,20 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from palpate.importing.convert import Understood
 from palpate.importing.written import picture, write_imported
+from palpate.results.base import Result
 from palpate.results.recording import Recording, recording_of
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
 
-@dataclass(frozen=True)
-class Imported:
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Imported(Result):
     """What was understood of a table: `recording` goes wherever a recording goes.
 
-    notes: what was done to it, one line each. thing: what was said of the object. sources: the files.
+    notes: what was done to it, one line each. thing: what was said of the object. sources: the files. `plot`:
+    force (N) over time (s); `show`: the tip's path (m); `draw`: all columns as they were understood.
     """
 
     understood: Understood
@@ -58,10 +64,11 @@ class Imported:
             *(f"  {note}" for note in self.understood.notes),
         ]
 
-    def __str__(self) -> str:
-        return "\n".join(self.lines())
+    def _draw(self, ax: Axes) -> None:
+        self.recording._draw(ax)
 
-    __repr__ = __str__
+    def _place(self, plotter: Plotter) -> None:
+        self.recording._place(plotter)
 
     def as_json(self) -> dict[str, Any]:
         """The figures of `palpate import --json`."""
