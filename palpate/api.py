@@ -481,8 +481,9 @@ def export(
 ) -> tuple[str, ...]:
     """Write a model for another program: a minimal scene that runs there, or its mesh.
 
-    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl"; path: the file to write. at: (3,) m, where the
-    scene's tip presses, None is the middle of the top; depth_m: how deep, None is half the tip's radius.
+    to: "mujoco" (.xml), "sofa" (.scn), "abaqus" (.inp), "gmsh" (.msh) or "stl"; path: the file to write.
+    at: (3,) m, where the scene's tip presses, None is the middle of the top; depth_m: how deep, None is half
+    the tip's radius.
     unit: of an STL's lengths; all else is in SI units and the model's frame. Returns what the format cannot
     say, one line each. progress: a bar while a scene is built. Raises OptionError for an unknown format or a
     place that misses the object, FileError where the file cannot be written.
