@@ -752,6 +752,7 @@ def test_a_damaged_mesh_of_the_laboratory_is_not_taken(tmp_path):
 def test_an_interrupt_while_loading_leaves_without_a_traceback(tmp_path):
     code = (
         "import os, signal, sys, threading; import palpate.cli\n"
+        "signal.signal(signal.SIGINT, signal.default_int_handler)\n"  # a shell's background job ignores it
         "threading.Timer(0.15, os.kill, (os.getpid(), signal.SIGINT)).start()\n"
         "sys.exit(palpate.cli.main(['touch', '--headless']))"
     )

@@ -77,7 +77,9 @@ def test_nothing_is_left_running(tmp_path, end):
     """Ctrl-C, the end of the block, and the sudden death of the parent end workers and what these started."""
     said = tmp_path / "processes.txt"
     script = f"""
+import signal
 from pathlib import Path
+signal.signal(signal.SIGINT, signal.default_int_handler)  # a shell's background job ignores it
 from palpate.tasks.driver import run
 from palpate.tasks.graph import Graph, Task
 from palpate.tasks.local import LocalExecutor
