@@ -107,7 +107,7 @@ def touches(it: Thing, draw: Draw) -> list[Touch]:
     if draw.clusters:
         distinct = min(distinct, max(4, len(order) // 2))
         points = np.array([place[0].point for place in it.places])
-        heaps = points[rng.choice(len(points), draw.clusters, replace=False)]
+        heaps = points[rng.choice(len(points), min(draw.clusters, len(points)), replace=False)]
         order = np.argsort(np.linalg.norm(points[:, None] - heaps, axis=2).min(axis=1))
     chosen = order[:distinct]
     visits = np.concatenate([rng.permutation(chosen), rng.choice(chosen, draw.presses - distinct)])
