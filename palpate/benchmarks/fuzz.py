@@ -215,6 +215,5 @@ def _print(counts: Counter[tuple[str, str]], targets: tuple[str, ...], broken: l
     rows = [[t, *(counts[t, o] for o in outcomes), sum(counts[t, o] for o in outcomes)] for t in targets]
     print(table(["damaged", *outcomes, "tried"], rows))
     for case in broken:
-        print(
-            f"{case['seed']} {case['target']}, {case['how']}: {case['outcome']}: {case['words'].strip()[-300:]}"
-        )
+        words = case["words"].strip()[-300:]
+        print(f"{case['seed']} {case['target']}, {case['how']}: {case['outcome']}: {words}")
