@@ -138,7 +138,8 @@ def test_a_mesh_is_a_model_in_its_own_frame(tmp_path):
     assert model.mesh.volumes.sum() == pytest.approx(1.2e-4, rel=0.01)
     curve = pp.press(tmp_path / "MODEL", (0.2, -0.1, 0.09), (0, 0, -1), 0.002, progress=False)
     hertz = 4 / 3 * 12e3 / (1 - 0.49**2) * np.sqrt(model.tool.tip_radius_m) * 0.002**1.5
-    assert hertz < curve.peak_force_n < 1.6 * hertz
+    # free sides make a block of this size some per cent softer than a half-space, its base stiffer
+    assert 0.9 * hertz < curve.peak_force_n < 1.3 * hertz
 
 
 @pytest.mark.slow
