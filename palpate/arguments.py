@@ -147,6 +147,16 @@ def add_output(
     setattr(parser.add_argument(*flags, **keywords), _WRITES, kind)
 
 
+def add_model_output(parser: argparse.ArgumentParser) -> None:
+    """Add -o MODEL, the folder of the model to write."""
+    from mechanics.model import MODEL
+
+    add_output(
+        parser, "-o", "--output", kind=MODEL, metavar="MODEL", required=True,
+        help="folder of the model to write",
+    )  # fmt: skip
+
+
 _READS, _WRITES = "palpate_reads", "palpate_writes"
 
 

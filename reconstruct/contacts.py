@@ -239,7 +239,7 @@ def _found(
     least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
     high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
     high = options.contact_threshold_n or high
-    gap = round(0.25 * recording.sample_rate_hz / given.cutoff_hz)
+    gap = passing_zero(recording.sample_rate_hz, given.cutoff_hz)
     touching = hysteresis(signals.magnitude / spread, _LOW * least, least, signals.force, gap)
     if not touching.any():
         raise ContactError(
@@ -307,6 +307,11 @@ def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndar
     )
     still = max(white, crowd_scale(signals.magnitude))
     return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+
+
+def passing_zero(rate_hz: float, cutoff_hz: float) -> int:
+    """Samples that a low-passed force may be near zero and not end: a quarter of its fastest wave."""
+    return round(0.25 * rate_hz / cutoff_hz)
 
 
 def hysteresis(

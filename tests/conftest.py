@@ -12,11 +12,20 @@ import mechanics  # noqa: F401  where compiled kernels are kept, before a test d
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 
+def _shared(name: str, words: str) -> Path:
+    folder = Path(os.environ.get("PALPATE_SHARED", REPOSITORY.parent / "shared")) / name
+    if not folder.is_dir():
+        pytest.skip(f"the {words} are not beside the checkout (set PALPATE_SHARED)")
+    return folder
+
+
 @pytest.fixture(scope="session")
 def shared_recordings() -> Path:
     """The folder of labelled recordings beside the checkout; tests that need it are skipped without it."""
-    root = Path(os.environ.get("PALPATE_SHARED", REPOSITORY.parent / "shared"))
-    folder = root / "recordings"
-    if not folder.is_dir():
-        pytest.skip("the labelled recordings are not beside the checkout (set PALPATE_SHARED)")
-    return folder
+    return _shared("recordings", "labelled recordings")
+
+
+@pytest.fixture(scope="session")
+def measured_data() -> Path:
+    """The folder of other people's measurements beside the checkout; the same."""
+    return _shared("realdata", "measurements")

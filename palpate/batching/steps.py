@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,28 +41,44 @@ def content_of(recording: str | Path, shape: str = "") -> dict[str, str]:
         return {name: sha256_of_file(path) for name, path in files.items() if path.is_file()}
 
 
-def reconstruct(
-    *,
-    sha256: Mapping[str, str],
-    options: Mapping[str, Any],
-    seed: int,
-    reports: bool,
-    recording: str,
-    shape: str,
-    folder: str,
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class Planned:
+    """What a step was planned with; sha256: of the recording's files then."""
+
+    sha256: Mapping[str, str]
+    options: Mapping[str, Any]
+    seed: int
+    reports: bool
+    recording: str
+    shape: str
+    folder: str
+
+    @property
+    def place(self) -> Path:
+        """Where this recording's results go."""
+        return Path(self.folder)
+
+    def read(self) -> Recording:
+        """The recording, which must still be the one that was planned for."""
+        if content_of(self.recording, self.shape) != dict(self.sha256):
+            raise RecordingError(f"'{self.recording}' changed after the batch began: run it again")
+        return api.read_recording(self.recording)
+
+
+def reconstruct(**planned: Any) -> dict[str, Any]:
     """The model. What an older model gave is removed first."""
-    place = Path(folder)
+    plan = Planned(**planned)
+    place = plan.place
     for step in STEPS[1:]:
         for name in (f"{step}.json", f"{step}.html"):
             (place / name).unlink(missing_ok=True)
-    measured = _read(recording, shape, sha256)
-    given = {**options, **({"shape": shape} if shape else {})}
-    result = api.reconstruct(measured, save=place / MODEL, seed=seed, progress=False, **given)
+    measured = plan.read()
+    given = {**plan.options, **({"shape": plan.shape} if plan.shape else {})}
+    result = api.reconstruct(measured, save=place / MODEL, seed=plan.seed, progress=False, **given)
     emit_json({"model": place / MODEL, **result.as_json()}, str(place / "reconstruct.json"))
     with _closing_figures():
         _draw_thumbnail(result.model, place / THUMBNAIL)
-        if reports:
+        if plan.reports:
             result.report(place / "reconstruct.html")
     about = measured.description.get("object", {})
     return {
@@ -72,55 +89,29 @@ def reconstruct(
     }
 
 
-def compare(
-    *,
-    sha256: Mapping[str, str],
-    options: Mapping[str, Any],
-    seed: int,
-    reports: bool,
-    recording: str,
-    shape: str,
-    folder: str,
-) -> dict[str, Any]:
+def compare(**planned: Any) -> dict[str, Any]:
     """FEM against the 1D models, on the model's geometry."""
-    place = Path(folder)
-    result = api.compare(_read(recording, shape, sha256), place / MODEL, seed=seed, progress=False, **options)
-    emit_json(result.as_json(), str(place / "compare.json"))
-    with _closing_figures():
-        if reports:
-            result.report(place / "compare.html")
+    plan = Planned(**planned)
+    result = api.compare(plan.read(), plan.place / MODEL, seed=plan.seed, progress=False, **plan.options)
+    _written(plan, "compare", result, result.as_json())
     return {"rmse_n": result.rmse_n, "relative_rmse": result.relative_rmse}
 
 
-def diagnose(
-    *,
-    sha256: Mapping[str, str],
-    options: Mapping[str, Any],
-    seed: int,
-    reports: bool,
-    recording: str,
-    shape: str,
-    folder: str,
-) -> dict[str, Any]:
+def diagnose(**planned: Any) -> dict[str, Any]:
     """The gap, its cause, and how far it shrinks."""
-    place = Path(folder)
-    result = api.diagnose(
-        _read(recording, shape, sha256), place / MODEL, seed=seed, progress=False, **options
-    )
+    plan = Planned(**planned)
+    result = api.diagnose(plan.read(), plan.place / MODEL, seed=plan.seed, progress=False, **plan.options)
     found = result.as_json()
-    emit_json(found, str(place / "diagnose.json"))
-    with _closing_figures():
-        if reports:
-            result.report(place / "diagnose.html")
+    _written(plan, "diagnose", result, found)
     keys = ("noise_n", "gap_before_n", "gap_after_n", "gap_closed")
     return {**found["verdict"], **{key: found[key] for key in keys}}
 
 
-def _read(recording: str, shape: str, sha256: Mapping[str, str]) -> Recording:
-    """The recording, which must still be the one that was planned for."""
-    if content_of(recording, shape) != dict(sha256):
-        raise RecordingError(f"'{recording}' changed after the batch began: run it again")
-    return api.read_recording(recording)
+def _written(plan: Planned, step: str, result: Any, figures: Mapping[str, Any]) -> None:
+    emit_json(figures, str(plan.place / f"{step}.json"))
+    with _closing_figures():
+        if plan.reports:
+            result.report(plan.place / f"{step}.html")
 
 
 def _draw_thumbnail(model: Any, path: Path) -> None:

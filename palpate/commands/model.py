@@ -9,9 +9,8 @@ from __future__ import annotations
 
 import argparse
 
-from mechanics.model import MODEL
 from palpate import api
-from palpate.arguments import add_input, add_json, add_output, emit_json, finite, say
+from palpate.arguments import add_input, add_json, add_model_output, emit_json, finite, say
 from palpate.sources import add_mesh_arguments, given_scene
 
 SUMMARY = "a MODEL from a surface's file and a modulus"
@@ -20,15 +19,7 @@ SUMMARY = "a MODEL from a surface's file and a modulus"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """FILE, -o MODEL, how the file is meant, --json."""
     add_input(parser, "shape", metavar="FILE", help="surface or mesh of the object")
-    add_output(
-        parser,
-        "-o",
-        "--output",
-        kind=MODEL,
-        metavar="MODEL",
-        required=True,
-        help="folder of the model to write",
-    )
+    add_model_output(parser)
     add_mesh_arguments(parser)
     parser.add_argument("--tip-radius", type=finite, metavar="M", help="of the tool (default: 0.005) [m]")
     parser.add_argument(

@@ -9,11 +9,12 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mechanics.model import MODEL, read_model
+from mechanics.model import read_model
 from palpate import api
 from palpate.arguments import (
     add_input,
     add_json,
+    add_model_output,
     add_options_of,
     add_output,
     add_seed,
@@ -29,15 +30,7 @@ SUMMARY = "a recording becomes a model"
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """REC, -o MODEL, the options of every step, --json, --seed."""
     add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
-    add_output(
-        parser,
-        "-o",
-        "--output",
-        kind=MODEL,
-        metavar="MODEL",
-        required=True,
-        help="the folder to write",
-    )
+    add_model_output(parser)
     add_output(
         parser,
         "--report",

@@ -15,7 +15,7 @@ from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
 from reconstruct.boundary import find_interval
-from reconstruct.contacts import hysteresis, signals_of
+from reconstruct.contacts import hysteresis, passing_zero, signals_of
 from reconstruct.filtering import FilterOptions, white_noise_std
 from reconstruct.finding import Signals
 
@@ -140,7 +140,7 @@ class Sight:
     def contact(self) -> np.ndarray:
         """(n,) bool, whether something is touched."""
         signals, _, spread = self._signals
-        gap = round(0.25 * self.rate_hz / self.cutoff_hz)
+        gap = passing_zero(self.rate_hz, self.cutoff_hz)
         return hysteresis(signals.magnitude / spread, _LOW, _HIGH, signals.force, gap)
 
     @cached_property

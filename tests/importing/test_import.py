@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import json
 import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -18,7 +17,6 @@ from palpate import cli
 from palpate.importing.convert import cross_correlated
 
 RATE, TIP = 500.0, 0.004
-SHARED = Path("/work/shared/realdata")
 
 
 def exploration(seconds: float = 6.0) -> dict[str, np.ndarray]:
@@ -250,11 +248,12 @@ def test_a_sign_that_is_wrong_is_warned_of(tmp_path, world):
     assert "WARNING: the force grows" in str(pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP))
 
 
-@pytest.mark.skipif(not SHARED.is_dir(), reason="needs the shared measured data")
-def test_instruments_of_others_are_understood():
-    file = SHARED / "chiaro_sphere_1khz" / "fmt-chiaro-txt_AEBP1_Indentation_002.txt"
+def test_instruments_of_others_are_understood(measured_data):
+    file = measured_data / "chiaro_sphere_1khz" / "fmt-chiaro-txt_AEBP1_Indentation_002.txt"
     made = pp.import_table(file, tip_radius_m=27.5e-6, columns={"z": "-Piezo (nm)", "fz": "Load (uN)"})
     assert len(made.recording.t) == 13827 and made.recording.sample_rate_hz == pytest.approx(1000, rel=0.01)
-    meat = pp.import_table(SHARED / "meat_indentation_relaxation/csv/230331_FF1_1A.csv", tip_radius_m=0.005)
+    meat = pp.import_table(
+        measured_data / "meat_indentation_relaxation/csv/230331_FF1_1A.csv", tip_radius_m=0.005
+    )
     assert meat.recording.force_on_tool[:, 2].max() == pytest.approx(1.062, abs=1e-3)
     assert 0.003 < np.ptp(meat.recording.position[:, 2]) < 0.006
