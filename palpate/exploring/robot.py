@@ -76,9 +76,8 @@ class LaboratoryRobot:
         """What the device reads while the suggestion is followed. Raises SceneError where it misses."""
         if suggestion.kind == "trace":
             made = self._simulated([self._aside()])
-            end = int(np.argmax(made.motion.touch >= 0)) - 1
-            # the way to the touch that was only laid down to have one is not part of the tracing
-            end = min(end, int((made.motion.phase[1] + 0.6) * 1000))
+            # with the way to a touch that is only laid down to have one: free air, which tells the noise
+            end = int(np.argmax(made.motion.touch >= 0))
             return self._part(made, "trace", 0, end)
         self._touches.append(self._touch(suggestion))
         made = self._simulated(self._touches)
