@@ -24,7 +24,6 @@ ERROR_WORDS = {
     "sensor": "noise of the force sensor",
     "repeatability": "touching one place again does not give the same force",
     "shape": "the object's shape is not known where nobody touched",
-    "model": "everything that the best model found still leaves",
 }
 
 UNITS = (
@@ -192,7 +191,7 @@ def _how_far(result: Diagnosis, force_rms_n: float) -> tuple[str, str, str]:
             )  # fmt: skip
         text = (
             f"{typical}: {before} before ({size}), {after} with what was found. The sensor's own noise is "
-            f"{noise}, so {result.gap_closed:.0%} of what lies above it is gone (95% sure: {low:.0%} to "
+            f"{noise}, so {result.gap_closed:.0%} of what lies above it is gone (95 % sure: {low:.0%} to "
             f"{high:.0%})."
         )
         return question, f"From {before} to {after}", text
