@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogFormatter
 
 from palpate.comparison import HOMOGENEOUS, MODELS, RIVALS, Comparison, stiffness_along, verdict
 from palpate.report.object3d import draw_object, spread_over
@@ -17,6 +18,7 @@ from palpate.report.view3d import (
     Line,
     View,
     facing,
+    local,
     thing_of,
     traces_of,
     usual_colourings,
@@ -55,18 +57,19 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
         f"{len(result.fields)} folds."
     )
     page.heading("Held-out palpations and regions")
+    names = compared(result)
     rows = [
         [
             "folds over sites",
             len(result.presses),
-            *(1e3 * result.rmse_n[m] for m in MODELS),
-            *("" for _ in MODELS),
+            *(1e3 * result.rmse_n[m] for m in names),
+            *("" for _ in names),
         ]
     ]
     for r in result.regions:
-        bias = [f"{100 * r.bias[m]:+.0f} %" for m in MODELS]
-        rows.append([r.region.name, int(r.region.members.sum()), *(1e3 * r.rmse_n[m] for m in MODELS), *bias])
-    page.table(["held out", "presses", *(f"{m} [mN]" for m in MODELS), *(f"bias {m}" for m in MODELS)], rows)
+        bias = [f"{100 * r.bias[m]:+.0f} %" for m in names]
+        rows.append([r.region.name, int(r.region.members.sum()), *(1e3 * r.rmse_n[m] for m in names), *bias])
+    page.table(["held out", "presses", *(f"{m} [mN]" for m in names), *(f"bias {m}" for m in names)], rows)
     for r in result.regions:
         page.paragraph(f"{r.region.name}: {r.region.words}.")
     page.figure(by_press(result), "Held-out error of every press (folds over sites), sorted by FEM's.")
@@ -88,6 +91,13 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
     return page.write(path)
 
 
+def compared(result: Comparison) -> tuple[str, ...]:
+    """The models that are shown: the FEM of one modulus only where some fold asked for a field."""
+    return (
+        MODELS if any(f is not None for f in result.fields) else tuple(m for m in MODELS if m != HOMOGENEOUS)
+    )
+
+
 def meaning(result: Comparison) -> str:
     """What the errors mean for a hand, in a sentence or two."""
     best = min(RIVALS, key=lambda name: result.rmse_n[name])
@@ -103,14 +113,11 @@ def meaning(result: Comparison) -> str:
 
 def view_of(result: Comparison) -> View:
     """The object by the error of each model; each press as measured and as predicted while held out."""
-    presses, names = result.presses, [m for m in MODELS if m in result.press_rmse_n]
-    normal = presses.normal[presses.press]
-    lines = [Line("measured", presses.push, "measured")]
+    presses, names = result.presses, compared(result)
+    lines = [Line("measured", local(presses, presses.force), "measured")]
     for name in names:
         kind = "rendered" if name == "fem" else "effect"
-        lines.append(
-            Line(name, (result.predicted[name] * normal).sum(axis=1), kind, name in ("fem", *RIVALS))
-        )
+        lines.append(Line(name, local(presses, result.predicted[name]), kind, name in ("fem", *RIVALS)))
     words = "Root mean square of predicted less measured force over each press, held out of every fit."
     colourings = [
         Colouring(ERROR, None, result.press_rmse_n[name], words, name=f"error of {name}") for name in names
@@ -164,14 +171,16 @@ def draw_by_press(result: Comparison, ax: Axes) -> None:
     """The same on axes that are there."""
     order = np.argsort(result.press_rmse_n["fem"])
     place = np.arange(len(order))
-    for k, name in enumerate(MODELS):
+    for k, name in enumerate(compared(result)):
         ax.plot(
             place, 1e3 * result.press_rmse_n[name][order], _MARKS[k], ms=4.5, color=COLOURS[name], label=name
         )
     ax.axhline(1e3 * result.noise_n, color="0.5", ls="--", lw=1, label="sensor noise")
-    step = max(1, len(order) // 20)
+    step = -(-len(order) // 20)
     ax.set_xticks(place[::step], [str(i + 1) for i in order[::step]], fontsize=8)
     ax.set(xlabel="number of the held-out press", ylabel="rms force error [mN]", yscale="log")
+    for axis in (ax.yaxis.set_major_formatter, ax.yaxis.set_minor_formatter):
+        axis(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
     ax.grid(axis="x", color="0.92", lw=0.6)
     ax.legend(frameon=False, ncol=5, fontsize=8, loc="lower center", bbox_to_anchor=(0.5, 1.0))
 
@@ -180,12 +189,12 @@ def scatter(result: Comparison) -> Figure:
     """Predicted against measured normal force."""
     presses = result.presses
     figure = Figure(figsize=(9, 3.2))
-    axes = figure.subplots(1, len(MODELS), sharex=True, sharey=True)
+    axes = figure.subplots(1, len(compared(result)), sharex=True, sharey=True)
     press = presses.press
     normal = presses.normal[press]
     measured = (presses.force * normal).sum(axis=1)
     top = float(measured.max())
-    for ax, name in zip(axes, MODELS, strict=True):
+    for ax, name in zip(axes, compared(result), strict=True):
         predicted = (result.predicted[name] * normal).sum(axis=1)
         ax.plot(measured[::10], predicted[::10], ".", ms=1.5, color=COLOURS[name], rasterized=True)
         ax.plot([0, top], [0, top], color="0.3", lw=0.8)
@@ -213,7 +222,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     figure = Figure(figsize=(7, 3.4))
     ax = figure.subplots()
     x = coordinate[family][order] * 1e3
-    for name in MODELS:
+    for name in compared(result):
         ax.plot(x, forces[name][order], "o", ms=4, color=COLOURS[name], label=name)
     measured = _at_depth(result)
     for inside, face, label in ((False, "none", "measured, seen"), (True, None, "measured, left out")):
@@ -231,7 +240,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
         xlabel="height above the support [mm]" if sideways else "distance from the middle [mm]",
         ylabel=f"normal force at {DEPTH_M * 1e3:g} mm [N]",
     )
-    ax.set_ylim(bottom=0)
+    ax.margins(y=0.15)
     ax.legend(frameon=False, fontsize=8, ncol=2)
     return figure
 

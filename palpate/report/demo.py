@@ -13,7 +13,7 @@ from palpate.report.exploration_figures import force_over_time
 from palpate.report.object3d import draw_object
 from palpate.report.page import Page, save_figures
 from palpate.report.quantities import ERROR, UNCERTAINTY
-from palpate.report.view3d import Colouring, Line, View, thing_of, traces_of, usual_colourings
+from palpate.report.view3d import Colouring, Line, View, local, thing_of, traces_of, usual_colourings
 from palpate.servo.histogram import lower_edge_ns
 from palpate.servo.report import ServoReport
 from reconstruct.uniaxial import low_passed
@@ -48,12 +48,11 @@ def view_of(result: DemoResult) -> View:
     model, recording = result.model, result.recording
     shown = low_passed(model.presses).window(0.03, 0.03)
     at = np.searchsorted(recording.t, shown.t).clip(0, len(recording.t) - 1)
-    normal = shown.normal[shown.press]
     off = result.rendered_n[at] - shown.force
     each = np.array([np.sqrt((off[part] ** 2).sum(axis=1).mean()) for part in shown.parts])
     lines = [
-        Line("measured", shown.push, "measured"),
-        Line("rendered", (result.rendered_n[at] * normal).sum(axis=1), "rendered"),
+        Line("measured", local(shown, shown.force), "measured"),
+        Line("rendered", local(shown, result.rendered_n[at]), "rendered"),
         *_simulated(result, shown.t),
     ]
     error = Colouring(
@@ -83,16 +82,16 @@ def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
     ):
         return []
     touches = found.forward.touches
+    following = np.searchsorted(touches.t, t).clip(1, len(touches.t) - 1)
+    between = touches.t[following] - touches.t[following - 1] > _STEP_S
     lines = []
     for name, residual, kind in (
         ("ideal simulation (linear, small strain)", found.residual_before, "effect"),
         ("simulation with what was found", found.residual_after, "found"),
     ):
-        force = np.interp(t, touches.t, touches.local_force[:, 0] - residual[:, 0], np.nan, np.nan)
-        gap = np.diff(touches.t, prepend=touches.t[0])[
-            np.searchsorted(touches.t, t).clip(0, len(touches.t) - 1)
-        ]
-        lines.append(Line(name, np.where(gap > _STEP_S, np.nan, force), kind, False))
+        force = touches.local_force - residual
+        seen = np.stack([np.interp(t, touches.t, axis, np.nan, np.nan) for axis in force.T], axis=1)
+        lines.append(Line(name, np.where(between[:, None], np.nan, seen), kind, False))
     return lines if found.effects else lines[:1]
 
 

@@ -27,6 +27,7 @@ from palpate.report.diagnosis_words import (
     force_words,
     meaning,
     parameter_rows,
+    percent,
     share_words,
     short,
     spoken,
@@ -176,7 +177,7 @@ def _tried(page: Page, result: Diagnosis) -> None:
             [
                 beside(result, e.name),
                 meaning(e.name),
-                f"{e.probability:.0%}",
+                percent(e.probability),
                 f"{e.gap_after_n * 1e3:.0f}",
                 share_words(e.gap_closed),
                 short(e.parameters) if e.probability > 0.01 else "",
@@ -195,7 +196,7 @@ def _follows(page: Page, result: Diagnosis) -> None:
     page.heading("What the difference depends on")
     page.table(
         ["the difference depends on", "share of it", "probability that this is chance"],
-        [[AXIS_WORDS[a.axis], f"{a.share:.0%}", f"{a.p:.2g}"] for a in result.where.axes],
+        [[AXIS_WORDS[a.axis], percent(a.share), f"{a.p:.2g}"] for a in result.where.axes],
     )
     page.figure(curves_picture(result), "Mean difference at each depth, and at each speed of the tip.")
     page.figure(presses_picture(result), "The presses that differ most, after the first picture's.")

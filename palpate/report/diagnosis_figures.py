@@ -10,6 +10,7 @@ from scipy.spatial.distance import cdist
 from diagnose.result import Diagnosis
 from mechanics.model import Model
 from mechanics.presses import Presses
+from palpate.report.diagnosis_words import percent
 from palpate.report.object3d import draw_object, spread_over, view_axes
 from palpate.report.quantities import ERROR, MODULUS
 from palpate.report.view3d import (
@@ -57,10 +58,9 @@ def view_of(model: Model, result: Diagnosis) -> View:
     each = np.array(
         [np.sqrt((before[(t.press == i) & t.counted] ** 2).sum(axis=1).mean()) for i in range(len(t))]
     )
-    force = t.local_force[:, 0]
 
     def line(name: str, residual: np.ndarray, kind: str, shown: bool = True) -> Line:
-        return Line(name, force - residual[:, 0], kind, shown)
+        return Line(name, t.local_force - residual, kind, shown)
 
     lines = [line("measured", np.zeros_like(before), "measured"), line("simulated", before, "rendered")]
     if result.effects:
@@ -76,7 +76,8 @@ def view_of(model: Model, result: Diagnosis) -> View:
         each,
         "Measured less simulated, root mean square over each press; between presses what is near.",
     )
-    first = int(_ranked(result)[0])
+    there = np.flatnonzero(t.site == np.argmax(result.where.site_rmse))
+    first = int(there[np.argmax(each[there])])
     return View(
         thing_of(model),
         t.point,
@@ -219,7 +220,7 @@ def gains(ax: Any, result: Diagnosis) -> None:
         ax.legend(fontsize=8.5, frameon=False, loc="lower right")
     for k, (value, entry) in enumerate(zip(values, entries, strict=True)):
         worse = (entry.gap_closed or 0.0) < 0
-        ax.text(value + 0.015, k, "none (worse)" if worse else f"{value:.0%}", va="center", fontsize=8.5)
+        ax.text(value + 0.015, k, "none (worse)" if worse else percent(value), va="center", fontsize=8.5)
     ax.invert_yaxis()
     ax.set(xlim=(0, 1.12), xlabel="share of the difference that it takes away")
     ax.set_xticks([0, 0.5, 1], ["0 %", "50 %", "100 %"])

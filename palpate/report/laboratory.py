@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 from matplotlib.figure import Figure
 
+from mechanics.frames import tangents
 from palpate.report.page import Page
 from palpate.report.quantities import DEPTH, ERROR, ORDER
 from palpate.report.view3d import Colouring, Line, Thing, Traces, View
@@ -79,20 +80,20 @@ def view_of(result: Simulation, phantom: Phantom) -> View:
         np.flatnonzero((motion.touch == k) & (motion.s > -_BEFORE_MM)) for k in range(len(result.touches))
     ]
     normals = np.array([touch.normal for touch in result.touches]) @ turn.T
-    along = np.concatenate([np.repeat(n[None], len(r), axis=0) for n, r in zip(normals, rows, strict=True)])
+    frame = np.repeat([np.stack([n, *tangents(n)]) for n in normals], [len(r) for r in rows], axis=0)
     chosen = np.concatenate(rows)
     starts = np.cumsum([0, *map(len, rows)])
     first = np.concatenate([np.full(len(r), r[0] if len(r) else 0) for r in rows])
     lines = [
-        Line("read", (recording.force_on_tool[chosen] * along).sum(axis=1), "measured"),
-        Line("without noise", (result.clean_n[chosen] * along).sum(axis=1), "found", shown=False),
+        Line("read", _turned(frame, recording.force_on_tool[chosen]), "measured"),
+        Line("without noise", _turned(frame, result.clean_n[chosen]), "found", shown=False),
     ]
     colourings = [
         Colouring(ORDER, None, np.arange(1.0, len(rows) + 1), "Each dot is a touch, in order of time."),
         Colouring(DEPTH, None, np.array([touch.depth for touch in result.touches]) * 1e-3),
     ]
     if result.ideal_n is not None:
-        lines.insert(1, Line("ideal object", (result.ideal_n[chosen] * along).sum(axis=1), "rendered"))
+        lines.insert(1, Line("ideal object", _turned(frame, result.ideal_n[chosen]), "rendered"))
         change = result.clean_n - result.ideal_n
         each = np.array([np.sqrt((change[r] ** 2).sum(axis=1).mean()) for r in rows])
         words = "What the effects change, root mean square over each touch; between touches what is near."
@@ -109,6 +110,10 @@ def view_of(result: Simulation, phantom: Phantom) -> View:
     )
     traces = Traces(starts, motion.s[chosen] * 1e-3, (chosen - first) * (motion.t[1] - motion.t[0]), lines)
     return View(thing, places * 1e-3, colourings, traces)
+
+
+def _turned(frame: np.ndarray, force_n: np.ndarray) -> np.ndarray:
+    return np.einsum("nij,nj->ni", frame, force_n)
 
 
 _BEFORE_MM = 1.0

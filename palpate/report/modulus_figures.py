@@ -128,7 +128,7 @@ def _limits(models: list[Model], key: str, quantity: Quantity) -> tuple[float, f
     """Of the colours of one column of several models: without the outermost twentieth of the presses."""
     values = np.concatenate([column(m, key) for m in models]) * quantity.scale
     low, high = np.nanpercentile(values, [5, 95])
-    return float(low), float(max(high, low + 1e-9))
+    return quantity.limits(float(low), float(max(high, low + 1e-9)))
 
 
 def _coloured(
@@ -198,7 +198,7 @@ def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, wo
     ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
     ax.set(xlabel=label, ylabel="count")
     if bound > 1.3 * most:
-        ax.set_xlim(right=1.05 * most)
+        ax.set_xlim(min(0.0, float(values.min())), 1.05 * most)
         ax.plot([], [], " ", label="(to the right of the picture)")
     ax.legend(frameon=False, fontsize=8)
     return ax

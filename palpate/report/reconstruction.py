@@ -33,7 +33,7 @@ from palpate.report.reconstruction_tables import (
     point_load_rows,
     table_one,
 )
-from palpate.report.view3d import Colouring, Line, View, thing_of, traces_of, usual_colourings
+from palpate.report.view3d import Colouring, Line, View, local, thing_of, traces_of, usual_colourings
 from reconstruct.pipeline import Reconstruction
 from reconstruct.uniaxial import low_passed
 
@@ -102,7 +102,7 @@ def view_of(result: Reconstruction) -> View:
     """The object; each press as measured and as the model with its one modulus answers the same path."""
     model = result.model
     shown = low_passed(model.presses).window(0.03, 0.03)
-    colourings, lines = usual_colourings(model), [Line("measured", shown.push, "measured")]
+    colourings, lines = usual_colourings(model), [Line("measured", local(shown, shown.force), "measured")]
     selected = 0
     if result.sites is not None and result.modulus is not None:
         force = forces_at(
@@ -113,7 +113,7 @@ def view_of(result: Reconstruction) -> View:
             tip_radius_m=shown.tip_radius_m,
             law=result.modulus.press.law,
         )
-        lines.append(Line("model with one modulus", (force * shown.normal[shown.press]).sum(axis=1)))
+        lines.append(Line("model with one modulus", local(shown, force)))
         off = force - shown.force
         each = np.array([np.sqrt((off[part] ** 2).sum(axis=1).mean()) for part in shown.parts])
         words = (
@@ -134,9 +134,11 @@ def object_figure(model: Model) -> Figure:
     axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
     own = model.presses.fits["e_pa"]
     if np.isfinite(own).any():
+        values = own[np.isfinite(own)] * MODULUS.scale
         draw_object(
             axes[1], model, over_surface(model, own * MODULUS.scale), label=MODULUS.label,
-            colour_map=MODULUS.colour_map, touches=touches[np.isfinite(own)],
+            colour_map=MODULUS.colour_map, limits=MODULUS.limits(values.min(), values.max()),
+            touches=touches[np.isfinite(own)],
         )  # fmt: skip
     else:
         axes[1].set_axis_off()
@@ -272,10 +274,15 @@ def _trends(page: Page, trends: list[Trend]) -> None:
     page.table(
         ["parameter", "Pearson r", "p", "Spearman", "p", "change over the height"],
         [
-            [t.name, t.pearson, t.pearson_p, t.spearman, t.spearman_p, f"{100 * t.change:+.1f} %"]
+            [t.name, f"{t.pearson:+.2f}", _chance(t.pearson_p), f"{t.spearman:+.2f}", _chance(t.spearman_p)]
+            + [f"{100 * t.change:+.1f} %"]
             for t in trends
         ],
     )
+
+
+def _chance(p: float) -> str:
+    return "< 0.001" if p < 1e-3 else f"{p:.2g}"
 
 
 def _point_load(page: Page, result: Reconstruction) -> None:

@@ -5,6 +5,8 @@ const THREE = window.THREE;
 const RAD = Math.PI / 180;
 const FIELD_DEG = 28, LOWEST_DEG = -5, HIGHEST_DEG = 89, TURN_DEG = 8;
 const PALETTE = ["#8e5bd0", "#c2571a", "#0f8b8d", "#b5179e", "#6a994e", "#3a86ff", "#bc6c25", "#7b8794"];
+const NAMES = {into: "force into the surface [N]", sideways: "force sideways [N]",
+  "into less": "less the measured force, into the surface [N]", "sideways less": "less the measured force, sideways [N]"};
 const FIXED = {measured: "var(--measured)", rendered: "var(--rendered)", found: "var(--found)"};
 
 const bytes = text => Uint8Array.from(atob(text), c => c.charCodeAt(0)).buffer;
@@ -138,14 +140,14 @@ function start(root) {
 
   // ---- colours
   function colour() {
-    const chosen = colourings[by.selectedIndex], plain = new THREE.Color(style("--object")), mix = new THREE.Color();
+    const chosen = colourings[by.selectedIndex], plain = new THREE.Color(style("--object")), unknown = new THREE.Color(style("--unknown")), mix = new THREE.Color();
     const share = value => (value - chosen.low) / (chosen.high - chosen.low || 1);
     for (let k = 0; k < points.length / 3; k++) {
       const value = chosen.surface ? chosen.surface[k] : NaN;
       if (Number.isFinite(value)) {
         chosen.ramp(share(value), mix);
-        if (chosen.known) mix.lerp(plain, 1 - chosen.known[k]);
-      } else mix.copy(plain);
+        if (chosen.known) mix.lerp(unknown, 1 - chosen.known[k]);
+      } else mix.copy(chosen.surface ? unknown : plain);
       mix.toArray(shade, 3 * k);
     }
     geometry.attributes.color.needsUpdate = true;
@@ -214,7 +216,7 @@ function start(root) {
 
   // ---- one press: its numbers and its curve
   const curves = data.curves && {...data.curves, starts: whole(data.curves.starts), depth: floats(data.curves.depth),
-    time: floats(data.curves.time), lines: data.curves.lines.map((line, k) => ({...line, force: floats(line.force),
+    time: floats(data.curves.time), lines: data.curves.lines.map((line, k) => ({...line, into: floats(line.into), sideways: floats(line.sideways),
       colour: FIXED[line.kind] || PALETTE[k % PALETTE.length]}))};
   function select(k, told = true) {
     if (k < 0 || k >= count) return;
@@ -237,11 +239,13 @@ function start(root) {
     if (!curves || selected < 0) return;
     const [a, b] = [curves.starts[selected], curves.starts[selected + 1]];
     const over = axis.value === "time" ? curves.time : curves.depth;
-    const shown = curves.lines.filter(line => line.shown);
-    let [x0, x1, y0, y1] = [Infinity, -Infinity, 0, -Infinity];
+    const [part_of, less] = part("what").value.split(" "), measured = curves.lines.find(line => line.kind === "measured");
+    const shown = curves.lines.filter(line => line.shown && !(less && line === measured));
+    const at = (line, k) => less ? line[part_of][k] - measured[part_of][k] : line[part_of][k];
+    let [x0, x1, y0, y1] = [Infinity, -Infinity, 0, less ? 0.02 : 0.1];
     for (let k = a; k < b; k++) {
       [x0, x1] = [Math.min(x0, over[k]), Math.max(x1, over[k])];
-      for (const line of shown) if (Number.isFinite(line.force[k])) [y0, y1] = [Math.min(y0, line.force[k]), Math.max(y1, line.force[k])];
+      for (const line of shown) if (Number.isFinite(at(line, k))) [y0, y1] = [Math.min(y0, at(line, k)), Math.max(y1, at(line, k))];
     }
     const [W, H, L, B, T] = [440, 270, 46, 40, 10];
     const X = x => L + (W - L - 8) * (x - x0) / (x1 - x0 || 1), Y = y => H - B - (H - B - T) * (y - y0) / (y1 - y0 || 1);
@@ -250,17 +254,17 @@ function start(root) {
     }
     for (const x of ticks(x0, x1, 6)) svg.append(el("text", {x: X(x), y: H - B + 17, class: "mid"}, said(x)));
     svg.append(el("text", {x: (L + W) / 2, y: H - 5, class: "mid name"}, axis.value === "time" ? "time since first touch [s]" : "depth [mm]"));
-    svg.append(el("text", {x: 12, y: (H - B) / 2, class: "mid name", transform: `rotate(-90 12 ${(H - B) / 2})`}, "force into the surface [N]"));
+    svg.append(el("text", {x: 12, y: (H - B) / 2, class: "mid name", transform: `rotate(-90 12 ${(H - B) / 2})`}, NAMES[part("what").value]));
     for (const line of shown) {
       let d = "";
-      for (let k = a; k < b; k++) if (Number.isFinite(line.force[k])) d += (d ? "L" : "M") + X(over[k]).toFixed(1) + " " + Y(line.force[k]).toFixed(1);
+      for (let k = a; k < b; k++) if (Number.isFinite(at(line, k))) d += (d ? "L" : "M") + X(over[k]).toFixed(1) + " " + Y(at(line, k)).toFixed(1);
       const path = el("path", {d, class: "line " + line.kind});
       path.style.stroke = line.colour;
       svg.append(path);
     }
     svg.setAttribute("aria-label", `Force of press ${selected + 1}: ` + shown.map(line => {
       let most = -Infinity;
-      for (let k = a; k < b; k++) if (line.force[k] > most) most = line.force[k];
+      for (let k = a; k < b; k++) if (at(line, k) > most) most = at(line, k);
       return `${line.name} up to ${said(most)} N`;
     }).join(", "));
   }
@@ -326,6 +330,7 @@ function start(root) {
   part("previous").addEventListener("click", keys.p);
   by.addEventListener("change", colour);
   axis?.addEventListener("change", plot);
+  part("what")?.addEventListener("change", plot);
   root.querySelectorAll("details.presses tbody tr").forEach((row, k) => row.addEventListener("click", () => select(k)));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", colour);
   renderer.domElement.addEventListener("webglcontextlost", () => { root.dataset.state = "still"; });

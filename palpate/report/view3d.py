@@ -25,7 +25,6 @@ from mechanics.presses import Presses
 from palpate.report.object3d import AZIMUTH_DEG, ELEVATION_DEG, level_axes, spread_over
 from palpate.report.quantities import (
     DEPTH,
-    FROM_ZERO,
     MODULUS,
     ORDER,
     STIFFNESS,
@@ -74,7 +73,8 @@ class Colouring:
 
 @dataclass(frozen=True)
 class Line:
-    """A force along the presses, (n,) N into the surface, at each row (NaN: none).
+    """A force along the presses, (n, 3) N on the tool in the local frame (outward normal, tangent, tangent),
+    at each row (NaN: none).
 
     kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start.
     """
@@ -148,6 +148,11 @@ def thing_of(model: Model) -> Thing:
     )
 
 
+def local(presses: Presses, force_n: np.ndarray) -> np.ndarray:
+    """(n, 3) N in the local frames of a table's rows, of forces in the device frame."""
+    return np.einsum("nij,nj->ni", presses.frame[presses.press], force_n)
+
+
 def traces_of(presses: Presses, lines: Sequence[Line]) -> Traces:
     """Curves at the rows of a table of presses."""
     return Traces(presses.starts, presses.depth, presses.t - presses.onset_s[presses.press], lines)
@@ -217,8 +222,7 @@ def _scaled(colourings: list[dict[str, Any]]) -> list[dict[str, Any]]:
     all_limits = [c.pop("limits") for c in colourings]
     for c, (quantity, _, _, least, most) in zip(colourings, all_limits, strict=True):
         alike = [limits for limits in all_limits if limits[0] is quantity]
-        low = 0.0 if quantity in FROM_ZERO else min(limits[1] for limits in alike)
-        high = max(limits[2] for limits in alike)
+        low, high = quantity.limits(min(x[1] for x in alike), max(x[2] for x in alike))
         slack = 1e-6 * (abs(low) + abs(high))
         c |= {"low": float(low), "high": float(high)}
         c |= {"cut_low": bool(least < low - slack), "cut_high": bool(most > high + slack)}
@@ -233,6 +237,7 @@ def _curves(traces: Traces) -> dict[str, Any]:
         for first, count in zip(traces.starts, lengths, strict=False)
     ]
     chosen = np.concatenate(kept) if kept else np.zeros(0, dtype=int)
+    along = _main_direction(traces)
     return {
         "starts": _whole(np.cumsum([0, *map(len, kept)])),
         "depth": _floats(1e3 * traces.depth_m[chosen]),
@@ -242,11 +247,22 @@ def _curves(traces: Traces) -> dict[str, Any]:
                 "name": line.name,
                 "kind": line.kind,
                 "shown": line.shown,
-                "force": _floats(line.force_n[chosen]),
+                "into": _floats(line.force_n[chosen, 0]),
+                "sideways": _floats((line.force_n[chosen, 1:] * along[chosen]).sum(axis=1)),
             }
             for line in traces.lines
         ],
     }
+
+
+def _main_direction(traces: Traces) -> np.ndarray:
+    """(n, 2) unit: where the first line's force points sideways in each press, for all its rows."""
+    sideways = traces.lines[0].force_n[:, 1:]
+    weighted = sideways * np.linalg.norm(sideways, axis=1, keepdims=True)
+    parts = zip(traces.starts[:-1], traces.starts[1:], strict=True)
+    total = np.array([np.nansum(weighted[a:b], axis=0) for a, b in parts]).reshape(-1, 2)
+    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+    return np.repeat(total, np.diff(traces.starts), axis=0)
 
 
 def _rows(view: View) -> tuple[list[str], list[list[str]]]:

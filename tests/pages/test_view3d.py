@@ -33,7 +33,8 @@ def a_view() -> View:
     out = np.array([[0, 0, 1.0], [1, 0, 0.2], [0, 1, 0.2], [-1, 0, 0.2], [0, -1, 0.2]])
     out /= np.linalg.norm(out, axis=1, keepdims=True)
     depth = np.tile(np.sin(np.linspace(0, np.pi, SAMPLES)), 5) * 0.004
-    measured = np.repeat(np.arange(1.0, 6.0), SAMPLES) * depth / 0.004
+    force = np.repeat(np.arange(1.0, 6.0), SAMPLES) * depth / 0.004
+    measured = force[:, None] * [1.0, 0.0, 0.4]
     lines = [
         Line("measured", measured, "measured"),
         Line("rendered", 0.9 * measured),
@@ -167,6 +168,22 @@ def test_an_effects_prediction_is_switched_on(tab):
     tab.evaluate("document.querySelectorAll('details.presses tbody tr')[4].click()")
     label = tab.evaluate("document.querySelector('.curve').getAttribute('aria-label')")
     assert label.startswith("Force of press 5: measured up to 5") and "viscoelasticity up to 2.5 N" in label
+
+
+@needs_browser
+@pytest.mark.parametrize(
+    ("what", "said"),
+    [
+        ("sideways", "measured up to 0.4 N, rendered up to 0.36 N"),
+        ("into less", "Force of press 1: rendered up to 0 N"),
+    ],
+)
+def test_the_curve_shows_the_sideways_force_and_what_is_left(tab, what, said):
+    tab.evaluate(
+        f"document.querySelector('.what').value = '{what}'; "
+        "document.querySelector('.what').dispatchEvent(new Event('change'))"
+    )
+    assert said in tab.evaluate("document.querySelector('.curve').getAttribute('aria-label')")
 
 
 @needs_browser
