@@ -78,9 +78,9 @@ class Page:
         self._parts.append(view.html(_figure(picture, caption)))
         self._live = True
 
-    def write(self, path: Path | str) -> Path:
-        """Write the page whole; returns its path."""
-        text = (
+    def html(self) -> str:
+        """The whole page."""
+        return (
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
             f"<title>{html.escape(self.title)}</title><style>{_style()}</style></head><body>"
@@ -88,8 +88,11 @@ class Page:
             + "<footer>Made by palpate. Positions are in the device's frame, forces are those on the tool."
             + f"</footer>{self._scripts()}</body></html>"
         )
+
+    def write(self, path: Path | str) -> Path:
+        """Write the page whole; returns its path."""
         with atomic_file(path, PAGE) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(self.html(), encoding="utf-8")
         return Path(path)
 
     def _scripts(self) -> str:

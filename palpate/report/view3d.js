@@ -219,7 +219,7 @@ function start(root) {
     time: floats(data.curves.time), lines: data.curves.lines.map((line, k) => ({...line, into: floats(line.into), sideways: floats(line.sideways),
       colour: FIXED[line.kind] || PALETTE[k % PALETTE.length]}))};
   function select(k, told = true) {
-    if (k < 0 || k >= count) return;
+    if (!(k >= 0 && k < count)) return;
     selected = k;
     root.dataset.selected = k + 1;
     halo.position.copy(place(k));

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
     from scenes.phantoms import Phantom
 
 
@@ -59,6 +60,12 @@ class Simulation(Result, room.Simulation):
 
     def _draw(self, ax: Axes) -> None:
         self.recording._draw(ax)
+
+    def view(self) -> View:
+        """The object to be turned, and each press beside what was simulated."""
+        from palpate.report.laboratory import view_of
+
+        return view_of(self, self.body)
 
     def _place(self, plotter: Plotter) -> None:
         self.recording._place(plotter)

@@ -230,3 +230,29 @@ def test_the_eye_stands_before_what_faces_aside():
     right = facing(up, np.array([1.0, 0, 0]))
     assert abs((facing(up, np.array([0, 1.0, 0])) - right) % 360 - 90) < 1e-9
     assert facing(up, up) == pytest.approx(35.0)
+
+
+def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
+    import sys
+    from types import ModuleType
+
+    from mechanics.box_mesh import box_mesh
+    from mechanics.material import Material
+    from mechanics.model import Model, Support, Tool
+    from palpate.results.model import model_of
+
+    class ZMQInteractiveShell:
+        pass
+
+    shown = []
+    kernel = ModuleType("IPython")
+    kernel.get_ipython = ZMQInteractiveShell
+    kernel.display = ModuleType("IPython.display")
+    kernel.display.HTML, kernel.display.display = str, shown.append
+    monkeypatch.setitem(sys.modules, "IPython", kernel)
+    monkeypatch.setitem(sys.modules, "IPython.display", kernel.display)
+    mesh = box_mesh((4, 4, 2), (0.06, 0.06, 0.03)).quadratic()
+    support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))
+    model = model_of(Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015))
+    assert model.show() is None
+    assert len(shown) == 1 and shown[0].startswith("<iframe srcdoc=") and "view3d" in shown[0]
