@@ -36,8 +36,8 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
     figure = Figure(figsize=(10, 3.9), layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1.05])
     _object(left, model, result)
-    _press(right, result, int(_ranked(result)[0]))
-    right.set_title("the press that differs most", fontsize=11)
+    _press(right, result, _worst_press(result))
+    right.set_title("a press there", fontsize=11)
     right.legend(fontsize=8.5, frameon=False)
     return figure
 
@@ -55,9 +55,7 @@ def gains_picture(result: Diagnosis) -> Any:
 def view_of(model: Model, result: Diagnosis) -> View:
     """The object by its gap; each press as measured, simulated, with what was found and with each effect."""
     t, before, after = gap_of(result)
-    each = np.array(
-        [np.sqrt((before[(t.press == i) & t.counted] ** 2).sum(axis=1).mean()) for i in range(len(t))]
-    )
+    each = press_gaps(result)
 
     def line(name: str, residual: np.ndarray, kind: str, shown: bool = True) -> Line:
         return Line(name, t.local_force - residual, kind, shown)
@@ -76,8 +74,7 @@ def view_of(model: Model, result: Diagnosis) -> View:
         each,
         "Measured less simulated, root mean square over each press; between presses what is near.",
     )
-    there = np.flatnonzero(t.site == np.argmax(result.where.site_rmse))
-    first = int(there[np.argmax(each[there])])
+    first = _worst_press(result)
     return View(
         thing_of(model),
         t.point,
@@ -85,7 +82,13 @@ def view_of(model: Model, result: Diagnosis) -> View:
         traces_of(t, lines),
         first,
         facing(model.support.normal, t.normal[first]),
+        force="sideways" if sideways(result) else "into",
     )
+
+
+def sideways(result: Diagnosis) -> bool:
+    """Whether the gap is in the force along the surface more than in that into it."""
+    return result.where.leading.axis == "direction"
 
 
 def residual_with(result: Diagnosis, name: str) -> np.ndarray | None:
@@ -121,9 +124,20 @@ def _shown_entries(result: Diagnosis) -> list[Any]:
 
 def _ranked(result: Diagnosis) -> np.ndarray:
     """Presses, the one with the largest gap first."""
+    return np.argsort(-press_gaps(result))
+
+
+def press_gaps(result: Diagnosis) -> np.ndarray:
+    """(p,) N, the rms gap of each press."""
     t, before, _ = gap_of(result)
-    each = np.bincount(t.press, weights=(before**2).sum(axis=1) * t.counted, minlength=len(t))
-    return np.argsort(-each)
+    square = np.bincount(t.press, weights=(before**2).sum(axis=1) * t.counted, minlength=len(t))
+    return np.sqrt(square / np.maximum(np.bincount(t.press, weights=t.counted, minlength=len(t)), 1))
+
+
+def _worst_press(result: Diagnosis) -> int:
+    """The one with the largest gap at the place with the largest: the place that words and ring name."""
+    there = np.flatnonzero(gap_of(result)[0].site == np.argmax(result.where.site_rmse))
+    return int(there[np.argmax(press_gaps(result)[there])])
 
 
 def sites_of(result: Diagnosis) -> np.ndarray:
@@ -179,15 +193,22 @@ def _press(ax: Any, result: Diagnosis, press: int) -> None:
     t, before, after = gap_of(result)
     rows = (t.press == press) & t.counted
     clock = t.t[rows] - t.onset_s[press]
-    force = t.local_force[rows, 0]
-    ax.plot(clock, force, color=MEASURED, lw=1.8, label="measured")
-    ax.plot(clock, force - before[rows, 0], color=IDEAL, lw=1.2, label="simulated")
+    measured = t.local_force[rows]
+    along = np.array([1.0, 0.0, 0.0])
+    if sideways(result):
+        pull = (measured * np.linalg.norm(measured[:, 1:], axis=1)[:, None]).sum(axis=0) * [0.0, 1.0, 1.0]
+        along = pull / max(float(np.linalg.norm(pull)), 1e-12)
+    ax.plot(clock, measured @ along, color=MEASURED, lw=1.8, label="measured")
+    ax.plot(clock, (measured - before[rows]) @ along, color=IDEAL, lw=1.2, label="simulated")
     if result.effects:
         ax.plot(
-            clock, force - after[rows, 0], color=IMPROVED, lw=1.2, ls="--",
+            clock, (measured - after[rows]) @ along, color=IMPROVED, lw=1.2, ls="--",
             label="simulated with what was found",
         )  # fmt: skip
-    ax.set(xlabel="time since first touch [s]", ylabel="force into the surface [N]")
+    ax.set(
+        xlabel="time since first touch [s]",
+        ylabel=f"force {'sideways' if sideways(result) else 'into the surface'} [N]",
+    )
     ax.spines[["top", "right"]].set_visible(False)
 
 
@@ -250,7 +271,7 @@ def presses_picture(result: Diagnosis, count: int = 4) -> Any:
     """Force against time of the presses with the largest gap, after the first."""
     from matplotlib.figure import Figure
 
-    shown = _ranked(result)[1 : 1 + count]
+    shown = [press for press in _ranked(result) if press != _worst_press(result)][:count]
     figure = Figure(figsize=(13, 3.2), layout="constrained")
     for ax, press in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         _press(ax, result, int(press))

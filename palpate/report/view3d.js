@@ -339,6 +339,7 @@ function start(root) {
   new ResizeObserver(resize).observe(stage);
   resize();
   colour();
+  if (curves) part("what").value = data.force;
   select(data.selected, false);
 }
 

@@ -98,7 +98,7 @@ class Traces:
 @dataclass(frozen=True)
 class View:
     """An object to be turned. places: (p, 3) m, where it was touched; selected: the press shown first; angles
-    as in `object3d`, degrees."""
+    as in `object3d`, degrees; force: of the curves, first "into" the surface or "sideways"."""
 
     thing: Thing
     places: np.ndarray
@@ -107,6 +107,7 @@ class View:
     selected: int = 0
     azimuth_deg: float = AZIMUTH_DEG
     elevation_deg: float = ELEVATION_DEG
+    force: str = "into"
 
     def html(self, still: str) -> str:
         """The section; still: HTML of what is shown without scripts."""
@@ -189,6 +190,7 @@ def _data(view: View) -> dict[str, Any]:
         "azimuth": view.azimuth_deg,
         "elevation": view.elevation_deg,
         "selected": int(view.selected),
+        "force": view.force,
         "colourings": _scaled([_colouring(c, view) for c in view.colourings]),
         "table": {"head": head, "rows": rows},
     }
