@@ -10,6 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 
 from palpate.demo import DemoResult
+from palpate.report.diagnosis_figures import known
 from palpate.report.exploration_figures import force_over_time
 from palpate.report.object3d import draw_object
 from palpate.report.page import Page, save_figures
@@ -205,9 +206,9 @@ def diagnosis_words(result: DemoResult) -> str:
     if found.effects:
         words += f", with what was found {1e3 * found.gap_after_n:.0f} mN"
     words += f"; the sensor's noise is {1e3 * found.noise_n:.0f} mN."
-    if deep and "finite_strain" in found.effects:
+    if deep and known() in found.effects:
         words += " Finite strain is in the rendered curves already: that is what the law stands for."
-    rest = [name.replace("_", " ") for name in found.effects if not (deep and name == "finite_strain")]
+    rest = [name.replace("_", " ") for name in found.effects if not (deep and name == known())]
     if rest:
         words += (
             f" The rendered curves do not have {' and '.join(rest)}: `palpate diagnose REC --apply` adds it."

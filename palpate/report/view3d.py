@@ -33,7 +33,7 @@ from palpate.report.quantities import (
 )
 from render.felt import felt_surface
 
-SAMPLES, FEWEST, MOST = 20_000, 30, 120
+SAMPLES, FEWEST, MOST = 20_000, 30, 160
 """Points of all curves together, and of one curve at least and at most."""
 _SHOWN_SHARE = (2.0, 98.0)
 _STOPS = 24
@@ -76,13 +76,15 @@ class Line:
     """A force along the presses, (n, 3) N on the tool in the local frame (outward normal, tangent, tangent),
     at each row (NaN: none).
 
-    kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start.
+    kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start. depth_m:
+    (n,) where this line has depths of its own.
     """
 
     name: str
     force_n: np.ndarray
     kind: str = "rendered"
     shown: bool = True
+    depth_m: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -235,7 +237,7 @@ def _curves(traces: Traces) -> dict[str, Any]:
     lengths = np.diff(traces.starts)
     most = int(np.clip(SAMPLES // max(len(lengths), 1), FEWEST, MOST))
     kept = [
-        first + np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+        first + _telling(traces.depth_m[first : first + count], most)
         for first, count in zip(traces.starts, lengths, strict=False)
     ]
     chosen = np.concatenate(kept) if kept else np.zeros(0, dtype=int)
@@ -251,10 +253,23 @@ def _curves(traces: Traces) -> dict[str, Any]:
                 "shown": line.shown,
                 "into": _floats(line.force_n[chosen, 0]),
                 "sideways": _floats((line.force_n[chosen, 1:] * along[chosen]).sum(axis=1)),
+                "depth": None if line.depth_m is None else _floats(1e3 * line.depth_m[chosen]),
             }
             for line in traces.lines
         ],
     }
+
+
+def _telling(depth_m: np.ndarray, most: int) -> np.ndarray:
+    """Rows of a press, `most` at most: half spread over its time, half over the way that the tip goes."""
+    count = len(depth_m)
+    if count <= most:
+        return np.arange(count)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(depth_m)))])
+    along = np.arange(count) / (count - 1) + way / max(float(way[-1]), 1e-12)
+    return np.unique(
+        np.interp(np.linspace(0.0, along[-1], most), along, np.arange(count)).round().astype(int)
+    )
 
 
 def _main_direction(traces: Traces) -> np.ndarray:
