@@ -465,7 +465,7 @@ def simulate(
             workers=workers,
             progress=tell,
         )
-    result = simulation_of(plain, Path(thing.name).name)
+    result = simulation_of(plain, Path(thing.name).name, thing)
     return result if save is None else result.save(save)
 
 
