@@ -175,7 +175,7 @@ def test_a_message_nested_by_thousands_and_one_of_no_numbers():
     for data in (b"[" * 100_000, STATE.replace(b"0.03", b"NaN"), STATE.replace(b"0.03", b"1" + b"0" * 400)):
         with pytest.raises(DeviceError):
             haply.decode(data, "049D")
-    assert haply.number(b"[" * 100_000) is None and haply.number(b"Infinity") is None
+    assert haply.number(b"[" * 100_000) is None
 
 
 def test_a_descriptor_that_declares_gigabytes():

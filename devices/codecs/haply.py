@@ -75,7 +75,7 @@ def _config(table: Mapping[str, Any]) -> HaplyConfig:
         _vector(mount.get("position") or {}),
         2.0 * math.acos(w),
         (_finite(scale.get("x", 1.0)), _finite(scale.get("y", 1.0)), _finite(scale.get("z", 1.0))),
-        None if damping is None else max(_numbers(damping), default=0.0),
+        None if damping is None else max(map(_finite, _numbers(damping)), default=0.0),
         None if gate is None else _finite(gate.get("gain", 0.0)),
         None
         if gravity is None
@@ -94,7 +94,7 @@ def _numbers(value: Any) -> list[float]:
     """Every number in a table, however deep."""
     if isinstance(value, Mapping):
         return [number for inner in value.values() for number in _numbers(inner)]
-    return [_finite(value)] if isinstance(value, int | float) and not isinstance(value, bool) else []
+    return [float(value)] if isinstance(value, int | float) and not isinstance(value, bool) else []
 
 
 def _is_simulated(table: Mapping[str, Any]) -> bool:

@@ -77,7 +77,7 @@ def _stick(data: bytes, random: np.random.Generator) -> Any:
 _CODECS: tuple[tuple[bytes, Callable[[bytes, np.random.Generator], Any]], ...] = (
     (STATE, lambda data, _: haply.decode(data, _ME)),
     (STATE, lambda data, _: haply.config(data, _ME)),
-    (STATE, lambda data, _: (haply.number(data), haply.version(data), haply.spelling(data))),
+    (STATE, lambda data, _: (haply.version(data), haply.spelling(data), bool(haply.number(data)))),
     (EVENT, lambda data, _: haply.event_fault(data, _ME)),
     (bytes(range(1, 14)), lambda data, _: spacemouse.decode(data, spacemouse.Deflection())),
     (STICK, _stick),
