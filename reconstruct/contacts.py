@@ -8,6 +8,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -93,6 +94,31 @@ class Exploration:
     delay_error_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class Filtered:
+    """A recording low-passed at `cutoff_hz`, and what it reads in free air.
+
+    free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
+    free motion; more where inertia is left.
+    """
+
+    signals: Signals
+    free_air: np.ndarray
+    spread: np.ndarray
+    cutoff_hz: float
+
+    @cached_property
+    def least(self) -> float:
+        """How many spreads a touch must reach (reconstruct.free_noise)."""
+        return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+
+    def touching(self) -> np.ndarray:
+        """(n,) bool, a new array: where something is touched, on the way or on purpose."""
+        gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+        contrast = self.signals.magnitude / self.spread
+        return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
+
+
 def explore(
     recording: Recording,
     *,
@@ -101,11 +127,13 @@ def explore(
     boundary_options: BoundaryOptions | None = None,
     filter_options: FilterOptions | None = None,
     boundary: Boundary | None = None,
+    filtered: Filtered | None = None,
 ) -> Exploration:
     """Phases, support, base outline and palpations of a recording.
 
-    boundary: a known base, for recordings without phase I. Raises ContactError where phase I is missing,
-    nothing is touched or too few presses can be used.
+    boundary: a known base, for recordings without phase I. filtered: of this recording at this cutoff, where
+    it is known already. Raises ContactError where phase I is missing, nothing is touched or too few presses
+    can be used.
     """
     options = contact_options or ContactOptions()
     if method not in METHODS:
@@ -115,8 +143,8 @@ def explore(
             f"--contact-threshold is {options.contact_threshold_n} N; it must be greater than 0"
         )
     cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
-    given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary)
-    found = _searched(recording, given)
+    given = _Given(method, options, boundary_options or BoundaryOptions(), boundary)
+    found = _searched(filtered or filtered_of(recording, cutoff_hz), given)
     if method == "paper" or not options.correct_delay:
         return _tabled(recording, found, given)
     step = force_delay(found.signals, found.contacts)
@@ -128,7 +156,7 @@ def explore(
         if not samples:
             break
         delay += samples / recording.sample_rate_hz
-        found = _searched(read_earlier(recording, delay), given)
+        found = _searched(filtered_of(read_earlier(recording, delay), cutoff_hz), given)
         step = force_delay(found.signals, found.contacts)
     return _tabled(recording, found, given, delay, step.error_s)
 
@@ -138,7 +166,6 @@ class _Given:
     method: str
     contact: ContactOptions
     boundary: BoundaryOptions
-    cutoff_hz: float
     known_base: Boundary | None
 
 
@@ -207,16 +234,16 @@ def _speed(signals: Signals, contact: Found) -> float:
     return float(np.ptp(path)) / max(len(path) - 1, 1) * rate
 
 
-def _searched(recording: Recording, given: _Given) -> _Found:
-    signals, free_air, spread = signals_of(recording, given.cutoff_hz)
-    wanders = recording.quaternion is None and spread.min() > signals.noise_n
+def _searched(filtered: Filtered, given: _Given) -> _Found:
+    signals, spread = filtered.signals, filtered.spread
+    wanders = signals.recording.quaternion is None and spread.min() > signals.noise_n
     hint = (
         f"in free motion the force wanders by {spread.min():.2g} N an axis, louder than its noise "
         f"({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation (qw, qx, qy, "
         "qz), or hold it one way"
     )
     try:
-        found = _found(recording, given, signals, free_air, spread)
+        found = _found(filtered, given)
     except ContactError as error:
         if not wanders:
             raise
@@ -231,16 +258,12 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     return found
 
 
-def _found(
-    recording: Recording, given: _Given, signals: Signals, free_air: np.ndarray, spread: np.ndarray
-) -> _Found:
-    """spread: (n,) noise of the filtered force, N an axis."""
+def _found(filtered: Filtered, given: _Given) -> _Found:
+    signals, recording = filtered.signals, filtered.signals.recording
     method, options, boundary = given.method, given.contact, given.known_base
-    least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
-    high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
+    high = PAPER_THRESHOLD_N if method == "paper" else filtered.least * float(filtered.spread.min())
     high = options.contact_threshold_n or high
-    gap = passing_zero(recording.sample_rate_hz, given.cutoff_hz)
-    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, signals.force, gap)
+    touching = filtered.touching()
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -281,11 +304,11 @@ def _found(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
+    return _Found(signals, filtered.free_air, boundary, tuple(contacts), tuple(unused), high)
 
 
-def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
-    """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis."""
+def filtered_of(recording: Recording, cutoff_hz: float) -> Filtered:
+    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off."""
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
@@ -306,7 +329,8 @@ def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndar
         noise_n=noise,
     )
     still = max(white, crowd_scale(signals.magnitude))
-    return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+    spread = moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+    return Filtered(signals, free_air, spread, cutoff_hz)
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

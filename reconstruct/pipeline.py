@@ -24,7 +24,7 @@ from reconstruct.casting import CastPoints, cast
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
-from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.contacts import ContactOptions, Exploration, Filtered, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
@@ -108,15 +108,17 @@ def reconstruct_fully(
     clock = _Clock()
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
-    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
+    checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
     placed = None
     if geometry.known:
-        exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        exploration, placed = _on_known(
+            recording, options, geometry, checkup.filtered, _part(progress, 0.02, 0.3)
+        )
         checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
-        exploration = _explored(recording, options)
+        exploration = _explored(recording, options, checkup.filtered)
         checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
@@ -233,7 +235,12 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     return float(nu)
 
 
-def _touches(recording: Recording, options: ReconstructOptions, base: Boundary | None = None) -> Exploration:
+def _touches(
+    recording: Recording,
+    options: ReconstructOptions,
+    filtered: Filtered | None,
+    base: Boundary | None = None,
+) -> Exploration:
     return explore(
         recording,
         method="paper" if options.method == "paper" else "noise",
@@ -241,25 +248,31 @@ def _touches(recording: Recording, options: ReconstructOptions, base: Boundary |
         boundary_options=options.boundary,
         filter_options=options.filter,
         boundary=base,
+        filtered=filtered,
     )
 
 
-def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
+def _explored(recording: Recording, options: ReconstructOptions, filtered: Filtered | None) -> Exploration:
     """Where the recording traces no base, that of [object] model = PATH stands in."""
     try:
-        return _touches(recording, options)
+        return _touches(recording, options, filtered)
     except NoBaseError:
         if recording.base_model is None:
             raise
     base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-    return _touches(recording, options, base)
+    return _touches(recording, options, filtered, base)
 
 
 def _on_known(
-    recording: Recording, options: ReconstructOptions, geometry: GeometryOptions, progress: Progress
+    recording: Recording,
+    options: ReconstructOptions,
+    geometry: GeometryOptions,
+    filtered: Filtered | None,
+    progress: Progress,
 ) -> tuple[Exploration, Placed]:
     """Touches told without a support place the geometry; then they are told again, over its base."""
-    first = without_slides(_touches(recording, options, nowhere(recording)), options.contact.least_palpations)
+    untold = _touches(recording, options, filtered, nowhere(recording))
+    first = without_slides(untold, options.contact.least_palpations)
     progress("contacts", 0.3)
     placed = place(
         recording,
@@ -269,7 +282,7 @@ def _on_known(
         spacing_m=options.surface.surface_spacing_m,
         progress=_part(progress, 0.3, 0.8),
     )
-    again = _touches(recording, options, placed.base)
+    again = _touches(recording, options, filtered, placed.base)
     return without_slides(again, options.contact.least_palpations), placed
 
 
