@@ -21,10 +21,13 @@ from numba import njit
 from mechanics.errors import OptionError
 
 DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
-USUAL_POISSON_RATIO = 0.49
-_RATIOS = (0.10, 0.30, 0.40, 0.45, USUAL_POISSON_RATIO)
-"""Poisson's ratios that the sticking laws are tabulated for; straight lines between and beyond."""
 _STEPS = 600
+USUAL_POISSON_RATIO = 0.49
+_RATIOS = {
+    "linear": (0.10, 0.30, 0.40, USUAL_POISSON_RATIO),
+    "neo-hookean": (0.40, USUAL_POISSON_RATIO),
+}
+"""Poisson's ratios that a sticking law is tabulated for; straight lines between and beyond."""
 
 
 @dataclass(frozen=True)
@@ -92,8 +95,9 @@ def _sphere() -> tuple[np.ndarray, str]:
 def _tabulated(name: str, poisson_ratio: float) -> tuple[np.ndarray, str]:
     """A sticking sphere grips a compressible solid, the more so the deeper: c is 6 % greater at 2 R for 0.40
     than for 0.49."""
-    upper = int(np.clip(np.searchsorted(_RATIOS, poisson_ratio), 1, len(_RATIOS) - 1))
-    low, high = _RATIOS[upper - 1 : upper + 1]
+    ratios = _RATIOS[name]
+    upper = int(np.clip(np.searchsorted(ratios, poisson_ratio), 1, len(ratios) - 1))
+    low, high = ratios[upper - 1 : upper + 1]
     share = (poisson_ratio - low) / (high - low)
     table = (1 - share) * _read(name, low) + share * _read(name, high)
     return table, f"axisymmetric finite elements, sticking sphere, nu = {poisson_ratio:g}"
