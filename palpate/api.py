@@ -273,10 +273,16 @@ def replay(
     """
     from palpate.results.model import model_of
     from palpate.results.replay import ReplayResult
+    from reconstruct.points import is_points
     from render.replay import replay_error, replay_recording
 
     make = _renderer("replay", model, renderer, options)
     measured = read_recording(recording)
+    if is_points(measured):
+        raise OptionError(
+            f"'{measured.name}' holds points without a time, and a replay needs a path: reconstruct, compare "
+            "and diagnose read points"
+        )
     with _told("replay", progress) as tell:
         scene = make(tell)
         forces = replay_recording(scene, measured, tell)

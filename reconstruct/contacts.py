@@ -25,6 +25,7 @@ from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
 from reconstruct.tool_weight import tool_weight
+from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
@@ -32,6 +33,8 @@ _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
 _CLEAR = 1.5
 """Presses must reach so many thresholds in the middle: else most were lost, and the loudest mislead."""
+_ABOVE = 10.0
+"""Standard deviations of the filtered force that a cycle's peak stands above the minima beside it."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -62,6 +65,12 @@ class ContactOptions:
         flag="--correct-delay",
     )  # fmt: skip
     site_m: float = option(SITE_M, "presses closer than this repeat one site", unit="m", flag="--site-size")
+    free_air: str = option(
+        "auto",
+        "of a known geometry: auto looks whether the tip is ever off the object, none takes the forces as "
+        "tared",
+        choices=("auto", "none"),
+    )
 
     def __post_init__(self) -> None:
         """Raises OptionError for a site without size."""
@@ -101,11 +110,13 @@ def explore(
     boundary_options: BoundaryOptions | None = None,
     filter_options: FilterOptions | None = None,
     boundary: Boundary | None = None,
+    unbroken: bool = False,
 ) -> Exploration:
     """Phases, support, base outline and palpations of a recording.
 
-    boundary: a known base, for recordings without phase I. Raises ContactError where phase I is missing,
-    nothing is touched or too few presses can be used.
+    boundary: a known base, for recordings without phase I. unbroken: contact may never break, so that it is
+    cut at its minima (reconstruct.unbroken). Raises ContactError where phase I is missing, nothing is touched
+    or too few presses can be used.
     """
     options = contact_options or ContactOptions()
     if method not in METHODS:
@@ -115,7 +126,7 @@ def explore(
             f"--contact-threshold is {options.contact_threshold_n} N; it must be greater than 0"
         )
     cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
-    given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary)
+    given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary, unbroken)
     found = _searched(recording, given)
     if method == "paper" or not options.correct_delay:
         return _tabled(recording, found, given)
@@ -140,6 +151,7 @@ class _Given:
     boundary: BoundaryOptions
     cutoff_hz: float
     known_base: Boundary | None
+    unbroken: bool
 
 
 def read_earlier(recording: Recording, delay_s: float) -> Recording:
@@ -150,7 +162,8 @@ def read_earlier(recording: Recording, delay_s: float) -> Recording:
 
 @dataclass(frozen=True)
 class _Found:
-    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations."""
+    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations. cut:
+    (start, end) of those that were cut into cycles."""
 
     signals: Signals
     free_air: np.ndarray
@@ -158,6 +171,7 @@ class _Found:
     contacts: tuple[Found, ...]
     unused: tuple[tuple[int, int, str], ...]
     threshold_n: float
+    cut: tuple[tuple[int, int], ...]
 
 
 def _tabled(
@@ -178,11 +192,13 @@ def _tabled(
         ),
         free_air=found.free_air[late],
         trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
-        others_s=[(t[a], t[b - 1]) for a, b, _ in found.unused],
+        others_s=[(t[a], t[b - 1]) for a, b, *_ in (*found.unused, *found.cut)],
         noise_n=signals.noise_n,
         delay_s=delay_s,
         delay_error_s=delay_error_s,
         site_m=given.contact.site_m,
+        kinds=["cycle" if c.unbroken else "press" for c in contacts],
+        until_s=t[[c.end - 1 for c in contacts]],
     )
     return Exploration(
         recording=recording,
@@ -208,7 +224,8 @@ def _speed(signals: Signals, contact: Found) -> float:
 
 
 def _searched(recording: Recording, given: _Given) -> _Found:
-    signals, free_air, spread = signals_of(recording, given.cutoff_hz)
+    tared = given.unbroken and not _off_the_object(recording, given)
+    signals, free_air, spread = signals_of(recording, given.cutoff_hz, tared=tared)
     wanders = recording.quaternion is None and spread.min() > signals.noise_n
     hint = (
         f"in free motion the force wanders by {spread.min():.2g} N an axis, louder than its noise "
@@ -229,6 +246,19 @@ def _searched(recording: Recording, given: _Given) -> _Found:
             f"{found.threshold_n:.2g} N: weaker ones are lost; {hint if wanders else 'press deeper'}"
         )
     return found
+
+
+def _off_the_object(recording: Recording, given: _Given) -> bool:
+    """Whether there is free air to be found."""
+    if given.contact.free_air == "none":
+        return False
+    rate, cutoff_hz = recording.sample_rate_hz, given.cutoff_hz
+    position, force = (
+        low_pass_at(recording.t, values, rate, cutoff_hz)
+        for values in (recording.position, recording.force_on_tool)
+    )
+    noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), 1e-6)
+    return free_air_seen(position, force, recording.tip_radius_m, noise * noise_gain(rate, cutoff_hz))
 
 
 def _found(
@@ -256,8 +286,16 @@ def _found(
     least_peak = options.least_peak_n or high
     contacts: list[Found] = []
     unused: list[tuple[int, int, str]] = []
+    cut_apart: list[Piece] = []
+    cut_up: list[tuple[int, int]] = []
     touches = runs(touching)
     for a, b in touches:
+        if given.unbroken:
+            pieces = cycles(signals, a, b, _ABOVE * float(spread[a:b].min()))
+            if len(pieces) > 1 or (a == 0 and not free_air.any()):
+                cut_apart += pieces
+                cut_up.append((a, b))
+                continue
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
@@ -267,6 +305,10 @@ def _found(
             contacts.append(contact)
         else:
             unused.append((a, b, reason))
+    if cut_apart:
+        found, slipped = found_cycles(signals, cut_apart)
+        contacts = sorted([*contacts, *found], key=lambda c: c.start)
+        unused = sorted([*unused, *slipped])
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
         hint = f"press at more places, and until the force is above {high:.2g} N"
@@ -281,17 +323,28 @@ def _found(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
+    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
 
 
-def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
-    """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis."""
+def signals_of(
+    recording: Recording, cutoff_hz: float, *, tared: bool = False
+) -> tuple[Signals, np.ndarray, np.ndarray]:
+    """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis.
+
+    tared: nothing is free air, and forces are taken as they are.
+    """
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
     noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
     white = noise * noise_gain(rate, cutoff_hz)
+    if tared:
+        nothing = np.zeros_like(filtered)
+        position = low_pass_at(recording.t, recording.position, rate, cutoff_hz)
+        size = np.linalg.norm(filtered, axis=1)
+        raw = recording.force_on_tool
+        return Signals(recording, position, filtered, size, raw, noise), nothing, np.full(len(size), white)
     weight, inertia = tool_weight(recording, filtered, cutoff_hz)
     left = np.linalg.norm(filtered - weight, axis=1)
     drift, _ = free_air_force(recording.t, filtered - weight, max(white, crowd_scale(left)))

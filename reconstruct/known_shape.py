@@ -170,7 +170,8 @@ def place(
     progress("registration", 0.0)
     given = read_surface(options.shape, options.unit)
     stood = standing(given, options.up, options.sink_m)
-    support = _traced_support(recording, first) if options.pose == "auto" else None
+    traces = options.pose == "auto" and set(presses.kinds) == {"press"}
+    support = _traced_support(recording, first) if traces else None
     body = Body(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
     touched = _touched(presses, support)
     found = register(body, touched, free=options.pose == "auto")
