@@ -46,8 +46,8 @@ def explore_points(recording: Recording, boundary: Boundary, options: ContactOpt
     """
     if len(recording.t) > _MOST_ROWS:
         raise ContactError(
-            f"{len(recording.t)} rows without a time are more than {_MOST_ROWS} points: where they are in order "
-            "of time, import them with --rate HZ"
+            f"{len(recording.t)} rows without a time are more than {_MOST_ROWS} points: where they are in "
+            "order of time, import them with --rate HZ"
         )
     force, position = recording.force_on_tool, recording.position
     groups, few = _groups(recording, options.site_m)
@@ -61,9 +61,9 @@ def explore_points(recording: Recording, boundary: Boundary, options: ContactOpt
     weak = len(groups) - len(strong)
     if len(strong) < options.least_palpations:
         raise ContactError(
-            f"{len(strong)} places among {len(groups) + few} can be used ({few} have fewer than two rows or a "
-            f"force that does not grow inwards, {weak} stay below {_ABOVE:g} times the noise of {noise:.2g} N); at "
-            f"least {options.least_palpations} are needed"
+            f"{len(strong)} places among {len(groups) + few} can be used ({few} have fewer than two rows or "
+            f"a force that does not grow inwards, {weak} stay below {_ABOVE:g} times the noise of "
+            f"{noise:.2g} N); at least {options.least_palpations} are needed"
         )
     try:
         shift, error = first_touches([g.loading for g in strong], noise)
