@@ -14,6 +14,7 @@ from diagnose.instrument_offsets import find_instrument_offsets
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
+from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of
 from diagnose.verdict import Evidence
@@ -75,14 +76,15 @@ def diagnose(
     lap("sites")
     excluded = {n.strip() for n in options.without.split(",") if n.strip()}
     allowed = effects(without=excluded)
-    offsets = find_instrument_offsets(forward, free, excluded)
+    rigid = rigid_of(recording, presses, model.support.normal)
+    offsets = find_instrument_offsets(forward, free, rigid, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
     search = Search(
         forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
     left_out = {e.name for e in effects() if e.costly and options.fast}
-    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in left_out]
+    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (*left_out, *offsets.names)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)
