@@ -22,6 +22,7 @@ COMMANDS = {
     "model": "a MODEL from a surface's file and a modulus",
     "import": "other programs' files become a recording",
     "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
+    "material": "the material of a specimen from a machine's curves",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",

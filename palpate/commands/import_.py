@@ -95,8 +95,8 @@ def _said(arguments: argparse.Namespace) -> dict[str, Any]:
         thing["half_space"] = True
     given = {
         "mapping": arguments.mapping,
-        "columns": _pairs(arguments.column, "--column", "t=Time"),
-        "units": _pairs(arguments.units.split(",") if arguments.units else [], "--units", "position=mm"),
+        "columns": pairs(arguments.column, "--column", "t=Time"),
+        "units": pairs(arguments.units.split(",") if arguments.units else [], "--units", "position=mm"),
         "tip_radius_m": arguments.tip_radius,
         "force_on": arguments.force_on,
         "frame": arguments.frame,
@@ -110,7 +110,7 @@ def _said(arguments: argparse.Namespace) -> dict[str, Any]:
     return {key: value for key, value in given.items() if value not in (None, {})}
 
 
-def _pairs(texts: list[str], flag: str, example: str) -> dict[str, str]:
+def pairs(texts: list[str], flag: str, example: str) -> dict[str, str]:
     pairs = {}
     for text in texts:
         name, found, value = text.partition("=")
