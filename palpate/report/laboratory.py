@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from matplotlib.figure import Figure
 
 from mechanics.frames import tangents
@@ -104,11 +103,9 @@ def view_of(result: Simulation, phantom: Phantom) -> View:
     if result.ideal_n is not None and each.max() > _LEAST_CHANGE_N:
         words = "What the effects change, root mean square over each touch; between touches what is near."
         colourings.append(Colouring(ERROR, None, each, words, name="change of the force"))
-    body = trimesh.Trimesh(1e3 * phantom.vertices @ turn.T + shift, phantom.faces, process=False)
     places = np.array([touch.point for touch in result.touches]) @ turn.T + shift
     thing = Thing(
-        body.vertices * 1e-3,
-        np.array(body.vertex_normals),
+        phantom.vertices @ turn.T + 1e-3 * shift,
         phantom.faces,
         phantom.vertices[:, 2] > 1e-4,
         shift * 1e-3,

@@ -34,13 +34,14 @@ function start(root) {
   const data = JSON.parse(root.querySelector("script.data").textContent);
   const part = name => root.querySelector("." + name);
   const stage = part("stage"), tip = part("tip"), by = part("by"), axis = part("axis");
-  const points = floats(data.points), triangles = whole(data.triangles);
+  const points = floats(data.points);
+  const triangles = data.wide ? whole(data.triangles) : new Uint16Array(bytes(data.triangles));
   const up = new THREE.Vector3(...data.up), aside = new THREE.Vector3(...data.aside);
   const across = new THREE.Vector3().crossVectors(up, aside);
   const places = floats(data.places), count = places.length / 3;
   const place = k => new THREE.Vector3().fromArray(places, 3 * k);
   const colourings = data.colourings.map(c => ({...c, ramp: ramp(c.stops), surface: c.surface && floats(c.surface),
-    known: c.known && floats(c.known), presses: c.presses && floats(c.presses)}));
+    known: c.known && Array.from(new Uint8Array(bytes(c.known)), v => v / 255), presses: c.presses && floats(c.presses)}));
   const style = name => getComputedStyle(root).getPropertyValue(name).trim();
 
   const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true});
@@ -55,10 +56,10 @@ function start(root) {
 
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-  geometry.setAttribute("normal", new THREE.BufferAttribute(floats(data.normals), 3));
   const shade = new Float32Array(points.length);
   geometry.setAttribute("color", new THREE.BufferAttribute(shade, 3));
   geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+  geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
   const middle = geometry.boundingSphere.center.clone(), size = geometry.boundingSphere.radius;
   const body = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({vertexColors: true, shininess: 18, specular: 0x151515}));
