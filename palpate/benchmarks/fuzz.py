@@ -53,13 +53,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--interrupts", type=int, default=0, metavar="N",
                         help="end long commands at N random moments, in place of all that")  # fmt: skip
     parser.add_argument("--command", action="append", help="with --interrupts: only this one (repeatable)")
+    parser.add_argument("--minutes", type=float, default=np.inf, metavar="M",
+                        help="begin no further input after that [min] (default: no limit)")  # fmt: skip
     parser.add_argument("--keep", metavar="DIR", help="keep what broke something here")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Try, print the counts and what broke."""
     if arguments.interrupts:
-        return interrupted(arguments.interrupts, arguments.first, arguments.command, arguments.keep)
+        return interrupted(
+            arguments.interrupts, arguments.first, arguments.command, arguments.keep, arguments.minutes
+        )
     if arguments.strangers < 1:
         raise OptionError(f"--strangers is {arguments.strangers}; it must be 1 or greater")
     return _fuzzed(arguments, tuple(arguments.target or TARGETS))
@@ -78,6 +82,8 @@ def _fuzzed(arguments: argparse.Namespace, targets: tuple[str, ...]) -> dict[str
         try:
             judge = _Judge(sound, child, deep="recording" in targets and arguments.deep > 0)
             for seed in tqdm(range(arguments.first, arguments.first + arguments.count), disable=None):
+                if time.perf_counter() - began > 60 * arguments.minutes:
+                    break
                 random = np.random.default_rng([29, seed])
                 target = str(random.choice(targets, p=shares / shares.sum()))
                 case = sound.drawn(target, random, Path(folder) / "case")
