@@ -2,8 +2,8 @@
 
 Sound recordings: the embedded one, those of --recordings DIR, and --variety N explorations as varied as the
 world with touches in closed form (Hertz and Mindlin: minutes where the laboratory needs hours). A warning is
-false where reconstruction could use the recording: one that it refuses anyway is counted by itself. A fault is
-found where the check-up finds anything, named rightly where the first finding is one of its names.
+false where reconstruction could use the recording: one that it refuses anyway is counted by itself. A fault
+is found where the check-up finds anything, named rightly where the first finding is one of its names.
 """
 
 from __future__ import annotations
