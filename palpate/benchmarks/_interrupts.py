@@ -17,6 +17,7 @@ import resource
 import shutil
 import signal
 import subprocess
+import sys
 import tempfile
 import time
 import tomllib
@@ -109,9 +110,13 @@ def interrupted(
             random = np.random.default_rng([37, seed])
             name, how = str(random.choice(names, p=weights / weights.sum())), HOW[seed % len(HOW)]
             after_s = float(random.uniform(0.03, whole_s[name]))
-            wrong = place.ended(name, how, after_s)
+            try:
+                wrong = place.ended(name, how, after_s)
+            except KeyboardInterrupt:
+                break
             tried[name, how] += 1
             if wrong:
+                print(f"{seed} {name}, {how}: {wrong}", file=sys.stderr, flush=True)
                 broken.append({"seed": seed, "command": name, "how": how, "after_s": after_s, "wrong": wrong})
                 if keep:
                     shutil.copytree(place.out, Path(keep) / f"{seed}-{name}", dirs_exist_ok=True)

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -78,7 +79,7 @@ def _fuzzed(arguments: argparse.Namespace, targets: tuple[str, ...]) -> dict[str
     shares = np.array([SHARES[TARGETS.index(t)] for t in targets], dtype=float)
     with tempfile.TemporaryDirectory(prefix="palpate-fuzz-") as folder:
         sound = Sound(Path(folder), arguments.deep)
-        child = Child(sound.warming())
+        child = Child()
         try:
             judge = _Judge(sound, child, deep="recording" in targets and arguments.deep > 0)
             for seed in tqdm(range(arguments.first, arguments.first + arguments.count), disable=None):
@@ -93,11 +94,14 @@ def _fuzzed(arguments: argparse.Namespace, targets: tuple[str, ...]) -> dict[str
                 outcome, words = judge.outcome(case, runner)
                 counts[target, outcome] += case.many
                 if outcome in BROKEN:
+                    print(f"{seed} {target}, {case.how}: {outcome}", file=sys.stderr, flush=True)
                     broken.append({"seed": seed, "target": target, "outcome": outcome, "how": case.how,
                                    "argv": case.argv, "words": words[-1200:]})  # fmt: skip
                     if arguments.keep:
                         kept = Path(arguments.keep) / f"{seed}-{target.replace(' ', '-')}"
                         shutil.copytree(case.folder, kept, dirs_exist_ok=True)
+        except KeyboardInterrupt:
+            print("interrupted: what was tried until then", file=sys.stderr)
         finally:
             child.end()
     seconds = time.perf_counter() - began
@@ -113,6 +117,7 @@ class _Judge:
         self._model_n = self._scene_n = self._modulus_pa = np.nan
         for argv in sound.warming():
             self._sound(child, argv)
+        child.first = sound.warming()[1:]  # what is compiled is on disk by now
         self._model_n = _force(sound.folder / "curve.csv")
         self._scene_n = _force(sound.folder / "scene.csv")
         if deep:
