@@ -221,8 +221,8 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
 
 
 def check_room(folder: Path, least_bytes: int, variable: str = "PALPATE_CACHE") -> None:
-    """Raises FileError where a folder of the cache cannot be made or has less room than that. variable: of the
-    environment, which names the folder."""
+    """Raises FileError where a folder, which a variable of the environment names, cannot be made or has less
+    room than that."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         free = shutil.disk_usage(folder).free
