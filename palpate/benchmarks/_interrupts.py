@@ -145,17 +145,13 @@ class _Place:
         self._environment = module_environment(TMPDIR=str(self.scratch))
 
     def whole(self, name: str) -> float:
-        """Run a command whole, twice where the first may have had to compile; s of the last."""
-        for _ in range(2):
-            began = time.monotonic()
-            process, said = self._begun(name)
-            code = _waited(process, _WHOLE_S)
-            text = _text(said)
-            if code not in (0, 1):
-                raise OptionError(f"'palpate {' '.join(self.jobs[name].argv)}' does not work: {text}")
-            seconds = time.monotonic() - began
-            if seconds > 100:
-                break
+        """Run a command whole; s."""
+        began = time.monotonic()
+        process, said = self._begun(name)
+        code, text = _waited(process, _WHOLE_S), _text(said)
+        if code not in (0, 1):
+            raise OptionError(f"'palpate {' '.join(self.jobs[name].argv)}' does not work: {text}")
+        seconds = time.monotonic() - began
         for entry in list(self.out.iterdir()):
             target = self.kept / name / entry.name
             target.parent.mkdir(exist_ok=True)
