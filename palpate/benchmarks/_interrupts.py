@@ -214,13 +214,15 @@ class _Place:
 
 
 def _waited(process: subprocess.Popen[bytes], longest_s: float) -> int | None:
-    """Its exit code; None where it had to be killed."""
+    """Its exit code; None where it had to be killed. It does not outlive this process's own interrupt."""
     try:
         return process.wait(longest_s)
-    except subprocess.TimeoutExpired:
+    except (subprocess.TimeoutExpired, KeyboardInterrupt) as why:
         with contextlib.suppress(OSError):
             os.killpg(process.pid, signal.SIGKILL)
         process.wait()
+        if isinstance(why, KeyboardInterrupt):
+            raise
         return None
 
 
