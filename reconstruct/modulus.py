@@ -42,7 +42,7 @@ class ModulusOptions:
         flag="--dent-law",
     )
     greatest_depth_m: float | None = option(
-        None, "leave out samples deeper than this", unit="m", flag="--greatest-depth"
+        None, "leave out samples deeper than this; None: none", unit="m", flag="--greatest-depth"
     )
     law_error: float = option(
         0.03, "error of the law as a share of the force; weights deep samples down", flag="--law-error"
