@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import mechanics.recording
     from mechanics.presses import Presses
     from palpate.results.batch import Batch
+    from palpate.results.calibration import Calibration
     from palpate.results.check import Checkup
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
@@ -460,6 +461,62 @@ def diagnose(
             attribution=AttributionOptions(**given[AttributionOptions]),
         )
     return dressed(Diagnosis, result, recording=measured, model=made)
+
+
+def calibrate(
+    recording: RecordingLike,
+    *,
+    rigid: bool = False,
+    modulus_pa: float | None = None,
+    poisson_ratio: float | None = None,
+    trust: str = "tip",
+    save: str | Path | None = None,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Calibration:
+    """The instrument, from presses on something known: tool's stiffness, sensor, bias, delay, play.
+
+    rigid: on a rigid plate; or modulus_pa and poisson_ratio of an object that the recording traces, or whose
+    geometry options give, see `pp.options("calibrate")`, m. trust: where a common factor is left, "tip"
+    gives it to the sensor, "gain" to the tip's radius. save: TOOL.toml to write, which recordings may name.
+    Raises OptionError unless one of rigid and modulus_pa is given, ContactError or DiagnosisError where
+    presses are too few.
+    """
+    from diagnose.calibrate import calibrate_on_object, calibrate_on_plate
+    from palpate.results.base import dressed
+    from palpate.results.calibration import Calibration
+    from reconstruct.contacts import explore
+    from reconstruct.known_shape import nowhere
+
+    taken("calibrate", options)
+    if rigid == (modulus_pa is not None):
+        raise OptionError(
+            "say on what it was pressed: rigid (--rigid), or modulus_pa (--modulus PA), one of them"
+        )
+    if modulus_pa is not None and not modulus_pa > 0:
+        raise OptionError(f"modulus_pa is {modulus_pa}; it must be greater than 0 Pa")
+    measured = read_recording(recording)
+    with _told("calibrate", progress) as tell:
+        if modulus_pa is None:
+            found = explore(measured, boundary=nowhere(measured), unbroken=True)
+            plain = calibrate_on_plate(measured, found)
+        else:
+            made = reconstruct(
+                measured,
+                poisson_ratio=poisson_ratio,
+                seed=seed,
+                progress=lambda s, x: tell(s, 0.3 * x),
+                **options,
+            )
+            plain = calibrate_on_object(
+                measured, made.model, modulus_pa, trust=trust, seed=seed,
+                progress=lambda s, x: tell(s, 0.3 + 0.7 * x),
+            )  # fmt: skip
+    result = dressed(Calibration, plain)
+    if save is not None:
+        result.save(save)
+    return result
 
 
 def simulate(
