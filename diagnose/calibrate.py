@@ -20,6 +20,7 @@ from diagnose.freeair import free_air_of
 from diagnose.instrument_offsets import find_instrument_offsets
 from diagnose.intervals import covariance, parameter_intervals
 from diagnose.judging import AttributionOptions, Candidate, Search
+from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of
 from diagnose.whiten import NuisanceOptions
@@ -69,7 +70,8 @@ def calibrate_on_object(
     free = free_air_of(recording, presses)
     progress("sites", 0.1)
     forward = build_forward(touches, model)
-    offsets = find_instrument_offsets(forward, free, set())
+    rigid = rigid_of(recording, presses, model.support.normal)
+    offsets = find_instrument_offsets(forward, free, rigid, set())
     nuisance = NuisanceOptions()
     strain = effect("finite_strain")
     search = Search(
@@ -77,7 +79,9 @@ def calibrate_on_object(
         site_sd=site_stiffness_sd(touches, model, nuisance), finite_strain=strain,
     )  # fmt: skip
     base = [strain] if material.dent_law == "neo-hookean" else []
-    kept, found = _kept(search, base, [effect(n) for n in FITTED], progress)
+    # a bending that a rigid support shows is settled there
+    tried = [effect(n) for n in FITTED if n not in offsets.names]
+    kept, found = _kept(search, base, tried, progress)
     return _told(recording, search, found.found, kept, offsets, modulus_pa, trust, seed)
 
 
@@ -116,7 +120,10 @@ def _told(
     forward, rng = search.forward, np.random.default_rng(seed)
     names = {e.name for e in kept}
     keys = {e.name: e.report(found.of(e.name), forward, found.modulus) for e in kept}
+    keys = {**offsets.parameters, **keys}
     between = {e.name: parameter_intervals(found, e.name, forward, search.dof, rng) for e in kept}
+    between = {**offsets.intervals, **between}
+    names |= set(offsets.names)
     spread = covariance(found, forward.touches.noise.variance_inflation, search.dof)
     scale_sd = float(np.hypot(np.sqrt(max(spread[0, 0], 0.0)), MODULUS_SD))
     scale = found.modulus / modulus_pa
@@ -140,7 +147,7 @@ def _told(
         ("backlash", "width_m", "play_m"),
         ("force_gain", "matrix", "cross_talk"),
     ):
-        if name in names and key in between[name]:
+        if key in between.get(name, {}):
             interval[label] = between[name][key]
     bias = offsets.parameters.get("force_bias", {}).get("bias_n")
     if bias is not None:

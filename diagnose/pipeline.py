@@ -16,6 +16,7 @@ from diagnose.instrument_offsets import find_instrument_offsets
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
+from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import LEAST_SITES, touches_of
 from diagnose.verdict import Evidence
@@ -79,7 +80,8 @@ def diagnose(
     untold = untold_effects(presses)
     excluded = {n.strip() for n in options.without.split(",") if n.strip()} | untold
     allowed = effects(without=excluded)
-    offsets = find_instrument_offsets(forward, free, excluded)
+    rigid = rigid_of(recording, presses, model.support.normal)
+    offsets = find_instrument_offsets(forward, free, rigid, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
     if touches.sites != presses.sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
@@ -89,7 +91,7 @@ def diagnose(
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
     left_out = {e.name for e in effects() if e.costly and options.fast}
-    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in left_out]
+    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (*left_out, *offsets.names)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)

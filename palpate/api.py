@@ -81,16 +81,15 @@ def check(recording: RecordingLike, *, full: bool = False, progress: bool | Prog
     recording, and what `reconstruct` raises with `full`.
     """
     from palpate.results.check import Checkup
-    from reconstruct.checks.registry import check as checked
-    from reconstruct.checks.registry import seen
+    from reconstruct.checks.registry import looked_at
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 
     measured = read_recording(recording)
     with _told("check", progress) as tell:
-        findings = checked(measured)
+        findings, seen = looked_at(measured)
         if full and not any(f.grave for f in findings):
             findings = reconstruct_fully(measured, ReconstructOptions(force=True), tell).findings
-    return Checkup(measured, findings, seen(measured), full)
+    return Checkup(measured, findings, seen, full)
 
 
 def import_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Imported:
@@ -569,7 +568,7 @@ def simulate(
             workers=workers,
             progress=tell,
         )
-    result = simulation_of(plain, Path(thing.name).name)
+    result = simulation_of(plain, Path(thing.name).name, thing)
     return result if save is None else result.save(save)
 
 

@@ -8,6 +8,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -102,6 +103,31 @@ class Exploration:
     delay_error_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class Filtered:
+    """A recording low-passed at `cutoff_hz`, and what it reads in free air.
+
+    free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
+    free motion; more where inertia is left.
+    """
+
+    signals: Signals
+    free_air: np.ndarray
+    spread: np.ndarray
+    cutoff_hz: float
+
+    @cached_property
+    def least(self) -> float:
+        """How many spreads a touch must reach (reconstruct.free_noise)."""
+        return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+
+    def touching(self) -> np.ndarray:
+        """(n,) bool, a new array: where something is touched, on the way or on purpose."""
+        gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+        contrast = self.signals.magnitude / self.spread
+        return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
+
+
 def explore(
     recording: Recording,
     *,
@@ -110,13 +136,15 @@ def explore(
     boundary_options: BoundaryOptions | None = None,
     filter_options: FilterOptions | None = None,
     boundary: Boundary | None = None,
+    filtered: Filtered | None = None,
     unbroken: bool = False,
 ) -> Exploration:
     """Phases, support, base outline and palpations of a recording.
 
-    boundary: a known base, for recordings without phase I. unbroken: contact may never break, so that it is
-    cut at its minima (reconstruct.unbroken). Raises ContactError where phase I is missing, nothing is touched
-    or too few presses can be used.
+    boundary: a known base, for recordings without phase I. filtered: of this recording at this cutoff, where
+    it is known already. unbroken: contact may never break, so that it is cut at its minima
+    (reconstruct.unbroken). Raises ContactError where phase I is missing, nothing is touched or too few
+    presses can be used.
     """
     options = contact_options or ContactOptions()
     if method not in METHODS:
@@ -126,8 +154,11 @@ def explore(
             f"--contact-threshold is {options.contact_threshold_n} N; it must be greater than 0"
         )
     cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
-    given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary, unbroken)
-    found = _searched(recording, given)
+    given = _Given(method, options, boundary_options or BoundaryOptions(), boundary, unbroken)
+    tared = unbroken and not _off_the_object(recording, options, cutoff_hz)
+    if filtered is None or tared:
+        filtered = filtered_of(recording, cutoff_hz, tared=tared)
+    found = _searched(filtered, given)
     if method == "paper" or not options.correct_delay:
         return _tabled(recording, found, given)
     step = force_delay(found.signals, found.contacts)
@@ -139,7 +170,7 @@ def explore(
         if not samples:
             break
         delay += samples / recording.sample_rate_hz
-        found = _searched(read_earlier(recording, delay), given)
+        found = _searched(filtered_of(read_earlier(recording, delay), cutoff_hz, tared=tared), given)
         step = force_delay(found.signals, found.contacts)
     return _tabled(recording, found, given, delay, step.error_s)
 
@@ -149,7 +180,6 @@ class _Given:
     method: str
     contact: ContactOptions
     boundary: BoundaryOptions
-    cutoff_hz: float
     known_base: Boundary | None
     unbroken: bool
 
@@ -223,17 +253,16 @@ def _speed(signals: Signals, contact: Found) -> float:
     return float(np.ptp(path)) / max(len(path) - 1, 1) * rate
 
 
-def _searched(recording: Recording, given: _Given) -> _Found:
-    tared = given.unbroken and not _off_the_object(recording, given)
-    signals, free_air, spread = signals_of(recording, given.cutoff_hz, tared=tared)
-    wanders = recording.quaternion is None and spread.min() > signals.noise_n
+def _searched(filtered: Filtered, given: _Given) -> _Found:
+    signals, spread = filtered.signals, filtered.spread
+    wanders = signals.recording.quaternion is None and spread.min() > signals.noise_n
     hint = (
         f"in free motion the force wanders by {spread.min():.2g} N an axis, louder than its noise "
         f"({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation (qw, qx, qy, "
         "qz), or hold it one way"
     )
     try:
-        found = _found(recording, given, signals, free_air, spread)
+        found = _found(filtered, given)
     except ContactError as error:
         if not wanders:
             raise
@@ -248,11 +277,11 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     return found
 
 
-def _off_the_object(recording: Recording, given: _Given) -> bool:
+def _off_the_object(recording: Recording, contact: ContactOptions, cutoff_hz: float) -> bool:
     """Whether there is free air to be found."""
-    if given.contact.free_air == "none":
+    if contact.free_air == "none":
         return False
-    rate, cutoff_hz = recording.sample_rate_hz, given.cutoff_hz
+    rate = recording.sample_rate_hz
     position, force = (
         low_pass_at(recording.t, values, rate, cutoff_hz)
         for values in (recording.position, recording.force_on_tool)
@@ -261,16 +290,13 @@ def _off_the_object(recording: Recording, given: _Given) -> bool:
     return free_air_seen(position, force, recording.tip_radius_m, noise * noise_gain(rate, cutoff_hz))
 
 
-def _found(
-    recording: Recording, given: _Given, signals: Signals, free_air: np.ndarray, spread: np.ndarray
-) -> _Found:
-    """spread: (n,) noise of the filtered force, N an axis."""
+def _found(filtered: Filtered, given: _Given) -> _Found:
+    signals, recording = filtered.signals, filtered.signals.recording
+    spread, free_air = filtered.spread, filtered.free_air
     method, options, boundary = given.method, given.contact, given.known_base
-    least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
-    high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
+    high = PAPER_THRESHOLD_N if method == "paper" else filtered.least * float(filtered.spread.min())
     high = options.contact_threshold_n or high
-    gap = passing_zero(recording.sample_rate_hz, given.cutoff_hz)
-    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, signals.force, gap)
+    touching = filtered.touching()
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -326,10 +352,8 @@ def _found(
     return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
 
 
-def signals_of(
-    recording: Recording, cutoff_hz: float, *, tared: bool = False
-) -> tuple[Signals, np.ndarray, np.ndarray]:
-    """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis.
+def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) -> Filtered:
+    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off.
 
     tared: nothing is free air, and forces are taken as they are.
     """
@@ -344,7 +368,8 @@ def signals_of(
         position = low_pass_at(recording.t, recording.position, rate, cutoff_hz)
         size = np.linalg.norm(filtered, axis=1)
         raw = recording.force_on_tool
-        return Signals(recording, position, filtered, size, raw, noise), nothing, np.full(len(size), white)
+        signals = Signals(recording, position, filtered, size, raw, noise)
+        return Filtered(signals, nothing, np.full(len(size), white), cutoff_hz)
     weight, inertia = tool_weight(recording, filtered, cutoff_hz)
     left = np.linalg.norm(filtered - weight, axis=1)
     drift, _ = free_air_force(recording.t, filtered - weight, max(white, crowd_scale(left)))
@@ -359,7 +384,8 @@ def signals_of(
         noise_n=noise,
     )
     still = max(white, crowd_scale(signals.magnitude))
-    return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+    spread = moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+    return Filtered(signals, free_air, spread, cutoff_hz)
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

@@ -72,7 +72,9 @@ class GeometryOptions:
     sink_m: float = option(
         0.0, "cut off flat at the shape's bottom, where the object settles", unit="m", flag="--sink"
     )
-    slab_m: float | None = option(None, "the object is a slab of this thickness", unit="m", flag="--slab")
+    slab_m: float | None = option(
+        None, "the object is a slab of this thickness; None: it is none", unit="m", flag="--slab"
+    )
     half_space: bool = option(False, "the object is deep and wide beside every contact")
 
     def __post_init__(self) -> None:

@@ -23,7 +23,7 @@ from reconstruct.casting import CastPoints, cast
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
-from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.contacts import ContactOptions, Exploration, Filtered, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
@@ -108,15 +108,17 @@ def reconstruct_fully(
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
     _check_points(recording, geometry, paper)
-    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
+    checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
     placed = None
     if geometry.known:
-        exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        exploration, placed = _on_known(
+            recording, options, geometry, checkup.filtered, _part(progress, 0.02, 0.3)
+        )
         checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
-        exploration = _explored(recording, options)
+        exploration = _explored(recording, options, checkup.filtered)
         checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
@@ -234,7 +236,11 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
 
 
 def _touches(
-    recording: Recording, options: ReconstructOptions, base: Boundary | None = None, unbroken: bool = False
+    recording: Recording,
+    options: ReconstructOptions,
+    filtered: Filtered | None,
+    base: Boundary | None = None,
+    unbroken: bool = False,
 ) -> Exploration:
     if base is not None and is_points(recording):
         return explore_points(recording, base, options.contact)
@@ -245,27 +251,32 @@ def _touches(
         boundary_options=options.boundary,
         filter_options=options.filter,
         boundary=base,
+        filtered=filtered,
         unbroken=unbroken,
     )
 
 
-def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
+def _explored(recording: Recording, options: ReconstructOptions, filtered: Filtered | None) -> Exploration:
     """Where the recording traces no base, that of [object] model = PATH stands in."""
     try:
-        return _touches(recording, options)
+        return _touches(recording, options, filtered)
     except NoBaseError:
         if recording.base_model is None:
             raise
     base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-    return _touches(recording, options, base)
+    return _touches(recording, options, filtered, base)
 
 
 def _on_known(
-    recording: Recording, options: ReconstructOptions, geometry: GeometryOptions, progress: Progress
+    recording: Recording,
+    options: ReconstructOptions,
+    geometry: GeometryOptions,
+    filtered: Filtered | None,
+    progress: Progress,
 ) -> tuple[Exploration, Placed]:
     """Touches told without a support place the geometry; then they are told again, over its base."""
     least = options.contact.least_palpations
-    first = without_slides(_touches(recording, options, nowhere(recording), unbroken=True), least)
+    first = without_slides(_touches(recording, options, filtered, nowhere(recording), unbroken=True), least)
     progress("contacts", 0.3)
     placed = place(
         recording,
@@ -275,7 +286,7 @@ def _on_known(
         spacing_m=options.surface.surface_spacing_m,
         progress=_part(progress, 0.3, 0.8),
     )
-    again = _touches(recording, options, placed.base, unbroken=True)
+    again = _touches(recording, options, filtered, placed.base, unbroken=True)
     return without_slides(again, least), placed
 
 
