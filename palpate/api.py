@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from mechanics.presses import Presses
     from palpate.results.batch import Batch
     from palpate.results.calibration import Calibration
+    from palpate.results.changes import Changes
     from palpate.results.check import Checkup
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
@@ -148,7 +149,8 @@ def material(
 
     files: a curve each. kind: "auto" goes by their headers. tip_radius_m: of an indenter's sphere, where the
     files do not say; layer_m: thickness of the sample, None is a half-space; specimens: each indentation is
-    of another piece. columns {"t", "z", "fz": name}, units {kind: unit}: where names do not tell. From 6
+    of another piece. columns {"t", "z", "fz": name}, units {kind: unit}: where names do not tell.
+    poisson_ratio: of the sample; fast: fewer effects are tried. From 6
     indentations on, effects are searched for as `diagnose` does, each curve held out (docs/real-data.md).
     Raises RecordingError where a file cannot be read, ContactError where nothing is touched.
     """
@@ -415,6 +417,47 @@ def compare(
         plain = None if model is None else load(model, progress=tell)
         result = compared(measured, plain, chosen, seed=seed, progress=tell)
     return dressed(Comparison, result, recording=measured, model=model_of(result.model))
+
+
+def changes(
+    before: RecordingLike,
+    after: RecordingLike,
+    *,
+    diagnosed: bool = True,
+    fast: bool = True,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Changes:
+    """Two recordings of one object, before and after or with two tools: moduli, their difference, what
+    explains it.
+
+    Each is reconstructed and, where diagnosed, diagnosed (fast: fewer effects); the moduli, Pa, are compared
+    with their intervals, and place by place where the two share a frame. options: of both reconstructions,
+    see `pp.options("changes")`, m. Raises what `reconstruct` and `diagnose` raise.
+    """
+    from palpate.before_after import Side
+    from palpate.before_after import changes as weighed
+    from palpate.results.base import dressed
+    from palpate.results.changes import Changes
+
+    taken("changes", options)
+    sides = []
+    with _told("changes", progress) as tell:
+        for k, source in enumerate((before, after)):
+
+            def step(words: str, share: float, k: int = k) -> None:
+                tell(words, 0.5 * k + 0.5 * share)
+
+            measured = read_recording(source)
+            made = reconstruct(measured, seed=seed, progress=lambda s, x: step(s, 0.4 * x), **options)
+            found = None
+            if diagnosed:
+                found = diagnose(
+                    measured, made, fast=fast, seed=seed, progress=lambda s, x: step(s, 0.4 + 0.6 * x)
+                )
+            sides.append(Side(measured, made.model, found))
+    return dressed(Changes, weighed(*sides))
 
 
 def diagnose(
