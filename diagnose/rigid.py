@@ -1,9 +1,9 @@
 """The rigid support: what yields there is the instrument.
 
-While the base is traced (or something rigid is pressed) the tip's centre lies in a plane, one tip radius
-above the support. A spring between position sensor and tip puts the reading off that plane by the force over
-its stiffness, so a plane fitted to readings with the force as one more column tells the spring before any
-press is looked at. Segments of one kind share a plane's height; its tilt is the support's.
+While the base is traced (or something rigid is pressed) the tip's centre lies in a plane, a tip radius above
+the support. A spring between position sensor and tip puts the reading off that plane by the force over its
+stiffness, so a plane fitted to readings with the force as one more column tells the spring before any press
+is looked at. Segments of one kind share a plane's height; its tilt is the support's.
 """
 
 from __future__ import annotations
