@@ -24,9 +24,9 @@ from pathlib import Path
 from typing import Any
 
 from devices.mapper import MapperOptions, axis_matrix
-from mechanics.effect_keys import BALL
 from mechanics.errors import OptionError, SceneError
 from mechanics.files import named_in, read_toml
+from mechanics.material import BALL
 from mechanics.recording import POISSON, TIP_RADIUS
 from mechanics.schema import Key, Listed, Schema, check_table
 from mechanics.surface_files import SUFFIXES, is_surface_file

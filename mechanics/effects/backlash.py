@@ -10,6 +10,7 @@ from numba import njit
 
 from mechanics.effects.base import Effect, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
+from mechanics.schema import Key
 
 
 @njit(cache=True)
@@ -44,6 +45,7 @@ EFFECT = Effect(
     scope=Scope.TIME,
     words="a constant play lies between the tip and the position sensor",
     parameters=(Parameter("width_m", "m", -2e-3, 2e-3, 0.0, (1e-4, 4e-4, -1e-4, -4e-4), 2e-5),),
+    keys={"width_m": Key(low=0.0, high=0.1, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {"width_m": abs(float(values[0]))},
     change=_change,
     # within the play the tip's place is not known, so a fit with the right width still misses
