@@ -83,6 +83,8 @@ def attribute(
             if not chosen:
                 candidate = _with_hidden_strain(search, effect, candidate, current)
             scores[effect.name] = search.score([effect], candidate, current)
+        if not scores:
+            break
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
             if score.gain > search.options.plain_gain and not search.passes(score, first=first):
