@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.child import module_command, module_environment
+from palpate.child import end_with_parent, module_command, module_environment
 
 
 @contextmanager
@@ -23,7 +23,7 @@ def warming_up() -> Iterator[subprocess.Popen]:
     """The compiling process, started at once; ended with the block where it is still running then."""
     process = subprocess.Popen(
         module_command("palpate.warm_up"),
-        stdin=subprocess.DEVNULL,
+        stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
@@ -34,13 +34,14 @@ def warming_up() -> Iterator[subprocess.Popen]:
         if process.poll() is None:
             process.terminate()
         process.wait()
+        if process.stdin is not None:
+            process.stdin.close()
 
 
 def warm_up() -> None:
     """Write, condense, replay and feel a block of 40 mm for a moment."""
     import render
     from mechanics.box_mesh import box_mesh
-    from mechanics.compliance import load_or_condense
     from mechanics.material import Material
     from mechanics.model import Model, Support, Tool, write_model
     from palpate.servo.headless import run_headless
@@ -51,7 +52,6 @@ def warm_up() -> None:
     with tempfile.TemporaryDirectory() as folder:
         block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(0.005), 0.0133)
         block = block.replaced(path=write_model(Path(folder) / "block", block))
-        load_or_condense(block)  # from now on it is mapped from disk, read-only: another type to the compiler
         renderer = render.create("fem", block)
         path = np.outer(np.linspace(0.05, 0.043, 50), up)
         t = np.arange(50) * 1e-3
@@ -61,4 +61,5 @@ def warm_up() -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     warm_up()
