@@ -3,7 +3,8 @@
 Two uncertainties are predicted forward: the surface's standard deviation (a touch takes away what it shares
 with its surroundings, by the correlation length of shape errors), and the modulus's (presses are replicates
 with a part that neighbours share and a part of their own). The worth of a touch is how much it brings the
-goals that are still missed nearer, in logarithms, a second.
+goals that are still missed nearer, in logarithms, a second. A shallow press tells little of the modulus: an
+error of first touch is a greater share of its depth.
 """
 
 from __future__ import annotations
@@ -23,8 +24,8 @@ SPACING_M = 0.008
 """Between places that are weighed."""
 TOUCH_ERROR_M = 0.0002
 """Of one first touch."""
-SHARED = 0.5
-"""Of a press's error in the modulus: how much neighbours have in common."""
+PLACE_ERROR = 0.05
+"""Of a press's modulus, relative: what shape and law do to a place, which neighbours share."""
 LIGHT_M = 0.0025
 """Depth of a touch that only asks where the surface is."""
 
@@ -76,6 +77,7 @@ def weighed(
     surface: Surface,
     standing: list[Standing],
     touched: np.ndarray,
+    depths_m: np.ndarray,
     here: np.ndarray,
     modulus_sd: float,
     modulus_bias: float,
@@ -83,7 +85,8 @@ def weighed(
     tip_radius_m: float,
     reach: ReachOptions,
 ) -> list[Candidate]:
-    """All touches, the best first. touched: (k, 3) m, places pressed so far; here: (3,) m, where the tip is.
+    """All touches, the best first. touched: (k, 3) m, places pressed so far, depths_m (k,); here: (3,) m,
+    where the tip is.
 
     modulus_sd: of its logarithm, of which modulus_bias no touch takes away. modulus_pa: nan where unknown.
     """
@@ -102,7 +105,7 @@ def weighed(
             now = surface_error(after[free], area[free])
             gains["surface"] = missing["surface"].missing - Standing("", now, missing["surface"].goal).missing
         if "modulus" in missing and missing["modulus"].missing > 0:
-            sd = modulus_after(touched, point, modulus_sd, modulus_bias)
+            sd = modulus_after(touched, depths_m, point, depth, modulus_sd, modulus_bias)
             gains["modulus"] = (
                 missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
             )
@@ -129,19 +132,24 @@ def after_touch(vertices: np.ndarray, deviation_m: np.ndarray, row: int) -> np.n
     return np.sqrt(variance * (1 - shared * told))
 
 
-def modulus_after(touched: np.ndarray, point: np.ndarray, sd: float, bias: float) -> float:
-    """Standard deviation of log E with one more press at `point`; `bias` is what presses do not lessen."""
+def modulus_after(
+    touched: np.ndarray, depths_m: np.ndarray, point: np.ndarray, depth_m: float, sd: float, bias: float
+) -> float:
+    """Standard deviation of log E with one more press, `depth_m` deep at `point`; `bias` is what presses do
+    not lessen."""
     rest = max(sd**2 - bias**2, 0.0)
-    return float(
-        np.sqrt(bias**2 + rest * _mean_variance(np.vstack([touched, point])) / _mean_variance(touched))
-    )
+    after = _mean_variance(np.vstack([touched, point]), np.append(depths_m, depth_m))
+    return float(np.sqrt(bias**2 + rest * after / _mean_variance(touched, depths_m)))
 
 
-def _mean_variance(points: np.ndarray) -> float:
-    """Of the best weighted mean of presses at points (k, 3), each of variance 1, in part shared by
-    neighbours."""
+def _mean_variance(points: np.ndarray, depths_m: np.ndarray) -> float:
+    """Of the best weighted mean of the log moduli of presses at points (k, 3), depths_m (k,) deep.
+
+    F ~ d^1.5, so an error of first touch moves a press's modulus by 1.5 of its share of the depth.
+    """
     squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
-    covariance = SHARED * np.exp(-squared / (2 * CORRELATION_M**2)) + (1 - SHARED) * np.eye(len(points))
+    own = 1.5 * TOUCH_ERROR_M / np.maximum(depths_m, TOUCH_ERROR_M)
+    covariance = PLACE_ERROR**2 * np.exp(-squared / (2 * CORRELATION_M**2)) + np.diag(own**2)
     return float(1 / np.linalg.solve(covariance, np.ones(len(points))).sum())
 
 

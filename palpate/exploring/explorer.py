@@ -14,6 +14,7 @@ from mechanics.recording import Recording, write_recording
 from palpate.exploring.candidates import Candidate, ReachOptions, first_places, vertex_areas, weighed
 from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing, surface_error
+from palpate.exploring.orders import Order
 from palpate.exploring.rows import Instrument, Segment, together
 from reconstruct.boundary import Boundary
 from reconstruct.contacts import ContactOptions, explore
@@ -105,8 +106,9 @@ class State:
 class Explorer:
     """A running exploration: `add` what was felt, read `state`, ask `suggest`.
 
-    instrument: what is known of the device. poisson_ratio: of the object. Segments that were added stay,
-    whatever happens after: `recording` and `save` hold them all.
+    instrument: what is known of the device. poisson_ratio: of the object. order: None goes where most is
+    told; another order of touching stands in for it where guidance is measured. Segments that were added
+    stay, whatever happens after: `recording` and `save` hold them all.
     """
 
     def __init__(
@@ -117,12 +119,14 @@ class Explorer:
         *,
         poisson_ratio: float = 0.49,
         seed: int = 0,
+        order: Order | None = None,
     ) -> None:
         self.instrument = instrument
         self.goals = goals or GoalOptions()
         self.reach = reach or ReachOptions()
         self.segments: list[Segment] = []
         self._nu, self._seed = poisson_ratio, seed
+        self._order, self._rng = order, np.random.default_rng([seed, 61])
         self._estimate = Estimate()
         self._base: Boundary | None = None
         self._trouble = ""
@@ -216,7 +220,7 @@ class Explorer:
         if self._estimate.surface is None:
             return self._first()
         best = self._best(state)
-        if best is None or best.worth <= 0:
+        if best is None or (best.worth <= 0 and self._order is None):
             return Suggestion(
                 "stop",
                 "no touch in reach is expected to bring a goal nearer at this noise; " + self._words(state),
@@ -248,11 +252,13 @@ class Explorer:
             return None
         low, high = e.fit.ci95_pa
         sd = float(np.log(high / low) / 3.92)
-        touched = e.exploration.presses.point[e.fit.weights > 0]
+        presses = e.exploration.presses
+        used = e.fit.weights > 0 if (e.fit.weights > 0).any() else np.ones(len(presses), dtype=bool)
         ranked = weighed(
             e.surface,
             list(state.standing),
-            touched if len(touched) else e.exploration.presses.point,
+            presses.point[used],
+            presses.depth_m[used],
             self.segments[-1].position[-1],
             sd,
             min(ModulusOptions().law_bias, sd),
@@ -260,7 +266,10 @@ class Explorer:
             self.instrument.tip_radius_m,
             self.reach,
         )
-        return ranked[0] if ranked else None
+        if self._order is None or not ranked:
+            return ranked[0] if ranked else None
+        places = np.array([c.point for c in ranked])
+        return ranked[self._order(places, presses.point, presses.point[-1], self._rng)]
 
     def _why(self, best: Candidate, state: State) -> str:
         by_name = {s.name: s for s in state.standing}
