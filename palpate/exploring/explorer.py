@@ -300,5 +300,5 @@ class Explorer:
 
 def check_goals(goals: GoalOptions) -> None:
     """Raises OptionError where nothing is asked for."""
-    if goals.modulus_within is None and goals.surface_within_m is None and goals.cause_at is None:
-        raise OptionError("no goal is given: ask for --modulus-within, --surface-within or --cause-at")
+    if goals.modulus_within is None and goals.surface_within_m is None:
+        raise OptionError("no goal is given: ask for --modulus-within or --surface-within")

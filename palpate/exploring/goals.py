@@ -11,9 +11,6 @@ from scipy.special import erf
 from mechanics.errors import OptionError
 from mechanics.options import option
 
-TIRING = 6 / np.pi**2
-"""Looks k = 1, 2, … at the data spend TIRING / k^2 of the false alarms that are allowed: their sum is 1."""
-
 
 @dataclass(frozen=True)
 class GoalOptions:
@@ -25,19 +22,12 @@ class GoalOptions:
     surface_within_m: float | None = option(
         0.002, "where 95 % of the surface must lie within", unit="m", flag="--surface-within"
     )
-    cause_at: float | None = option(
-        None, "how sure the verdict on the sim-to-real gap must be", flag="--cause-at"
-    )
     most: int = option(40, "never more presses than these", flag="--most")
-    false_alarms: float = option(
-        0.02, "rate of named causes that are none, over the whole exploration", flag="--false-alarms"
-    )
 
     def __post_init__(self) -> None:
         """Raises OptionError for goals that cannot be."""
-        for flag, value in (("--modulus-within", self.modulus_within), ("--cause-at", self.cause_at)):
-            if value is not None and not 0 < value < 1:
-                raise OptionError(f"{flag} is {value}; it must lie between 0 and 1")
+        if self.modulus_within is not None and not 0 < self.modulus_within < 1:
+            raise OptionError(f"--modulus-within is {self.modulus_within}; it must lie between 0 and 1")
         if self.surface_within_m is not None and not self.surface_within_m > 0:
             raise OptionError(f"--surface-within is {self.surface_within_m} m; it must be greater than 0")
         if self.most < 4:
@@ -72,13 +62,3 @@ def surface_error(deviation_m: np.ndarray, area: np.ndarray, share: float = 0.95
         return float(weight @ erf(x / (deviation * np.sqrt(2)))) - share
 
     return float(brentq(short, 0.0, 10 * float(deviation.max())))
-
-
-def allowed_at(look: int, false_alarms: float) -> float:
-    """The false-alarm rate that the `look`-th look (from 1) may spend: over all looks at most `false_alarms`.
-
-    The union bound, so it holds however the looks depend on one another and whenever one stops.
-    """
-    if look < 1:
-        raise OptionError(f"look is {look}; looks are counted from 1")
-    return false_alarms * TIRING / look**2

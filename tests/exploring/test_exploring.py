@@ -9,7 +9,7 @@ import pytest
 from mechanics.errors import OptionError, RecordingError
 from palpate.exploring.candidates import after_touch, modulus_after
 from palpate.exploring.explorer import Explorer
-from palpate.exploring.goals import GoalOptions, Standing, allowed_at, surface_error
+from palpate.exploring.goals import GoalOptions, Standing, surface_error
 from palpate.exploring.protocol import segment_of, serve
 from palpate.exploring.rows import Instrument, Segment, together
 
@@ -19,25 +19,6 @@ def test_the_surfaces_error_is_the_quantile_of_a_gaussian():
     # a tenth of the area is bad: it alone holds the quantile
     mixed = np.r_[np.full(90, 1e-5), np.full(10, 1e-2)]
     assert surface_error(mixed, np.ones(100)) == pytest.approx(0.6745e-2, rel=1e-3)
-
-
-def test_all_looks_together_spend_what_one_may():
-    assert sum(allowed_at(k, 0.02) for k in range(1, 20_000)) == pytest.approx(0.02, rel=1e-3)
-    with pytest.raises(OptionError, match="from 1"):
-        allowed_at(0, 0.02)
-
-
-def test_looking_after_every_press_keeps_the_rate_of_false_alarms():
-    rng = np.random.default_rng(3)
-    alarms = 0
-    for _ in range(2000):
-        # the p value of a running mean of noise that is looked at 40 times
-        z = np.cumsum(rng.normal(size=40)) / np.sqrt(np.arange(1, 41))
-        from scipy.stats import norm
-
-        p = 2 * norm.sf(np.abs(z))
-        alarms += any(p[k] < allowed_at(k + 1, 0.02) for k in range(40))
-    assert alarms / 2000 < 0.02 + 3 * np.sqrt(0.02 * 0.98 / 2000)
 
 
 def test_a_touch_tells_of_its_surroundings_and_not_of_the_far_side():
