@@ -54,7 +54,7 @@ class LaboratoryRobot:
         self.options = options or SimulateOptions()
         self.robot = robot or RobotOptions()
         self.hand = HandOptions(hold_share=0.3, longest_hold_s=0.5, pause_s=0.1, tilt_deg=4.0)
-        self._keywords = {"workers": workers, "cache": cache, "progress": progress}
+        self._workers, self._cache, self._progress = workers, cache, progress
         self._surface = trimesh.Trimesh(phantom.vertices, phantom.faces, process=False)
         self._rng = np.random.default_rng([seed, 16])
         self._touches: list[Touch] = []
@@ -82,8 +82,9 @@ class LaboratoryRobot:
         self._touches.append(self._touch(suggestion))
         made = self._simulated(self._touches)
         rows = np.flatnonzero(made.motion.touch == len(self._touches) - 1)
-        before = np.flatnonzero(made.motion.touch == len(self._touches) - 2) if len(self._touches) > 1 else []
-        start = int(before[-1]) + 1 if len(before) else int((made.motion.phase[1] + 0.6) * 1000)
+        # after the touch before, or where the tracing's segment ended
+        last = made.motion.touch == len(self._touches) - 2
+        start = int(np.flatnonzero(last)[-1]) + 1 if last.any() else int((made.motion.phase[1] + 0.6) * 1000)
         return self._part(made, "press", start, int(rows[-1]) + 1)
 
     def _simulated(self, touches: list[Touch]) -> Simulation:
@@ -95,7 +96,9 @@ class LaboratoryRobot:
             seed=self.seed,
             sizes=False,
             staging=Staging(touches=tuple(touches)),
-            **self._keywords,
+            workers=self._workers,
+            cache=self._cache,
+            progress=self._progress,
         )
         return self.last
 
