@@ -102,11 +102,6 @@ def _reconstruct(recording: Path, folder: Path) -> list[str]:
 _SCENE = """title = "A block"
 [object]
 model = "MODEL"
-[[inclusion]]
-name = "lump"
-centre_m = [0.0, 0.0, 0.015]
-radius_m = 0.008
-modulus_ratio = 4.0
 [tool]
 tip_radius_m = 0.005
 [device]
