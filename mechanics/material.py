@@ -10,9 +10,17 @@ import numpy as np
 
 from mechanics.dent import dent_laws
 from mechanics.errors import ModelError
+from mechanics.schema import Key, Schema
 
 UNKNOWN = (float("nan"), float("nan"))
 """An interval that nobody estimated."""
+
+LENGTH = Key(low=1e-5, high=1.0, unit="m", required=True)
+RATIO = Key(low=1e-3, high=1e3, required=True)
+PLACE = Key(low=-10.0, high=10.0, size=3, unit="m", required=True)
+BALL: Schema = {"centre_m": PLACE, "radius_m": LENGTH, "modulus_ratio": RATIO}
+GRADIENT: Schema = {"ratio_base": RATIO, "ratio_top": RATIO}
+SKIN: Schema = {"thickness_m": LENGTH, "modulus_ratio": RATIO}
 
 
 @dataclass(frozen=True)

@@ -22,10 +22,21 @@ from typing import Any
 import numpy as np
 
 from mechanics.dent import dent_laws
-from mechanics.effect_keys import BALL, EFFECT_KEYS, GRADIENT, PLACE, SKIN
 from mechanics.errors import MeshError, ModelError
 from mechanics.files import FolderKind, Kind, atomic_folder, read_toml
-from mechanics.material import UNKNOWN, Ball, Gradient, Material, Skin, finite, positive
+from mechanics.material import (
+    BALL,
+    GRADIENT,
+    PLACE,
+    SKIN,
+    UNKNOWN,
+    Ball,
+    Gradient,
+    Material,
+    Skin,
+    finite,
+    positive,
+)
 from mechanics.moduli import balls_ratio, gradient_ratio, skin_ratio, with_balls, within_limits
 from mechanics.press_files import read_csv, read_presses, write_csv, write_presses
 from mechanics.press_making import no_presses
@@ -64,11 +75,11 @@ SCHEMA: Schema = {
         "support_point": PLACE,
         "support_normal": Key(low=-1e6, high=1e6, size=3, required=True),
     },
-    "effects": EFFECT_KEYS,
+    "effects": ANY,
     "provenance": ANY,
     "end": {"whole": Key(bool, required=True)},
 }
-"""What model.toml may hold; further tables inform and are left alone."""
+"""What model.toml may hold; further tables inform and are left alone. Each effect says its own keys."""
 _NEEDED = ("material", "tool", "mesh", "frame")
 
 MODEL = FolderKind(
@@ -256,8 +267,10 @@ def _checked(table: dict[str, Any], file: Path) -> None:
     for name in _NEEDED:
         if name not in table:
             raise ModelError(f"'{file}' lacks [{name}]: it was cut off or is none; reconstruct it again")
+    from mechanics.effects.registry import effect_keys  # effects act on models
+
     known = {name: value for name, value in table.items() if name in SCHEMA}
-    check_table(known, SCHEMA, file, ModelError, strict=True)
+    check_table(known, {**SCHEMA, "effects": effect_keys()}, file, ModelError, strict=True)
 
 
 def read_model(path: Path | str) -> Model:

@@ -27,12 +27,15 @@ if TYPE_CHECKING:
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
     from palpate.api import batch as batch
+    from palpate.api import calibrate as calibrate
+    from palpate.api import changes as changes
     from palpate.api import check as check
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
     from palpate.api import export as export
     from palpate.api import import_table as import_table
     from palpate.api import load as load
+    from palpate.api import material as material
     from palpate.api import model_of as model_of
     from palpate.api import press as press
     from palpate.api import read_recording as read_recording
@@ -43,11 +46,14 @@ if TYPE_CHECKING:
     from palpate.api import simulate as simulate
     from palpate.keywords import options as options
     from palpate.results.batch import Batch as Batch
+    from palpate.results.calibration import Calibration as Calibration
+    from palpate.results.changes import Changes as Changes
     from palpate.results.check import Checkup as Checkup
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
     from palpate.results.imported import Imported as Imported
+    from palpate.results.material import Material as Material
     from palpate.results.model import Model as Model
     from palpate.results.reconstruction import Reconstruction as Reconstruction
     from palpate.results.recording import Recording as Recording
@@ -59,13 +65,16 @@ if TYPE_CHECKING:
 
 _DOOR = {
     "palpate.api": (
-        "read_recording read_table import_table check load model_of reconstruct renderer replay press "
-        "compare diagnose simulate export batch"
+        "read_recording read_table import_table material check load model_of reconstruct renderer replay "
+        "press compare changes diagnose calibrate simulate export batch"
     ),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.imported": "Imported",
+    "palpate.results.calibration": "Calibration",
+    "palpate.results.changes": "Changes",
     "palpate.results.check": "Checkup",
+    "palpate.results.material": "Material",
     "palpate.results.model": "Model",
     "palpate.results.reconstruction": "Reconstruction",
     "palpate.results.replay": "ReplayResult",

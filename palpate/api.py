@@ -22,11 +22,14 @@ if TYPE_CHECKING:
     import mechanics.recording
     from mechanics.presses import Presses
     from palpate.results.batch import Batch
+    from palpate.results.calibration import Calibration
+    from palpate.results.changes import Changes
     from palpate.results.check import Checkup
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
     from palpate.results.imported import Imported
+    from palpate.results.material import Material
     from palpate.results.model import Model
     from palpate.results.reconstruction import Reconstruction
     from palpate.results.recording import Recording
@@ -127,6 +130,47 @@ def read_table(*files: str | Path, mapping: str | Path | None = None, **said: An
     """The recording in other programs' files, in m, s and N; files, mapping and said are as for
     `import_table`, which also tells and draws what it understood. Raises RecordingError."""
     return import_table(*files, mapping=mapping, **said).recording
+
+
+def material(
+    *files: str | Path,
+    kind: str = "auto",
+    tip_radius_m: float | None = None,
+    layer_m: float | None = None,
+    poisson_ratio: float = 0.49,
+    specimens: bool = False,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    fast: bool = False,
+    seed: int = 0,
+    progress: bool | Progress = True,
+) -> Material:
+    """The material of a specimen from a machine's curves: indentation, compression, tension or relaxation.
+
+    files: a curve each. kind: "auto" goes by their headers. tip_radius_m: of an indenter's sphere, where the
+    files do not say; layer_m: thickness of the sample, None is a half-space; specimens: each indentation is
+    of another piece. columns {"t", "z", "fz": name}, units {kind: unit}: where names do not tell.
+    poisson_ratio: of the sample; fast: fewer effects are tried. From 6
+    indentations on, effects are searched for as `diagnose` does, each curve held out (docs/real-data.md).
+    Raises RecordingError where a file cannot be read, ContactError where nothing is touched.
+    """
+    from palpate.materials import material_of
+    from palpate.specimens import read_tests
+
+    tests = read_tests(
+        files, kind=kind, tip_radius_m=tip_radius_m, columns=dict(columns or {}), units=dict(units or {})
+    )
+    with _told("material", progress) as tell:
+        return material_of(
+            tests,
+            files,
+            layer_m=layer_m,
+            poisson_ratio=poisson_ratio,
+            specimens=specimens,
+            fast=fast,
+            seed=seed,
+            progress=tell,
+        )
 
 
 def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
@@ -272,10 +316,16 @@ def replay(
     """
     from palpate.results.model import model_of
     from palpate.results.replay import ReplayResult
+    from reconstruct.points import is_points
     from render.replay import replay_error, replay_recording
 
     make = _renderer("replay", model, renderer, options)
     measured = read_recording(recording)
+    if is_points(measured):
+        raise OptionError(
+            f"'{measured.name}' holds points without a time, and a replay needs a path: reconstruct, compare "
+            "and diagnose read points"
+        )
     with _told("replay", progress) as tell:
         scene = make(tell)
         forces = replay_recording(scene, measured, tell)
@@ -369,6 +419,47 @@ def compare(
     return dressed(Comparison, result, recording=measured, model=model_of(result.model))
 
 
+def changes(
+    before: RecordingLike,
+    after: RecordingLike,
+    *,
+    diagnosed: bool = True,
+    fast: bool = True,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Changes:
+    """Two recordings of one object, before and after or with two tools: moduli, their difference, what
+    explains it.
+
+    Each is reconstructed and, where diagnosed, diagnosed (fast: fewer effects); the moduli, Pa, are compared
+    with their intervals, and place by place where the two share a frame. options: of both reconstructions,
+    see `pp.options("changes")`, m. Raises what `reconstruct` and `diagnose` raise.
+    """
+    from palpate.before_after import Side
+    from palpate.before_after import changes as weighed
+    from palpate.results.base import dressed
+    from palpate.results.changes import Changes
+
+    taken("changes", options)
+    sides = []
+    with _told("changes", progress) as tell:
+        for k, source in enumerate((before, after)):
+
+            def step(words: str, share: float, k: int = k) -> None:
+                tell(words, 0.5 * k + 0.5 * share)
+
+            measured = read_recording(source)
+            made = reconstruct(measured, seed=seed, progress=lambda s, x: step(s, 0.4 * x), **options)
+            found = None
+            if diagnosed:
+                found = diagnose(
+                    measured, made, fast=fast, seed=seed, progress=lambda s, x: step(s, 0.4 + 0.6 * x)
+                )
+            sides.append(Side(measured, made.model, found))
+    return dressed(Changes, weighed(*sides))
+
+
 def diagnose(
     recording: RecordingLike,
     model: ModelLike | None = None,
@@ -412,6 +503,62 @@ def diagnose(
             attribution=AttributionOptions(**given[AttributionOptions]),
         )
     return dressed(Diagnosis, result, recording=measured, model=made)
+
+
+def calibrate(
+    recording: RecordingLike,
+    *,
+    rigid: bool = False,
+    modulus_pa: float | None = None,
+    poisson_ratio: float | None = None,
+    trust: str = "tip",
+    save: str | Path | None = None,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Calibration:
+    """The instrument, from presses on something known: tool's stiffness, sensor, bias, delay, play.
+
+    rigid: on a rigid plate; or modulus_pa and poisson_ratio of an object that the recording traces, or whose
+    geometry options give, see `pp.options("calibrate")`, m. trust: where a common factor is left, "tip"
+    gives it to the sensor, "gain" to the tip's radius. save: TOOL.toml to write, which recordings may name.
+    Raises OptionError unless one of rigid and modulus_pa is given, ContactError or DiagnosisError where
+    presses are too few.
+    """
+    from diagnose.calibrate import calibrate_on_object, calibrate_on_plate
+    from palpate.results.base import dressed
+    from palpate.results.calibration import Calibration
+    from reconstruct.contacts import explore
+    from reconstruct.known_shape import nowhere
+
+    taken("calibrate", options)
+    if rigid == (modulus_pa is not None):
+        raise OptionError(
+            "say on what it was pressed: rigid (--rigid), or modulus_pa (--modulus PA), one of them"
+        )
+    if modulus_pa is not None and not modulus_pa > 0:
+        raise OptionError(f"modulus_pa is {modulus_pa}; it must be greater than 0 Pa")
+    measured = read_recording(recording)
+    with _told("calibrate", progress) as tell:
+        if modulus_pa is None:
+            found = explore(measured, boundary=nowhere(measured), unbroken=True)
+            plain = calibrate_on_plate(measured, found)
+        else:
+            made = reconstruct(
+                measured,
+                poisson_ratio=poisson_ratio,
+                seed=seed,
+                progress=lambda s, x: tell(s, 0.3 * x),
+                **options,
+            )
+            plain = calibrate_on_object(
+                measured, made.model, modulus_pa, trust=trust, seed=seed,
+                progress=lambda s, x: tell(s, 0.3 + 0.7 * x),
+            )  # fmt: skip
+    result = dressed(Calibration, plain)
+    if save is not None:
+        result.save(save)
+    return result
 
 
 def simulate(
@@ -464,7 +611,7 @@ def simulate(
             workers=workers,
             progress=tell,
         )
-    result = simulation_of(plain, Path(thing.name).name)
+    result = simulation_of(plain, Path(thing.name).name, thing)
     return result if save is None else result.save(save)
 
 

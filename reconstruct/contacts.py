@@ -26,6 +26,7 @@ from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
 from reconstruct.tool_weight import tool_weight
+from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
@@ -33,6 +34,8 @@ _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
 _CLEAR = 1.5
 """Presses must reach so many thresholds in the middle: else most were lost, and the loudest mislead."""
+_ABOVE = 10.0
+"""Standard deviations of the filtered force that a cycle's peak stands above the minima beside it."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -63,6 +66,12 @@ class ContactOptions:
         flag="--correct-delay",
     )  # fmt: skip
     site_m: float = option(SITE_M, "presses closer than this repeat one site", unit="m", flag="--site-size")
+    free_air: str = option(
+        "auto",
+        "of a known geometry: auto looks whether the tip is ever off the object, none takes the forces as "
+        "tared",
+        choices=("auto", "none"),
+    )
 
     def __post_init__(self) -> None:
         """Raises OptionError for a site without size."""
@@ -128,12 +137,14 @@ def explore(
     filter_options: FilterOptions | None = None,
     boundary: Boundary | None = None,
     filtered: Filtered | None = None,
+    unbroken: bool = False,
 ) -> Exploration:
     """Phases, support, base outline and palpations of a recording.
 
     boundary: a known base, for recordings without phase I. filtered: of this recording at this cutoff, where
-    it is known already. Raises ContactError where phase I is missing, nothing is touched or too few presses
-    can be used.
+    it is known already. unbroken: contact may never break, so that it is cut at its minima
+    (reconstruct.unbroken). Raises ContactError where phase I is missing, nothing is touched or too few
+    presses can be used.
     """
     options = contact_options or ContactOptions()
     if method not in METHODS:
@@ -143,8 +154,11 @@ def explore(
             f"--contact-threshold is {options.contact_threshold_n} N; it must be greater than 0"
         )
     cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
-    given = _Given(method, options, boundary_options or BoundaryOptions(), boundary)
-    found = _searched(filtered or filtered_of(recording, cutoff_hz), given)
+    given = _Given(method, options, boundary_options or BoundaryOptions(), boundary, unbroken)
+    tared = unbroken and not _off_the_object(recording, options, cutoff_hz)
+    if filtered is None or tared:
+        filtered = filtered_of(recording, cutoff_hz, tared=tared)
+    found = _searched(filtered, given)
     if method == "paper" or not options.correct_delay:
         return _tabled(recording, found, given)
     step = force_delay(found.signals, found.contacts)
@@ -156,7 +170,7 @@ def explore(
         if not samples:
             break
         delay += samples / recording.sample_rate_hz
-        found = _searched(filtered_of(read_earlier(recording, delay), cutoff_hz), given)
+        found = _searched(filtered_of(read_earlier(recording, delay), cutoff_hz, tared=tared), given)
         step = force_delay(found.signals, found.contacts)
     return _tabled(recording, found, given, delay, step.error_s)
 
@@ -167,6 +181,7 @@ class _Given:
     contact: ContactOptions
     boundary: BoundaryOptions
     known_base: Boundary | None
+    unbroken: bool
 
 
 def read_earlier(recording: Recording, delay_s: float) -> Recording:
@@ -177,7 +192,8 @@ def read_earlier(recording: Recording, delay_s: float) -> Recording:
 
 @dataclass(frozen=True)
 class _Found:
-    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations."""
+    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations. cut:
+    (start, end) of those that were cut into cycles."""
 
     signals: Signals
     free_air: np.ndarray
@@ -185,6 +201,7 @@ class _Found:
     contacts: tuple[Found, ...]
     unused: tuple[tuple[int, int, str], ...]
     threshold_n: float
+    cut: tuple[tuple[int, int], ...]
 
 
 def _tabled(
@@ -205,11 +222,13 @@ def _tabled(
         ),
         free_air=found.free_air[late],
         trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
-        others_s=[(t[a], t[b - 1]) for a, b, _ in found.unused],
+        others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
         noise_n=signals.noise_n,
         delay_s=delay_s,
         delay_error_s=delay_error_s,
         site_m=given.contact.site_m,
+        kinds=["cycle" if c.unbroken else "press" for c in contacts],
+        until_s=t[[c.end - 1 for c in contacts]],
     )
     return Exploration(
         recording=recording,
@@ -258,8 +277,22 @@ def _searched(filtered: Filtered, given: _Given) -> _Found:
     return found
 
 
+def _off_the_object(recording: Recording, contact: ContactOptions, cutoff_hz: float) -> bool:
+    """Whether there is free air to be found."""
+    if contact.free_air == "none":
+        return False
+    rate = recording.sample_rate_hz
+    position, force = (
+        low_pass_at(recording.t, values, rate, cutoff_hz)
+        for values in (recording.position, recording.force_on_tool)
+    )
+    noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), 1e-6)
+    return free_air_seen(position, force, recording.tip_radius_m, noise * noise_gain(rate, cutoff_hz))
+
+
 def _found(filtered: Filtered, given: _Given) -> _Found:
     signals, recording = filtered.signals, filtered.signals.recording
+    spread, free_air = filtered.spread, filtered.free_air
     method, options, boundary = given.method, given.contact, given.known_base
     high = PAPER_THRESHOLD_N if method == "paper" else filtered.least * float(filtered.spread.min())
     high = options.contact_threshold_n or high
@@ -279,8 +312,16 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     least_peak = options.least_peak_n or high
     contacts: list[Found] = []
     unused: list[tuple[int, int, str]] = []
+    cut_apart: list[Piece] = []
+    cut_up: list[tuple[int, int]] = []
     touches = runs(touching)
     for a, b in touches:
+        if given.unbroken:
+            pieces = cycles(signals, a, b, _ABOVE * float(spread[a:b].min()))
+            if len(pieces) > 1 or (a == 0 and not free_air.any()):
+                cut_apart += pieces
+                cut_up.append((a, b))
+                continue
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
@@ -290,6 +331,10 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
             contacts.append(contact)
         else:
             unused.append((a, b, reason))
+    if cut_apart:
+        found, slipped = found_cycles(signals, cut_apart)
+        contacts = sorted([*contacts, *found], key=lambda c: c.start)
+        unused = sorted([*unused, *slipped])
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
         hint = f"press at more places, and until the force is above {high:.2g} N"
@@ -304,17 +349,27 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    return _Found(signals, filtered.free_air, boundary, tuple(contacts), tuple(unused), high)
+    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
 
 
-def filtered_of(recording: Recording, cutoff_hz: float) -> Filtered:
-    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off."""
+def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) -> Filtered:
+    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off.
+
+    tared: nothing is free air, and forces are taken as they are.
+    """
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
     noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
     white = noise * noise_gain(rate, cutoff_hz)
+    if tared:
+        nothing = np.zeros_like(filtered)
+        position = low_pass_at(recording.t, recording.position, rate, cutoff_hz)
+        size = np.linalg.norm(filtered, axis=1)
+        raw = recording.force_on_tool
+        signals = Signals(recording, position, filtered, size, raw, noise)
+        return Filtered(signals, nothing, np.full(len(size), white), cutoff_hz)
     weight, inertia = tool_weight(recording, filtered, cutoff_hz)
     left = np.linalg.norm(filtered - weight, axis=1)
     drift, _ = free_air_force(recording.t, filtered - weight, max(white, crowd_scale(left)))

@@ -12,6 +12,7 @@ from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchan
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Touch
 from mechanics.model import Model
+from mechanics.schema import Key
 
 _TURN = 0.25  # of the range: the way back over which the pull sets in, so that no force steps
 _TURN_INSIDE_M = 1e-3  # the same deeper in the contact
@@ -66,6 +67,11 @@ EFFECT = Effect(
         Parameter("range_m", "m", 1e-4, 4e-3, 1e-3, (3e-4, 1.2e-3, 6e-4), 1e-4),
         Parameter("inside", "1", 0.0, 1.0, 0.0, (0.1, 0.3, 0.9), 0.05),
     ),
+    keys={
+        "pull_off_n": Key(low=0.0, high=100.0, unit="N", required=True),
+        "range_m": Key(low=1e-6, high=0.1, unit="m", required=True),
+        "inside": Key(low=0.0, high=1.0),
+    },
     report=_report,
     touch=_touch,
     law=LAW,

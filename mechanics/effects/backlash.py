@@ -6,21 +6,11 @@ not taken off a recording: the tip's side of the play is not known in free air.
 """
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
-
-
-@njit(cache=True)
-def play(start, y, width, out):
-    """Play operator, axis by axis: what follows is dragged once it is width / 2 behind. start: (p + 1,)."""
-    half = 0.5 * width
-    for p in range(start.shape[0] - 1):
-        for k in range(3):
-            out[start[p], k] = y[start[p], k]
-            for i in range(start[p] + 1, start[p + 1]):
-                out[i, k] = min(max(out[i - 1, k], y[i, k] - half), y[i, k] + half)
+from mechanics.leads import play
+from mechanics.schema import Key
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -44,6 +34,7 @@ EFFECT = Effect(
     scope=Scope.TIME,
     words="a constant play lies between the tip and the position sensor",
     parameters=(Parameter("width_m", "m", -2e-3, 2e-3, 0.0, (1e-4, 4e-4, -1e-4, -4e-4), 2e-5),),
+    keys={"width_m": Key(low=0.0, high=0.1, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {"width_m": abs(float(values[0]))},
     change=_change,
     # within the play the tip's place is not known, so a fit with the right width still misses

@@ -17,6 +17,7 @@ from mechanics.effects.law import Law
 from mechanics.errors import ModelError
 from mechanics.model import Model
 from mechanics.recording import Recording
+from mechanics.schema import ANY, Schema
 
 if TYPE_CHECKING:
     from mechanics.effects.settings import Scene, Settings, Touch
@@ -84,7 +85,8 @@ class Effect:
     """A departure from the ideal model.
 
     words: what it is; plain_words: the same for a person who knows no mechanics, where that needs others.
-    report(values, scene, modulus_pa): its keys; keys_in_words(keys): where a list of numbers says little.
+    report(values, scene, modulus_pa): its keys; keys: their types, ranges and units, as a model's
+    [effects.NAME] may hold them; keys_in_words(keys): where a list of numbers says little.
     touch(touch, keys, model): its law, where it acts on what one tip feels; prediction and renderer run it.
     change(settings, values, scene): what it does to a prediction besides, or instead where its keys say less
     than its values.
@@ -117,6 +119,7 @@ class Effect:
     words: str
     parameters: tuple[Parameter, ...]
     report: Callable[[np.ndarray, Scene, float], dict[str, Any]]
+    keys: Schema | None = ANY
     plain_words: str = ""
     keys_in_words: Callable[[Keys], str] | None = None
     role: Role = Role.SEARCHED

@@ -6,6 +6,7 @@ import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.settings import Scene, Settings
+from mechanics.schema import Key
 from mechanics.support_motion import far_on_springs
 
 _FELT = 1.5e-3  # share of the object's height that counts as no compliance
@@ -44,6 +45,10 @@ EFFECT = Effect(
         Parameter("log_compliance_of_height", "ln 1", np.log(1e-3), 2.5, np.log(1e-3), (-1.5, 0.0), 0.05),
         Parameter("log_tangential", "ln 1", -2.5, 1.0, -0.5, (-0.5, -0.5), 0.05, 0.7),
     ),
+    keys={
+        "k_normal_pa_per_m": Key(low=1.0, high=1e15, unit="Pa/m", required=True),
+        "k_tangential_pa_per_m": Key(low=1.0, high=1e15, unit="Pa/m", required=True),
+    },
     report=_report,
     change=_change,
     apply=unchanged,

@@ -28,6 +28,7 @@ EFFECT = Effect(
     scope=Scope.PRESS,
     words="the presses are so deep that small-strain elasticity no longer holds",
     parameters=(),
+    keys={},
     report=no_keys,
     plain_words="the presses are so deep that the material is stretched and squeezed strongly, where force "
     "no longer follows the simple law of elasticity",

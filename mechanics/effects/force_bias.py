@@ -7,6 +7,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
 from mechanics.effects.settings import SHIFTED, Scene, Settings
 from mechanics.recording import Recording
+from mechanics.schema import Key
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -25,6 +26,7 @@ EFFECT = Effect(
     scope=Scope.READING,
     words="the force sensor does not read zero in free air",
     parameters=tuple(Parameter(f"bias_{a}_n", "N", -2.0, 2.0, 0.0, (0.0,), 0.005) for a in "xyz"),
+    keys={"bias_n": Key(low=-1e3, high=1e3, size=3, unit="N", required=True)},
     report=lambda values, scene, modulus_pa: {"bias_n": [float(v) for v in values]},
     role=Role.FREE_AIR,
     change=_change,

@@ -7,6 +7,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
 from mechanics.effects.settings import SHIFTED, Scene, Settings
 from mechanics.recording import Recording
+from mechanics.schema import Key
 
 
 def drifted(t: np.ndarray, rate_n_per_s: np.ndarray) -> np.ndarray:
@@ -29,6 +30,7 @@ EFFECT = Effect(
     scope=Scope.READING,
     words="the zero of the force sensor drifts",
     parameters=tuple(Parameter(f"rate_{a}_n_per_s", "N/s", -0.02, 0.02, 0.0, (0.0,), 1e-4) for a in "xyz"),
+    keys={"rate_n_per_s": Key(low=-1e3, high=1e3, size=3, unit="N/s", required=True)},
     report=lambda values, scene, modulus_pa: {"rate_n_per_s": [float(v) for v in values]},
     role=Role.FREE_AIR,
     change=_change,

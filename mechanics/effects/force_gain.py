@@ -7,6 +7,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import MIXED, Scene, Settings
 from mechanics.recording import Recording
+from mechanics.schema import ANY
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -30,6 +31,7 @@ EFFECT = Effect(
         for a in "xyz"
         for b in "xyz"
     ),
+    keys={"matrix": ANY},
     report=lambda values, scene, modulus_pa: {"matrix": np.asarray(values).reshape(3, 3).tolist()},
     plain_words="the force sensor's axes read too much or too little, or into one another",
     change=_change,

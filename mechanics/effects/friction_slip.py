@@ -11,6 +11,7 @@ from numba import njit
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
+from mechanics.schema import Key
 
 SLIPS = 12
 CAUTION, SECANT_CAUTION = 0.9, 0.98
@@ -54,6 +55,7 @@ EFFECT = Effect(
     scope=Scope.PRESS,
     words="the tip slides instead of sticking",
     parameters=(Parameter("mu", "1", 0.005, 1.5, 1.5, (0.05, 0.15, 0.4), 0.01),),
+    keys={"mu": Key(low=0.0, high=100.0, required=True)},
     report=lambda values, scene, modulus_pa: {"mu": float(values[0])},
     touch=_touch,
     apply=unchanged,

@@ -15,7 +15,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Misfit, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
-from mechanics.material import Ball
+from mechanics.material import BALL, Ball
 from mechanics.model import Model
 from mechanics.moduli import inclusion_ratio
 from mechanics.patch import PatchSampler
@@ -155,6 +155,7 @@ EFFECT = Effect(
             "log_ratio", "1", np.log(RATIO_LIMITS[0]), np.log(RATIO_LIMITS[1]), 0.0, (1.0, -0.7), 0.05, 1.5
         ),
     ),
+    keys=BALL,
     report=_report,
     change=_change,
     apply=_apply,

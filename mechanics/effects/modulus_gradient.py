@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields, far_with_weights
-from mechanics.material import Gradient
+from mechanics.material import GRADIENT, Gradient
 from mechanics.model import Model
 from mechanics.moduli import gradient_ratio
 
@@ -45,6 +45,7 @@ EFFECT = Effect(
     scope=Scope.PLACES,
     words="the object is stiffer at one end than at the other",
     parameters=(Parameter("log_ratio", "1", -3.0, 3.0, 0.0, (0.3, -0.3), 0.05),),
+    keys=GRADIENT,
     report=_report,
     change=_change,
     apply=_apply,

@@ -16,6 +16,7 @@ from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchan
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
+from mechanics.schema import Key
 
 _NONE = 1e-6  # 1 / r that counts as none
 
@@ -59,6 +60,10 @@ EFFECT = Effect(
         Parameter("inverse_r", "1", 0.0, 0.8, 0.0, (0.1, 0.1), 0.01),
         Parameter("m_rel", "1", 0.01, 2.0, 0.3, (0.1, 0.4), 0.02),
     ),
+    keys={
+        "r": Key(low=1.0, high=1e9, required=True),
+        "m_rel": Key(low=1e-6, high=1e3, required=True),
+    },
     report=lambda values, scene, modulus_pa: {
         "r": float(1 / max(values[0], _NONE)),
         "m_rel": float(values[1]),

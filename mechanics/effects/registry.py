@@ -6,6 +6,7 @@ import importlib
 
 from mechanics.effects.base import Effect
 from mechanics.errors import OptionError
+from mechanics.schema import Schema
 
 NAMES = (
     "finite_strain",
@@ -46,3 +47,8 @@ def effects(*, without: frozenset[str] | set[str] = frozenset()) -> tuple[Effect
     for name in without:
         effect(name)
     return tuple(effect(name) for name in NAMES if name not in without)
+
+
+def effect_keys() -> dict[str, Schema | None]:
+    """What a model's [effects.NAME] may hold, by name."""
+    return {each.name: each.keys for each in effects()}

@@ -15,7 +15,7 @@ from mechanics.dent import grid
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.far_field import energy_fields, far_with_weights
-from mechanics.material import Skin
+from mechanics.material import SKIN, Skin
 from mechanics.model import Model
 
 
@@ -80,6 +80,7 @@ EFFECT = Effect(
         Parameter("thickness_m", "m", 3e-4, 8e-3, 3e-3, (2e-3, 2e-3), 2e-4),
         Parameter("log_ratio", "1", -2.0, 3.0, 0.0, (0.5, -0.4), 0.03),
     ),
+    keys=SKIN,
     report=_report,
     of_material=_of_material,
     change=_change,

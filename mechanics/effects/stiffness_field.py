@@ -17,8 +17,10 @@ from mechanics.effects.base import Effect, Keys, Misfit, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields
 from mechanics.field_response import far_of, shares_in_elements, tips_of
+from mechanics.material import LENGTH
 from mechanics.model import Model
 from mechanics.places import Places
+from mechanics.schema import ANY, Key
 from mechanics.smooth_field import (
     Prior,
     SmoothField,
@@ -145,6 +147,11 @@ EFFECT = Effect(
         Parameter(f"pattern_{k + 1}", "1", -6.0, 6.0, 0.0, (0.5 if k < 2 else 0.0,), 0.05, 1.0)
         for k in range(MODES)
     ),
+    keys={
+        "places_m": ANY,
+        "ratio": Key(low=1e-3, high=1e3, size=0, required=True),
+        "length_m": LENGTH,
+    },
     report=_report,
     keys_in_words=_words,
     change=_change,

@@ -14,6 +14,7 @@ from mechanics.dent import grid
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
+from mechanics.schema import Key
 
 FORCE_PER_C20, FORCE_POWER = 0.197, 1.25
 SIDEWAYS_PER_C20, SIDEWAYS_POWER = 0.129, 1.7
@@ -39,6 +40,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the material stiffens as it is strained",
     parameters=(Parameter("c20_over_c10", "1", 0.0, 4.0, 0.0, (0.3,), 0.02),),
+    keys={"c20_over_c10": Key(low=0.0, high=100.0, required=True)},
     report=lambda values, scene, modulus_pa: {"c20_over_c10": float(values[0])},
     touch=_touch,
     apply=unchanged,

@@ -7,6 +7,7 @@ import numpy as np
 
 from mechanics.effects.base import Effect, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
+from mechanics.schema import Key
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -24,6 +25,10 @@ EFFECT = Effect(
         *(Parameter(f"shift_{a}_m", "m", -8e-3, 8e-3, 0.0, (0.0,), 5e-5, 2e-3) for a in "xyz"),
         *(Parameter(f"rotation_{a}_rad", "rad", -0.15, 0.15, 0.0, (0.0,), 1e-3, 0.03) for a in "xyz"),
     ),
+    keys={
+        "shift_m": Key(low=-1.0, high=1.0, size=3, unit="m", required=True),
+        "rotation_rad": Key(low=-4.0, high=4.0, size=3, unit="rad", required=True),
+    },
     report=lambda values, scene, modulus_pa: {
         "shift_m": [float(v) for v in values[:3]],
         "rotation_rad": [float(v) for v in values[3:]],

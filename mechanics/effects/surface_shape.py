@@ -7,6 +7,7 @@ say, so it is not rendered.
 """
 
 from mechanics.effects.base import Effect, Role, Scope, no_keys
+from mechanics.schema import ANY, Key
 
 EFFECT = Effect(
     name="surface_shape",
@@ -14,6 +15,7 @@ EFFECT = Effect(
     scope=Scope.PLACES,
     words="the reconstructed shape is wrong where nobody touched",
     parameters=(),
+    keys={"rms_m": Key(low=0.0, high=1.0, unit="m"), "where": ANY},
     report=no_keys,
     role=Role.REST,
 )

@@ -9,6 +9,7 @@ from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import LATE, Scene, Settings
 from mechanics.recording import Recording
 from mechanics.samples import delayed
+from mechanics.schema import Key
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -27,6 +28,7 @@ EFFECT = Effect(
     scope=Scope.TIME,
     words="the force is read later than the position",
     parameters=(Parameter("delay_s", "s", -0.08, 0.08, 0.0, (0.01, -0.01), 0.002),),
+    keys={"delay_s": Key(low=-10.0, high=10.0, unit="s", required=True)},
     report=lambda values, scene, modulus_pa: {"delay_s": float(values[0])},
     change=_change,
     correct=_correct,

@@ -3,6 +3,7 @@
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
+from mechanics.schema import Key
 
 
 def _touch(touch: Touch, keys: Keys, model: Model) -> None:
@@ -17,6 +18,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the tip is larger or smaller than stated",
     parameters=(Parameter("ratio", "1", 0.4, 2.5, 1.0, (0.8, 1.25), 0.02),),
+    keys={"tip_radius_m": Key(low=1e-5, high=0.1, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {"tip_radius_m": float(values[0] * scene.tip_radius)},
     touch=_touch,
     apply=unchanged,

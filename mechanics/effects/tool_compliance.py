@@ -7,6 +7,7 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
 from mechanics.recording import Recording
+from mechanics.schema import Key
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -24,6 +25,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the tool bends: the tip is not where the position sensor says",
     parameters=(Parameter("compliance_m_per_n", "m/N", 0.0, 0.01, 0.0, (5e-4,), 5e-5),),
+    keys={"stiffness_n_per_m": Key(low=1.0, high=1e12, unit="N/m", required=True)},
     report=lambda values, scene, modulus_pa: {"stiffness_n_per_m": float(1 / np.maximum(values[0], 1e-9))},
     change=_change,
     correct=_correct,

@@ -9,6 +9,7 @@ from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
 from mechanics.effects.settings import WEIGHED, Scene, Settings
 from mechanics.kinematics import acceleration
 from mechanics.recording import Recording
+from mechanics.schema import Key
 
 STANDARD_GRAVITY = 9.80665
 
@@ -48,6 +49,7 @@ EFFECT = Effect(
         Parameter("mass_kg", "kg", 0.0, 1.0, 0.0, (0.02, 0.02), 0.002),
         Parameter("weight_share", "1", 0.0, 1.0, 0.0, (0.0, 1.0), 0.05),
     ),
+    keys={"mass_kg": Key(low=-5.0, high=5.0, unit="kg", required=True), "tared": Key(bool)},
     report=lambda values, scene, modulus_pa: {"mass_kg": float(values[0]), "tared": bool(values[1] < 0.5)},
     role=Role.FREE_AIR,
     change=_change,

@@ -6,6 +6,7 @@ import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.settings import Scene, Settings
+from mechanics.schema import Key
 from mechanics.support_motion import ANGLES, far_partly_bonded, support_axes
 
 
@@ -38,6 +39,10 @@ EFFECT = Effect(
         Parameter("angle", "rad", -7.0, 14.0, 0.0, (0.0,), 0.1),
         Parameter("floor", "1", 0.0, 1.0, 1.0, (1.0,), 0.05, 0.7),
     ),
+    keys={
+        "bonded_fraction": Key(low=1e-3, high=1.0, required=True),
+        "direction": Key(low=-1e3, high=1e3, size=3, required=True),
+    },
     report=_report,
     change=_change,
     apply=unchanged,

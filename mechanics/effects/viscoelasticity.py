@@ -17,6 +17,7 @@ from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
 from mechanics.model import Model
+from mechanics.schema import Key
 
 
 @njit(cache=True, error_model="numpy")
@@ -99,6 +100,10 @@ EFFECT = Effect(
             "log_tau_slow", "ln s", np.log(0.05), np.log(100.0), np.log(0.7), (np.log(0.7),), 0.05, 1.0
         ),
     ),
+    keys={
+        "g": Key(low=0.0, high=100.0, size=0, required=True),
+        "tau_s": Key(low=1e-6, high=1e5, size=0, unit="s", required=True),
+    },
     report=_report,
     keys_in_words=_in_words,
     touch=_touch,
