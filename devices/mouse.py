@@ -92,7 +92,7 @@ class MouseDevice(OpenInWith):
         if self._position is None:
             self._position, self._velocity = np.array(pose.position_m), _ZERO
             self._from = self._to = self._position
-            self._left = 0
+            self._left, self._written_s = 0, pose.time_s
             self._sequence += 1
         if pose.time_s != self._written_s:
             took_s = min(max(pose.time_s - self._written_s, 0.0), WINDOW_SILENT_S)

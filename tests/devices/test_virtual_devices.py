@@ -125,6 +125,18 @@ def test_exploration_presses_to_the_force_it_means_and_comes_back() -> None:
     assert min(heights) > 0, "directions stay within the given spread of 'up'"
 
 
+@pytest.mark.parametrize("radius_m", [0.02, 0.09, 0.5])
+def test_an_exploring_hand_never_hurries(radius_m: float) -> None:
+    """Whatever the next direction: its 128th turn once went at 2.1 m/s, faster than its own device allows."""
+    explorer = FreeExploration(np.zeros(3), radius_m, speed_m_per_s=1.0, hold_s=0.0, seed=0)
+    times = np.arange(0.0, 300.0, 0.004)
+    places = np.array([explorer.place(t, np.zeros(3), np.zeros(3)) for t in times])
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / 0.004
+    assert speeds.max() < 2.01, "out at twice its own pace"
+    around = np.abs(np.linalg.norm(places[:-1], axis=1) - radius_m) < 1e-9
+    assert 0.1 < speeds[around].max() <= 1.01
+
+
 def test_path_reaches_its_waypoints_without_a_jerk() -> None:
     path = Path([0.0, 1.0, 2.0], [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]])
     assert path.place(1.0, None, None) == pytest.approx([0.1, 0, 0])
