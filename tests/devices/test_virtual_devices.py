@@ -242,7 +242,7 @@ def test_mouse_follows_smoothly_and_goes_stale_with_its_window() -> None:
 
 @pytest.mark.parametrize("frames_per_s", [60.0, 8.0, 2.0])
 def test_slow_pictures_make_late_motion_and_no_steps(frames_per_s: float) -> None:
-    """A place moved at 40 mm/s, told rarely: the tip goes at no more than that, between any two ticks."""
+    """A place moved at 40 mm/s, told rarely: the tip goes no faster, between any two ticks."""
     clock = Clock()
     channel = PoseChannel.create()
     with MouseDevice(channel.path, clock=clock) as mouse:
@@ -255,8 +255,8 @@ def test_slow_pictures_make_late_motion_and_no_steps(frames_per_s: float) -> Non
             xs.append(mouse.read().position_m[0])
     channel.close()
     steps = np.diff(xs)
-    assert steps.max() < 1.1 * 0.04e-3 and steps[len(steps) // 2 :].min() > 0.9 * 0.04e-3
-    assert np.abs(np.diff(steps)).max() < 0.04e-3 / 20, "and its speed changes smoothly"
+    assert steps.max() < 1.05 * 0.04e-3 and steps[len(steps) // 2 :].min() > 0.9 * 0.04e-3
+    assert np.abs(np.diff(steps)).max() < 0.25 * 0.04e-3, "and its speed changes smoothly"
     assert xs[-1] == pytest.approx(0.16, abs=0.04 * (0.05 + 2.0 / frames_per_s))
 
 
