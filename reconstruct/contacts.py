@@ -222,7 +222,7 @@ def _tabled(
         ),
         free_air=found.free_air[late],
         trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
-        others_s=[(t[a], t[b - 1]) for a, b, *_ in (*found.unused, *found.cut)],
+        others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
         noise_n=signals.noise_n,
         delay_s=delay_s,
         delay_error_s=delay_error_s,
