@@ -47,7 +47,7 @@ _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)
 _BRISK, _TAKES_UP, _PRESSED = 0.2, 0.3, 0.1
 _CORRELATED = 10.0
 _PLAIN_Z = 4.0
-_LAW_SD = (1e-3, 2e-6, 1e-4)
+_LAW_SD = (1e-3, 5e-6, 2e-4)
 """What filter and sampling leave besides noise: share of the tool's give, m of half the play, s of the delay
 (twenty drawn plates; `palpate bench calibrate`)."""
 

@@ -130,13 +130,13 @@ def _phantom(seed: int, name: str) -> list[dict[str, Any]]:
     found = api.calibrate(
         spoilt, modulus_pa=float((clean.truth or {})["young_modulus_pa"]), seed=seed, progress=False
     )
-    between = found.interval
+    between, told = found.interval, found.stiffness_n_per_m
     common = float(np.trace(found.matrix)) / 3 if found.matrix is not None else None
     off = None if found.matrix is None else float(np.abs(found.matrix - matrix).max())
     return [
         _judged("object: common gain, share", gain, common, between.get("common_gain"), gain),
         _judged("object: worst of the matrix", 0.0, off, None, 1.0),
-        _judged("object: stiffness, share", stiffness, found.stiffness_n_per_m, between.get(STIFF), stiffness),
+        _judged("object: stiffness, share", stiffness, told, between.get(STIFF), stiffness),
         _judged("object: delay, s", late, found.delay_s, between.get("delay_s"), 1.0),
         _judged("object: bias, N", 0.0, _off(found.bias_n, bias), None, 1.0),
     ]  # fmt: skip
