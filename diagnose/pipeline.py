@@ -12,7 +12,7 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets
+from diagnose.instrument_offsets import find_instrument_offsets, read_sideways
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
@@ -97,7 +97,10 @@ def diagnose(
     misfit = misfit_of(forward, base.found, site_sd)
     search.starts = {e.name: e.seek(forward, misfit) for e in tried if e.seek is not None}
     lap("baseline")
-    found = attribute(search, tried, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
+    seen = read_sideways(rigid) & frozenset(e.name for e in tried)
+    if rigid is not None and seen:
+        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
+    found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
     evidence = Evidence(
         forward, search, found, free, offsets, site_sd, frozenset(excluded), options.shape_gain,
