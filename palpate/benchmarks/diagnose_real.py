@@ -31,6 +31,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", required=True, help="folder that holds the sets' folders")
     parser.add_argument("--sets", default=",".join(SETS), help=f"which: {', '.join(SETS)}")
     parser.add_argument("--session", default="230331", help="pieces of beef whose names begin so")
+    parser.add_argument("--every", type=int, default=1, help="only each so-manieth silicone (default: 1)")
     parser.add_argument("--pieces", type=int, default=16, help="at most so many of them")
 
 
@@ -94,7 +95,7 @@ Rows = Iterator[tuple[str, Material]]
 
 
 def _silicones(folder: Path, arguments: argparse.Namespace) -> Rows:
-    for each in sorted(p for p in folder.iterdir() if p.is_dir()):
+    for each in sorted(p for p in folder.iterdir() if p.is_dir())[:: arguments.every]:
         files = sorted(each.glob("*.csv"))
         if files:
             yield each.name, api.material(*files, progress=False)
