@@ -321,8 +321,8 @@ class Approach:
     turn.
 
     error: dent law (and 'hunt-crossley', 'regression') -> rms error over rms force, median of the curves.
-    law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does not come back;
-    pull_n: (c,) N, greatest pull on the way out.
+    law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does not come back
+    (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
     """
 
     error: dict[str, float]
@@ -350,7 +350,9 @@ def approach_of(bench: Bench) -> Approach:
             errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
         back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
         given = max(np.trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
-        work.append(1 + np.trapezoid(push[back], u[back]) / given)
+        # a curve that ends in its hold gives nothing back to be weighed
+        gone = 1 + np.trapezoid(push[back], u[back]) / given
+        work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
         pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
     law = min(APPROACH_LAWS, key=lambda name: medians[name])

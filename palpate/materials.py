@@ -187,6 +187,8 @@ def _few(bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[s
     own = approach.modulus_pa
     low, high = _mean_interval(own)
     gone = f"{100 * approach.hysteresis:.0f} % of the work does not come back"
+    if not np.isfinite(approach.hysteresis):
+        gone = "it ends in its hold"
     pull = float(approach.pull_n.max())
     if pull > 0:
         gone += f", and it pulls by up to {pull:.2g} N on the way out"

@@ -132,6 +132,8 @@ def test_what_is_no_test_or_two_kinds_is_one_line(tmp_path, capsys):
     )
     with pytest.raises(RecordingError, match="--tip-radius"):
         pp.material(tmp_path / "up.csv", progress=False)
+    with pytest.raises(OptionError, match="give metres"):
+        pp.material(tmp_path / "up.csv", tip_radius_m=5, progress=False)
     with pytest.raises(ContactError, match="signs"):
         pp.material(tmp_path / "up.csv", tip_radius_m=0.005, progress=False)
     assert cli.main(["material", *map(str, files), "--json", str(tmp_path / "out.json")]) == 0
