@@ -124,7 +124,8 @@ def _indentations(
         raise RecordingError("the tip's radius is in no file: give --tip-radius M")
     if not _TIPS_M[0] <= tip_radius_m <= _TIPS_M[1]:
         raise OptionError(
-            f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and {_TIPS_M[1]:g} m: give metres"
+            f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and "
+            f"{_TIPS_M[1]:g} m: give metres"
         )
     good = [s for s in stated if np.isfinite(s)]
     return Tests(
