@@ -3,7 +3,9 @@
 The set: github.com/SarahIaquinta/perineal_indentation (GPL-3.0), converted to CSVs with the columns t_s,
 force_N, indent_mm, tool_gap_mm at 10 Hz. Every piece is another animal's, so each force is scaled to 1 N at
 3 mm of its ramp, and the pieces become places on one slab. The indenter's shape is not stated; a sphere of
-5 mm is taken. What can be judged: whether the hold's decay is called viscoelasticity, and what its terms are.
+5 mm is taken. What can be judged: whether the hold's decay is called viscoelasticity, what its terms are, and
+how well they tell a hold that no fit has seen from that piece's own ramp: there neither the piece's stiffness
+nor the form of its depth law matters, which are another animal's in every piece.
 """
 
 from __future__ import annotations
@@ -14,12 +16,20 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.result import Diagnosis
+from diagnose.whiten import NuisanceOptions
 from mechanics.box_mesh import box_mesh
+from mechanics.effects.registry import effect
+from mechanics.effects.settings import Touch
+from mechanics.effects.viscoelasticity import LAW as PRONY
 from mechanics.errors import RecordingError
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.press_cutting import cut
 from mechanics.recording import Recording
+from palpate.benchmarks.timing import table
+from reconstruct.external.relaxation import FORMS, Held, fit_holds, hold_error
 
 SUMMARY = "diagnosis of measured meat indentations (ramp and hold)"
 RADIUS_M = 0.005
@@ -34,24 +44,76 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--data", required=True, help="folder with the CSVs of the pieces")
     parser.add_argument("--session", default="230331", help="the pieces whose names begin so")
     parser.add_argument("--pieces", type=int, default=16, help="at most so many")
+    parser.add_argument("--holds-only", action="store_true", help="only the holds, from their own ramps")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Diagnose the pieces as one recording and print the verdict."""
-    from diagnose.pipeline import DiagnoseOptions, diagnose
-    from diagnose.whiten import NuisanceOptions
-
+    """Diagnose the pieces as one recording, then each half to tell the holds of the other; print both."""
     pieces = sorted(Path(arguments.data).glob(f"{arguments.session}_[RF]*.csv"))[: arguments.pieces]
     if len(pieces) < 6:
         raise RecordingError(f"--data {arguments.data} holds {len(pieces)} pieces of session "
                              f"{arguments.session}; at least 6 are needed")  # fmt: skip
+    figures: dict[str, Any] = {"pieces": len(pieces)}
+    if not arguments.holds_only:
+        result = diagnosed(pieces)
+        print(f"{len(pieces)} pieces")
+        print("\n".join(result.words()))
+        figures |= result.as_json()
+    figures["unseen_holds"] = unseen_holds(pieces, diagnosing=not arguments.holds_only)
+    rows = [
+        [form, f"{f['rms_n']:.3f} N", f"{f['closed']:.0%}"] for form, f in figures["unseen_holds"].items()
+    ]
+    print(table(["memory", "unseen holds miss by (rms)", "closed of what none leaves"], rows))
+    return figures
+
+
+def diagnosed(pieces: list[Path]) -> Diagnosis:
+    """The pieces as one recording on one slab."""
     recording, model = slab(pieces)
-    # pieces differ in thickness and grain: a tenth each
-    nuisance = NuisanceOptions(site_stiffness=0.1, onset_m=0.5e-3, law=0.1)
-    result = diagnose(recording, model, DiagnoseOptions(fast=True), nuisance=nuisance)
-    print(f"{len(pieces)} pieces")
-    print("\n".join(result.words()))
-    return {**result.as_json(), "pieces": len(pieces)}
+    # pieces differ in thickness and grain: in stiffness by a quarter, in the power of their depth law as well
+    nuisance = NuisanceOptions(site_stiffness=0.25, onset_m=0.5e-3, law=0.25)
+    return diagnose(recording, model, DiagnoseOptions(fast=True), nuisance=nuisance)
+
+
+def unseen_holds(pieces: list[Path], *, diagnosing: bool = True) -> dict[str, dict[str, float]]:
+    """How far each form of memory, found in one half of the pieces, misses the other half's holds, N rms.
+
+    'diagnosed': the terms that a diagnosis of that half names; the others are fitted to its own holds.
+    """
+    presses = [held(path) for path in pieces]
+    halves = [(list(range(k, len(pieces), 2)), list(range(1 - k, len(pieces), 2))) for k in (0, 1)]
+    errors: dict[str, list[np.ndarray]] = {form: [] for form in FORMS}
+    if diagnosing:
+        errors["diagnosed"] = []
+    for seen, unseen in halves:
+        terms = {form: fit_holds([presses[k] for k in seen], form) for form in FORMS}
+        if diagnosing:
+            terms["diagnosed"] = _named_terms(diagnosed([pieces[k] for k in seen]))
+        for form, (g, tau) in terms.items():
+            errors[form] += [hold_error(presses[k], g, tau) for k in unseen]
+    rms = {form: float(np.sqrt(np.mean(np.concatenate(e) ** 2))) for form, e in errors.items()}
+    return {form: {"rms_n": each, "closed": 1 - each / rms["elastic"]} for form, each in rms.items()}
+
+
+def _named_terms(result: Diagnosis) -> tuple[np.ndarray, np.ndarray]:
+    """(g, tau_s) of the relaxation that a diagnosis names; no memory where it names none."""
+    touch = Touch()
+    for entry in result.entries:
+        known = effect(entry.name)
+        if entry.name in result.effects and known.phenomenon == "relaxation":
+            known.set_touch(touch, entry.parameters, None)
+    pairs = touch.numbers.get(PRONY, np.array([0.0, 1.0])).reshape(-1, 2)
+    return pairs[:, 0], pairs[:, 1]
+
+
+def held(path: Path) -> Held:
+    """A piece's force, scaled as in `slab`, from just before its first touch."""
+    t, force, depth = (column for column in np.loadtxt(path, delimiter=",", skiprows=1)[:, :3].T)
+    force = force - np.median(force[:3])
+    ramp = slice(0, int(depth.argmax()))
+    force = force / np.interp(3.0, depth[ramp], force[ramp])
+    begin = max(int(np.flatnonzero(force > 0.02)[0]) - 1, 0)
+    return Held(t[begin:], force[begin:], int(force.argmax()) - begin)
 
 
 def slab(pieces: list[Path]) -> tuple[Recording, Model]:
@@ -61,9 +123,9 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
     height = float(np.median([t[0, 3] for t in tables])) * 1e-3
     times, centres, forces, found = [], [], [], []
     clock = 0.0
-    for k, table in enumerate(tables):
+    for k, piece in enumerate(tables):
         early = round(0.3 * RATE_HZ)
-        t, force, depth = table[:, 0], table[:, 1] - np.median(table[:early, 1]), table[:, 2] * 1e-3
+        t, force, depth = piece[:, 0], piece[:, 1] - np.median(piece[:early, 1]), piece[:, 2] * 1e-3
         force = force / np.interp(3e-3, depth[: depth.argmax()], force[: depth.argmax()])
         x = (k - (len(tables) - 1) / 2) * SPACING_M
         touched = np.flatnonzero(force > 0.02)[0]
@@ -99,7 +161,7 @@ def slab(pieces: list[Path]) -> tuple[Recording, Model]:
     return recording, model
 
 
-def _finer(table: np.ndarray) -> np.ndarray:
+def _finer(piece: np.ndarray) -> np.ndarray:
     """The columns at RATE_HZ, straight between the machine's readings."""
-    t = np.arange(table[0, 0], table[-1, 0], 1 / RATE_HZ)
-    return np.column_stack([t, *(np.interp(t, table[:, 0], column) for column in table[:, 1:].T)])
+    t = np.arange(piece[0, 0], piece[-1, 0], 1 / RATE_HZ)
+    return np.column_stack([t, *(np.interp(t, piece[:, 0], column) for column in piece[:, 1:].T)])
