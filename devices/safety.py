@@ -62,7 +62,11 @@ class SafetyOptions:
     """What the filter allows; the device's own specification is never exceeded."""
 
     max_force_n: float | None = option(
-        None, "greatest force; the device's own limit if lower", unit="N", low=0.01, high=200.0
+        None,
+        "greatest force, or the device's own limit if lower; None: the device's own",
+        unit="N",
+        low=0.01,
+        high=200.0,
     )
     slew_n_per_s: float = option(
         2000.0, "fastest rise of the force", unit="N/s", flag="--slew", low=1.0, high=1e4, looser="higher"
@@ -86,7 +90,7 @@ class SafetyOptions:
         looser="higher",
     )
     max_speed_m_per_s: float | None = option(
-        None, "faster than this trips the filter", unit="m/s", low=0.001, high=10.0
+        None, "faster than this trips the filter; None: the device's own", unit="m/s", low=0.001, high=10.0
     )
     jump_m: float = option(
         0.005,
@@ -97,7 +101,7 @@ class SafetyOptions:
         looser="higher",
     )
     workspace_radius_m: float | None = option(
-        None, "no force outside this radius", unit="m", low=0.001, high=10.0
+        None, "no force outside this radius; None: the device's own", unit="m", low=0.001, high=10.0
     )
 
     def __post_init__(self) -> None:

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose import kernel
+from diagnose.touches import place_of
 from mechanics.dent import effective_radius
 from mechanics.effects.path import new_memory, path_numbers
 from mechanics.effects.settings import Settings
@@ -130,7 +131,7 @@ class Forward:
         t, path = self.touches, path_numbers(s.touch)
         averaged = kernel.SUB_PLACES if t.block > 1 else 1
         kernel.follow(
-            t.starts, t.t, np.ascontiguousarray(y[:, 0]), t.site, np.zeros(t.sites), path.numbers,
+            t.starts, t.t, np.ascontiguousarray(y[:, 0]), place_of(t), np.zeros(t.sites), path.numbers,
             path.reach_m[0], averaged, new_memory(path, 1)[0], f,
         )  # fmt: skip
 

@@ -1,6 +1,7 @@
-"""Instrument offsets, found in free air before any press is looked at: bias, drift, the tool's own weight.
+"""What the instrument does, found before any press is looked at: bias, drift and the tool's own weight in
+free air, a yielding tool on the rigid support.
 
-Their readings are taken off the forces, so that the search for other effects starts from clean ones.
+It is taken off the forces and positions, so that the search for other effects starts from clean ones.
 """
 
 from __future__ import annotations
@@ -16,9 +17,11 @@ from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
 from diagnose.judging import Candidate
 from diagnose.result import EffectEntry
+from diagnose.rigid import Rigid
 from diagnose.whiten import Whitener
 from mechanics.effects.force_bias import EFFECT as BIAS
 from mechanics.effects.force_drift import EFFECT as DRIFT
+from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
@@ -72,8 +75,34 @@ class InstrumentOffsets:
         return result
 
 
-def find_instrument_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]) -> InstrumentOffsets:
-    """Decide the free-air effects and take them off the forces of forward.touches."""
+def find_instrument_offsets(
+    forward: Forward, free: FreeAir | None, rigid: Rigid | None, excluded: set[str]
+) -> InstrumentOffsets:
+    """Decide what free air and the support tell; take it off forces and positions of forward.touches."""
+    offsets = _free_air_offsets(forward, free, excluded)
+    if rigid is None or SPRING.name in excluded or rigid.compliance <= Z * rigid.error:
+        return offsets
+    t = forward.touches
+    settings = forward.ideal(forward.model.material.young_modulus_pa)
+    read = np.nan_to_num(forward.predict(settings))
+    stiffness = 1 / rigid.compliance
+    forward.touches = dataclasses.replace(t, position=t.position + t.force / stiffness)
+    change = np.nan_to_num(forward.predict(settings)) - read
+    if np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) < t.noise.raw_n:
+        forward.touches = t  # too little to matter
+        return offsets
+    low, high = (1 / max(rigid.compliance + s * 1.96 * rigid.error, 1e-9) for s in (1, -1))
+    yields = f"on the rigid support the tip's reading gives by {1e3 * rigid.compliance:.3f} mm a newton"
+    return InstrumentOffsets(
+        (*offsets.names, SPRING.name),
+        {**offsets.parameters, SPRING.name: {"stiffness_n_per_m": float(stiffness)}},
+        offsets.residual + change,
+        (*offsets.reasons, yields),
+        {**offsets.intervals, SPRING.name: {"stiffness_n_per_m": [float(low), float(high)]}},
+    )
+
+
+def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]) -> InstrumentOffsets:
     t = forward.touches
     nothing = np.zeros_like(t.local_force)
     if free is None:

@@ -275,6 +275,8 @@ def sideways_off(forward: Forward, candidate: Candidate) -> float:
     residual = candidate.residual[t.counted, 1:]
     predicted = t.local_force[t.counted, 1:] - residual
     missed, force = (float(np.sqrt((x**2).sum(axis=1).mean())) for x in (residual, predicted))
+    # points without a time are not thinned: their noise is none of the miss
+    missed = float(np.sqrt(max(missed**2 - 2 * t.noise_n**2, 0.0)))
     if missed < np.sqrt(2) * t.noise.raw_n or missed < SIDEWAYS_SHARE * force:
         return 0.0
     return missed / force

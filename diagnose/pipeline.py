@@ -6,6 +6,8 @@ import dataclasses
 import time
 from dataclasses import dataclass
 
+import numpy as np
+
 from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
@@ -14,14 +16,16 @@ from diagnose.instrument_offsets import find_instrument_offsets
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
+from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
-from diagnose.touches import touches_of
+from diagnose.touches import LEAST_SITES, touches_of
 from diagnose.verdict import Evidence
 from diagnose.whiten import NuisanceOptions
-from mechanics.effects.base import Role
+from mechanics.effects.base import Role, Scope
 from mechanics.effects.registry import effects
 from mechanics.model import Model
 from mechanics.options import option
+from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from reconstruct.placing import presses_on
@@ -73,16 +77,21 @@ def diagnose(
     progress("sites", 0.05)
     forward = build_forward(touches, model)
     lap("sites")
-    excluded = {n.strip() for n in options.without.split(",") if n.strip()}
+    untold = untold_effects(presses)
+    excluded = {n.strip() for n in options.without.split(",") if n.strip()} | untold
     allowed = effects(without=excluded)
-    offsets = find_instrument_offsets(forward, free, excluded)
+    rigid = rigid_of(recording, presses, model.support.normal)
+    offsets = find_instrument_offsets(forward, free, rigid, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
+    if touches.sites != presses.sites:
+        # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
+        site_sd = np.full(len(touches), nuisance.press_stiffness)
     search = Search(
         forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
     left_out = {e.name for e in effects() if e.costly and options.fast}
-    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in left_out]
+    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (*left_out, *offsets.names)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)
@@ -96,4 +105,16 @@ def diagnose(
     )  # fmt: skip
     result = conclude(evidence, lap)
     progress("done", 1.0)
-    return dataclasses.replace(result, seconds=seconds, left_out=tuple(sorted(left_out)))
+    return dataclasses.replace(result, seconds=seconds, left_out=tuple(sorted(left_out | untold)))
+
+
+def untold_effects(presses: Presses) -> set[str]:
+    """Names of the effects that presses of this kind say nothing of: points have no time, one place has no
+    other place, and what never leaves the object has no free air."""
+    told_nothing: set[Scope] = set()
+    if presses.quasi_static:
+        told_nothing |= {Scope.TIME, Scope.READING}
+    if presses.sites < LEAST_SITES:
+        told_nothing |= {Scope.PLACES}
+    names = {e.name for e in effects() if e.scope in told_nothing}
+    return names - {e.name for e in effects() if e.role is Role.KNOWN}

@@ -14,12 +14,15 @@ from mechanics.presses import LEAD_S, STEP_S, Presses
 LEAST_PRESSES, LEAST_SITES = 6, 4
 LEAST_S = 0.08
 LEAST_ROWS = 12
+LEAST_POINTS = 3
 
 
 def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
     """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (diagnose.leads).
 
-    Raises DiagnosisError with fewer than 6 presses or 4 sites: nothing can be held out.
+    Presses of fewer places than 4 are a group each: they are held out press by press, and from place to place
+    nothing is told (diagnose.pipeline). Raises DiagnosisError with fewer than 6 presses: nothing can be held
+    out.
     """
     if len(presses) < LEAST_PRESSES:
         raise DiagnosisError(
@@ -28,6 +31,8 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
         )
     if not presses.sampled:
         raise DiagnosisError("the table of presses has no samples: reconstruct the recording again")
+    if presses.quasi_static:
+        return _enough(presses, np.diff(presses.starts) >= LEAST_POINTS, f"have {LEAST_POINTS} rows or more")
     lead = np.concatenate([leads(presses.t[part], presses.position[part]) for part in presses.parts])
     limit = np.append(presses.onset_s[1:] - LEAD_S, np.inf)
     seen = dataclasses.replace(presses, columns={"lead": lead})
@@ -36,13 +41,27 @@ def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
     )
     seen = seen.where(rows).thinned(step_s)
     lasting = (seen.end_s - seen.onset_s >= LEAST_S) & (np.diff(seen.starts) >= LEAST_ROWS)
-    if lasting.sum() < LEAST_PRESSES:
+    return _enough(seen, lasting, f"last {LEAST_S} s or more")
+
+
+def _enough(seen: Presses, good: np.ndarray, words: str) -> Presses:
+    if good.sum() < LEAST_PRESSES:
         raise DiagnosisError(
-            f"only {lasting.sum()} palpations last 0.1 s or more; a diagnosis needs at least {LEAST_PRESSES}"
+            f"only {good.sum()} palpations {words}; a diagnosis needs at least {LEAST_PRESSES}"
         )
-    seen = seen.of(lasting)
+    seen = seen.of(good)
+    if "lead" not in seen.columns:
+        seen = dataclasses.replace(seen, columns={"lead": np.zeros_like(seen.position)})
     if seen.sites < LEAST_SITES:
-        raise DiagnosisError(
-            f"the palpations are at {seen.sites} places only; a diagnosis needs {LEAST_SITES} or more"
-        )
+        # one place pressed again and again: each press is held out by itself, and remembers the others
+        place = {"place": seen.site[seen.press].astype(float)}
+        seen = dataclasses.replace(seen, site=np.arange(len(seen)), columns={**seen.columns, **place})
     return seen
+
+
+def place_of(touches: Presses) -> np.ndarray:
+    """(p,) number of the place of each press, which presses that are held out one by one share."""
+    if "place" not in touches.columns:
+        return touches.site
+    place = touches.columns["place"][np.minimum(touches.starts[:-1], len(touches.t) - 1)]
+    return np.ascontiguousarray(np.round(place), dtype=touches.site.dtype)

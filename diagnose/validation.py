@@ -61,11 +61,14 @@ def _without(search: Search, found: Fit, fold: np.ndarray, extra: np.ndarray | N
 
 
 def neighbours(t: Presses) -> list[np.ndarray]:
-    """Site numbers of each fold: sites nearest to one of FOLDS centres, spread by farthest points."""
+    """Site numbers of each fold: sites nearest to one of FOLDS centres, spread by farthest points; of one
+    place, its presses by turns."""
     place = t.site_point
     centres = [int(np.argmax(np.linalg.norm(place - place.mean(axis=0), axis=1)))]
     while len(centres) < min(FOLDS, t.sites):
         away = np.linalg.norm(place[:, None] - place[centres], axis=2).min(axis=1)
+        if not away.max() > 0:
+            return [np.arange(t.sites)[k :: min(FOLDS, t.sites)] for k in range(min(FOLDS, t.sites))]
         centres.append(int(np.argmax(away)))
     nearest = np.linalg.norm(place[:, None] - place[centres], axis=2).argmin(axis=1)
     return [np.flatnonzero(nearest == k) for k in range(len(centres))]

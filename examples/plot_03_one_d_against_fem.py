@@ -10,7 +10,7 @@ are asked about presses that no fit has seen, and about a whole region that was 
 import palpate as pp
 
 recording = pp.read_recording("silicone-1-cylinder")
-made = pp.reconstruct(recording)
+made = pp.load("silicone-1")  # the model of the recording, kept after the first time
 compared = pp.compare(recording, made)
 print(compared)
 

@@ -10,9 +10,14 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import palpate as pp
+from mechanics.material import Ball
+from scenes.phantoms import phantom
 
-felt = pp.renderer("nodule", "fem")  # half a minute the first time, then kept
-model = pp.load("nodule")
+dome = phantom("dome")
+soft = pp.model_of(dome, dome.young_modulus_pa, mesh_size_m=0.012)
+nodule = Ball(centre_m=(0.014, 0.012, 0.030), radius_m=0.010, modulus_ratio=8.0)
+model = soft.with_material(inclusions={"nodule": nodule})
+felt = pp.renderer(model, "fem")
 
 # %%
 # Nine presses of 4 mm along a line at y = 12 mm, straight down:
@@ -22,10 +27,10 @@ curves = [pp.press(felt, at=(x, 0.012, 0.06), depth_m=0.004) for x in places]
 stiffness = [curve.force_at(0.004) @ model.support.normal / 0.004 for curve in curves]
 
 figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-axes.plot(1e3 * places, stiffness, "o-")
+axes.plot(1e3 * places, stiffness, "o")
 axes.axvline(14, color="0.6", linestyle="--", label="the nodule")
-axes.set(xlabel="x, mm", ylabel="force over depth at 4 mm, N/m")
+axes.set(xlabel="x [mm]", ylabel="force over depth at 4 mm [N/m]")
 axes.legend()
 
 # %%
-# To feel it yourself: ``palpate touch nodule``.
+# To feel it yourself, on a finer mesh: ``palpate touch nodule``.

@@ -12,7 +12,7 @@ from tempfile import mkdtemp
 import palpate as pp
 
 folder = Path(mkdtemp()) / "my-model"
-pp.reconstruct("silicone-1-cylinder", save=folder)
+pp.load("silicone-1").save(folder)
 curve = pp.press(folder, at=(0, 0, 0.08), depth_m=0.004)
 curve.plot()
 

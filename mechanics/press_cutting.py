@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping, Sequence
 
 import numpy as np
 
@@ -64,10 +64,19 @@ def free_segments(
     return tuple(Segment("free", float(t[a]), float(t[b - 1])) for a, b in runs(free) if b > a + 1)
 
 
-def measured_noise(recording: Recording, free: np.ndarray) -> Noise:
-    """The noise in free air, (n,) bool; the stated (or a usual) value, white, where there is too little."""
+def measured_noise(recording: Recording, free: np.ndarray, usual_n: float = USUAL_NOISE_N) -> Noise:
+    """The noise in free air, (n,) bool; the stated (or the usual) value, white, where there is too little.
+
+    A recording that was read more slowly than it is sampled ([recording] read_rate_hz) has no more noise
+    than its readings had, and that lasts from one reading to the next.
+    """
     per_step = max(1, round(STEP_S * recording.sample_rate_hz))
-    stated = recording.force_noise_std_n or USUAL_NOISE_N
+    held = _held(recording)
+    stated = recording.force_noise_std_n or usual_n
+    if held > 1:
+        lasting = min(1.0, held / per_step)
+        step = stated * np.sqrt(max(lasting, 1 / per_step))
+        return Noise(stated, step, float(np.clip(held / per_step, 1.0, 10.0)))
     if free.sum() < 200 * per_step:
         return Noise(stated, stated / np.sqrt(per_step), 1.0)
     force = recording.force_on_tool
@@ -89,6 +98,13 @@ def measured_noise(recording: Recording, free: np.ndarray) -> Noise:
     return Noise(float(raw), float(step), float(np.clip(inflation, 1.0, 10.0)))
 
 
+def _held(recording: Recording) -> int:
+    """Samples between two readings: 1, but for what was resampled to a faster clock."""
+    about = recording.description.get("recording", {})
+    read_hz = about.get("read_rate_hz") if isinstance(about, Mapping) else None
+    return max(1, round(recording.sample_rate_hz / float(read_hz))) if read_hz else 1
+
+
 def _robust_std(values: np.ndarray) -> float:
     return spread_about_zero(values - np.median(values, axis=0))
 
@@ -108,13 +124,16 @@ def cut(
     delay_s: float = 0.0,
     delay_error_s: float = 0.0,
     site_m: float = SITE_M,
+    kinds: Sequence[str] | None = None,
+    until_s: np.ndarray | None = None,
 ) -> Presses:
     """The table of a recording whose presses were found: first touches onset_s (p,) and greatest forces
     peak_s (p,) s, in order, the tip's centre (p, 3) m and the outward normal (p, 3) at first touch.
 
     onset_error_m: (p,) standard errors. free_air: (n, 3) N, as late as the force. trace_s: when the base was
     traced. others_s: further contacts, which are neither presses nor free air. noise_n: N, of a sample; None:
-    the stated or a usual one.
+    the stated or a usual one. kinds: (p,) of the presses; a "cycle" or "points" has contact before and after
+    and lasts until until_s (p,), s, and no row beyond is its own.
     """
     t, count = recording.t, len(onset_s)
     normal = np.asarray(normal, dtype=float).reshape(-1, 3)
@@ -123,7 +142,12 @@ def cut(
     noise = noise_n or recording.force_noise_std_n or USUAL_NOISE_N
     limits = np.append(np.asarray(onset_s)[1:] - LEAD_S, t[-1])
     onset, end = np.asarray(onset_s, dtype=float), np.empty(count)
+    kinds = ["press"] * count if kinds is None else list(kinds)
     for i in range(count):
+        if kinds[i] != "press":
+            assert until_s is not None
+            end[i] = until_s[i]
+            continue
         near = slice(*np.searchsorted(t, [onset[i] - 0.2, max(limits[i], peak_s[i]) + 0.2]))
         end[i] = loss_of_touch(
             t[near], recording.force_on_tool[near] @ normal[i], recording.sample_rate_hz,
@@ -131,14 +155,15 @@ def cut(
         )  # fmt: skip
     pieces = []
     for i in range(count):
-        stop = min(end[i] + AROUND_S, onset[i + 1] if i + 1 < count else np.inf)
-        pieces.append(np.arange(*np.searchsorted(t, [onset[i] - AROUND_S, stop])))
+        around = AROUND_S if kinds[i] == "press" else 0.0
+        stop = min(end[i] + around, onset[i + 1] if i + 1 < count else np.inf)
+        pieces.append(np.arange(*np.searchsorted(t, [onset[i] - around, stop])))
     rows = np.concatenate(pieces) if pieces else np.zeros(0, dtype=int)
     touches = np.array([*zip(onset, end, strict=True), *others_s]).reshape(-1, 2)
     begin = -np.inf if trace_s is None else trace_s[1] + SETTLED_S
     air = free_segments(t, touches[:, 0], touches[:, 1], begin)
     segments = [] if trace_s is None else [Segment("trace", *map(float, trace_s))]
-    segments += [Segment("press", float(a), float(b)) for a, b in zip(onset, end, strict=True)]
+    segments += [Segment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
     point = centre - recording.tip_radius_m * normal
     table = Presses(
         starts=np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])]),
@@ -165,4 +190,6 @@ def cut(
         recording=recording.content,
     )
     quiet = table.within("free", t)
-    return dataclasses.replace(table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet))
+    return dataclasses.replace(
+        table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, noise)
+    )

@@ -22,9 +22,16 @@ from mechanics.errors import ModelError
 from mechanics.frames import tangents
 from mechanics.samples import delayed
 
-KINDS = ("trace", "press", "free", "rigid", "retrace", "slide")
+KINDS = ("trace", "press", "free", "rigid", "retrace", "slide", "cycle", "points")
 """Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
-more, sliding over a surface."""
+more, sliding over a surface, a press cut out of a contact that never breaks, quasi-static points of one
+place."""
+CANNOT_TELL = {
+    "slide": ("modulus", "1D law", "first touch"),
+    "cycle": ("force in free air", "adhesion", "own first touch: it follows from the law of the others"),
+    "points": ("rates", "delay", "memory", "drift", "force in free air", "own noise"),
+}
+"""What a segment of a kind says nothing of; of the other kinds all is told."""
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc
 N/m^r, b_hc N s/m^(r+1), r_hc; without damping k_v N/m, eq. (5), k_c N/m^r, r_c, eq. (6), and k_h N/m^r, eq.
@@ -177,6 +184,17 @@ class Presses:
             inside |= (t > onset - margin_s) & (t < end + margin_s)
         return inside
 
+    @cached_property
+    def kinds(self) -> tuple[str, ...]:
+        """(p,) the kind of segment that each press is: press, cycle or points."""
+        named = {s.start_s: s.kind for s in self.segments}
+        return tuple(named.get(float(t), "press") for t in self.onset_s)
+
+    @property
+    def quasi_static(self) -> bool:
+        """Whether the rows are points without a time: their clock only numbers them."""
+        return bool(len(self)) and all(kind == "points" for kind in self.kinds)
+
     # the rows, seen from the device and from the place that was touched
 
     @cached_property
@@ -213,9 +231,9 @@ class Presses:
 
     @cached_property
     def rate(self) -> np.ndarray:
-        """(n,) m/s, of the depth."""
+        """(n,) m/s, of the depth; 0 of points without a time."""
         out = np.zeros(len(self.t))
-        for part in self.parts:
+        for part in () if self.quasi_static else self.parts:
             if part.stop - part.start > 2:
                 out[part] = np.gradient(self.depth[part], self.t[part])
         return out
@@ -248,9 +266,10 @@ class Presses:
 
     @cached_property
     def speed(self) -> np.ndarray:
-        """(n,) m/s, rate of the depth below the surface, smoothed over five rows."""
+        """(n,) m/s, rate of the depth below the surface, smoothed over five rows; 0 of points without a
+        time."""
         out = np.zeros(len(self.t))
-        for part in self.parts:
+        for part in () if self.quasi_static else self.parts:
             smooth = np.convolve(np.pad(self.travel[part, 0], 2, mode="edge"), np.full(5, 0.2), mode="valid")
             out[part] = np.gradient(smooth, self.t[part])
         return out

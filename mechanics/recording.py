@@ -37,6 +37,7 @@ SCHEMA: Schema = {
         "force_on": Key(str, choices=("tool", "object"), required=True),
         "boundary_phase": Key(size=2, unit="s"),
         "quasi_static": Key(bool),
+        "read_rate_hz": Key(low=1e-3, high=1e5, unit="Hz"),
     },
     "tool": {"tip_radius_m": TIP_RADIUS, "mass_kg": Key(low=0.0, high=5.0, unit="kg")},
     "sensor": {

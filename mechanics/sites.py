@@ -137,21 +137,17 @@ def touch_sites(
 
 def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     """(k, 3, 3) mean displacement a unit force of each patch (nodes, weights), unit modulus, 1/m."""
-    displacement = patch_solutions(solver, patches)
-    result = np.empty((len(patches), 3, 3))
-    for k, (nodes, weights) in enumerate(patches):
-        block = np.einsum("n,nar->ar", weights, displacement[nodes][:, :, 3 * k : 3 * k + 3])
-        result[k] = (block + block.T) / 2
-    return result
+    loads = patch_loads(solver.mesh, patches).reshape(-1, len(patches), 3)
+    return solver.quadratic_forms(loads[solver.free])
 
 
-def patch_solutions(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
-    """(n, 3, 3k) m Pa: displacement of all nodes for unit forces x, y, z on each patch (nodes, weights)."""
-    forces = np.zeros((len(solver.mesh.points), 3, 3 * len(patches)))
+def patch_loads(mesh: TetMesh, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """(n, 3, 3k) N: nodal forces of unit forces x, y, z on each patch (nodes, weights)."""
+    forces = np.zeros((len(mesh.points), 3, 3 * len(patches)))
     for k, (nodes, weights) in enumerate(patches):
         for axis in range(3):
             forces[nodes, axis, 3 * k + axis] = weights
-    return solver.solve(forces)
+    return forces
 
 
 def mean_curvature(

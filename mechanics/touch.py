@@ -244,7 +244,7 @@ def touch_forces(
     displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (k + 1 entries) and begins
     untouched. normals: (k, 3). far: (k, 3, 3) 1/m, unit modulus. curvature: (k,) or one, 1/m.
     """
-    table = (law if isinstance(law, DentLaw) else dent_law(law)).table
+    table = (law if isinstance(law, DentLaw) else dent_law(law, poisson_ratio)).table
     displacement = np.ascontiguousarray(displacement, dtype=float)
     starts = np.ascontiguousarray(starts, dtype=np.int64)
     count = len(starts) - 1

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from palpate.api import export as export
     from palpate.api import import_table as import_table
     from palpate.api import load as load
+    from palpate.api import material as material
     from palpate.api import model_of as model_of
     from palpate.api import press as press
     from palpate.api import read_recording as read_recording
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from palpate.results.curve import Curve as Curve
     from palpate.results.diagnosis import Diagnosis as Diagnosis
     from palpate.results.imported import Imported as Imported
+    from palpate.results.material import Material as Material
     from palpate.results.model import Model as Model
     from palpate.results.reconstruction import Reconstruction as Reconstruction
     from palpate.results.recording import Recording as Recording
@@ -59,13 +61,14 @@ if TYPE_CHECKING:
 
 _DOOR = {
     "palpate.api": (
-        "read_recording read_table import_table check load model_of reconstruct renderer replay press "
-        "compare diagnose simulate export batch"
+        "read_recording read_table import_table material check load model_of reconstruct renderer replay "
+        "press compare diagnose simulate export batch"
     ),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.imported": "Imported",
     "palpate.results.check": "Checkup",
+    "palpate.results.material": "Material",
     "palpate.results.model": "Model",
     "palpate.results.reconstruction": "Reconstruction",
     "palpate.results.replay": "ReplayResult",

@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from palpate.results.curve import Curve
     from palpate.results.diagnosis import Diagnosis
     from palpate.results.imported import Imported
+    from palpate.results.material import Material
     from palpate.results.model import Model
     from palpate.results.reconstruction import Reconstruction
     from palpate.results.recording import Recording
@@ -79,16 +80,15 @@ def check(recording: RecordingLike, *, full: bool = False, progress: bool | Prog
     recording, and what `reconstruct` raises with `full`.
     """
     from palpate.results.check import Checkup
-    from reconstruct.checks.registry import check as checked
-    from reconstruct.checks.registry import seen
+    from reconstruct.checks.registry import looked_at
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 
     measured = read_recording(recording)
     with _told("check", progress) as tell:
-        findings = checked(measured)
+        findings, seen = looked_at(measured)
         if full and not any(f.grave for f in findings):
             findings = reconstruct_fully(measured, ReconstructOptions(force=True), tell).findings
-    return Checkup(measured, findings, seen(measured), full)
+    return Checkup(measured, findings, seen, full)
 
 
 def import_table(*files: str | Path, mapping: str | Path | None = None, **said: Any) -> Imported:
@@ -128,6 +128,46 @@ def read_table(*files: str | Path, mapping: str | Path | None = None, **said: An
     """The recording in other programs' files, in m, s and N; files, mapping and said are as for
     `import_table`, which also tells and draws what it understood. Raises RecordingError."""
     return import_table(*files, mapping=mapping, **said).recording
+
+
+def material(
+    *files: str | Path,
+    kind: str = "auto",
+    tip_radius_m: float | None = None,
+    layer_m: float | None = None,
+    poisson_ratio: float = 0.49,
+    specimens: bool = False,
+    columns: Mapping[str, str] | None = None,
+    units: Mapping[str, str] | None = None,
+    fast: bool = False,
+    seed: int = 0,
+    progress: bool | Progress = True,
+) -> Material:
+    """The material of a specimen from a machine's curves: indentation, compression, tension or relaxation.
+
+    files: a curve each. kind: "auto" goes by their headers. tip_radius_m: of an indenter's sphere, where the
+    files do not say; layer_m: thickness of the sample, None is a half-space; specimens: each indentation is
+    of another piece. columns {"t", "z", "fz": name}, units {kind: unit}: where names do not tell. From 6
+    indentations on, effects are searched for as `diagnose` does, each curve held out (docs/real-data.md).
+    Raises RecordingError where a file cannot be read, ContactError where nothing is touched.
+    """
+    from palpate.materials import material_of
+    from palpate.specimens import read_tests
+
+    tests = read_tests(
+        files, kind=kind, tip_radius_m=tip_radius_m, columns=dict(columns or {}), units=dict(units or {})
+    )
+    with _told("material", progress) as tell:
+        return material_of(
+            tests,
+            files,
+            layer_m=layer_m,
+            poisson_ratio=poisson_ratio,
+            specimens=specimens,
+            fast=fast,
+            seed=seed,
+            progress=tell,
+        )
 
 
 def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
@@ -273,10 +313,16 @@ def replay(
     """
     from palpate.results.model import model_of
     from palpate.results.replay import ReplayResult
+    from reconstruct.points import is_points
     from render.replay import replay_error, replay_recording
 
     make = _renderer("replay", model, renderer, options)
     measured = read_recording(recording)
+    if is_points(measured):
+        raise OptionError(
+            f"'{measured.name}' holds points without a time, and a replay needs a path: reconstruct, compare "
+            "and diagnose read points"
+        )
     with _told("replay", progress) as tell:
         scene = make(tell)
         forces = replay_recording(scene, measured, tell)
@@ -465,7 +511,7 @@ def simulate(
             workers=workers,
             progress=tell,
         )
-    result = simulation_of(plain, Path(thing.name).name)
+    result = simulation_of(plain, Path(thing.name).name, thing)
     return result if save is None else result.save(save)
 
 

@@ -8,6 +8,7 @@ import dataclasses
 import json
 import math
 import os
+import re
 import sys
 import types
 import typing
@@ -33,8 +34,38 @@ class Options(Protocol):
 T = TypeVar("T", bound=Options)
 
 
+_DEFAULT = re.compile(r" *\(default: ([^()]*(?:\([^()]*\)[^()]*)*)\)")
+_UNIT = re.compile(r" *\[([^\[\]]{1,9})\](?=$| \()")
+_NONE = re.compile(r"[;,] (?:None:|default:|'' for|'' means|'' keeps) (.*)$")
+_SAID = {"": "", "None": "", "True": "yes", "False": "no"}
+
+
+def told_help(text: str) -> str:
+    """The words of an option in the one order of all: what it is, [unit], (default: ...); no default that
+    says nothing, and none that only Python has."""
+    default = _DEFAULT.search(text)
+    unit = _UNIT.search(text)
+    words = _UNIT.sub("", _DEFAULT.sub("", text)).strip()
+    value = _SAID.get(default[1], default[1]) if default else ""
+    meant = _NONE.search(words)
+    if meant and not value:
+        words, value = words[: meant.start()], meant[1]
+    parts = [words, f"[{unit[1]}]" if unit else "", f"(default: {value})" if value else ""]
+    return " ".join(part for part in parts if part)
+
+
+class HelpWords(argparse.RawDescriptionHelpFormatter):
+    """Help in the order of `told_help`."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        return told_help(action.help) if action.help else action.help
+
+
 class OneLineParser(argparse.ArgumentParser):
-    """Wrong words are an OptionError, which the command line prints in one line."""
+    """Wrong words are an OptionError, which the command line prints in one line; help is `HelpWords`."""
+
+    def __init__(self, **keywords: Any) -> None:
+        super().__init__(**{"formatter_class": HelpWords, **keywords})
 
     def error(self, message: str) -> NoReturn:
         """Raise it."""
@@ -49,10 +80,9 @@ def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[s
         if field.name in skip or "help" not in field.metadata:
             continue
         meta = field.metadata
-        flag = meta["flag"] or "--" + field.name.replace("_", "-")
+        flag, *others = flags_of(field)
         unit = f" [{meta['unit']}]" if meta["unit"] else ""
-        default = "chosen from the data" if field.default is None else field.default
-        text = f"{meta['help']}{unit} (default: {default})".replace("%", "%%")
+        text = f"{meta['help']}{unit} (default: {field.default})".replace("%", "%%")
         keywords: dict[str, Any] = {"dest": field.name, "default": argparse.SUPPRESS, "help": text}
         base = _base_type(hints[field.name])
         if base is bool:
@@ -62,8 +92,23 @@ def add_options(parser: argparse.ArgumentParser, kind: type, *, skip: Sequence[s
             if meta["choices"]:
                 keywords["choices"] = meta["choices"]
             else:
-                keywords["metavar"] = (meta["unit"] or base.__name__).upper().replace(" ", "_")
+                keywords["metavar"] = _METAVARS.get(base, "TEXT")
         group.add_argument(flag, **keywords)
+        for other in others:
+            group.add_argument(other, **{**keywords, "help": argparse.SUPPRESS})
+
+
+_METAVARS = {int: "INTEGER", float: "NUMBER", str: "TEXT"}
+
+
+def flags_of(field: dataclasses.Field[Any]) -> list[str]:
+    """The flag that help shows, whose unit stands beside it and not in it, and one that is taken as well."""
+    if field.metadata["flag"]:
+        return [field.metadata["flag"]]
+    whole = "--" + field.name.replace("_", "-")
+    unit = field.metadata["unit"].lower().replace("/", " per ").replace(" ", "-").replace("--", "-")
+    short = whole.removesuffix(f"-{unit}") if unit else whole
+    return [short] if short == whole else [short, whole]
 
 
 def _ranged(field: dataclasses.Field[Any], base: type) -> Callable[[str], Any]:

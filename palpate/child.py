@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -22,3 +23,15 @@ def module_environment(**variables: str) -> dict[str, str]:
     """This process's environment and `variables`, with the parent's own packages found first."""
     old = os.environ.get("PYTHONPATH")
     return {**os.environ, "PYTHONPATH": os.pathsep.join([str(ROOT), *([old] if old else [])]), **variables}
+
+
+def end_with_parent() -> None:
+    """From now on, end this process at once when its input ends: then the parent, which holds the other end
+    of that pipe, is gone, however that happened."""
+
+    def wait() -> None:
+        while os.read(0, 1 << 16):
+            pass
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()

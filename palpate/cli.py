@@ -22,6 +22,7 @@ COMMANDS = {
     "model": "a MODEL from a surface's file and a modulus",
     "import": "other programs' files become a recording",
     "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
+    "material": "the material of a specimen from a machine's curves",
     "replay": "a recorded tip path through a renderer, headless",
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",
@@ -31,6 +32,7 @@ COMMANDS = {
     "simulate": "the virtual laboratory: a person's exploration of a phantom",
     "bench": "benchmarks: medians, spreads and ratios",
     "batch": "many recordings at once",
+    "completion": "what lets a shell complete all this: bash, zsh or fish",
 }
 """Every sub-command, one line each; its module is `palpate.commands.NAME`."""
 MODULES = {"import": "palpate.commands.import_"}
@@ -65,7 +67,6 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, int]:
     """(parser, the command's module or None, then the exit code)."""
-    import argparse
     import importlib
 
     parser = _top_parser()
@@ -84,15 +85,26 @@ def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, int]:
         print(f"palpate {name}: not in this version yet; see CHANGELOG.md for what is", file=sys.stderr)
         return parser, None, 2
 
+    return *_with_arguments(name, module), 0
+
+
+def _with_arguments(name: str, module: Any) -> tuple[argparse.ArgumentParser, Any]:
     from palpate.arguments import OneLineParser
 
     command = OneLineParser(
         prog=f"palpate {name}",
         description=module.__doc__,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
     )
     module.add_arguments(command)
-    return command, module, 0
+    return command, module
+
+
+def parser_of(name: str) -> argparse.ArgumentParser:
+    """The parser of one command, with all its options."""
+    import importlib
+
+    module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
+    return _with_arguments(name, module)[0]
 
 
 def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int:

@@ -24,11 +24,15 @@ def with_friction(options: RenderOptions, scene: Scene) -> RenderOptions:
 def add_mesh_arguments(parser: argparse.ArgumentParser) -> None:
     """How a surface's file (STL, OBJ, PLY, glTF, VTP, VTU, MSH, INP) is meant, where one is the object."""
     group = parser.add_argument_group("a surface's file as the object")
-    group.add_argument("--modulus", type=finite, metavar="PA", help="Young's modulus (default: 20000) [Pa]")
-    group.add_argument("--nu", type=finite, metavar="NU", help="Poisson's ratio (default: 0.49)")
+    group.add_argument(
+        "--modulus", type=finite, metavar="NUMBER", help="Young's modulus [Pa] (default: 20000)"
+    )
+    group.add_argument("--nu", type=finite, metavar="NUMBER", help="Poisson's ratio (default: 0.49)")
     group.add_argument("--unit", choices=tuple(UNITS), help="of the file's lengths (default: m)")
     group.add_argument("--up", metavar="AXIS", help="out of the support: +z, -x, ... or X,Y,Z (default: +z)")
-    group.add_argument("--sink", type=finite, metavar="M", help="cut off flat at the bottom (default: 0) [m]")
+    group.add_argument(
+        "--sink", type=finite, metavar="NUMBER", help="cut off flat at the bottom [m] (default: 0)"
+    )
 
 
 def given_scene(arguments: argparse.Namespace, name: str) -> Scene:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from palpate.child import module_command, module_environment
+from palpate.child import end_with_parent, module_command, module_environment
 
 
 @contextmanager
@@ -23,7 +23,7 @@ def warming_up() -> Iterator[subprocess.Popen]:
     """The compiling process, started at once; ended with the block where it is still running then."""
     process = subprocess.Popen(
         module_command("palpate.warm_up"),
-        stdin=subprocess.DEVNULL,
+        stdin=subprocess.PIPE,
         stdout=subprocess.DEVNULL,
         stderr=subprocess.DEVNULL,
         env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
@@ -34,6 +34,8 @@ def warming_up() -> Iterator[subprocess.Popen]:
         if process.poll() is None:
             process.terminate()
         process.wait()
+        if process.stdin is not None:
+            process.stdin.close()
 
 
 def warm_up() -> None:
@@ -61,4 +63,5 @@ def warm_up() -> None:
 
 
 if __name__ == "__main__":
+    end_with_parent()
     warm_up()

@@ -8,6 +8,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
 from reconstruct.tool_weight import tool_weight
+from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")
@@ -32,6 +34,8 @@ _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
 _CLEAR = 1.5
 """Presses must reach so many thresholds in the middle: else most were lost, and the loudest mislead."""
+_ABOVE = 10.0
+"""Standard deviations of the filtered force that a cycle's peak stands above the minima beside it."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
@@ -62,6 +66,12 @@ class ContactOptions:
         flag="--correct-delay",
     )  # fmt: skip
     site_m: float = option(SITE_M, "presses closer than this repeat one site", unit="m", flag="--site-size")
+    free_air: str = option(
+        "auto",
+        "of a known geometry: auto looks whether the tip is ever off the object, none takes the forces as "
+        "tared",
+        choices=("auto", "none"),
+    )
 
     def __post_init__(self) -> None:
         """Raises OptionError for a site without size."""
@@ -93,6 +103,31 @@ class Exploration:
     delay_error_s: float = 0.0
 
 
+@dataclass(frozen=True)
+class Filtered:
+    """A recording low-passed at `cutoff_hz`, and what it reads in free air.
+
+    free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
+    free motion; more where inertia is left.
+    """
+
+    signals: Signals
+    free_air: np.ndarray
+    spread: np.ndarray
+    cutoff_hz: float
+
+    @cached_property
+    def least(self) -> float:
+        """How many spreads a touch must reach (reconstruct.free_noise)."""
+        return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+
+    def touching(self) -> np.ndarray:
+        """(n,) bool, a new array: where something is touched, on the way or on purpose."""
+        gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+        contrast = self.signals.magnitude / self.spread
+        return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
+
+
 def explore(
     recording: Recording,
     *,
@@ -101,11 +136,15 @@ def explore(
     boundary_options: BoundaryOptions | None = None,
     filter_options: FilterOptions | None = None,
     boundary: Boundary | None = None,
+    filtered: Filtered | None = None,
+    unbroken: bool = False,
 ) -> Exploration:
     """Phases, support, base outline and palpations of a recording.
 
-    boundary: a known base, for recordings without phase I. Raises ContactError where phase I is missing,
-    nothing is touched or too few presses can be used.
+    boundary: a known base, for recordings without phase I. filtered: of this recording at this cutoff, where
+    it is known already. unbroken: contact may never break, so that it is cut at its minima
+    (reconstruct.unbroken). Raises ContactError where phase I is missing, nothing is touched or too few
+    presses can be used.
     """
     options = contact_options or ContactOptions()
     if method not in METHODS:
@@ -115,8 +154,11 @@ def explore(
             f"--contact-threshold is {options.contact_threshold_n} N; it must be greater than 0"
         )
     cutoff_hz = (filter_options or FilterOptions()).cutoff_hz
-    given = _Given(method, options, boundary_options or BoundaryOptions(), cutoff_hz, boundary)
-    found = _searched(recording, given)
+    given = _Given(method, options, boundary_options or BoundaryOptions(), boundary, unbroken)
+    tared = unbroken and not _off_the_object(recording, options, cutoff_hz)
+    if filtered is None or tared:
+        filtered = filtered_of(recording, cutoff_hz, tared=tared)
+    found = _searched(filtered, given)
     if method == "paper" or not options.correct_delay:
         return _tabled(recording, found, given)
     step = force_delay(found.signals, found.contacts)
@@ -128,7 +170,7 @@ def explore(
         if not samples:
             break
         delay += samples / recording.sample_rate_hz
-        found = _searched(read_earlier(recording, delay), given)
+        found = _searched(filtered_of(read_earlier(recording, delay), cutoff_hz, tared=tared), given)
         step = force_delay(found.signals, found.contacts)
     return _tabled(recording, found, given, delay, step.error_s)
 
@@ -138,8 +180,8 @@ class _Given:
     method: str
     contact: ContactOptions
     boundary: BoundaryOptions
-    cutoff_hz: float
     known_base: Boundary | None
+    unbroken: bool
 
 
 def read_earlier(recording: Recording, delay_s: float) -> Recording:
@@ -150,7 +192,8 @@ def read_earlier(recording: Recording, delay_s: float) -> Recording:
 
 @dataclass(frozen=True)
 class _Found:
-    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations."""
+    """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations. cut:
+    (start, end) of those that were cut into cycles."""
 
     signals: Signals
     free_air: np.ndarray
@@ -158,6 +201,7 @@ class _Found:
     contacts: tuple[Found, ...]
     unused: tuple[tuple[int, int, str], ...]
     threshold_n: float
+    cut: tuple[tuple[int, int], ...]
 
 
 def _tabled(
@@ -178,11 +222,13 @@ def _tabled(
         ),
         free_air=found.free_air[late],
         trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
-        others_s=[(t[a], t[b - 1]) for a, b, _ in found.unused],
+        others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
         noise_n=signals.noise_n,
         delay_s=delay_s,
         delay_error_s=delay_error_s,
         site_m=given.contact.site_m,
+        kinds=["cycle" if c.unbroken else "press" for c in contacts],
+        until_s=t[[c.end - 1 for c in contacts]],
     )
     return Exploration(
         recording=recording,
@@ -207,16 +253,16 @@ def _speed(signals: Signals, contact: Found) -> float:
     return float(np.ptp(path)) / max(len(path) - 1, 1) * rate
 
 
-def _searched(recording: Recording, given: _Given) -> _Found:
-    signals, free_air, spread = signals_of(recording, given.cutoff_hz)
-    wanders = recording.quaternion is None and spread.min() > signals.noise_n
+def _searched(filtered: Filtered, given: _Given) -> _Found:
+    signals, spread = filtered.signals, filtered.spread
+    wanders = signals.recording.quaternion is None and spread.min() > signals.noise_n
     hint = (
         f"in free motion the force wanders by {spread.min():.2g} N an axis, louder than its noise "
         f"({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation (qw, qx, qy, "
         "qz), or hold it one way"
     )
     try:
-        found = _found(recording, given, signals, free_air, spread)
+        found = _found(filtered, given)
     except ContactError as error:
         if not wanders:
             raise
@@ -231,16 +277,26 @@ def _searched(recording: Recording, given: _Given) -> _Found:
     return found
 
 
-def _found(
-    recording: Recording, given: _Given, signals: Signals, free_air: np.ndarray, spread: np.ndarray
-) -> _Found:
-    """spread: (n,) noise of the filtered force, N an axis."""
+def _off_the_object(recording: Recording, contact: ContactOptions, cutoff_hz: float) -> bool:
+    """Whether there is free air to be found."""
+    if contact.free_air == "none":
+        return False
+    rate = recording.sample_rate_hz
+    position, force = (
+        low_pass_at(recording.t, values, rate, cutoff_hz)
+        for values in (recording.position, recording.force_on_tool)
+    )
+    noise = max(white_noise_std(recording.force_on_tool), 0.5 * (recording.force_noise_std_n or 0.0), 1e-6)
+    return free_air_seen(position, force, recording.tip_radius_m, noise * noise_gain(rate, cutoff_hz))
+
+
+def _found(filtered: Filtered, given: _Given) -> _Found:
+    signals, recording = filtered.signals, filtered.signals.recording
+    spread, free_air = filtered.spread, filtered.free_air
     method, options, boundary = given.method, given.contact, given.known_base
-    least = least_contrast(recording.sample_rate_hz, given.cutoff_hz)
-    high = PAPER_THRESHOLD_N if method == "paper" else least * float(spread.min())
+    high = PAPER_THRESHOLD_N if method == "paper" else filtered.least * float(filtered.spread.min())
     high = options.contact_threshold_n or high
-    gap = passing_zero(recording.sample_rate_hz, given.cutoff_hz)
-    touching = hysteresis(signals.magnitude / spread, _LOW * least, least, signals.force, gap)
+    touching = filtered.touching()
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -256,8 +312,16 @@ def _found(
     least_peak = options.least_peak_n or high
     contacts: list[Found] = []
     unused: list[tuple[int, int, str]] = []
+    cut_apart: list[Piece] = []
+    cut_up: list[tuple[int, int]] = []
     touches = runs(touching)
     for a, b in touches:
+        if given.unbroken:
+            pieces = cycles(signals, a, b, _ABOVE * float(spread[a:b].min()))
+            if len(pieces) > 1 or (a == 0 and not free_air.any()):
+                cut_apart += pieces
+                cut_up.append((a, b))
+                continue
         reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
@@ -267,6 +331,10 @@ def _found(
             contacts.append(contact)
         else:
             unused.append((a, b, reason))
+    if cut_apart:
+        found, slipped = found_cycles(signals, cut_apart)
+        contacts = sorted([*contacts, *found], key=lambda c: c.start)
+        unused = sorted([*unused, *slipped])
     if len(contacts) < options.least_palpations:
         why = f" (the first not used, at {recording.t[unused[0][0]]:.1f} s, {unused[0][2]})" if unused else ""
         hint = f"press at more places, and until the force is above {high:.2g} N"
@@ -281,17 +349,27 @@ def _found(
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high)
+    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
 
 
-def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndarray, np.ndarray]:
-    """Filtered signals, free-air force (n, 3) N, and the noise (n,) of the filtered force, N an axis."""
+def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) -> Filtered:
+    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off.
+
+    tared: nothing is free air, and forces are taken as they are.
+    """
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
     noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
     white = noise * noise_gain(rate, cutoff_hz)
+    if tared:
+        nothing = np.zeros_like(filtered)
+        position = low_pass_at(recording.t, recording.position, rate, cutoff_hz)
+        size = np.linalg.norm(filtered, axis=1)
+        raw = recording.force_on_tool
+        signals = Signals(recording, position, filtered, size, raw, noise)
+        return Filtered(signals, nothing, np.full(len(size), white), cutoff_hz)
     weight, inertia = tool_weight(recording, filtered, cutoff_hz)
     left = np.linalg.norm(filtered - weight, axis=1)
     drift, _ = free_air_force(recording.t, filtered - weight, max(white, crowd_scale(left)))
@@ -306,7 +384,8 @@ def signals_of(recording: Recording, cutoff_hz: float) -> tuple[Signals, np.ndar
         noise_n=noise,
     )
     still = max(white, crowd_scale(signals.magnitude))
-    return signals, free_air, moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+    spread = moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
+    return Filtered(signals, free_air, spread, cutoff_hz)
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

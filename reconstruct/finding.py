@@ -22,7 +22,7 @@ class Found(NamedTuple):
 
     start, peak, end: samples of first touch, greatest force, loss of the last force above the noise (end
     exclusive). centre: (3,) tip's centre at first touch. normal: (3,) outward, from the force. onset_error_m:
-    standard error of the first touch along it.
+    standard error of the first touch along it. unbroken: cut out of a contact; start and end are the cuts.
     """
 
     start: int
@@ -31,6 +31,7 @@ class Found(NamedTuple):
     centre: np.ndarray
     normal: np.ndarray
     onset_error_m: float = 0.0
+    unbroken: bool = False
 
 
 @dataclass(frozen=True)

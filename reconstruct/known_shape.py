@@ -72,7 +72,9 @@ class GeometryOptions:
     sink_m: float = option(
         0.0, "cut off flat at the shape's bottom, where the object settles", unit="m", flag="--sink"
     )
-    slab_m: float | None = option(None, "the object is a slab of this thickness", unit="m", flag="--slab")
+    slab_m: float | None = option(
+        None, "the object is a slab of this thickness; None: it is none", unit="m", flag="--slab"
+    )
     half_space: bool = option(False, "the object is deep and wide beside every contact")
 
     def __post_init__(self) -> None:
@@ -170,7 +172,8 @@ def place(
     progress("registration", 0.0)
     given = read_surface(options.shape, options.unit)
     stood = standing(given, options.up, options.sink_m)
-    support = _traced_support(recording, first) if options.pose == "auto" else None
+    traces = options.pose == "auto" and set(presses.kinds) == {"press"}
+    support = _traced_support(recording, first) if traces else None
     body = Body(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
     touched = _touched(presses, support)
     found = register(body, touched, free=options.pose == "auto")
@@ -332,11 +335,7 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
     middle = top + ((low + high) / 2) @ axes[:2]
     wide = high - low + 2 * _MARGIN * thickness if options.slab_m else np.full(2, _WIDE * thickness)
     size = np.append(wide, thickness)
-    # as fine at its surface as touches need, so that nothing is halved again
-    most = _CELLS if options.slab_m else _CELLS / 2
-    edge = max(min(mesh_size_m, SURFACE_EDGE_M, thickness / 3), size[:2].max() / most)
-    nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
-    box = box_mesh((nx, ny, nz), tuple(size))
+    box = flat_mesh(size, mesh_size_m, _CELLS if options.slab_m else _CELLS // 2)
     points = (box.points - [0, 0, thickness]) @ axes + middle
     mesh = TetMesh(points, box.tetrahedra, box.fixed, box.touchable)
     vertices, triangles = _shell(mesh)
@@ -379,6 +378,20 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
         },
         notes=tuple(notes),
     )
+
+
+def flat_mesh(size: np.ndarray, mesh_size_m: float, cells: int) -> TetMesh:
+    """A slab of size (3,) m on its base, as fine at its surface as touches need (so that nothing is halved
+    again), in at most so many cells a side."""
+    edge = max(min(mesh_size_m, SURFACE_EDGE_M, size[2] / 3), size[:2].max() / cells)
+    nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
+    return box_mesh((nx, ny, nz), tuple(size))
+
+
+def half_space_size(contact_m: float) -> np.ndarray:
+    """(3,) m, of a block that is a half-space to a contact of that radius at its middle."""
+    deep = _DEEP * contact_m
+    return np.array([_WIDE * deep, _WIDE * deep, deep])
 
 
 def _plane(presses: Presses) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

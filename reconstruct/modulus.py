@@ -2,9 +2,9 @@
 claim.
 
 Each press gives its modulus (reconstruct.press_fit). The global modulus weights presses by their precision
-and the spread between sites; its interval resamples sites (repeats at one place share that place's errors of
-shape), lets every resample choose its dent law, and carries the shape's uncertainty
-(reconstruct.shape_error).
+and the spread between sites; its interval is that of a site-to-site random effect (repeats at one place share
+that place's errors), of dent laws as often as resampled sites choose them, of the shape's uncertainty
+(reconstruct.shape_error) and of what is common to all presses.
 """
 
 from __future__ import annotations
@@ -25,6 +25,9 @@ from reconstruct.press_fit import LawFit, far_sensitivity, fit_law, press_data
 LAWS = ("linear", "neo-hookean", "sphere", "hertz")
 AUTO_LAWS = ("linear", "neo-hookean")
 _AGREE = 0.005  # relative
+_GRID, _DRAWS = 240, 20_000
+_USUAL_SCATTER = 0.05
+"""Scale of the prior of what sites scatter by, as a share of the modulus; far wider than most."""
 _RANGES_M = (0.002, 0.003, 0.004, 0.005, 0.006, 0.007)
 
 
@@ -39,7 +42,7 @@ class ModulusOptions:
         flag="--dent-law",
     )
     greatest_depth_m: float | None = option(
-        None, "leave out samples deeper than this", unit="m", flag="--greatest-depth"
+        None, "leave out samples deeper than this; None: none", unit="m", flag="--greatest-depth"
     )
     law_error: float = option(
         0.03, "error of the law as a share of the force; weights deep samples down", flag="--law-error"
@@ -47,7 +50,7 @@ class ModulusOptions:
     law_bias: float = option(
         0.02, "standard error common to all presses (law, mesh), as a share of the modulus", flag="--law-bias"
     )
-    bootstraps: int = option(1000, "resamples of the sites for the 95 % interval", flag="--bootstraps")
+    bootstraps: int = option(1000, "resamples of the sites that choose a dent law", flag="--bootstraps")
 
     def __post_init__(self) -> None:
         """Raises OptionError for a depth that is not positive, errors below 0, or fewer than 20 resamples."""
@@ -119,10 +122,10 @@ def fit_modulus(
     if compliance_covariance is not None:
         slope = far_sensitivity(data, sites, fits[0], radius, options.law_error, noise_n)
         shape = slope[:, None] * compliance_covariance * slope
-    logs, chosen = _bootstrap(fits, whole, site, options, shape, seed)
-    shares = [float(np.mean(chosen == i)) for i in range(len(fits))]
+    shares = _law_shares(whole, site, options, seed)
     values = [combine(f.modulus_pa, f.relative_error, site) for f in fits]
     modulus = float(np.exp(sum(s * np.log(v[0]) for s, v in zip(shares, values, strict=True))))
+    logs = _draws(fits, shares, site, options, shape, seed)
     low, high = modulus * np.exp(np.percentile(logs - logs.mean(), [2.5, 97.5]))
     weights, between = values[0][1], values[0][2]
     return ModulusFit(
@@ -217,38 +220,66 @@ def _scatter(values: np.ndarray) -> float:
     return float(max(np.std(values, ddof=1), spread_about_zero(values)))
 
 
-def _bootstrap(
+def between_sites(
+    modulus: np.ndarray, relative_error: np.ndarray, site: np.ndarray, weights: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Standard errors (g,) of the `combine`d ln e by chance between sites, and their probabilities (g,).
+
+    Sites scatter about the global modulus by an unknown share, and presses by their own errors. The
+    restricted likelihood of that share (Patterson & Thompson 1971) has the centre integrated out; its prior
+    is a wide half-Cauchy (Gelman 2006). Few places leave it open, and so the interval wide. A site far off
+    counts as the farthest that the robust mean would still have heard.
+    """
+    good = np.isfinite(modulus) & (modulus > 0) & np.isfinite(relative_error)
+    value, error = np.log(np.where(good, modulus, 1.0)), np.where(good, relative_error, 0.0)
+    centre = float(weights @ value)
+    scale = max(GAUSSIAN * float(np.median(np.abs(value[good] - centre))), 0.01)
+    farthest = EFFICIENT * np.hypot(scale, error)
+    label = np.unique(site[good], return_inverse=True)[1]
+    even = 1 / np.bincount(label)[label]
+    mean = np.bincount(label, even * np.clip(value - centre, -farthest, farthest)[good])
+    noise = np.bincount(label, (even * error[good]) ** 2)
+    share = np.bincount(label, weights[good])
+    grid = 0.6 * np.linspace(0.0, 1.0, _GRID + 1)[1:] ** 2
+    variance = grid[:, None] ** 2 + noise
+    precision = (1 / variance).sum(axis=1)
+    middle = (mean / variance).sum(axis=1) / precision
+    chi = ((mean - middle[:, None]) ** 2 / variance).sum(axis=1)
+    log = -0.5 * (np.log(variance).sum(axis=1) + np.log(precision) + chi)
+    # the grid is quadratic: as much of it lies in an equal step of its root
+    density = np.exp(log - log.max()) * np.sqrt(grid) / (1 + (grid / _USUAL_SCATTER) ** 2)
+    return np.sqrt((share**2 * variance).sum(axis=1)), density / density.sum()
+
+
+def _draws(
     fits: list[LawFit],
-    whole: list[LawFit],
+    shares: list[float],
     site: np.ndarray,
     options: ModulusOptions,
     shape: np.ndarray | None,
     seed: int,
-) -> tuple[np.ndarray, np.ndarray]:
-    """ln of the global modulus in each resample of the sites, and the index of the law that it chose.
-
-    fits give the moduli, whole (the same laws on all depths) the costs by which a resample chooses.
-    """
+) -> np.ndarray:
+    """(n,) ln of the global modulus as it may be: by law, by chance between sites, by the shape's and the
+    common error."""
     random = np.random.default_rng(seed)
-    count, presses, sites = options.bootstraps, len(site), site.max() + 1
-    members = [np.flatnonzero(site == s) for s in range(sites)]
-    shifts = options.law_bias * random.standard_normal((count, 1)) * np.ones((1, presses))
-    if shape is not None:
-        values, vectors = np.linalg.eigh(shape)
-        shifts = (
-            shifts + random.standard_normal((count, presses)) * np.sqrt(np.maximum(values, 0)) @ vectors.T
-        )
-    costs = np.array([f.cost for f in whole])
-    logs, chosen = np.empty(count), np.empty(count, dtype=int)
-    for b in range(count):
-        drawn = random.integers(0, sites, sites)
-        index = np.concatenate([members[s] for s in drawn])
-        label = np.repeat(np.arange(sites), [len(members[s]) for s in drawn])
-        chosen[b] = int(np.argmin(costs[:, index].sum(axis=1)))
-        fit = fits[chosen[b]]
-        e, weights, _ = combine(fit.modulus_pa[index], fit.relative_error[index], label)
-        logs[b] = np.log(e) + weights @ shifts[b, index]
-    return logs, chosen
+    drawn = []
+    for fit, share in zip(fits, shares, strict=True):
+        e, weights, _ = combine(fit.modulus_pa, fit.relative_error, site)
+        errors, probability = between_sites(fit.modulus_pa, fit.relative_error, site, weights)
+        common = options.law_bias**2 + (0.0 if shape is None else max(float(weights @ shape @ weights), 0.0))
+        count = round(share * _DRAWS)
+        chance = random.choice(errors, count, p=probability)
+        drawn.append(np.log(e) + np.sqrt(chance**2 + common) * random.standard_normal(count))
+    return np.concatenate(drawn)
+
+
+def _law_shares(whole: list[LawFit], site: np.ndarray, options: ModulusOptions, seed: int) -> list[float]:
+    """How often each law has the least cost, on all depths, when the sites are drawn anew (bootstrap)."""
+    cost = np.array([np.bincount(site, f.cost) for f in whole])
+    sites = cost.shape[1]
+    counts = np.random.default_rng(seed).multinomial(sites, np.full(sites, 1 / sites), options.bootstraps)
+    chosen = np.argmin(counts @ cost.T, axis=1)
+    return [float(np.mean(chosen == i)) for i in range(len(whole))]
 
 
 def _reason(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import dataclasses
 import time
-from collections.abc import Mapping
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
@@ -24,7 +23,7 @@ from reconstruct.casting import CastPoints, cast
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
-from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.contacts import ContactOptions, Exploration, Filtered, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
@@ -33,6 +32,7 @@ from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
+from reconstruct.points import explore_points, is_points
 from reconstruct.shape_error import compliance_covariance
 from reconstruct.slides import without_slides
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface, shape_table
@@ -104,19 +104,21 @@ def reconstruct_fully(
     options = options or ReconstructOptions()
     paper = options.method == "paper"
     nu = _poisson_ratio(recording, options)
-    _check_timed(recording)
     clock = _Clock()
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
-    checkup = Checkup(recording, options.force, by_hand=not geometry.known)
+    _check_points(recording, geometry, paper)
+    checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
     placed = None
     if geometry.known:
-        exploration, placed = _on_known(recording, options, geometry, _part(progress, 0.02, 0.3))
+        exploration, placed = _on_known(
+            recording, options, geometry, checkup.filtered, _part(progress, 0.02, 0.3)
+        )
         checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
-        exploration = _explored(recording, options)
+        exploration = _explored(recording, options, checkup.filtered)
         checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
@@ -202,13 +204,13 @@ def reconstruct_fully(
     )
 
 
-def _check_timed(recording: Recording) -> None:
-    """Raises ContactError for rows that are no path: their first touches and noise cannot be told yet."""
-    about = recording.description.get("recording", {})
-    if isinstance(about, Mapping) and about.get("quasi_static"):
+def _check_points(recording: Recording, geometry: GeometryOptions, paper: bool) -> None:
+    """Raises ContactError where quasi-static points lack what their first touches are told by."""
+    if is_points(recording) and (paper or not geometry.known):
         raise ContactError(
-            f"'{recording.name}' holds quasi-static points without a time, and presses are read off "
-            "paths from free air: if its rows are in order of time, import it with --rate HZ"
+            f"'{recording.name}' holds quasi-static points without a time, which trace no base: say what they"
+            " lie on with --slab M, --shape FILE or --half-space (method finite-tip); if its rows are in "
+            "order of time, import it with --rate HZ"
         )
 
 
@@ -233,7 +235,15 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     return float(nu)
 
 
-def _touches(recording: Recording, options: ReconstructOptions, base: Boundary | None = None) -> Exploration:
+def _touches(
+    recording: Recording,
+    options: ReconstructOptions,
+    filtered: Filtered | None,
+    base: Boundary | None = None,
+    unbroken: bool = False,
+) -> Exploration:
+    if base is not None and is_points(recording):
+        return explore_points(recording, base, options.contact)
     return explore(
         recording,
         method="paper" if options.method == "paper" else "noise",
@@ -241,25 +251,32 @@ def _touches(recording: Recording, options: ReconstructOptions, base: Boundary |
         boundary_options=options.boundary,
         filter_options=options.filter,
         boundary=base,
+        filtered=filtered,
+        unbroken=unbroken,
     )
 
 
-def _explored(recording: Recording, options: ReconstructOptions) -> Exploration:
+def _explored(recording: Recording, options: ReconstructOptions, filtered: Filtered | None) -> Exploration:
     """Where the recording traces no base, that of [object] model = PATH stands in."""
     try:
-        return _touches(recording, options)
+        return _touches(recording, options, filtered)
     except NoBaseError:
         if recording.base_model is None:
             raise
     base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-    return _touches(recording, options, base)
+    return _touches(recording, options, filtered, base)
 
 
 def _on_known(
-    recording: Recording, options: ReconstructOptions, geometry: GeometryOptions, progress: Progress
+    recording: Recording,
+    options: ReconstructOptions,
+    geometry: GeometryOptions,
+    filtered: Filtered | None,
+    progress: Progress,
 ) -> tuple[Exploration, Placed]:
     """Touches told without a support place the geometry; then they are told again, over its base."""
-    first = without_slides(_touches(recording, options, nowhere(recording)), options.contact.least_palpations)
+    least = options.contact.least_palpations
+    first = without_slides(_touches(recording, options, filtered, nowhere(recording), unbroken=True), least)
     progress("contacts", 0.3)
     placed = place(
         recording,
@@ -269,8 +286,8 @@ def _on_known(
         spacing_m=options.surface.surface_spacing_m,
         progress=_part(progress, 0.3, 0.8),
     )
-    again = _touches(recording, options, placed.base)
-    return without_slides(again, options.contact.least_palpations), placed
+    again = _touches(recording, options, filtered, placed.base, unbroken=True)
+    return without_slides(again, least), placed
 
 
 def _provenance(

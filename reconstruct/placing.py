@@ -9,23 +9,35 @@ from mechanics.recording import Recording
 from reconstruct.casting import cast
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.known_base import base_of_model
+from reconstruct.known_shape import GeometryOptions, stated_geometry
+from reconstruct.points import explore_points, is_points
+from reconstruct.slides import without_slides
 
 _ANY = ContactOptions(least_palpations=1)
 
 
 def presses_on(recording: Recording, model: Model) -> Presses:
     """The model's own table where it was made from this recording; else its presses, found and cast onto the
-    model's surface. A recording that does not trace a base stands on the model's.
+    model's surface. A recording that does not trace a base, or states what it lies on, stands on the model's.
 
     Raises ContactError where the recording holds no press.
     """
     own = model.presses
     if own.sampled and own.recording == recording.content:
         return own
-    try:
-        found = explore(recording, contact_options=_ANY).presses
-    except NoBaseError:
-        base = base_of_model(model, recording.tip_radius_m)
-        found = explore(recording, contact_options=_ANY, boundary=base).presses
+    found = _found(recording, model)
     where = cast(model.mesh.points, model.mesh.touchable_surface, found.point, found.contact_normal)
     return found.on_surface(where.points, where.normals)
+
+
+def _found(recording: Recording, model: Model) -> Presses:
+    if not is_points(recording) and not stated_geometry(recording, GeometryOptions()).known:
+        try:
+            return explore(recording, contact_options=_ANY).presses
+        except NoBaseError:
+            pass
+    base = base_of_model(model, recording.tip_radius_m)
+    if is_points(recording):
+        return explore_points(recording, base, _ANY).presses
+    found = explore(recording, contact_options=_ANY, boundary=base, unbroken=True)
+    return without_slides(found, _ANY.least_palpations).presses

@@ -17,6 +17,7 @@ from mechanics.touch import forces_at
 
 _BLOCK_S = 0.004
 _LEAD_S = 0.03
+_NOTHING = 1e-200  # no press that tells its modulus has a determinant so small
 _CORRELATED = 10  # rows of one press that a lasting error of the law binds together
 
 
@@ -24,9 +25,9 @@ _CORRELATED = 10  # rows of one press that a lasting error of the law binds toge
 class LawFit:
     """Every press fitted by one law up to one depth.
 
-    modulus_pa: (k,). relative_error: (k,) standard error of ln e. onset_shift_m: (k,) first touch moves by
-    this along the outward normal. rms_n: (k,) vector misfit, N. cost: (k,) weighted squared residuals,
-    comparable between laws at the same depth. rows: (k,) rows used.
+    modulus_pa: (k,). relative_error: (k,) standard error of ln e, infinite where a press does not tell it.
+    onset_shift_m: (k,) first touch moves by this along the outward normal. rms_n: (k,) vector misfit, N.
+    cost: (k,) weighted squared residuals, comparable between laws at the same depth. rows: (k,) rows used.
     """
 
     law: str
@@ -106,7 +107,9 @@ def fit_law(
     rows = np.bincount(press, weights=used, minlength=k)
     squared = np.bincount(press, weights=used * (residual**2).sum(axis=1), minlength=k)
     scale = np.maximum(cost / np.maximum(3 * rows, 1), 1.0)
-    error = np.sqrt(_CORRELATED * scale * a_uu / det) / np.maximum(e, 1e-300)
+    told = (e > 0) & (det > _NOTHING)
+    error = np.full(k, np.inf)
+    error[told] = np.sqrt(_CORRELATED * (scale * a_uu)[told] / det[told]) / e[told]
     return LawFit(law, depth_m, e, error, shift, np.sqrt(squared / np.maximum(rows, 1)), cost, rows)
 
 
@@ -114,7 +117,7 @@ def far_sensitivity(
     data: Presses, sites: TouchSites, fit: LawFit, tip_radius_m: float, law_error: float, noise_n: float
 ) -> np.ndarray:
     """(k,) m: change of ln e of every press per unit of change of its far-field compliance along the normal,
-    1/m."""
+    1/m; 0 where a press tells no modulus."""
     step = 0.05 * np.abs(np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)) + 0.1
     changed = TouchSites(
         sites.points,
@@ -125,4 +128,6 @@ def far_sensitivity(
         sites.poisson_ratio,
     )
     other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, noise_n, fit)
-    return np.log(other.modulus_pa / fit.modulus_pa) / step
+    told = (other.modulus_pa > 0) & (fit.modulus_pa > 0)
+    ratio = np.where(told, other.modulus_pa, 1.0) / np.where(told, fit.modulus_pa, 1.0)
+    return np.log(ratio) / step

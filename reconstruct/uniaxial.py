@@ -11,8 +11,11 @@ from reconstruct.filtering import FilterOptions, low_pass
 
 
 def low_passed(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> Presses:
-    """The presses net of free air, position and force low-passed without phase shift."""
+    """The presses net of free air, position and force low-passed without phase shift; points without a time
+    stay as they are."""
     net = presses.net
+    if net.quasi_static:
+        return net
     position, force = np.array(net.position), np.array(net.force)
     for part in net.parts:
         if part.stop - part.start > 3:

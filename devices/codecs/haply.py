@@ -20,6 +20,8 @@ from mechanics.state import IDENTITY_QUATERNION
 BASIS = "XYZ"
 GRIPS = ("wireless_verse_grip", "verse_grip")
 GRIP_BUTTONS = ("a", "b", "c")
+_UNREADABLE = (ValueError, TypeError, AttributeError, KeyError, OverflowError, RecursionError)
+"""What reading a message raises that is none of the service's, or is nested by thousands."""
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,7 @@ def config(text: str | bytes, device_id: str) -> HaplyConfig | None:
         devices = json.loads(text).get("inverse3") or []
         found = next((d.get("config") for d in devices if d.get("device_id") == device_id), None)
         return _config(found) if found else None
-    except (ValueError, TypeError, AttributeError, KeyError) as error:
+    except _UNREADABLE as error:
         raise DeviceError(
             f"the Inverse service's configuration cannot be read ({error}): update this program"
         ) from error
@@ -65,17 +67,19 @@ def _config(table: Mapping[str, Any]) -> HaplyConfig:
         table.get("gravity_compensation"),
     )
     rotation = mount.get("rotation") or {}
-    w = min(1.0, abs(float(rotation.get("w", 1.0))))
+    w = min(1.0, abs(_finite(rotation.get("w", 1.0))))
     scale = mount.get("scale") or {}
     return HaplyConfig(
         _name(table.get("preset"), "preset"),
         _name(table.get("basis"), "permutation"),
         _vector(mount.get("position") or {}),
         2.0 * math.acos(w),
-        (float(scale.get("x", 1.0)), float(scale.get("y", 1.0)), float(scale.get("z", 1.0))),
-        None if damping is None else max(_numbers(damping), default=0.0),
-        None if gate is None else float(gate.get("gain", 0.0)),
-        None if gravity is None else gravity.get("enabled", True) * float(gravity.get("scaling_factor", 1.0)),
+        (_finite(scale.get("x", 1.0)), _finite(scale.get("y", 1.0)), _finite(scale.get("z", 1.0))),
+        None if damping is None else max(map(_finite, _numbers(damping)), default=0.0),
+        None if gate is None else _finite(gate.get("gain", 0.0)),
+        None
+        if gravity is None
+        else gravity.get("enabled", True) * _finite(gravity.get("scaling_factor", 1.0)),
         _is_simulated(table),
     )
 
@@ -106,11 +110,11 @@ def number(text: str | bytes) -> float | None:
     """The number of an answer about one setting: bare, or under `data` and `value`; None where it is none."""
     try:
         told = json.loads(text)
-    except ValueError:
+        for key in ("data", "value"):
+            told = told.get(key, told) if isinstance(told, Mapping) else told
+        numbers = _numbers({"": told})
+    except (ValueError, OverflowError, RecursionError):
         return None
-    for key in ("data", "value"):
-        told = told.get(key, told) if isinstance(told, Mapping) else told
-    numbers = _numbers({"": told})
     return numbers[0] if len(numbers) == 1 else None
 
 
@@ -120,7 +124,7 @@ def version(text: str | bytes) -> str:
         told = json.loads(text)
         told = told.get("data") or told
         return str(told.get("git_tag") or told.get("project_version") or "")
-    except (ValueError, AttributeError):
+    except (ValueError, AttributeError, RecursionError):
         return ""
 
 
@@ -150,7 +154,7 @@ def decode(text: str | bytes, device_id: str = "") -> HaplyState | None:
         if not chosen or "state" not in chosen[0] or "cursor_position" not in chosen[0]["state"]:
             return None
         return _state(message, chosen[0])
-    except (ValueError, TypeError, AttributeError, KeyError) as error:
+    except _UNREADABLE as error:
         raise DeviceError(
             f"the Inverse service sent a message that cannot be read ({error}): update it"
         ) from error
@@ -179,7 +183,15 @@ def _state(message: Mapping[str, Any], device: Mapping[str, Any]) -> HaplyState:
 def _vector(value: Mapping[str, Any]) -> tuple[float, float, float]:
     """x, y, z of a vector, bare or under either spelling."""
     value = value.get("vector") or value.get("values") or value
-    return (float(value.get("x", 0.0)), float(value.get("y", 0.0)), float(value.get("z", 0.0)))
+    return _finite(value.get("x", 0.0)), _finite(value.get("y", 0.0)), _finite(value.get("z", 0.0))
+
+
+def _finite(value: Any) -> float:
+    """A number; raises ValueError or TypeError for anything else, NaN and infinity too."""
+    number = float(value)
+    if not math.isfinite(number):
+        raise ValueError(f"{number} is no finite number")
+    return number
 
 
 def _grip(message: Mapping[str, Any]) -> tuple[tuple[float, float, float, float], int]:
@@ -187,7 +199,7 @@ def _grip(message: Mapping[str, Any]) -> tuple[tuple[float, float, float, float]
         for grip in message.get(kind) or []:
             state = grip.get("state") or {}
             q = state.get("orientation") or {}
-            w, x, y, z = (float(q.get(k, d)) for k, d in zip("wxyz", IDENTITY_QUATERNION, strict=True))
+            w, x, y, z = (_finite(q.get(k, d)) for k, d in zip("wxyz", IDENTITY_QUATERNION, strict=True))
             pressed = state.get("buttons") or {}
             return (w, x, y, z), sum(bool(pressed.get(b)) << i for i, b in enumerate(GRIP_BUTTONS))
     return IDENTITY_QUATERNION, 0
@@ -195,7 +207,11 @@ def _grip(message: Mapping[str, Any]) -> tuple[tuple[float, float, float, float]
 
 def spelling(text: str | bytes) -> str:
     """'vector' or 'values': how the service that sent this writes vectors; 'vector' if it does not show."""
-    return "values" if '"values"' in (text if isinstance(text, str) else text.decode()) else "vector"
+    return (
+        "values"
+        if '"values"' in (text if isinstance(text, str) else text.decode(errors="replace"))
+        else "vector"
+    )
 
 
 def probe(device_id: str) -> str:
@@ -257,7 +273,7 @@ def event_fault(text: str | bytes, device_id: str = "") -> str:
     """
     try:
         message = json.loads(text)
-    except ValueError:
+    except (ValueError, RecursionError):
         return ""
     if not isinstance(message, dict):
         return ""

@@ -14,6 +14,8 @@ from mechanics.errors import DeviceError
 Kind = Literal["input", "output", "feature"]
 _MAIN: dict[int, Kind] = {8: "input", 9: "output", 11: "feature"}
 _COLLECTION, _END_COLLECTION = 10, 12
+_WIDEST_BITS, _LONGEST_BITS = 64, 8 * 4096
+"""Of a value, and of a report: what declares more is damaged, and would fill the memory."""
 
 
 @dataclass(frozen=True)
@@ -140,9 +142,13 @@ def parse(descriptor: bytes) -> Descriptor:
                 path.pop()
             elif tag in _MAIN:
                 key = (_MAIN[tag], state.report_id)
-                if not value & 1:  # not constant padding
-                    fields.append(_field(_MAIN[tag], state, local, value, bits.get(key, 0), tuple(path)))
-                bits[key] = bits.get(key, 0) + state.size * state.count
+                first, bits[key] = bits.get(key, 0), bits.get(key, 0) + state.size * state.count
+                if state.size > _WIDEST_BITS or bits[key] > _LONGEST_BITS or state.report_id > 255:
+                    raise DeviceError(
+                        "the device's report descriptor declares an impossible report: replug it"
+                    )
+                if not value & 1 and state.size * state.count:  # neither constant padding nor nothing
+                    fields.append(_field(_MAIN[tag], state, local, value, first, tuple(path)))
             local = _Locals()
     return Descriptor(tuple(fields), bits, numbered)
 

@@ -33,6 +33,7 @@ BLOCK_FREE = PAGE | 0x90
 LOAD_STATUS, LOADED, POOL_FULL = PAGE | 0x8B, PAGE | 0x8C, PAGE | 0x8D
 ACTUATORS_ENABLED, SAFETY_SWITCH, ACTUATOR_POWER = PAGE | 0xA0, PAGE | 0xA4, PAGE | 0xA6
 NO_TRIGGER_BUTTON = 255
+_BUTTONS = 256
 
 
 @dataclass(frozen=True)
@@ -79,6 +80,8 @@ class PidLayout:
             place = self.descriptor.find(kind, inside, usage)
             if place is None:
                 continue  # optional in the class definition: gain, trigger button, loop count
+            if report_id not in (None, place.report_id):
+                raise DeviceError("this device's descriptor spreads one report over several ids: replug it")
             report_id = place.report_id
             bits = place.put(bits, value, index or 0)
         if report_id is None:
@@ -213,13 +216,15 @@ class PidLayout:
         return words
 
     def _split(self, report: bytes) -> tuple[int, bytes]:
-        return (report[0], report[1:]) if self.descriptor.numbered else (0, report)
+        return (report[0], report[1:]) if self.descriptor.numbered and report else (0, report)
 
     def _axis(self, report_id: int, body: bytes, usage: int) -> float | None:
         for place in self.descriptor.fields:
             index = place.index(usage)
             if place.kind == "input" and place.report_id == report_id and index is not None:
                 low, high = place.logical_min, place.logical_max
+                if not low < high:
+                    raise DeviceError("the device's report descriptor gives an axis no range: replug it")
                 return min(max(2.0 * (place.get(body, index) - low) / (high - low) - 1.0, -1.0), 1.0)
         return None
 
@@ -227,8 +232,9 @@ class PidLayout:
         mask = 0
         for place in self.descriptor.fields:
             on_page = place.usages and place.usages[0] >> 16 == 9
-            if place.kind == "input" and place.report_id == report_id and on_page and place.size == 1:
+            first = place.usages[0] - 0x00090001 if on_page else -1
+            if place.kind == "input" and place.report_id == report_id and first >= 0 and place.size == 1:
                 mask |= sum(
-                    place.get(body, i) << (place.usages[0] - 0x00090001 + i) for i in range(place.count)
+                    place.get(body, i) << (first + i) for i in range(min(place.count, _BUTTONS - first))
                 )
         return mask

@@ -32,7 +32,7 @@ class Touch:
 
     def law_of_dent(self, poisson_ratio: float) -> DentLaw:
         """The dent's law with all factors."""
-        law = dent_law(self.dent_law)
+        law = dent_law(self.dent_law, poisson_ratio)
         for factor in self.factors:
             law = law.scaled(*factor(poisson_ratio))
         return law

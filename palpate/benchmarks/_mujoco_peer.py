@@ -29,8 +29,15 @@ def hertz_n(depth_m: float) -> float:
     return 4.0 / 3.0 * YOUNG_PA / (1 - POISSON**2) * np.sqrt(TIP_RADIUS_M) * depth_m**1.5
 
 
-def flex_xml(mesh: TetMesh, timestep_s: float) -> str:
-    """The block as a flex with a mocap sphere above its top."""
+def flex_xml(
+    mesh: TetMesh,
+    timestep_s: float,
+    *,
+    young_pa: float = YOUNG_PA,
+    poisson: float = POISSON,
+    radius_m: float = TIP_RADIUS_M,
+) -> str:
+    """An object as a flex with a mocap sphere above its top."""
     points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
     elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
     pins = " ".join(str(node) for node in np.flatnonzero(mesh.fixed))
@@ -41,12 +48,12 @@ def flex_xml(mesh: TetMesh, timestep_s: float) -> str:
 <option timestep="{timestep_s}" gravity="0 0 0" integrator="discrete" solver="CG"/>
 <size memory="1G"/>
 <worldbody>
-<body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + TIP_RADIUS_M + 0.001}">
-<geom name="tip" type="sphere" size="{TIP_RADIUS_M}" condim="3" friction="0.5"/></body>
+<body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + radius_m + 0.001}">
+<geom name="tip" type="sphere" size="{radius_m}" condim="3" friction="0.5"/></body>
 <flexcomp name="block" type="direct" dim="3" mass="{mass}" radius="1e-4"
  point="{points}" element="{elements}">
 <contact condim="3" selfcollide="none" friction="0.5"/>
-<elasticity young="{YOUNG_PA}" poisson="{POISSON}" damping="0.01"/>
+<elasticity young="{young_pa}" poisson="{poisson}" damping="0.01"/>
 <pin id="{pins}"/>
 </flexcomp></worldbody></mujoco>"""
 

@@ -1,4 +1,5 @@
-"""Ways to damage a file: bits, lines, numbers, encodings. Each is a function (bytes, random) -> bytes."""
+"""Ways to damage a file: bits, lines, numbers, encodings, columns of samples. Each is a function
+(bytes, random) -> bytes."""
 
 from __future__ import annotations
 
@@ -9,8 +10,10 @@ import numpy as np
 
 Mutation = Callable[[bytes, np.random.Generator], bytes]
 NUMBER = re.compile(rb"(?<![\w.])[-+]?\d+(?:\.\d+)?(?:[eE][-+]?\d+)?")
-EXTREMES = (b"nan", b"inf", b"-inf", b"1e308", b"-1e308", b"0", b"-1", b"1e-308", b"1e200", b"9" * 400,
-            b"0x10", b"", b" ", b"true", b'"x"', b"[1, 2]", b"{}", "\u65e5\u672c".encode())  # fmt: skip
+EXTREMES = (
+    b"nan", b"NaN", b"inf", b"-inf", b"Infinity", b"1e308", b"-1e308", b"0", b"-1", b"1e-308", b"1e200",
+    b"9" * 400, b"0x10", b"", b" ", b"true", b'"x"', b"[1, 2]", b"{}", "\u65e5\u672c".encode(),
+)  # fmt: skip
 
 
 def flip_bits(data: bytes, random: np.random.Generator) -> bytes:
@@ -42,6 +45,12 @@ def noise(data: bytes, random: np.random.Generator) -> bytes:
     """Random bytes in between."""
     at = int(random.integers(0, len(data)))
     return data[:at] + random.bytes(int(random.integers(1, 60))) + data[at:]
+
+
+def zeros(data: bytes, random: np.random.Generator) -> bytes:
+    """A stretch of zeros, as a disk leaves that lost power."""
+    a, b = sorted(random.integers(0, len(data) + 1, 2))
+    return data[:a] + bytes(int(b - a)) + data[b:]
 
 
 def number(data: bytes, random: np.random.Generator) -> bytes:
@@ -89,6 +98,34 @@ def encoding(data: bytes, random: np.random.Generator) -> bytes:
     return data.replace(b",", b";").replace(b".", b",")
 
 
+def column(data: bytes, random: np.random.Generator) -> bytes:
+    """A column of a CSV scaled by anything, shifted, held, swapped with another or played backwards."""
+    head, _, body = data.partition(b"\n")
+    try:
+        table = np.array([row.split(b",") for row in body.split()], dtype=float)
+    except ValueError:
+        return noise(data, random)
+    if table.ndim != 2 or table.shape[1] < 2:
+        return noise(data, random)
+    i, j = random.choice(table.shape[1], 2, replace=False)
+    kind = int(random.integers(5))
+    if kind == 0:
+        table[:, i] *= float(random.choice([-1, 1])) * 10.0 ** random.uniform(-6, 6)
+    elif kind == 1:
+        table[:, i] += 10.0 ** random.uniform(-3, 3)
+    elif kind == 2:
+        table[int(random.integers(len(table))) :, i] = table[0, i]
+    elif kind == 3:
+        table[:, [i, j]] = table[:, [j, i]]
+    else:
+        table[:, i] = table[::-1, i]
+    rows = (",".join(f"{v:.9g}" for v in row) for row in table)
+    return head + b"\n" + "\n".join(rows).encode() + b"\n"
+
+
 MUTATIONS: tuple[Mutation, ...] = (
-    flip_bits, cut, hole, repeat, noise, number, number, scaled, line, encoding,
+    flip_bits, cut, hole, repeat, noise, zeros, number, number, scaled, line, encoding,
 )  # fmt: skip
+"""Of any file."""
+OF_SAMPLES: tuple[Mutation, ...] = (*MUTATIONS, column, column, column)
+"""Of a recording's CSV."""

@@ -23,7 +23,7 @@ from mechanics.model import Model, Support, Tool
 from mechanics.nearest import closest
 from mechanics.patch import PatchSampler
 from mechanics.refine import refined_near_surface
-from mechanics.sites import patch_solutions, touch_sites
+from mechanics.sites import patch_loads, touch_sites
 from mechanics.solver import Solver
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
@@ -74,7 +74,7 @@ def errors(made: SurfaceCompliance, solver: Solver, places: int, seed: int) -> d
     between = press_errors(made, solver, points, normals[chosen] / area[chosen, None])
     sampler = PatchSampler(solver.mesh, float(made.patch_width_m[0]))
     patches = [sampler.weights(p) for p in points[:8]]
-    moved = patch_solutions(solver, patches)
+    moved = solver.solve(patch_loads(solver.mesh, patches))
     _, triangle, weights = closest(made.points, made.triangles, points[:8])
     worst = 0.0
     for j in range(8):

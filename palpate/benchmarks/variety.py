@@ -14,6 +14,7 @@ import json
 import time
 from collections.abc import Callable
 from concurrent.futures import as_completed
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -37,7 +38,11 @@ ROOMS = ("mechanics", "reconstruct")
 _WITHIN_S = 0.15
 """A press is found where a first touch is told within a true touch, or this close to it."""
 
+_DEVELOPMENT = 150
+"""Draws below this seed were looked at while the program was mended, those from it on were not."""
+
 NUISANCES: dict[str, Callable[[Draw], str]] = {
+    "seed": lambda d: "development" if d.seed < _DEVELOPMENT else "evaluation",
     "modulus": lambda d: _band(d.young_modulus_pa / 1e3, (12, 40), "kPa"),
     "phase": lambda d: "stated" if d.boundary_phase_stated else "not stated",
     "rate": lambda d: f"{d.rate_hz:g} Hz",
@@ -60,6 +65,17 @@ NUISANCES: dict[str, Callable[[Draw], str]] = {
     "object": lambda d: thing(d.number).phantom.name.rsplit("-", 1)[0],
 }
 """Nuisance: the group that a draw belongs to."""
+
+REMEDIES: dict[str, Callable[[Draw], Draw]] = {
+    "record its orientation": lambda d: replace(d, orientation="given"),
+    "hold it one way": lambda d: replace(d, orientation="constant"),
+    "press deeper": lambda d: replace(
+        d, least_depth_m=min(2 * d.least_depth_m, 0.01), most_depth_m=min(2 * d.most_depth_m, 0.01)
+    ),
+    "trace the whole base": lambda d: replace(d, tracing="two", begins_in_contact=False),
+    "more places": lambda d: replace(d, presses=max(2 * d.presses, 30), repeat_share=0.05, clusters=0),
+}
+"""Words of a refusal that tell what to do: the same exploration, had it been done."""
 
 
 def _band(value: float, cuts: tuple[float, ...], unit: str) -> str:
@@ -116,10 +132,26 @@ def answered(seed: int, work: Path, version: str, effect: str | None = None) -> 
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         return found
     answer = {"seed": seed, "truth": _truth(varied), **_reconstructed(varied)}
+    if "refused" in answer:
+        answer["remedies"] = _tried(draw(seed), answer["refused"], work / "mended", effects)
     path.parent.mkdir(exist_ok=True)
     with atomic_file(path) as temporary:
         temporary.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
     return answer
+
+
+def _tried(drawn: Draw, refusal: str, folder: Path, effects: dict[str, float]) -> dict[str, dict[str, Any]]:
+    """What becomes of the same exploration with each remedy that the refusal names, and with all of them."""
+    folder.mkdir(parents=True, exist_ok=True)
+    named = [words for words in REMEDIES if words in refusal]
+    ways = {words: [words] for words in named} | ({"all of them": named} if len(named) > 1 else {})
+    tried = {}
+    for name, steps in ways.items():
+        mended = drawn
+        for words in steps:
+            mended = REMEDIES[words](mended)
+        tried[name] = _reconstructed(record(mended, folder, effects))
+    return tried
 
 
 def touched_s(varied: Varied) -> np.ndarray:
@@ -177,7 +209,7 @@ def _reconstructed(varied: Varied) -> dict[str, Any]:
     }
 
 
-_HEADER = ["nuisance", "group", "recordings", "reconstructed", "refused", "crashed", "within 5 %",
+_HEADER = ["nuisance", "group", "recordings", "reconstructed", "refused", "mended", "crashed", "within 5 %",
            "within 10 %", "covered", "median error %", "median surface mm", "presses found"]  # fmt: skip
 
 
@@ -208,14 +240,21 @@ def _figures(members: list[dict[str, Any]]) -> dict[str, Any]:
     close, near = int((error < 0.05).sum()), int((error < 0.10).sum())
     covered = sum(a["covers"] for a in done)
     refused, crashed = (sum(k in a for a in members) for k in ("refused", "crashed"))
+    mended = sum(_mended(a) for a in members)
     found = sum(a["found"] for a in done) / max(1, sum(a["truth"]["presses"] for a in done))
     surface = float(np.median([1e3 * a["mean_m"] for a in done])) if done else float("nan")
     return {
-        "recordings": len(members), "reconstructed": len(done), "refused": refused, "crashed": crashed,
+        "recordings": len(members), "reconstructed": len(done), "refused": refused, "mended": mended,
+        "crashed": crashed,
         "within_5": close, "within_10": near, "covered": covered, "covered95": wilson(covered, len(done)),
-        "row": [len(members), len(done), refused, crashed, close, near, covered,
+        "row": [len(members), len(done), refused, mended, crashed, close, near, covered,
                 f"{100 * np.median(error):.1f}", f"{surface:.2f}", f"{100 * found:.0f} %"],
     }  # fmt: skip
+
+
+def _mended(answer: dict[str, Any]) -> bool:
+    """Whether a refused exploration is reconstructed once all that its refusal says is done."""
+    return "error" in list(answer.get("remedies", {}).values() or [{}])[-1]
 
 
 def _miss(answer: dict[str, Any]) -> str:
@@ -223,7 +262,11 @@ def _miss(answer: dict[str, Any]) -> str:
     what = f"seed {answer['seed']}, {truth['object']}, {truth['young_modulus_pa'] / 1e3:.1f} kPa, "
     what += f"{truth['presses']} presses of {truth['median_peak_n']:.3g} N in the middle: "
     if "error" not in answer:
-        return what + (answer.get("refused") or "CRASHED " + answer["crashed"])
+        what += answer.get("refused") or "CRASHED " + answer["crashed"]
+        for words, tried in answer.get("remedies", {}).items():
+            then = f"{100 * tried['error']:+.1f} %" if "error" in tried else tried.get("refused", "CRASHED")
+            what += f"\n    after '{words}': {then}"
+        return what
     low, high = (v / 1e3 for v in answer["ci95_pa"])
     return what + (
         f"{100 * answer['error']:+.1f} %, interval {low:.1f} to {high:.1f} kPa, {answer['found']} presses "

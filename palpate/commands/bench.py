@@ -8,7 +8,7 @@ import pkgutil
 
 from mechanics.errors import OptionError
 from palpate import benchmarks
-from palpate.arguments import add_json, emit_json
+from palpate.arguments import OneLineParser, add_json, emit_json
 
 SUMMARY = "benchmarks: medians, spreads and ratios"
 _HELPERS = ("timing",)
@@ -32,7 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.name not in names():
         raise OptionError(f"'{arguments.name}' is no benchmark; allowed are {', '.join(names())}")
     module = importlib.import_module(f"palpate.benchmarks.{arguments.name.replace('-', '_')}")
-    parser = argparse.ArgumentParser(prog=f"palpate bench {arguments.name}", description=module.__doc__)
+    parser = OneLineParser(prog=f"palpate bench {arguments.name}", description=module.__doc__)
     module.add_arguments(parser)
     parser.add_argument("--json", metavar="PATH", default=arguments.json, help="write the figures as JSON")
     own = parser.parse_args(arguments.rest)

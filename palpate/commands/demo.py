@@ -11,6 +11,7 @@ import argparse
 import os
 import sys
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from mechanics.files import check_target, sole_writer
 from mechanics.model import MODEL
@@ -25,6 +26,9 @@ from palpate.arguments import (
     say,
 )
 from palpate.demo import DemoOptions, run_demo
+
+if TYPE_CHECKING:
+    from diagnose.result import Diagnosis
 
 SUMMARY = "the main job on the embedded example; prints the report's path"
 
@@ -77,6 +81,7 @@ def _run(arguments: argparse.Namespace, folder: Path) -> None:
         f"rendered against measured force: {result.replay_rmse_n:.3f} N rms "
         f"of {result.contact_force_rms_n:.3f} N rms",
         str(result.servo),
+        *([f"diagnosis: {result.diagnosis.summary}"] if result.diagnosis else []),
         f"report: {report.resolve()}",
         f"to feel it: palpate touch {folder / 'model' if arguments.recording else ''}".rstrip(),
     )
@@ -88,9 +93,18 @@ def _run(arguments: argparse.Namespace, folder: Path) -> None:
             "servo": result.servo.as_dict(),
             "seconds": result.seconds,
             "report": str(report.resolve()),
+            "diagnosis": _found(result.diagnosis),
         },
         arguments.json,
     )
+
+
+def _found(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
+    """The diagnosis's answer, by the keys of `palpate diagnose --json`; None where none was made."""
+    if diagnosis is None:
+        return None
+    whole = diagnosis.as_json()
+    return {key: whole[key] for key in ("verdict", "noise_n", "gap_before_n", "gap_after_n", "gap_closed")}
 
 
 def _has_screen() -> bool:

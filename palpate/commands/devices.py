@@ -27,7 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument(
         "--measure",
-        metavar="S",
+        metavar="NUMBER",
         type=finite,
         help="open the hardware that is there, force off, and measure its rate for this long [s]",
     )

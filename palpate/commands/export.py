@@ -25,10 +25,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--at",
         type=vector,
         metavar="X,Y,Z",
-        help="where the scene's tip presses (default: middle of the top) [m]",
+        help="where the scene's tip presses [m] (default: middle of the top)",
     )
     parser.add_argument(
-        "--depth", type=finite, metavar="M", help="how deep (default: half the tip's radius) [m]"
+        "--depth", type=finite, metavar="NUMBER", help="how deep [m] (default: half the tip's radius)"
     )
     parser.add_argument("--unit", default="m", metavar="UNIT", help="of an STL's lengths (default: m)")
     add_json(parser)

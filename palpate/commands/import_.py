@@ -31,18 +31,22 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--column", metavar="ROLE=NAME", action="append", default=[], help="repeatable")
     add_input(parser, "--mapping", metavar="TOML", help="all of this as a file (docs/import-export.md)")
     parser.add_argument("--units", metavar="KIND=UNIT,...", help="kinds: position, force, time")
-    parser.add_argument("--tip-radius", type=finite, metavar="M", help="of the tool's spherical tip [m]")
+    parser.add_argument("--tip-radius", type=finite, metavar="NUMBER", help="of the tool's spherical tip [m]")
     parser.add_argument("--force-on", choices=("tool", "object"), help="whose force it is (default: tool)")
     parser.add_argument("--frame", choices=("device", "tool"), help="of the force (default: device)")
     parser.add_argument("--flange-to-tip", type=vector, metavar="X,Y,Z", help="in the tool's frame [m]")
     parser.add_argument(
-        "--tool-mass", type=finite, metavar="KG", help="beyond the sensor; its weight is taken off"
+        "--tool-mass", type=finite, metavar="NUMBER", help="beyond the sensor; its weight is taken off [kg]"
     )
     parser.add_argument("--tare", metavar="START,END", help="take off the mean force of this time [s]")
-    parser.add_argument("--offset", metavar="S", help="of the force's clock [s], or auto (cross-correlation)")
-    parser.add_argument("--rate", type=finite, metavar="HZ", help="to resample to, or of rows without a time")
+    parser.add_argument(
+        "--offset", metavar="NUMBER", help="of the force's clock, or auto (cross-correlation) [s]"
+    )
+    parser.add_argument(
+        "--rate", type=finite, metavar="NUMBER", help="to resample to, or of rows without a time [Hz]"
+    )
     parser.add_argument("--name", help="of the object")
-    parser.add_argument("--slab", type=finite, metavar="M", help="the object is a slab so thick [m]")
+    parser.add_argument("--slab", type=finite, metavar="NUMBER", help="the object is a slab so thick [m]")
     parser.add_argument("--half-space", action="store_true", help="the object is deep and wide")
     parser.add_argument("--picture", metavar="PNG", help="what was understood (default: beside REC; 'none')")
     parser.add_argument("--dry-run", action="store_true", help="picture and summary only: write no recording")
@@ -91,8 +95,8 @@ def _said(arguments: argparse.Namespace) -> dict[str, Any]:
         thing["half_space"] = True
     given = {
         "mapping": arguments.mapping,
-        "columns": _pairs(arguments.column, "--column", "t=Time"),
-        "units": _pairs(arguments.units.split(",") if arguments.units else [], "--units", "position=mm"),
+        "columns": pairs(arguments.column, "--column", "t=Time"),
+        "units": pairs(arguments.units.split(",") if arguments.units else [], "--units", "position=mm"),
         "tip_radius_m": arguments.tip_radius,
         "force_on": arguments.force_on,
         "frame": arguments.frame,
@@ -106,7 +110,7 @@ def _said(arguments: argparse.Namespace) -> dict[str, Any]:
     return {key: value for key, value in given.items() if value not in (None, {})}
 
 
-def _pairs(texts: list[str], flag: str, example: str) -> dict[str, str]:
+def pairs(texts: list[str], flag: str, example: str) -> dict[str, str]:
     pairs = {}
     for text in texts:
         name, found, value = text.partition("=")

@@ -21,12 +21,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_input(parser, "shape", metavar="FILE", help="surface or mesh of the object")
     add_model_output(parser)
     add_mesh_arguments(parser)
-    parser.add_argument("--tip-radius", type=finite, metavar="M", help="of the tool (default: 0.005) [m]")
+    parser.add_argument(
+        "--tip-radius", type=finite, metavar="NUMBER", help="of the tool [m] (default: 0.005)"
+    )
     parser.add_argument(
         "--mesh-size",
         type=finite,
-        metavar="M",
-        help="edge of the tetrahedra (default: 0.010 or an eighth) [m]",
+        metavar="NUMBER",
+        help="edge of the tetrahedra [m] (default: 0.010 or an eighth)",
     )
     add_json(parser)
 

@@ -38,15 +38,21 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument(
         "--direction", type=vector, required=True, metavar="X,Y,Z", help="of the motion; any length"
     )
-    parser.add_argument("--depth", type=finite, required=True, metavar="M", help="after first touch [m]")
-    parser.add_argument("--speed", type=finite, default=0.01, metavar="M_PER_S", help="(default: 0.01) [m/s]")
-    parser.add_argument("--hold", type=finite, default=0.0, metavar="S", help="at depth (default: 0) [s]")
-    parser.add_argument("--tip-radius", type=finite, metavar="M", help="(default: the model's) [m]")
-    parser.add_argument("--renderer", choices=names(), default="fem", help="(default: fem)")
+    parser.add_argument("--depth", type=finite, required=True, metavar="NUMBER", help="after first touch [m]")
+    parser.add_argument(
+        "--speed", type=finite, default=0.01, metavar="NUMBER", help="of the tip [m/s] (default: 0.01)"
+    )
+    parser.add_argument(
+        "--hold", type=finite, default=0.0, metavar="NUMBER", help="at depth [s] (default: 0)"
+    )
+    parser.add_argument(
+        "--tip-radius", type=finite, metavar="NUMBER", help="of the tool [m] (default: the model's)"
+    )
+    parser.add_argument("--renderer", choices=names(), default="fem", help="what answers (default: fem)")
     add_output(parser, "-o", "--output", kind=CURVE, metavar="CURVE.csv", help="write the curve")
     add_input(parser, "--expect", metavar="CURVE.csv", help="a curve to compare with")
     parser.add_argument(
-        "--tolerance", type=finite, default=0.02, metavar="N", help="of --expect (default: 0.02) [N]"
+        "--tolerance", type=finite, default=0.02, metavar="NUMBER", help="of --expect [N] (default: 0.02)"
     )
     add_options_of(parser, "press")
     add_json(parser)

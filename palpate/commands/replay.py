@@ -23,7 +23,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_input(parser, "model", metavar="MODEL", help="folder of a model, or a scene")
     add_input(parser, "recording", metavar="REC", help="recording: .csv, .csv.gz or .toml")
     add_output(parser, "-o", "--output", kind=FORCES, metavar="FORCES.csv", help="write the forces")
-    parser.add_argument("--renderer", choices=names(), default="fem", help="(default: fem)")
+    parser.add_argument("--renderer", choices=names(), default="fem", help="what answers (default: fem)")
     add_options_of(parser, "replay")
     add_json(parser)
 

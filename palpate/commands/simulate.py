@@ -26,6 +26,7 @@ from palpate.arguments import (
     natural,
     say,
 )
+from palpate.report.page import PAGE
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.sealing import write_sealed
 from scenes.phantoms import PHANTOMS
@@ -72,6 +73,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="PNG",
         help="also draw the path, the force and every press beside the ideal object",
     )
+    add_output(
+        parser, "--report", kind=PAGE, metavar="HTML",
+        help="write the object to be turned, and every touch beside the ideal object's, as one HTML page",
+    )  # fmt: skip
     parser.add_argument("--workers", type=natural, help="processes that solve touches (default: one a core)")
     add_options_of(parser, "simulate")
     add_seed(parser)
@@ -98,13 +103,15 @@ def run(arguments: argparse.Namespace) -> int:
     """Simulate and write."""
     if arguments.seal and not arguments.truth:
         raise OptionError("--seal withholds the truth: say with --truth PATH where it shall be kept")
+    if arguments.seal and arguments.report:
+        raise OptionError("--seal withholds the truth, which --report would tell: give one of them")
     result = api.simulate(
         arguments.phantom,
         effects_from(arguments.effect),
         seed=arguments.seed,
         person=arguments.person,
         sizes=arguments.sizes,
-        ideal=arguments.pictures is not None,
+        ideal=arguments.pictures is not None or arguments.report is not None,
         workers=arguments.workers,
         save=None if arguments.seal else arguments.output,
         **given_for(arguments, "simulate"),
@@ -120,6 +127,8 @@ def run(arguments: argparse.Namespace) -> int:
         with atomic_file(arguments.pictures, PNG) as picture:
             simulation_figure(result).savefig(picture, dpi=110, format="png")
         say(arguments, f"pictures: {arguments.pictures}")
+    if arguments.report:
+        say(arguments, f"report: {result.report(arguments.report)}")
     duration = float(result.recording.t[-1])
     summary = {
         "recording": str(path),

@@ -71,7 +71,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--headless", action="store_true", help="no window: all else is the same")
     parser.add_argument(
-        "--seconds", type=finite, help="stop after this time [s] (default: when the window closes)"
+        "--seconds",
+        type=finite,
+        metavar="NUMBER",
+        help="stop after this time [s] (default: when the window closes)",
     )
     add_output(
         parser, "--record", kind=SAMPLES, metavar="REC", type=Path,

@@ -19,23 +19,27 @@ from mechanics.errors import RecordingError
 from mechanics.recording import Recording
 from palpate.importing.mapping import ROLES, Column, Said, find_columns, time_of
 from palpate.importing.tables import Table
+from reconstruct.filtering import white_noise_std
 
 GRAVITY_M_PER_S2 = 9.80665
 _SEARCH_S, _SURE = 3.0, 0.5
 _MOST_HZ = 2000.0
 POINTS_HZ = 100.0
-"""Rows without a time are numbered by this clock; a recording needs one."""
+"""Rows without a time are numbered by this clock, and slower readings put on it; a recording needs one."""
+LEAST_HZ = 60.0
+"""Slower readings are drawn out to a faster clock."""
 
 
 @dataclass(frozen=True)
 class Understood:
     """recording: SI, device frame, force on the tool. columns: by role. notes: what was done, one line each.
-    quasi_static: rows without a time."""
+    quasi_static: rows without a time. read_hz: rate of the readings, where they lie on a faster clock."""
 
     recording: Recording
     columns: dict[str, Column]
     notes: tuple[str, ...]
     quasi_static: bool = False
+    read_hz: float | None = None
 
 
 def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
@@ -62,8 +66,10 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
         streams = {part: _Stream(steps, s.values, s.source) for part, s in streams.items()}
         timed = True
         notes.append(f"no column of time: rows taken at {said.rate_hz:g} Hz")
+    read_hz, noise_n = None, None
     if timed:
         t, position, force, quaternion, rate = _one_clock(streams, said, notes)
+        read_hz, noise_n = _slower(streams["force"], rate, notes)
     else:
         notes.append(
             "no column of time: quasi-static points, which tell no rates and no delay (else give --rate)"
@@ -82,10 +88,33 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
         sample_rate_hz=rate,
         tip_radius_m=float(said.tip_radius_m),
         quaternion=quaternion,
+        force_noise_std_n=noise_n,
         object_name=str(thing.get("name", name)),
         poisson_ratio=None if thing.get("poisson_ratio") is None else float(thing["poisson_ratio"]),
+        description=_description(said, not timed, read_hz),
     )
-    return Understood(recording, columns, tuple(notes), not timed)
+    return Understood(recording, columns, tuple(notes), not timed, read_hz)
+
+
+def _description(said: Said, quasi_static: bool, read_hz: float | None) -> dict[str, Any]:
+    """What the recording's TOML will say of how it is to be read, for those who use it at once."""
+    about: dict[str, Any] = {"quasi_static": True} if quasi_static else {}
+    if read_hz is not None:
+        about["read_rate_hz"] = read_hz
+    return {"recording": about, "object": dict(said.thing)}
+
+
+def _slower(force: _Stream, rate_hz: float, notes: list[str]) -> tuple[float | None, float | None]:
+    """(rate of the force's readings, noise N of a component), where these are slower than the clock: what is
+    drawn between two readings has lost its noise."""
+    assert force.t is not None
+    read_hz = float(1 / np.median(np.diff(force.t)))
+    if read_hz > rate_hz / 1.5 or len(force.values) < 10:
+        return None, None
+    moving = np.ptp(force.values, axis=0) > 0
+    noise = white_noise_std(force.values[:, moving]) if moving.any() else 0.0
+    notes.append(f"the force was read at {read_hz:.4g} Hz, with a noise of {noise:.2g} N a component")
+    return read_hz, noise or None
 
 
 _PARTS = {"position": ROLES[1:4], "force": ROLES[4:7], "orientation": ROLES[7:]}
@@ -168,9 +197,9 @@ def _one_clock(
     together = all(
         len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values()
     )
-    if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz:
+    rate = float(1 / np.median(np.diff(times["position"])))
+    if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz and rate >= LEAST_HZ:
         t = times["position"] - times["position"][0]
-        rate = float(1 / np.median(np.diff(t)))
         return t, place.values, push.values, None if turn is None else turn.values, rate
     offset = _offset(place, push, said, notes)
     times["force"] = times["force"] + offset
@@ -178,7 +207,7 @@ def _one_clock(
     if not end > begin:
         raise RecordingError("the clocks of position and force share no time: give --offset S or auto")
     finest = max(1 / float(np.median(np.diff(t))) for t in times.values())
-    rate = said.rate_hz or min(finest, _MOST_HZ)
+    rate = said.rate_hz or (min(finest, _MOST_HZ) if finest >= LEAST_HZ else POINTS_HZ)
     t = begin + np.arange(int((end - begin) * rate) + 1) / rate
     even = {
         part: np.column_stack([np.interp(t, times[part], column) for column in streams[part].values.T])

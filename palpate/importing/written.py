@@ -41,9 +41,12 @@ def write_imported(
     about: dict[str, Any] = {"sample_rate_hz": recording.sample_rate_hz, "force_on": "tool"}
     if understood.quasi_static:
         about["quasi_static"] = True
+    if understood.read_hz is not None:
+        about["read_rate_hz"] = understood.read_hz
     table = {
         "recording": about,
         "tool": {"tip_radius_m": recording.tip_radius_m},
+        "sensor": {"force_noise_std_n": recording.force_noise_std_n},
         "object": {"name": recording.object_name, **{k: v for k, v in thing.items() if k != "name"}},
         "import": {
             "files": sources,

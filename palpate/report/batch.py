@@ -28,25 +28,25 @@ table.sortable { width: 100%; } .sortable td, .sortable th { padding: .3rem .6re
 .sortable td.words { white-space: normal; overflow-wrap: anywhere; min-width: 8rem; }
 .sortable button { font: inherit; font-weight: 600; background: none; border: 0; padding: 0; color: inherit;
                    text-align: inherit; cursor: pointer; }
-.sortable button::after { content: "\\00a0\\2195"; color: #a3adb8; }
+.sortable button::after { content: "\\00a0\\2195"; color: var(--rule); }
 .sortable th[aria-sort=ascending] button::after { content: "\\00a0\\2191"; color: inherit; }
 .sortable th[aria-sort=descending] button::after { content: "\\00a0\\2193"; color: inherit; }
 .sortable img { display: block; width: 5rem; height: 3.75rem; object-fit: contain; }
-.sortable small { color: #55606e; font-size: .86rem; } .sortable td small { display: block; }
-tr.failed { background: #fdf0ee; } tr.waiting { background: #f6f7f9; }
+.sortable small { color: var(--soft); font-size: .86rem; } .sortable td small { display: block; }
+tr.failed { background: var(--failed); } tr.waiting { background: var(--waiting); }
 #find { font: inherit; padding: .35rem .6rem; width: min(100%, 24rem); box-sizing: border-box;
-        border: 1px solid #8a96a5; border-radius: 4px; }
+        border: 1px solid var(--rule); border-radius: 4px; background: var(--paper); color: inherit; }
 @media (max-width: 48rem) {
   table.sortable, .sortable thead, .sortable tbody { display: block; }
   .sortable thead tr { display: flex; flex-wrap: wrap; gap: .2rem .9rem; }
   .sortable th { border: 0; padding: 0; font-size: .9rem; } .sortable th:empty { display: none; }
-  .sortable tbody tr { display: block; border: 1px solid #d9dee5; border-radius: 4px; margin: .7rem 0;
+  .sortable tbody tr { display: block; border: 1px solid var(--line); border-radius: 4px; margin: .7rem 0;
                        padding: .4rem .7rem; }
   .sortable tbody tr[hidden] { display: none; }
   .sortable td { display: flex; justify-content: space-between; gap: 1rem; border: 0; padding: .12rem 0;
                  text-align: right; }
   .sortable td.words { text-align: right; } .sortable td:empty { display: none; }
-  .sortable td::before { content: attr(data-name); color: #55606e; text-align: left; white-space: normal;
+  .sortable td::before { content: attr(data-name); color: var(--soft); text-align: left; white-space: normal;
                          overflow-wrap: normal; flex: none; max-width: 60%; }
   .sortable td.picture::before { content: none; } .sortable td.picture { justify-content: center; }
   .sortable td.picture img { width: 9rem; height: 6.75rem; }
@@ -96,6 +96,8 @@ def write_report(path: Path, result: Batch, steps: Sequence[str]) -> Path:
     page = Page(f"Batch of {_count(len(result.entries), 'recording')}")
     page.part(_STYLE)
     page.lead(lead(result))
+    page.paragraph(meaning(result))
+    page.next_step(_what_next(result))
     if result.agreements:
         _agreement(page, result)
     page.heading("Recordings")
@@ -121,6 +123,31 @@ def lead(result: Batch) -> str:
     if count["waiting"]:
         parts.append(f"{count['waiting']} not finished: run the same command again")
     return "; ".join(parts) + "."
+
+
+def meaning(result: Batch) -> str:
+    """What the moduli of one object explored more than once say, or how far the objects lie apart."""
+    known = [e.row.young_modulus_pa for e in result.entries if e.row.young_modulus_pa]
+    if result.agreements:
+        worst = max(result.agreements, key=lambda a: a.spread)
+        return (
+            f"Explorations of one object differ by up to {100 * worst.spread:.1f} % in modulus "
+            f"({worst.object}); "
+            f"their own intervals let expect {100 * worst.expected:.1f} %."
+        )
+    if len(known) > 1:
+        return (
+            f"Moduli from {min(known) / 1e3:.1f} to {max(known) / 1e3:.1f} kPa; no object was explored twice."
+        )
+    return "No object was explored twice, so nothing is said about how far explorations agree."
+
+
+def _what_next(result: Batch) -> str:
+    first = next((e.row.recording for e in result.entries if e.row.status == "done"), None)
+    if any(e.row.status != "done" for e in result.entries):
+        return "What to do next: mend what a row names, and run the same command again; what is done is kept."
+    feel = f"`palpate touch {result.folder / first / 'model'}`" if first else "`palpate touch OUT/NAME/model`"
+    return f"What to do next: open a recording's page by its name; feel one: {feel}."
 
 
 def _count(number: int, noun: str) -> str:

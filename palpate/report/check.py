@@ -38,6 +38,8 @@ def write_report(path: Path | str, checkup: Checkup) -> Path:
     save_figures(path.with_suffix(""), figures)
     page = Page(f"Check-up of {checkup.recording.name}")
     page.lead(checkup.lines()[0])
+    page.paragraph(_meaning(checkup))
+    page.next_step(_what_next(checkup))
     if checkup.findings:
         page.table(
             ["finding", "grave", "adds to the modulus's error", "how sure"],
@@ -54,6 +56,20 @@ def write_report(path: Path | str, checkup: Checkup) -> Path:
     for figure in figures.values():
         plt.close(figure)
     return page.write(path)
+
+
+def _meaning(checkup: Checkup) -> str:
+    if not checkup.findings:
+        return "Nothing stands out that would move the modulus beyond its interval."
+    if any(f.grave for f in checkup.findings):
+        return "The model could be another object's: `palpate reconstruct` refuses this without --force."
+    return "The modulus's interval is widened by what was found; the model can be made as it is."
+
+
+def _what_next(checkup: Checkup) -> str:
+    if any(f.grave for f in checkup.findings):
+        return f"What to do next: {checkup.findings[0].todo}."
+    return f"What to do next: `palpate reconstruct {checkup.recording.path or 'REC'} -o MODEL`."
 
 
 def over_time(ax: Axes, checkup: Checkup) -> None:

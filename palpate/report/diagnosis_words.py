@@ -24,7 +24,6 @@ ERROR_WORDS = {
     "sensor": "noise of the force sensor",
     "repeatability": "touching one place again does not give the same force",
     "shape": "the object's shape is not known where nobody touched",
-    "model": "everything that the best model found still leaves",
 }
 
 UNITS = (
@@ -98,11 +97,16 @@ def force_words(newtons: float) -> str:
     return f"{newtons * 1e3:.0f} mN"
 
 
+def percent(share: float) -> str:
+    """A share as a percentage."""
+    return f"{100 * share:.0f} %"
+
+
 def share_words(value: float | None) -> str:
     """A share of the gap that is closed."""
     if value is None:
         return "-"
-    return f"{value:.0%}" if value >= 0 else "none (worse)"
+    return percent(value) if value >= 0 else "none (worse)"
 
 
 def verdict(result: Diagnosis) -> str:
@@ -140,12 +144,13 @@ def _where(result: Diagnosis) -> tuple[str, str, str]:
         return question, "Nowhere in particular", text
     there = f"largest at {largest} (ringed): {force_words(rms)} there."
     if axis.share < LITTLE:
-        text = f"What it follows most is {AXIS_WORDS[axis.axis]}, and that is {axis.share:.0%} of it. It is "
-        text += there
+        text = f"What it follows most is {AXIS_WORDS[axis.axis]}, and that is {percent(axis.share)} of it. "
+        text += f"It is {there}"
         return question, "It follows no single thing", text
     chance = "" if axis.p < 0.05 else " This may be chance."
     text = (
-        f"{axis.share:.0%} of the difference between measured and simulated force follows it.{chance} The "
+        f"{percent(axis.share)} of the difference between measured and simulated force follows it.{chance} "
+        "The "
         f"difference is {there}"
     )
     return question, f"It depends on {AXIS_WORDS[axis.axis]}", text
@@ -187,7 +192,7 @@ def _suspects(result: Diagnosis) -> str:
 def _how_far(result: Diagnosis, force_rms_n: float) -> tuple[str, str, str]:
     question = "How far does it shrink?"
     before, noise = force_words(result.gap_before_n), force_words(result.noise_n)
-    size = f"{result.gap_before_n / force_rms_n:.0%} of the force of a typical touch"
+    size = f"{percent(result.gap_before_n / force_rms_n)} of the force of a typical touch"
     typical = "Typical difference (root mean square) at places that were left out of the fit"
     if result.effects and result.gap_closed is not None and result.gap_closed_ci95 is not None:
         low, high = result.gap_closed_ci95
@@ -199,8 +204,9 @@ def _how_far(result: Diagnosis, force_rms_n: float) -> tuple[str, str, str]:
             )  # fmt: skip
         text = (
             f"{typical}: {before} before ({size}), {after} with what was found. The sensor's own noise is "
-            f"{noise}, so {result.gap_closed:.0%} of what lies above it is gone (95% sure: {low:.0%} to "
-            f"{high:.0%})."
+            f"{noise}, so {percent(result.gap_closed)} of what lies above it is gone (95 % sure: "
+            f"{percent(low)} to "
+            f"{percent(high)})."
         )
         return question, f"From {before} to {after}", text
     text = f"{typical}: {before} ({size}). The sensor's own noise is {noise}."

@@ -1,17 +1,123 @@
-"""Pictures of a simulated recording: the tip's path, the force in time, and every press's curve."""
+"""The page of a simulated recording, and its pictures: the tip's path, the force in time, every press."""
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
+import trimesh
 from matplotlib.figure import Figure
 
+from mechanics.frames import tangents
+from palpate.report.page import Page
+from palpate.report.quantities import DEPTH, ERROR, ORDER
+from palpate.report.view3d import Colouring, Line, Thing, Traces, View
 from scenes.laboratory.paths import SIDEWAYS
 from scenes.laboratory.simulate import Simulation
+from scenes.phantoms import Phantom
 
 _COLOURS = ("#c0392b", "#27ae60", "#2c6fbb")
 
 PRESSES_SHOWN = 7
 """Presses whose curves are drawn: more would hide one another."""
+
+
+def write_report(path: Path | str, result: Simulation, phantom: Phantom) -> Path:
+    """Write one page: what was simulated, the object, and every touch as read beside the ideal object's."""
+    recording, truth = result.recording, result.truth
+    strengths = truth["strengths"]
+    effects = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in strengths.items())
+    page = Page(f"Simulated exploration of {recording.object_name}")
+    page.lead(
+        f"{len(result.touches)} touches in {recording.t[-1]:.0f} s of an object of "
+        f"{truth['young_modulus_pa'] / 1e3:.1f} kPa, "
+        f"{'with ' + effects if effects else 'without any effect'}."
+    )
+    page.paragraph(_meaning(result))
+    where = recording.path or "REC"
+    page.next_step(
+        f"What to do next: see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
+        f"`palpate diagnose {where} --model MODEL --report PAGE.html`; feel it: `palpate touch MODEL`."
+    )
+    page.view(
+        view_of(result, phantom),
+        simulation_figure(result),
+        "Path of the tip, force in time, the longest drag or touch, and some presses; grey and dashed is "
+        "what "
+        "the ideal object would answer to the same hand.",
+    )
+    if truth.get("sizes"):
+        page.heading("How large each effect is")
+        page.table(
+            ["effect", "change of the force [mN]", "after a refit of the modulus [mN]"],
+            [
+                [name.replace("_", " "), *(f"{1e3 * size[key]:.1f}" for key in _SIZES)]
+                for name, size in truth["sizes"].items()
+            ],
+        )
+    return page.write(path)
+
+
+_SIZES = ("rms_n", "rms_after_best_scale_n")
+
+
+def _meaning(result: Simulation) -> str:
+    noise = result.recording.force_noise_std_n
+    words = (
+        "The recording holds what a device would have read; the truth stands beside it and is used by nobody."
+    )
+    if noise:
+        words += f" The sensor's noise is {1e3 * noise:.0f} mN an axis: a smaller effect is hard to see."
+    return words
+
+
+def view_of(result: Simulation, phantom: Phantom) -> View:
+    """The phantom in the device's frame; each touch as read, without noise, and of the ideal object."""
+    motion, recording = result.motion, result.recording
+    turn = np.array(result.truth["device_from_object_rotation"])
+    shift = np.array(result.truth["device_from_object_shift_mm"])
+    rows = [
+        np.flatnonzero((motion.touch == k) & (motion.s > -_BEFORE_MM)) for k in range(len(result.touches))
+    ]
+    normals = np.array([touch.normal for touch in result.touches]) @ turn.T
+    frame = np.repeat([np.stack([n, *tangents(n)]) for n in normals], [len(r) for r in rows], axis=0)
+    chosen = np.concatenate(rows)
+    starts = np.cumsum([0, *map(len, rows)])
+    first = np.concatenate([np.full(len(r), r[0] if len(r) else 0) for r in rows])
+    lines = [
+        Line("read", _turned(frame, recording.force_on_tool[chosen]), "measured"),
+        Line("without noise", _turned(frame, result.clean_n[chosen]), "found", shown=False),
+    ]
+    colourings = [
+        Colouring(ORDER, None, np.arange(1.0, len(rows) + 1), "Each dot is a touch, in order of time."),
+        Colouring(DEPTH, None, np.array([touch.depth for touch in result.touches]) * 1e-3),
+    ]
+    if result.ideal_n is not None:
+        lines.insert(1, Line("ideal object", _turned(frame, result.ideal_n[chosen]), "rendered"))
+        change = result.clean_n - result.ideal_n
+        each = np.array([np.sqrt((change[r] ** 2).sum(axis=1).mean()) for r in rows])
+        words = "What the effects change, root mean square over each touch; between touches what is near."
+        colourings.append(Colouring(ERROR, None, each, words, name="change of the force"))
+    body = trimesh.Trimesh(1e3 * phantom.vertices @ turn.T + shift, phantom.faces, process=False)
+    places = np.array([touch.point for touch in result.touches]) @ turn.T + shift
+    thing = Thing(
+        body.vertices * 1e-3,
+        np.array(body.vertex_normals),
+        phantom.faces,
+        phantom.vertices[:, 2] > 1e-4,
+        shift * 1e-3,
+        turn[:, 2],
+    )
+    traces = Traces(starts, motion.s[chosen] * 1e-3, (chosen - first) * (motion.t[1] - motion.t[0]), lines)
+    return View(thing, places * 1e-3, colourings, traces)
+
+
+def _turned(frame: np.ndarray, force_n: np.ndarray) -> np.ndarray:
+    return np.einsum("nij,nj->ni", frame, force_n)
+
+
+_BEFORE_MM = 1.0
+"""Above the surface: where the curve of a touch begins and ends."""
 
 
 def simulation_figure(result: Simulation) -> Figure:

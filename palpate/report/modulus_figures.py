@@ -14,6 +14,7 @@ from scipy.stats import pearsonr, spearmanr
 from mechanics.model import Model
 from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, spread
 from palpate.report.object3d import draw_object
+from palpate.report.quantities import KELVIN_VOIGT, MODULUS, Quantity
 from reconstruct.modulus import ModulusFit
 from render.felt import felt_surface
 
@@ -97,64 +98,76 @@ def undamped_figure(models: dict[str, Model]) -> Figure:
 
 
 def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None = None) -> Figure:
-    """Figure 5: k_V over the surface from the side and from above, and of another sample (else this) aslant;
-    k_V, k_H and e over height on the side."""
-    figure, axes = plt.subplots(2, 3, figsize=(13, 7.6), layout="constrained")
+    """Figure 5: k_V over the surface from the side and from above, and of another sample (else this) aslant,
+    all on one scale; k_V, k_H and e over height on the side, each over its mean and on one scale."""
+    figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), layout="constrained")
     aslant = (*(other or (name, model)), 30.0, "aslant")
     views = [(name, model, 8.0, "side"), (name, model, 89.0, "top"), aslant]
+    limits = _limits([m for _, m, _, _ in views], "k_v", KELVIN_VOIGT)
     for ax, (called, shown, elevation, view) in zip(axes[0], views, strict=True):
-        _coloured(ax, shown, "k_v", 1.0, "$k_V$ [N/m]", elevation)
+        _coloured(ax, shown, "k_v", KELVIN_VOIGT, limits, elevation)
         ax.set_title(f"{called} {view}".strip(), fontsize=10)
     trends = {t.name: t for t in height_trends(model)}
     side, height = on_side(model), heights(model) * 1e3
-    for ax, name, label, factor in zip(
-        axes[1],
-        ("k_v", "k_h", "e_pa"),
-        ("$k_V$ [N/m]", "$k_H$ [N/m$^r$]", "e [kPa]"),
-        (1, 1, 1e-3),
-        strict=True,
-    ):
-        value = column(model, name) * factor
-        ax.plot(height[side], value[side], "o", ms=4, color=FORCE_COLOUR)
-        ax.set(xlabel="height above the support [mm]", ylabel=label)
-        if side.any():
-            ax.set_ylim(0, 1.3 * np.nanmax(value[side]))
-        if name in trends:
-            ax.set_title(f"r = {trends[name].pearson:+.2f} (p = {trends[name].pearson_p:.2g})", fontsize=10)
-    axes[1, 2].axhline(model.material.young_modulus_pa / 1e3, color=PEAK_COLOUR, lw=1)
+    reach = 0.1
+    for ax, key, label in zip(axes[1], ("k_v", "k_h", "e_pa"), ("$k_V$", "$k_H$", "e"), strict=True):
+        value = column(model, key)
+        share = 100 * (value[side] / np.nanmean(value[side]) - 1) if side.any() else np.zeros(0)
+        ax.plot(height[side], share, "o", ms=4, color=FORCE_COLOUR)
+        ax.axhline(0, color=PEAK_COLOUR, lw=1)
+        ax.set(xlabel="height above the support [mm]", ylabel=f"{label} over its mean [%]")
+        reach = max([reach, *np.abs(share[np.isfinite(share)])])
+        if key in trends:
+            ax.set_title(f"r = {trends[key].pearson:+.2f} (p = {trends[key].pearson_p:.2g})", fontsize=10)
+    for ax in axes[1]:
+        ax.set_ylim(-1.15 * reach, 1.15 * reach)
     return figure
+
+
+def _limits(models: list[Model], key: str, quantity: Quantity) -> tuple[float, float]:
+    """Of the colours of one column of several models: without the outermost twentieth of the presses."""
+    values = np.concatenate([column(m, key) for m in models]) * quantity.scale
+    low, high = np.nanpercentile(values, [5, 95])
+    return quantity.limits(float(low), float(max(high, low + 1e-9)))
 
 
 def _coloured(
     ax: Axes,
     model: Model,
-    name: str,
-    factor: float,
-    label: str,
-    elevation_deg: float,
-    share: float | None = None,
+    key: str,
+    quantity: Quantity,
+    limits: tuple[float, float],
+    elevation_deg: float = 25.0,
 ) -> None:
-    """The object coloured by a column of its palpations; share: half the colours' range over the median."""
-    values = column(model, name) * factor
-    used = np.isfinite(values)
-    limits = None if share is None else tuple(np.nanmedian(values) * np.array([1 - share, 1 + share]))
+    """The object coloured by a column of its palpations."""
+    values = column(model, key) * quantity.scale
     draw_object(
-        ax, model, over_surface(model, values), label=label, limits=limits, elevation_deg=elevation_deg,
-        touches=model.presses.point[used],
+        ax, model, over_surface(model, values), label=quantity.label, colour_map=quantity.colour_map,
+        limits=limits, elevation_deg=elevation_deg, touches=model.presses.point[np.isfinite(values)],
     )  # fmt: skip
 
 
 def moduli_figure(models: dict[str, Model]) -> Figure:
-    """Figure 6: (a) moduli of single presses, * the global one; (b) where they hold, on two samples."""
+    """Figure 6: (a) moduli of single presses, * the global one with its interval; (b) where they hold, on two
+    samples, on one scale."""
     shown = list(models.items())[:2]
     figure, axes = plt.subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4), layout="constrained")
     stars = [m.material.young_modulus_pa / 1e3 for m in models.values()]
     spread(axes[0], [column(m, "e_pa") / 1e3 for m in models.values()], list(models), stars)
-    axes[0].set(ylabel="Young's modulus [kPa]", ylim=(0, None))
+    for i, model in enumerate(models.values()):
+        low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
+        if np.isfinite([low, high]).all():
+            axes[0].plot([i + 1.34] * 2, [low, high], "-", lw=3, color=PEAK_COLOUR, solid_capstyle="butt")
+        axes[0].annotate(
+            f"{stars[i]:.2f}", (i + 1.34, stars[i]), xytext=(6, 0), textcoords="offset points", va="center"
+        )
+    axes[0].set(ylabel="Young's modulus [kPa]", xlim=(0.5, len(models) + 0.9))
+    axes[0].margins(y=0.12)
     axes[0].tick_params(axis="x", labelrotation=15)
     axes[0].set_title("(a)", loc="left", fontsize=10)
+    limits = _limits([m for _, m in shown], "e_pa", MODULUS)
     for ax, (name, model) in zip(axes[1:], shown, strict=True):
-        _coloured(ax, model, "e_pa", 1e-3, "e of single presses [kPa]", 25.0, share=0.25)
+        _coloured(ax, model, "e_pa", MODULUS, limits)
         ax.set_title(f"(b) {name}", loc="left", fontsize=10)
     return figure
 
@@ -179,9 +192,13 @@ def depth_figure(fit: ModulusFit) -> Figure:
 
 
 def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, word: str = "bound") -> Axes:
-    """Histogram of a mesh quality with its bound."""
+    """Histogram of a mesh quality, its bound drawn where it lies among the values, else named."""
     ax.hist(values, bins=40, color=FORCE_COLOUR)
+    most = float(values.max())
     ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
     ax.set(xlabel=label, ylabel="count")
+    if bound > 1.3 * most:
+        ax.set_xlim(min(0.0, float(values.min())), 1.05 * most)
+        ax.plot([], [], " ", label="(to the right of the picture)")
     ax.legend(frameon=False, fontsize=8)
     return ax

@@ -14,6 +14,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import PolyCollection
 from matplotlib.colors import Normalize, to_rgb
 from scipy.spatial import cKDTree
+from scipy.spatial.distance import cdist
 
 from mechanics.model import Model
 from render.felt import felt_surface
@@ -23,17 +24,36 @@ TOUCH_COLOUR = "#c1121f"
 BASE_COLOUR = "#1d3557"
 
 
-def view_axes(up: np.ndarray, elevation_deg: float, azimuth_deg: float) -> np.ndarray:
-    """(3, 3) rows right, upward, towards the eye, for an eye at these angles about `up`."""
+AZIMUTH_DEG, ELEVATION_DEG = 35.0, 25.0
+SPREAD_M = 0.015
+"""How far a press speaks for the surface around it."""
+
+
+def level_axes(up: np.ndarray) -> np.ndarray:
+    """(2, 3) unit vectors across `up`, of which azimuths are counted: from the first towards the second."""
     up = up / np.linalg.norm(up)
     aside = np.cross(up, np.eye(3)[np.argmin(np.abs(up))])
     aside /= np.linalg.norm(aside)
+    return np.array([aside, np.cross(up, aside)])
+
+
+def view_axes(up: np.ndarray, elevation_deg: float, azimuth_deg: float) -> np.ndarray:
+    """(3, 3) rows right, upward, towards the eye, for an eye at these angles about `up`."""
+    up = up / np.linalg.norm(up)
     elevation, azimuth = np.radians([elevation_deg, azimuth_deg])
-    level = np.cos(azimuth) * aside + np.sin(azimuth) * np.cross(up, aside)
+    level = np.array([np.cos(azimuth), np.sin(azimuth)]) @ level_axes(up)
     eye = np.cos(elevation) * level + np.sin(elevation) * up
     right = np.cross(up, eye)
     right /= np.linalg.norm(right)
     return np.array([right, np.cross(eye, right), eye])
+
+
+def spread_over(points: np.ndarray, places: np.ndarray, values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) values of places (k, 3) m at points (n, 3) m, near ones counting most; and (n,) how well they are
+    known there, from 1 beside a place to 0 where none is within some SPREAD_M."""
+    weight = np.exp(-((cdist(points, places) / SPREAD_M) ** 2)) + 1e-9
+    total = weight.sum(axis=1)
+    return (weight @ values) / total, np.clip(2.0 * total, 0.0, 1.0)
 
 
 def draw_object(
@@ -46,8 +66,8 @@ def draw_object(
     limits: tuple[float, float] | None = None,
     touches: np.ndarray | None = None,
     show_base: bool = False,
-    elevation_deg: float = 25.0,
-    azimuth_deg: float = 35.0,
+    elevation_deg: float = ELEVATION_DEG,
+    azimuth_deg: float = AZIMUTH_DEG,
 ) -> Axes:
     """Draw what a tip meets of the object (render.felt) and return `ax`.
 

@@ -1,37 +1,24 @@
-"""A self-contained HTML page: headings, paragraphs, tables and embedded pictures; nothing is fetched."""
+"""A self-contained HTML page: headings, words, tables, pictures and one view of the object in 3D; nothing is
+fetched."""
 
 from __future__ import annotations
 
 import base64
 import html
 import io
+import re
 from collections.abc import Sequence
+from functools import cache
+from importlib.resources import files
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from mechanics.files import PNG, Kind, atomic_file, reading
 
-PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
+if TYPE_CHECKING:
+    from palpate.report.view3d import View
 
-_STYLE = """
-:root { color-scheme: light; }
-body { font: 16px/1.5 system-ui, sans-serif; color: #1c2430; background: #fff; max-width: 62rem;
-       margin: 2rem auto; padding: 0 1.2rem; }
-h1 { font-size: 1.7rem; margin-bottom: .2rem; } h2 { font-size: 1.25rem; margin-top: 2.2rem; }
-p.lead { font-size: 1.15rem; } figure { margin: 1rem 0; } figure img { max-width: 100%; height: auto; }
-figcaption { color: #55606e; font-size: .92rem; } table { border-collapse: collapse; margin: .8rem 0; }
-th, td { padding: .3rem .8rem; border-bottom: 1px solid #d9dee5; text-align: right; }
-th:first-child, td:first-child, td.words, th.words { text-align: left; }
-th { border-bottom: 2px solid #8a96a5; }
-.cards { display: grid; grid-template-columns: repeat(auto-fit, minmax(16rem, 1fr)); gap: .9rem;
-         margin: .9rem 0; }
-.card { border: 1px solid #d9dee5; border-top: 4px solid #2a9d8f; border-radius: 4px; padding: .6rem .9rem;
-        overflow-wrap: anywhere; }
-.card h2 { margin: 0; font-size: .82rem; letter-spacing: .06em; text-transform: uppercase; color: #55606e; }
-.card strong { display: block; font-size: 1.12rem; line-height: 1.3; margin: .15rem 0 .3rem; }
-.card p { margin: 0; font-size: .95rem; line-height: 1.4; }
-footer { margin-top: 3rem; color: #77808c; font-size: .85rem; }
-"""
+PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
 
 
 class Page:
@@ -40,6 +27,7 @@ class Page:
     def __init__(self, title: str) -> None:
         self.title = title
         self._parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
+        self._live = False
 
     def heading(self, text: str) -> None:
         """A section's heading."""
@@ -50,8 +38,12 @@ class Page:
         self._parts.append(f'<p class="lead">{html.escape(text)}</p>')
 
     def paragraph(self, text: str) -> None:
-        """Plain words."""
-        self._parts.append(f"<p>{html.escape(text)}</p>")
+        """Plain words; what stands between backticks is code."""
+        self._parts.append(f"<p>{_words(text)}</p>")
+
+    def next_step(self, text: str) -> None:
+        """What to do now, marked; what stands between backticks is code."""
+        self._parts.append(f'<p class="next">{_words(text)}</p>')
 
     def cards(self, cards: Sequence[tuple[str, str, str]]) -> None:
         """Answers side by side: (question, answer in a few words, a sentence or two) each."""
@@ -71,7 +63,7 @@ class Page:
             "<tr>" + "".join(f"<td{k}>{_cell(v)}</td>" for k, v in zip(kind, row, strict=True)) + "</tr>"
             for row in rows
         )
-        self._parts.append(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+        self._parts.append(scrolling(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"))
 
     def part(self, text: str) -> None:
         """HTML as it is."""
@@ -79,25 +71,59 @@ class Page:
 
     def figure(self, picture: Any, caption: str) -> None:
         """A picture: a matplotlib figure, a PNG's path, or an (h, w, 3) uint8 image."""
-        data = base64.b64encode(png_bytes(picture)).decode()
-        caption = html.escape(caption)
-        self._parts.append(
-            f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
-            f"<figcaption>{caption}</figcaption></figure>"
+        self._parts.append(_figure(picture, caption))
+
+    def view(self, view: View, picture: Any, caption: str) -> None:
+        """The object to be turned; without scripts the picture with its caption."""
+        self._parts.append(view.html(_figure(picture, caption)))
+        self._live = True
+
+    def html(self) -> str:
+        """The whole page."""
+        return (
+            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
+            '<meta name="viewport" content="width=device-width, initial-scale=1">'
+            f"<title>{html.escape(self.title)}</title><style>{_style()}</style></head><body>"
+            + "\n".join(self._parts)
+            + "<footer>Made by palpate. Positions are in the device's frame, forces are those on the tool."
+            + f"</footer>{self._scripts()}</body></html>"
         )
 
     def write(self, path: Path | str) -> Path:
         """Write the page whole; returns its path."""
-        text = (
-            '<!doctype html><html lang="en"><head><meta charset="utf-8">'
-            '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"<title>{html.escape(self.title)}</title><style>{_STYLE}</style></head><body>"
-            + "\n".join(self._parts)
-            + "<footer>Made by palpate. Forces are on the tool; SI units.</footer></body></html>"
-        )
         with atomic_file(path, PAGE) as temporary:
-            temporary.write_text(text, encoding="utf-8")
+            temporary.write_text(self.html(), encoding="utf-8")
         return Path(path)
+
+    def _scripts(self) -> str:
+        if not self._live:
+            return ""
+        from palpate.report.view3d import scripts
+
+        return scripts()
+
+
+def scrolling(table: str) -> str:
+    """A table that scrolls by itself where it is wider than the page, by keyboard too."""
+    return f'<div class="scroll" tabindex="0">{table}</div>'
+
+
+@cache
+def _style() -> str:
+    return files("palpate.report").joinpath("page.css").read_text(encoding="utf-8")
+
+
+def _words(text: str) -> str:
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
+
+
+def _figure(picture: Any, caption: str) -> str:
+    data = base64.b64encode(png_bytes(picture)).decode()
+    caption = html.escape(caption)
+    return (
+        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
+        f"<figcaption>{caption}</figcaption></figure>"
+    )
 
 
 def png_bytes(picture: Any) -> bytes:

@@ -10,6 +10,7 @@ from matplotlib import pyplot as plt
 from matplotlib.figure import Figure
 
 from mechanics.model import Model
+from mechanics.touch import forces_at
 from palpate.report.differences import differences
 from palpate.report.exploration_figures import exploration_figures
 from palpate.report.modulus_figures import (
@@ -17,18 +18,24 @@ from palpate.report.modulus_figures import (
     depth_figure,
     height_trends,
     moduli_figure,
+    over_surface,
     quality_histogram,
     spatial_figure,
     undamped_figure,
 )
+from palpate.report.object3d import draw_object
 from palpate.report.page import Page, save_figures
+from palpate.report.quantities import ERROR, MODULUS
 from palpate.report.reconstruction_tables import (
     PAPER_SECONDS,
     one_d_comparison,
+    paper_remade,
     point_load_rows,
     table_one,
 )
+from palpate.report.view3d import Colouring, Line, View, local, thing_of, traces_of, usual_colourings
 from reconstruct.pipeline import Reconstruction
+from reconstruct.uniaxial import low_passed
 
 
 def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Model] | None = None) -> Path:
@@ -43,32 +50,42 @@ def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Mod
     save_figures(path.with_suffix(""), figures)
     page = Page(f"Reconstruction of {result.exploration.recording.name}")
     _summary(page, result)
+    page.view(
+        view_of(result), figures["object"],
+        "Left: first touches and fixed base. Right: the modulus of single presses, and where.",
+    )  # fmt: skip
+    _how(page, result)
     page.heading("Exploration and geometry")
-    page.figure(figures["figure-2"], "Figure 2: force magnitude, first touches (o) and peaks (+).")
+    page.figure(
+        figures["figure-2"], "Force magnitude, first touches (o) and peaks (+) (the paper's Figure 2)."
+    )
     page.figure(
         figures["figure-3abc"],
-        "Figure 3: (a) first touches (+) and base outline with its farthest-point sample (o); (b) mesh, "
-        "fixed "
-        "base nodes and the nodes nearest to the contacts, in order; (c) force over depth of every "
-        "palpation.",
+        "(a) First touches (+) and base outline with its farthest-point sample (o); (b) mesh, fixed base "
+        "nodes "
+        "and the nodes nearest to the contacts, in order; (c) force over depth of every palpation (the "
+        "paper's "
+        "Figure 3).",
     )
     _not_used(page, result)
     page.figure(figures["figure-mesh"], _mesh_words(result))
     page.heading("1D models")
-    page.figure(figures["figure-3d"], "Figure 3(d): Kelvin-Voigt and Hunt-Crossley parameters.")
-    page.figure(figures["figure-4"], "Figure 4: without damping; k_H at the mean exponent.")
+    page.figure(figures["figure-3d"], "Kelvin-Voigt and Hunt-Crossley parameters (the paper's Figure 3(d)).")
+    page.figure(figures["figure-4"], "Without damping; k_H at the mean exponent (the paper's Figure 4).")
     _one_d(page, result)
     page.heading("Where the parameters hold")
     page.figure(
         figures["figure-5"],
-        "Figure 5: k_V over the surface (radial basis functions through the presses, dots); below k_V, "
-        "k_H and e "
-        "over height on the side, the line is the global modulus.",
+        "Above, k_V over the surface (radial basis functions through the presses, dots); below, k_V, k_H "
+        "and e "
+        "over height on the side, relative to their means and on one scale (the paper's Figure 5).",
     )
     _trends(page, height_trends(result.model))
     page.heading("Modulus")
     page.figure(
-        figures["figure-6"], "Figure 6: (a) moduli of single palpations, * the global one; (b) where."
+        figures["figure-6"],
+        "(a) Moduli of single palpations, * the global one with its 95 % interval; (b) where (the paper's "
+        "Figure 6).",
     )
     page.table(*table_one(result, beside or {}))
     if "figure-depth" in figures:
@@ -81,9 +98,57 @@ def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Mod
     return page.write(path)
 
 
+def view_of(result: Reconstruction) -> View:
+    """The object; each press as measured and as the model with its one modulus answers the same path."""
+    model = result.model
+    shown = low_passed(model.presses).window(0.03, 0.03)
+    colourings, lines = usual_colourings(model), [Line("measured", local(shown, shown.force), "measured")]
+    selected = 0
+    if result.sites is not None and result.modulus is not None:
+        force = forces_at(
+            result.sites,
+            shown.displacement,
+            shown.starts,
+            young_modulus_pa=result.modulus.modulus_pa,
+            tip_radius_m=shown.tip_radius_m,
+            law=result.modulus.press.law,
+        )
+        lines.append(Line("model with one modulus", local(shown, force)))
+        off = force - shown.force
+        each = np.array([np.sqrt((off[part] ** 2).sum(axis=1).mean()) for part in shown.parts])
+        words = (
+            "Model less measured, root mean square over each press, which the modulus was fitted to; "
+            "between presses "
+            "what is near."
+        )
+        colourings.insert(1, Colouring(ERROR, None, each, words))
+        selected = int(np.argmax(each))
+    return View(thing_of(model), model.presses.point, colourings, traces_of(shown, lines), selected)
+
+
+def object_figure(model: Model) -> Figure:
+    """First touches and fixed base; the modulus of single presses over the surface."""
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    touches = model.presses.point
+    draw_object(axes[0], model, touches=touches, show_base=True)
+    axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
+    own = model.presses.fits["e_pa"]
+    if np.isfinite(own).any():
+        values = own[np.isfinite(own)] * MODULUS.scale
+        draw_object(
+            axes[1], model, over_surface(model, own * MODULUS.scale), label=MODULUS.label,
+            colour_map=MODULUS.colour_map, limits=MODULUS.limits(values.min(), values.max()),
+            touches=touches[np.isfinite(own)],
+        )  # fmt: skip
+    else:
+        axes[1].set_axis_off()
+    return figure
+
+
 def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figure]:
     models = {result.exploration.recording.name: result.model, **beside}
     figures = exploration_figures(result)
+    figures["object"] = object_figure(result.model)
     figures["figure-4"] = undamped_figure(models)
     figures["figure-5"] = spatial_figure(
         result.model, result.exploration.recording.name, next(iter(beside.items()), None)
@@ -103,16 +168,59 @@ def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figu
 
 
 def _summary(page: Page, result: Reconstruction) -> None:
-    model, surface = result.model, result.surface
+    model = result.model
     low, high = model.material.young_modulus_ci95_pa
     page.lead(
         f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
-        f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations (method "
-        f"{model.provenance['method']})."
+        f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations."
     )
+    page.paragraph(_meaning(result))
+    where = model.path or "MODEL"
+    page.next_step(
+        f"What to do next: feel it: `palpate touch {where}`; see what it leaves out: "
+        f"`palpate diagnose REC --model {where} --report PAGE.html`."
+    )
+    for finding in result.findings:
+        page.paragraph(finding.line())
+
+
+def _meaning(result: Reconstruction) -> str:
+    """What the modulus and its interval mean, in a sentence or two."""
+    model = result.model
+    e, (low, high) = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
+    words = f"About as soft as {_soft_as(e)}."
+    if np.isfinite([low, high]).all():
+        words += (
+            f" Another exploration of the same object would be expected to find a modulus within "
+            f"{100 * max(high / e - 1, 1 - low / e):.0f} % of this one."
+        )
+    if result.modulus:
+        misfit = float(np.sqrt((result.modulus.press.rms_n**2).mean()))
+        words += f" One number for the whole object leaves {1e3 * misfit:.0f} mN of a press unexplained."
+    return words
+
+
+_SOFTNESS = (
+    (2e3, "fat tissue or a soft jelly"),
+    (8e3, "liver"),
+    (20e3, "relaxed muscle"),
+    (60e3, "a very soft silicone, or tensed muscle"),
+    (300e3, "a soft rubber"),
+    (np.inf, "a firm rubber, or stiffer"),
+)
+"""Up to a modulus, Pa: what is about as soft. Orders of magnitude of elastography and of data sheets."""
+
+
+def _soft_as(modulus_pa: float) -> str:
+    return next(words for limit, words in _SOFTNESS if modulus_pa <= limit)
+
+
+def _how(page: Page, result: Reconstruction) -> None:
+    surface = result.surface
     page.paragraph(
-        f"Surface: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm^3. "
-        f"Force noise {result.exploration.noise_n * 1e3:.1f} mN an axis."
+        f"Surface: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. Force "
+        "noise "
+        f"{result.exploration.noise_n * 1e3:.1f} mN an axis. Method: {result.model.provenance['method']}."
     )
     if result.modulus:
         fit = result.modulus
@@ -121,9 +229,9 @@ def _summary(page: Page, result: Reconstruction) -> None:
             f"shape's uncertainty makes {100 * fit.shape_error:.2f} % of the modulus's standard error."
         )
         page.table(
-            ["dent law", "modulus [kPa]", "misfit of a press [N]", "chosen by resamples"],
+            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen by resamples"],
             [
-                [name, e / 1e3, misfit, f"{100 * share:.0f} %"]
+                [name, e / 1e3, 1e3 * misfit, f"{100 * share:.0f} %"]
                 for name, (e, misfit, share) in fit.by_law.items()
             ],
         )
@@ -145,7 +253,7 @@ def _mesh_words(result: Reconstruction) -> str:
         f"ratio of 2 (greatest {report.radius_edge_ratio.max():.2f}); greatest distance between mesh and "
         f"surface "
         f"{report.surface_distance_m.max() * 1e3:.2f} mm; volume {report.volume_m3 * 1e6:.1f} of "
-        f"{report.surface_volume_m3 * 1e6:.1f} cm^3."
+        f"{report.surface_volume_m3 * 1e6:.1f} cm³."
     )
 
 
@@ -166,10 +274,15 @@ def _trends(page: Page, trends: list[Trend]) -> None:
     page.table(
         ["parameter", "Pearson r", "p", "Spearman", "p", "change over the height"],
         [
-            [t.name, t.pearson, t.pearson_p, t.spearman, t.spearman_p, f"{100 * t.change:+.1f} %"]
+            [t.name, f"{t.pearson:+.2f}", _chance(t.pearson_p), f"{t.spearman:+.2f}", _chance(t.spearman_p)]
+            + [f"{100 * t.change:+.1f} %"]
             for t in trends
         ],
     )
+
+
+def _chance(p: float) -> str:
+    return "< 0.001" if p < 1e-3 else f"{p:.2g}"
 
 
 def _point_load(page: Page, result: Reconstruction) -> None:
@@ -186,9 +299,13 @@ def _point_load(page: Page, result: Reconstruction) -> None:
 
 
 def _speed(page: Page, result: Reconstruction) -> None:
-    total = sum(result.seconds.values())
-    rows = [
-        [name, seconds, PAPER_SECONDS.get(name, float("nan"))] for name, seconds in result.seconds.items()
+    total = {**result.seconds, "whole": sum(result.seconds.values())}
+    remade = paper_remade(result)
+    rows: list[list[object]] = [
+        [name, seconds, *([PAPER_SECONDS.get(name, float("nan"))] if remade else [])]
+        for name, seconds in total.items()
     ]
-    page.paragraph("Wall time of the steps on this machine, and what the paper states:")
-    page.table(["step", "seconds", "paper [s]"], [*rows, ["whole", total, PAPER_SECONDS["whole"]]])
+    page.paragraph(
+        "Wall time of the steps on this machine" + (", and what the paper states:" if remade else ":")
+    )
+    page.table(["step", "time [s]", *(["paper [s]"] if remade else [])], rows)

@@ -12,6 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+
 T = TypeVar("T")
 
 
@@ -33,6 +35,10 @@ class Result(ABC):
     def _place(self, plotter: Plotter) -> None:
         """Put this result into a 3D scene, device frame, m."""
 
+    def view(self) -> View | None:
+        """The object to be turned, as pages and notebooks show it; None where there is none."""
+        return None
+
     def __str__(self) -> str:
         return "\n".join(self.lines())
 
@@ -52,6 +58,19 @@ class Result(ABC):
         picture = base64.b64encode(png_bytes(figure)).decode()
         return f'<pre>{html.escape(str(self))}</pre><img src="data:image/png;base64,{picture}">'
 
+    def _in_cell(self) -> bool:
+        """Show the view in a notebook's cell; whether there is one."""
+        from matplotlib.figure import Figure
+
+        from palpate.results.notebook import display, frame
+
+        view = self.view()
+        if view is not None:
+            figure = Figure(figsize=(7, 3.2), layout="constrained")
+            self._draw(figure.subplots())
+            display(frame(view, self.lines()[0], figure))
+        return view is not None
+
     def plot(self, ax: Axes | None = None) -> Axes:
         """Draw the result by matplotlib and return the axes, whose labels carry the units.
 
@@ -65,19 +84,23 @@ class Result(ABC):
         self._draw(ax)
         return ax
 
-    def show(self, plotter: Plotter | None = None, *, screenshot: str | Path | None = None) -> Plotter:
+    def show(self, plotter: Plotter | None = None, *, screenshot: str | Path | None = None) -> Plotter | None:
         """Draw the result in 3D by PyVista (device frame, m) and return the plotter.
 
-        plotter: add to it, and leave showing it to the caller. Without one a window opens (in a notebook a
-        view); screenshot: write this PNG instead, which needs no screen. Raises OptionError where there is no
-        screen to show it on.
+        plotter: add to it, and leave showing it to the caller. Without one a window opens; in a notebook the
+        view of the pages, to be turned in the cell, where the result has one (then None is returned).
+        screenshot: write this PNG instead, which needs no screen. Raises OptionError where there is no screen
+        to show it on.
         """
         from mechanics.files import PNG, atomic_file
+        from palpate.results.notebook import in_notebook
         from palpate.results.scenery import new_plotter
 
         if plotter is not None:
             self._place(plotter)
             return plotter
+        if screenshot is None and in_notebook() and self._in_cell():
+            return None
         plotter = new_plotter(off_screen=screenshot is not None)
         self._place(plotter)
         if screenshot is None:

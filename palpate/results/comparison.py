@@ -14,6 +14,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Comparison(Result, room.Comparison):
@@ -74,6 +76,12 @@ class Comparison(Result, room.Comparison):
         from palpate.report.comparison import draw_by_press
 
         draw_by_press(self, ax)
+
+    def view(self) -> View:
+        """The object to be turned, and each press beside what was simulated."""
+        from palpate.report.comparison import view_of
+
+        return view_of(self)
 
     def _place(self, plotter: Plotter) -> None:
         from palpate.results.scenery import add_dots, add_object

@@ -17,6 +17,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis(Result, room.Diagnosis):
@@ -58,6 +60,12 @@ class Diagnosis(Result, room.Diagnosis):
         from palpate.report.diagnosis_figures import gains
 
         gains(ax, self)
+
+    def view(self) -> View:
+        """The object to be turned, and each press beside what was simulated."""
+        from palpate.report.diagnosis_figures import view_of
+
+        return view_of(self.model, self)
 
     def _place(self, plotter: Plotter) -> None:
         from palpate.report.diagnosis_figures import gap_at, sites_of

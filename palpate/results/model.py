@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Result, room.Model):
@@ -59,6 +61,12 @@ class Model(Result, room.Model):
         draw_object(ax, self, touches=self.presses.point, show_base=True)
         ax.set_title(f"{self.name}: {modulus_words(self)}", fontsize=10)
         ax.legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
+
+    def view(self) -> View:
+        """The object to be turned, coloured by what is known of it."""
+        from palpate.report.view3d import View, thing_of, usual_colourings
+
+        return View(thing_of(self), self.presses.point, usual_colourings(self))
 
     def _place(self, plotter: Plotter) -> None:
         from palpate.report.modulus_figures import column

@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+
 _NAMED = 12
 
 
@@ -134,6 +136,12 @@ class Reconstruction(Result, room.Reconstruction):
         from palpate.report.exploration_figures import force_over_time
 
         force_over_time(ax, self.exploration)
+
+    def view(self) -> View:
+        """The object to be turned, and each press beside what was simulated."""
+        from palpate.report.reconstruction import view_of
+
+        return view_of(self)
 
     def _place(self, plotter: Plotter) -> None:
         self.model._place(plotter)

@@ -15,17 +15,22 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+    from scenes.phantoms import Phantom
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Simulation(Result, room.Simulation):
     """A recording of the virtual laboratory, and the truth about it; goes wherever a recording goes.
 
     Every field is that of `scenes.laboratory.simulate.Simulation`: recording, truth, clean_n (n, 3) N on the
-    tool without noise, touches, motion. `plot`: force over time. `show`: the tip's path.
+    tool without noise, touches, motion. body: the phantom as it was explored. `plot`: force over time.
+    `show`: the tip's path.
     """
 
     recording: Recording
     phantom: str = field(kw_only=True)
+    body: Phantom = field(kw_only=True)
 
     def save(self, path: Path | str) -> Simulation:
         """Write the recording with its truth; returns the simulation whose recording knows its file."""
@@ -33,6 +38,12 @@ class Simulation(Result, room.Simulation):
 
         written = write_recording(path, self.recording, truth=self.truth)
         return dressed(Simulation, self, recording=recording_of(read_recording(written)))
+
+    def report(self, path: Path | str) -> Path:
+        """Write the object to be turned and every touch beside the ideal object's as one HTML page."""
+        from palpate.report.laboratory import write_report
+
+        return write_report(path, self, self.body)
 
     def lines(self) -> list[str]:
         """What `print` says, line by line, with units."""
@@ -50,10 +61,16 @@ class Simulation(Result, room.Simulation):
     def _draw(self, ax: Axes) -> None:
         self.recording._draw(ax)
 
+    def view(self) -> View:
+        """The object to be turned, and each press beside what was simulated."""
+        from palpate.report.laboratory import view_of
+
+        return view_of(self, self.body)
+
     def _place(self, plotter: Plotter) -> None:
         self.recording._place(plotter)
 
 
-def simulation_of(plain: room.Simulation, phantom: str) -> Simulation:
+def simulation_of(plain: room.Simulation, phantom: str, body: Phantom) -> Simulation:
     """The room's simulation as the door gives it."""
-    return dressed(Simulation, plain, recording=recording_of(plain.recording), phantom=phantom)
+    return dressed(Simulation, plain, recording=recording_of(plain.recording), phantom=phantom, body=body)

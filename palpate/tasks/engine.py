@@ -22,14 +22,14 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     group.add_argument(
         "--workers",
         type=int,
-        metavar="N",
+        metavar="INTEGER",
         help="processes of one thread each on this machine (default: one a core)",
     )
     group.add_argument(
         "--memory",
         type=float,
-        metavar="GB",
-        help="what they may take together (default: 90 %% of what is free)",
+        metavar="NUMBER",
+        help="what they may take together [GB] (default: 90 %% of what is free)",
     )
     group.add_argument(
         "--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://HOST:8786, in their place"

@@ -6,6 +6,7 @@ What is wrong with units is mended for the checks that follow, so that one fault
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -20,7 +21,8 @@ from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
-from reconstruct.contacts import Exploration, explore
+from reconstruct.contacts import Exploration, Filtered, explore
+from reconstruct.filtering import FilterOptions
 from reconstruct.known_shape import GeometryOptions, stated_geometry
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
@@ -31,20 +33,37 @@ REFUSALS = ("no base", "no presses")
 _LEAST_SAMPLES = 100
 
 
-def checked_samples(recording: Recording, by_hand: bool = True) -> tuple[Finding, ...]:
+@dataclass(frozen=True)
+class CheckedSamples:
+    """What the samples alone show: findings, gravest first, and the sight that showed them (None: none was
+    needed)."""
+
+    found: tuple[Finding, ...] = ()
+    sight: Sight | None = None
+
+    @property
+    def filtered(self) -> Filtered | None:
+        """The signals that reconstruction would filter anew; None where it would see others."""
+        return self.sight.filtered if self.sight is not None and self.sight.as_stated else None
+
+
+def checked_samples(
+    recording: Recording, by_hand: bool = True, cutoff_hz: float = FilterOptions.cutoff_hz
+) -> CheckedSamples:
     """What the samples alone show; nothing of points that have no clock (quasi-static).
 
     by_hand: a hand explored a whole object. Otherwise (a slab under an indenter) only the force's direction
-    is looked at, as sizes, speeds and channels that stand still may be anything.
+    is looked at, as sizes, speeds and channels that stand still may be anything. cutoff_hz: of the low-pass.
     """
     if recording.description.get("recording", {}).get("quasi_static"):
-        return ()
-    if not by_hand:
-        return ordered(handedness(Sight(recording))) if len(recording.t) >= _LEAST_SAMPLES else ()
+        return CheckedSamples()
     if len(recording.t) < _LEAST_SAMPLES:
-        return (_too_short(recording),)
-    sight, found = settled(recording)
-    return ordered([*found, *(f for check in OF_SAMPLES for f in check(sight))])
+        return CheckedSamples((_too_short(recording),) if by_hand else ())
+    if not by_hand:
+        sight = Sight(recording, cutoff_hz=cutoff_hz)
+        return CheckedSamples(ordered(handedness(sight)), sight)
+    sight, found = settled(recording, cutoff_hz)
+    return CheckedSamples(ordered([*found, *(f for check in OF_SAMPLES for f in check(sight))]), sight)
 
 
 def checked_presses(exploration: Exploration) -> tuple[Finding, ...]:
@@ -59,12 +78,23 @@ def checked_results(result: Result) -> tuple[Finding, ...]:
 
 def check(recording: Recording) -> tuple[Finding, ...]:
     """What samples and presses show, the gravest first; the presses are looked for only in sound samples."""
+    return looked_at(recording)[0]
+
+
+def looked_at(recording: Recording) -> tuple[tuple[Finding, ...], Seen]:
+    """As `check`, and what the checks measure on the way."""
     known = stated_geometry(recording, GeometryOptions()).known
-    found = checked_samples(recording, by_hand=not known)
-    if known or any(f.grave for f in found):
-        return found
+    samples = checked_samples(recording, by_hand=not known)
+    found = samples.found
+    if not (known or any(f.grave for f in found)):
+        found = _with_presses(recording, samples)
+    return found, seen(samples.sight)
+
+
+def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Finding, ...]:
+    found = samples.found
     try:
-        exploration = explore(recording)
+        exploration = explore(recording, filtered=samples.filtered)
     except NoBaseError as error:
         if recording.base_model is not None:
             return found
@@ -74,11 +104,14 @@ def check(recording: Recording) -> tuple[Finding, ...]:
     return ordered([*found, *checked_presses(exploration)])
 
 
-def seen(recording: Recording) -> tuple[tuple[str, float, float], ...]:
-    """What the checks measure on the way: words with the unit, value, and what is usual (NaN: anything)."""
-    if recording.description.get("recording", {}).get("quasi_static") or len(recording.t) < _LEAST_SAMPLES:
+Seen = tuple[tuple[str, float, float], ...]
+"""Words with the unit, value, and what is usual (NaN: anything)."""
+
+
+def seen(sight: Sight | None) -> Seen:
+    """What the checks measure on the way."""
+    if sight is None:
         return ()
-    sight, _ = settled(recording)
     rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
     late, error = sight.lag_s
     free = np.linalg.norm(sight.air, axis=1)
@@ -96,12 +129,20 @@ def seen(recording: Recording) -> tuple[tuple[str, float, float], ...]:
 class Checkup:
     """The check-up beside a reconstruction: each stage refuses what is grave, unless `force`.
 
-    found: what the stages so far have found. Every stage raises RecordingError.
+    found: what the stages so far have found. filtered: signals that need not be made again, None where
+    reconstruction would see others. Every stage raises RecordingError.
     """
 
-    def __init__(self, recording: Recording, force: bool = False, by_hand: bool = True) -> None:
+    def __init__(
+        self,
+        recording: Recording,
+        force: bool = False,
+        by_hand: bool = True,
+        cutoff_hz: float = FilterOptions.cutoff_hz,
+    ) -> None:
         self._force = force
-        self.found = self._judged(checked_samples(recording, by_hand))
+        samples = checked_samples(recording, by_hand, cutoff_hz)
+        self.found, self.filtered = self._judged(samples.found), samples.filtered
 
     def presses(self, exploration: Exploration) -> None:
         """Before a surface is made."""

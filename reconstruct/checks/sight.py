@@ -15,14 +15,14 @@ from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
 from reconstruct.boundary import find_interval
-from reconstruct.contacts import hysteresis, passing_zero, signals_of
+from reconstruct.contacts import Filtered, filtered_of
 from reconstruct.filtering import FilterOptions, white_noise_std
-from reconstruct.finding import Signals
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples
-_LOW, _HIGH, _PEAK, _FEEBLE = 5.0, 10.0, 20.0, 0.15
 _LEAST_S = 0.05
+_EVEN = 0.02
+"""The stated rate is believed where it is so near to the samples' own."""
 _SLIDE = 8.0
 _TIPS_M = (1e-3, 0.02)
 _GAP_S = 1.0
@@ -64,8 +64,10 @@ class Sight:
     times: (n,) s as they are; t: (n,) s, gaps cut to a second. position (n, 3) m, force (n, 3) N on the tool.
     """
 
-    def __init__(self, recording: Recording, units: Units | None = None) -> None:
-        self.recording = recording
+    def __init__(
+        self, recording: Recording, units: Units | None = None, cutoff_hz: float = FilterOptions.cutoff_hz
+    ) -> None:
+        self.recording, self.cutoff_hz = recording, cutoff_hz
         self.units = units or Units()
         self.times = recording.t / self.units.time
         self.t = _without_gaps(self.times)
@@ -95,13 +97,10 @@ class Sight:
         return max(white_noise_std(self.force), float(np.median(self.step[3:])) / np.sqrt(12), 1e-9)
 
     @cached_property
-    def cutoff_hz(self) -> float:
-        """Of the low-pass."""
-        return FilterOptions().cutoff_hz
-
-    @cached_property
-    def _signals(self) -> tuple[Signals, np.ndarray, np.ndarray]:
+    def filtered(self) -> Filtered:
         """As reconstruction reads them, at the rate and in the units that are believed."""
+        if self.as_stated:
+            return filtered_of(self.recording, self.cutoff_hz)
         believed = replace(
             self.recording,
             t=self.t,
@@ -109,39 +108,43 @@ class Sight:
             force_on_tool=self.force,
             sample_rate_hz=self.rate_hz,
         )
-        return signals_of(believed, self.cutoff_hz)
+        return filtered_of(believed, self.cutoff_hz)
+
+    @property
+    def as_stated(self) -> bool:
+        """Whether units, times and rate are believed as they stand: then reconstruction sees the same."""
+        even = abs(np.log(self.rate_hz / self.recording.sample_rate_hz)) < _EVEN
+        return self.units == Units() and bool(even) and np.array_equal(self.t, self.recording.t)
 
     @property
     def path(self) -> np.ndarray:
         """(n, 3) m, low-passed position."""
-        return self._signals[0].position
+        return self.filtered.signals.position
 
     @property
     def air(self) -> np.ndarray:
         """(n, 3) N, what is read in free air."""
-        return self._signals[1]
+        return self.filtered.free_air
 
     @cached_property
     def spread_n(self) -> float:
         """N an axis, noise of the filtered force of a tip that is not moved."""
-        return float(self._signals[2].min())
+        return float(self.filtered.spread.min())
 
     @property
     def net(self) -> np.ndarray:
         """(n, 3) N, low-passed, free air taken off."""
-        return self._signals[0].force
+        return self.filtered.signals.force
 
     @property
     def size(self) -> np.ndarray:
         """(n,) N, length of the net force."""
-        return self._signals[0].magnitude
+        return self.filtered.signals.magnitude
 
     @cached_property
     def contact(self) -> np.ndarray:
         """(n,) bool, whether something is touched."""
-        signals, _, spread = self._signals
-        gap = passing_zero(self.rate_hz, self.cutoff_hz)
-        return hysteresis(signals.magnitude / spread, _LOW, _HIGH, signals.force, gap)
+        return self.filtered.touching()
 
     @cached_property
     def traced(self) -> tuple[int, int]:
@@ -161,13 +164,7 @@ class Sight:
         shortest = max(3, round(_LEAST_S * self.rate_hz))
         found = [(a, b) for a, b in runs(contact) if b - a >= shortest and a > 0 and b < len(self.t)]
         reach = _SLIDE * float(np.clip(self.tip_radius_m, *_TIPS_M))
-        found = [(a, b) for a, b in found if np.ptp(self.path[a:b], axis=0).max() < reach]
-        peaks = np.array([self.size[a:b].max() for a, b in found])
-        if not len(peaks):
-            return []
-        # a brisk hand with a heavy tool makes many feeble contacts in the air
-        least = max(_PEAK * self.spread_n, _FEEBLE * float(np.percentile(peaks, 90)))
-        return [span for span, peak in zip(found, peaks, strict=True) if peak > least]
+        return [(a, b) for a, b in found if np.ptp(self.path[a:b], axis=0).max() < reach]
 
     @cached_property
     def touches(self) -> Touches:
@@ -212,7 +209,10 @@ class Sight:
 
 def _without_gaps(t: np.ndarray) -> np.ndarray:
     dt = np.diff(t)
-    return t[0] + np.concatenate([[0.0], np.cumsum(np.minimum(dt, max(_GAP_S, 2 * float(np.median(dt)))))])
+    longest = max(_GAP_S, 2 * float(np.median(dt)))
+    if dt.max() <= longest:
+        return t
+    return t[0] + np.concatenate([[0.0], np.cumsum(np.minimum(dt, longest))])
 
 
 def _lattice(values: np.ndarray) -> float:

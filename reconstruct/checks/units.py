@@ -74,17 +74,17 @@ QUANTITIES = {
 _OF_TIME = ("duration", "rate", "speed", "extent")
 
 
-def settled(recording: Recording) -> tuple[Sight, tuple[Finding, ...]]:
+def settled(recording: Recording, cutoff_hz: float) -> tuple[Sight, tuple[Finding, ...]]:
     """The samples in their most probable units, and a finding for each that is far more probable than SI.
 
     The clock comes first: everything else is read through filters that need one.
     """
-    sight = Sight(recording)
+    sight = Sight(recording, cutoff_hz=cutoff_hz)
     known, odds = _best({k: v for k, v in measured(sight, of_touches=False).items() if k in _OF_TIME})
     found = []
     if known["time"] != "s" and odds["time"] > SURE_ODDS:
         found.append(_finding(sight, "time", known["time"], odds["time"], measured(sight, of_touches=False)))
-        sight = Sight(recording, Units(time=READINGS["time"][known["time"]]))
+        sight = Sight(recording, Units(time=READINGS["time"][known["time"]]), cutoff_hz)
     seen = measured(sight)
     known, odds = _best(seen)
     wrong = [
@@ -93,7 +93,7 @@ def settled(recording: Recording) -> tuple[Sight, tuple[Finding, ...]]:
     if wrong:
         found += [_finding(sight, kind, known[kind], odds[kind], seen) for kind in wrong]
         factors = {kind: READINGS[kind][known[kind]] for kind in wrong}
-        sight = Sight(recording, replace(sight.units, **factors))
+        sight = Sight(recording, replace(sight.units, **factors), cutoff_hz)
     return sight, (*found, *_beyond(measured(sight)))
 
 

@@ -92,8 +92,8 @@ def fit_approach(indentation: Indentation, *, poisson_ratio: float = 0.5, law: s
     noise = spread_about_zero(force[: max(10, len(force) // 5)])
     if not force.max() > 8 * noise:
         raise ContactError("the force of the approach never rises above its noise: no contact")
-    dent = dent_law(law)
     nu = min(poisson_ratio, 0.4999)
+    dent = dent_law(law, nu)
 
     def fitted(onset: float) -> tuple[float, float]:
         shape = np.asarray(dent.force(np.maximum(travel - onset, 0.0), 1.0, nu, indentation.tip_radius_m))

@@ -6,13 +6,14 @@ import hashlib
 import os
 import signal
 import sys
+import threading
 import zipfile
 import zlib
 from collections.abc import Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import contextmanager
 from dataclasses import dataclass
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
 from pathlib import Path
 from types import ModuleType
 from typing import TypedDict
@@ -246,8 +247,18 @@ def workers_of_ours(count: int) -> Iterator[ProcessPoolExecutor]:
 
 
 def _follow_parent() -> None:
-    """In a worker: Ctrl-C is the parent's business, which then ends this process."""
+    """In a worker: Ctrl-C is the parent's business, which then ends this process; it ends with the parent."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is None:
+        return
+
+    def wait() -> None:
+        # a pool's worker holds both ends of its queue: from that it never learns that the parent was killed
+        parent.join()
+        os._exit(1)
+
+    threading.Thread(target=wait, daemon=True).start()
 
 
 @contextmanager

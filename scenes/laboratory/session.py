@@ -33,7 +33,7 @@ class SimulateOptions:
     """What a person may choose about a simulated exploration."""
 
     young_modulus_pa: float | None = option(
-        None, "Young's modulus of the matrix", unit="Pa", flag="--modulus"
+        None, "Young's modulus of the matrix; None: the phantom's own", unit="Pa", flag="--modulus"
     )
     protocol: str = option("ordinary", "how much is touched", choices=tuple(PROTOCOLS))
     presses: int = option(0, "number of the press set: which places, how deep, in which order")

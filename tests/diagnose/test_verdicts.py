@@ -7,6 +7,7 @@ import dataclasses
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from diagnose.apply import corrected, improved
 from diagnose.forward import Forward
@@ -14,6 +15,8 @@ from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.validation import held_out_by_refit
 from diagnose.whiten import NuisanceOptions
+from palpate.report.diagnosis import write_report
+from palpate.report.diagnosis_figures import gains, view_of
 from reconstruct.placing import presses_on
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -185,3 +188,31 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
     assert result.effects == () and "time_delay" in result.candidates
     assert result.kind == "unknown" and result.gap_after_n == result.gap_before_n
     assert any("grows" in reason for reason in result.reasons)
+
+
+def test_the_page_says_what_to_do_and_its_view_switches_effects_on(delayed, tmp_path):
+    recording, model, result = delayed
+    text = write_report(tmp_path / "page.html", recording, model, result).read_text(encoding="utf-8")
+    assert "What to do next: take time delay off the readings" in text
+    assert "fitted anew with what was found" in text and "once more" in text
+    assert 'class="view3d"' in text and "everything that the best model" not in text
+    view = view_of(model, result)
+    measured, simulated, found, *effects = view.traces.lines
+    late = next(line for line in effects if "time delay" in line.name)
+    counted = result.forward.touches.counted
+    for better in (found, late):
+        off, before = (np.abs(x.force_n - measured.force_n)[counted].mean() for x in (better, simulated))
+        assert off < 0.7 * before
+    assert not any(line.shown for line in effects)
+
+
+def test_a_bar_says_what_finite_strain_takes_away_beside_an_effect(delayed):
+    result = delayed[2]
+    ax = Figure().subplots()
+    gains(ax, result)
+    names = [label.get_text() for label in ax.get_yticklabels()]
+    for name, entry in zip(names, (e for e in result.entries if e.gap_closed is not None), strict=False):
+        alone = entry.name == "finite_strain" or "finite_strain" not in (
+            result.attribution.scores[entry.name].candidate.found.names
+        )
+        assert ("and finite strain" in name) != alone

@@ -55,6 +55,17 @@ def test_finite_strain_is_softer_down_and_stiffer_sideways():
     assert 1.15 < sideways[1] / sideways[0] < 1.3
 
 
+@pytest.mark.parametrize("name", ["linear", "neo-hookean"])
+def test_a_compressible_solid_is_gripped_the_harder_the_deeper(name):
+    """What sticks cannot slide aside: beyond E / (1 - nu^2) the dent is stiffer, more so at a lower ratio."""
+    usual, lower, low = (dent_law(name, nu).table[:, 0] for nu in (0.49, 0.445, 0.40))
+    at = np.searchsorted(grid(), [0.2, 0.6, 1.2, 1.8])
+    over = (low / usual)[at] - 1
+    assert np.all(np.diff(over) > 0)
+    assert 0.04 < over[-1] < 0.09
+    assert np.all((lower > usual)[at] & (lower < low)[at])
+
+
 def test_unknown_law_lists_what_is_allowed():
     with pytest.raises(OptionError, match="hertz, sphere, linear, neo-hookean"):
         dent_law("rubber")
@@ -79,9 +90,9 @@ def test_axisymmetric_solution_meets_punches_and_the_tables():
     sideways = body.tangential_stiffness(np.zeros_like(body.points), stuck)
     assert sideways == pytest.approx(bonded_punch_sideways_force(1.0, radius, 1.0, NU), rel=0.03)
     assert flat_punch_force(1.0, radius, 1.0, NU) == pytest.approx(2 * radius / (1 - NU**2))
-    for law in ("linear", "neo-hookean"):
-        rows = press_curve(law, NU, 0.15, 0.3)
+    for law, nu in (("linear", NU), ("neo-hookean", NU), ("linear", 0.35)):
+        rows = press_curve(law, nu, 0.15, 0.3)
         x, force = rows[5, :2]
-        known = dent_force(dent_law(law).table, x, 1.0, 1.0)[0]
+        known = dent_force(dent_law(law, nu).table, x, 1.0, 1.0)[0]
         assert force == pytest.approx(known, rel=0.02)
         assert plane_strain_modulus(1.0, NU) > 1

@@ -26,14 +26,14 @@ def test_a_sound_exploration_gives_no_finding(seed):
 
 def test_a_heavy_tool_and_a_bias_are_no_faults():
     recording, _ = explore_cylinder(tool_mass_kg=0.06, bias=(0.3, -0.2, 0.5), drift_n_per_s=0.002)
-    assert checked_samples(recording) == ()
+    assert checked_samples(recording).found == ()
 
 
 @pytest.mark.parametrize("fault", [f for f in FAULTS if f not in NEED_PRESSES])
 def test_a_fault_is_found_under_its_name(cylinder, fault):
     it = FAULTS[fault]
     try:
-        found = checked_samples(it.change(cylinder[0], np.random.default_rng(0)))
+        found = checked_samples(it.change(cylinder[0], np.random.default_rng(0))).found
     except PalpateError:  # refused where it is read
         return
     assert found and found[0].name in it.names, [f.line() for f in found]
@@ -51,7 +51,7 @@ def test_what_is_found_says_where_and_how_sure(cylinder):
     position = np.array(recording.position)
     rows = (recording.t > 20.0) & (recording.t < 28.0)
     position[rows] = position[np.argmax(rows)]
-    found = checked_samples(dataclasses.replace(recording, position=position))[0]
+    found = checked_samples(dataclasses.replace(recording, position=position)).found[0]
     assert found.name == "stuck channel" and found.channels == ("x", "y", "z")
     assert found.stretch == pytest.approx((20.0, 28.0), abs=0.5)
     assert "p = 1e-" in found.sure and found.decades > 6

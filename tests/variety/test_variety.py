@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+import reconstruct
 from mechanics.recording import read_recording
+from palpate.benchmarks.variety import REMEDIES
 from scenes.laboratory.effects import Readings
 from scenes.laboratory.frame import axes_of
 from scenes.variety.draws import ORIENTATIONS, RATES_HZ, TRACINGS, draw
@@ -168,3 +172,17 @@ def test_nuisances_leave_the_truth_as_it_is(tmp_path):
     assert np.median(difference) == pytest.approx(0.09 * 9.81, rel=0.1)
     assert light.truth["effects"] == burdened.truth["effects"] == []
     assert hand(base) == hand(heavy)
+
+
+def test_a_remedy_changes_how_an_object_is_explored_and_nothing_of_the_object(draws):
+    """Modulus, object, frame and hand stay; and the refusals of reconstruct do speak of every remedy."""
+    texts = [p.read_text(encoding="utf-8") for p in Path(reconstruct.__file__).parent.rglob("*.py")]
+    told = re.sub(r'"\s*f?"', "", "".join(texts))
+    for words, mended in REMEDIES.items():
+        assert words in told
+        for before in draws[:40]:
+            after = mended(before)
+            assert (after.number, after.young_modulus_pa, after.person) == (
+                before.number, before.young_modulus_pa, before.person
+            )  # fmt: skip
+            assert np.allclose(frame(after)[0], frame(before)[0])

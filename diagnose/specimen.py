@@ -1,0 +1,352 @@
+"""Bench instruments: one place of one specimen, or one place of many, pressed in a machine that logs travel
+and load.
+
+The curves are brought to the size of a hand's tip by similarity (lengths, and forces beside them), which
+elasticity, memory and all effects here are indifferent to; so a cantilever of an AFM, a texture analyser and
+a finger are diagnosed by one machinery on a half-space or a layer. What is found is turned back into the
+machine's own units.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from diagnose.judging import AttributionOptions
+from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.result import Diagnosis
+from diagnose.touches import LEAST_PRESSES
+from diagnose.whiten import NuisanceOptions
+from mechanics.dent import dent_law
+from mechanics.errors import ContactError
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
+from mechanics.press_cutting import cut
+from mechanics.progress import Progress, silent
+from mechanics.recording import Recording
+from mechanics.robust import spread_about_zero
+from reconstruct.filtering import white_noise_std
+from reconstruct.known_shape import flat_mesh, half_space_size
+from reconstruct.unbroken import Loading, first_touches
+
+HAND_TIP_M, PEAK_N = 0.005, 1.0
+"""The size to which curves are brought: tip's radius, and the force of the middle one at its peak."""
+RATE_HZ, LEAST_RATE_HZ = 200.0, 60.0
+_BETWEEN_S = 2.0
+_CELLS = 20
+_MARGIN = 2.0
+_BASELINE = 0.1
+_LEAST_NOISE = 1e-3
+_CONTACT = 8.0
+"""A curve must rise above so many standard deviations of its noise."""
+UP = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Curve:
+    """One cycle of a machine: t (n,) s increasing, travel (n,) m into the sample from any zero, force (n,) N
+    that pushes the tip out, from any level. name: of its file."""
+
+    t: np.ndarray
+    travel: np.ndarray
+    force: np.ndarray
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Similarity:
+    """Factors from a machine's metres and newtons to those of a hand."""
+
+    length: float
+    force: float
+
+    def back(self, keys: Mapping[str, Any]) -> dict[str, Any]:
+        """Parameters in the machine's units; which unit is told by a key's ending, as everywhere."""
+        return {key: _times(value, 1 / self._factor(key)) for key, value in keys.items()}
+
+    def _factor(self, key: str) -> float:
+        metres, newtons = 0, 0
+        for ending, powers in _ENDINGS.items():
+            if key.endswith(ending):
+                metres, newtons = powers
+                break
+        return self.length**metres * self.force**newtons
+
+    @property
+    def modulus(self) -> float:
+        """Factor from Pa to Pa."""
+        return self.force / self.length**2
+
+
+_ENDINGS = {
+    "_pa_per_m": (-3, 1), "_n_per_m": (-1, 1), "_n_per_s": (0, 1), "_m_per_n": (1, -1), "_m_per_s": (1, 0),
+    "_pa": (-2, 1), "_n": (0, 1), "_m": (1, 0),
+}  # fmt: skip
+
+
+def _times(value: Any, factor: float) -> Any:
+    if isinstance(value, list | tuple):
+        return [_times(v, factor) for v in value]
+    return float(value) * factor if isinstance(value, int | float) and not isinstance(value, bool) else value
+
+
+@dataclass(frozen=True)
+class Bench:
+    """Curves as a recording of one place on a model, in a hand's size.
+
+    similarity: what brought them there. onset_m: (c,) m, travel at first touch, in the machine's own zero;
+    modulus_pa: (c,) Pa, of each curve's way in by itself, by the exact sphere on a half-space. used: (c,)
+    bool, curves with a contact. specimens: every curve is of another piece.
+    """
+
+    recording: Recording
+    model: Model
+    similarity: Similarity
+    onset_m: np.ndarray
+    modulus_pa: np.ndarray
+    used: np.ndarray
+    specimens: bool
+
+
+def bench_of(
+    curves: Sequence[Curve],
+    tip_radius_m: float,
+    *,
+    layer_m: float | None = None,
+    poisson_ratio: float = 0.49,
+    specimens: bool = False,
+) -> Bench:
+    """layer_m: thickness of the sample on its plate, None is a half-space. specimens: each curve is of
+    another piece, so each force is taken over its own stiffness. Raises ContactError where no curve has a
+    contact."""
+    length = HAND_TIP_M / tip_radius_m
+    ready = [_levelled(c) for c in curves]
+    found = [_way_in(c) for c in ready]
+    used = np.array([f is not None for f in found])
+    if not used.any():
+        raise ContactError(
+            f"none of the {len(curves)} curves rises above its noise as the tip goes in: are travel and load "
+            "the right columns, and their signs (travel into the sample, load that pushes the tip out)?"
+        )
+    kept = [(c, f) for c, f in zip(ready, found, strict=True) if f is not None]
+    noise = float(np.median([n for _, (_, _, n) in kept]))
+    loadings = [Loading(length * u, push, np.zeros(3), UP) for _, (u, push, _) in kept]
+    top = float(np.median([each.push.max() for each in loadings]))
+    loadings = [Loading(each.u, each.push / top, each.origin, UP) for each in loadings]
+    try:
+        onset, error = first_touches(loadings, noise / top)
+    except ValueError as wrong:
+        raise ContactError("the curves have fewer than four samples on their way in") from wrong
+    law = dent_law("sphere")
+    own = np.array([_modulus(each, at, law, poisson_ratio) for each, at in zip(loadings, onset, strict=True)])
+    middle = float(np.median(own))
+    scale = middle / own if specimens else np.ones(len(own))
+    recording, times = _side_by_side([c for c, _ in kept], onset, length, scale / top, noise / top)
+    deepest = max(float(each.u.max() - at) for each, at in zip(loadings, onset, strict=True))
+    contact = float(np.sqrt(HAND_TIP_M * max(deepest, 0.1 * HAND_TIP_M)))
+    if layer_m is None:
+        size = half_space_size(contact)
+    else:
+        thick = length * layer_m
+        wide = 2 * _MARGIN * thick + 4 * contact
+        size = np.array([wide, wide, thick])
+    mesh = flat_mesh(size, 0.01, _CELLS)
+    at_top = np.array([0.0, 0.0, size[2]])
+    rows = [slice(a, b) for a, b in times]
+    peak = [rows[i].start + int(np.argmax(recording.force_on_tool[rows[i], 2])) for i in range(len(rows))]
+    first = [
+        r.start + int(np.argmax(recording.position[r, 2] <= HAND_TIP_M)) for r in rows
+    ]  # the first row in contact
+    centre = np.tile([0.0, 0.0, size[2] + HAND_TIP_M], (len(rows), 1))
+    lifted = dataclasses.replace(recording, position=recording.position + at_top)
+    presses = cut(
+        lifted, onset_s=lifted.t[first], peak_s=lifted.t[peak], centre=centre,
+        normal=np.tile(UP, (len(rows), 1)),
+        onset_error_m=error, noise_n=noise / top,
+    )  # fmt: skip
+    model = Model(
+        mesh=mesh.quadratic(), material=Material(middle, poisson_ratio), support=Support(np.zeros(3), UP),
+        tool=Tool(HAND_TIP_M), mesh_size_m=0.01, presses=presses,
+    )  # fmt: skip
+    similarity = Similarity(length, 1 / top)
+    every = np.full((2, len(curves)), np.nan)
+    every[:, used] = onset / length, own / similarity.modulus
+    return Bench(lifted, model, similarity, every[0], every[1], used, specimens)
+
+
+def _levelled(curve: Curve) -> Curve:
+    """At RATE_HZ, by means or straight between the readings."""
+    rate = (len(curve.t) - 1) / float(curve.t[-1] - curve.t[0])
+    block = max(1, round(rate / RATE_HZ))
+    count = len(curve.t) // block
+    t, travel, force = (
+        v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
+    )
+    return Curve(t - t[0], travel, force, curve.name)
+
+
+def _way_in(curve: Curve) -> tuple[np.ndarray, np.ndarray, float] | None:
+    """(travel, force over the level before contact, noise N) from the start to the peak; None without a
+    contact."""
+    peak = int(np.argmax(curve.force))
+    early = slice(0, max(3, int(_BASELINE * peak)))
+    force = curve.force - np.median(curve.force[early])
+    noise = max(white_noise_std(curve.force[:, None]), spread_about_zero(force[early]) / np.sqrt(2))
+    noise = max(noise, _LEAST_NOISE * float(force.max()))
+    if peak < 4 or not force[peak] > _CONTACT * noise:
+        return None
+    return curve.travel[: peak + 1], force[: peak + 1], noise
+
+
+def _modulus(each: Loading, onset: float, law: Any, poisson_ratio: float) -> float:
+    shape = np.asarray(law.force(np.maximum(each.u - onset, 0.0), 1.0, poisson_ratio, HAND_TIP_M))
+    return float(shape @ each.push / max(shape @ shape, 1e-300))
+
+
+def _side_by_side(
+    curves: Sequence[Curve], onset: np.ndarray, length: float, factor: np.ndarray, noise: float
+) -> tuple[Recording, list[tuple[int, int]]]:
+    """One recording of all curves in a hand's size, the surface at z = 0; (first, last) rows of each."""
+    slow = min((len(c.t) - 1) / float(np.ptp(c.t)) for c in curves)
+    rate = RATE_HZ if slow < LEAST_RATE_HZ else slow
+    times, heights, forces, spans = [], [], [], []
+    clock, rows = 0.0, 0
+    for curve, at, scale in zip(curves, onset, factor, strict=True):
+        t = np.arange(0.0, curve.t[-1], 1 / rate)
+        travel, force = (np.interp(t, curve.t, v) for v in (curve.travel, curve.force))
+        peak = int(np.argmax(force))
+        level = np.median(force[: max(3, int(_BASELINE * peak))])
+        times.append(clock + t)
+        heights.append(HAND_TIP_M + at - length * travel)
+        forces.append(scale * (force - level))
+        spans.append((rows, rows + len(t)))
+        rows += len(t)
+        clock += t[-1] + _BETWEEN_S
+    height, push = np.concatenate(heights), np.concatenate(forces)
+    recording = Recording(
+        t=np.concatenate(times),
+        position=np.column_stack([0 * height, 0 * height, height]),
+        force_on_tool=np.column_stack([0 * push, 0 * push, push]),
+        sample_rate_hz=rate,
+        tip_radius_m=HAND_TIP_M,
+        force_noise_std_n=noise,
+        object_name="specimen",
+        description={"recording": {"read_rate_hz": slow}} if slow < LEAST_RATE_HZ else {},
+    )
+    return recording, spans
+
+
+def diagnose_bench(
+    bench: Bench, *, fast: bool = False, seed: int = 0, progress: Progress = silent
+) -> Diagnosis | None:
+    """The sim-to-real gap of the curves, each held out; None with fewer than 6, of which none can be."""
+    if len(bench.model.presses) < LEAST_PRESSES:
+        return None
+    # pieces differ in more than their stiffness, and a machine's zero is worth what its load is
+    nuisance = NuisanceOptions(press_stiffness=0.07, law=0.1) if bench.specimens else NuisanceOptions()
+    return diagnose(
+        bench.recording,
+        bench.model,
+        DiagnoseOptions(fast=fast, seed=seed),
+        progress,
+        nuisance=nuisance,
+        attribution=AttributionOptions(most=1 if fast else 3),
+    )
+
+
+APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
+_BLOCKS = 8
+_SHIFTS = np.linspace(-0.1, 0.1, 41)
+
+
+@dataclass(frozen=True)
+class Approach:
+    """What a few curves tell, none of which can be held out: each way in, block by block of it left out in
+    turn.
+
+    error: dent law (and 'hunt-crossley', 'regression') -> rms error over rms force, median of the curves.
+    law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does not come back;
+    pull_n: (c,) N, greatest pull on the way out.
+    """
+
+    error: dict[str, float]
+    law: str
+    modulus_pa: np.ndarray
+    hysteresis: float
+    pull_n: np.ndarray
+
+
+def approach_of(bench: Bench) -> Approach:
+    """The ways in of a bench's curves on a half-space."""
+    presses, nu = bench.model.presses, bench.model.material.poisson_ratio
+    errors: dict[str, list[float]] = {}
+    moduli: dict[str, list[float]] = {}
+    work, pull = [], []
+    for part in presses.parts:
+        u, push = presses.depth[part], presses.push[part]
+        top = int(np.argmax(push))
+        ways = u[: top + 1], push[: top + 1]
+        for name in APPROACH_LAWS:
+            error, modulus = _left_out(*ways, dent_law(name), nu)
+            errors.setdefault(name, []).append(error)
+            moduli.setdefault(name, []).append(modulus)
+        for name, order in (("hunt-crossley", 0), ("regression", 5)):
+            errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
+        work.append(
+            1 + np.trapezoid(push[top:], u[top:]) / max(np.trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
+        )
+        pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
+    medians = {name: float(np.median(values)) for name, values in errors.items()}
+    law = min(APPROACH_LAWS, key=lambda name: medians[name])
+    own = np.array(moduli[law]) / bench.similarity.modulus
+    return Approach(medians, law, own, float(np.median(work)), np.array(pull))
+
+
+def _blocks(count: int) -> np.ndarray:
+    return np.minimum(np.arange(count) * _BLOCKS // max(count, 1), _BLOCKS - 1)
+
+
+def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[float, float]:
+    """(held-out rms over rms, modulus) of one way in; first touch and modulus are free."""
+    span = float(u.max())
+    shapes = np.array([law.force(np.maximum(u - s * span, 0.0), 1.0, nu, HAND_TIP_M) for s in _SHIFTS])
+
+    def fitted(seen: np.ndarray) -> tuple[int, float]:
+        power = np.maximum((shapes[:, seen] ** 2).sum(axis=1), 1e-300)
+        e = shapes[:, seen] @ push[seen] / power
+        k = int(np.argmin(((e[:, None] * shapes[:, seen] - push[seen]) ** 2).sum(axis=1)))
+        return k, float(e[k])
+
+    block, predicted = _blocks(len(u)), np.zeros(len(u))
+    for b in range(_BLOCKS):
+        k, e = fitted(block != b)
+        predicted[block == b] = e * shapes[k, block == b]
+    return _relative(predicted, push), fitted(np.ones(len(u), dtype=bool))[1]
+
+
+def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
+    """The same of k u^r (order 0) or of a polynomial of the depth."""
+    block, predicted = _blocks(len(u)), np.zeros(len(u))
+    x = np.maximum(u, 0.0) / max(float(u.max()), 1e-300)
+    exponents = np.linspace(0.5, 3.0, 26)
+    for b in range(_BLOCKS):
+        seen = block != b
+        if order:
+            basis = x[:, None] ** np.arange(1, order + 1)
+            predicted[~seen] = basis[~seen] @ np.linalg.lstsq(basis[seen], push[seen], rcond=None)[0]
+            continue
+        k = np.array(
+            [(x[seen] ** r) @ push[seen] / max((x[seen] ** (2 * r)).sum(), 1e-300) for r in exponents]
+        )
+        cost = [float(((k[i] * x[seen] ** r - push[seen]) ** 2).sum()) for i, r in enumerate(exponents)]
+        best = int(np.argmin(cost))
+        predicted[~seen] = k[best] * x[~seen] ** exponents[best]
+    return _relative(predicted, push)
+
+
+def _relative(predicted: np.ndarray, push: np.ndarray) -> float:
+    return float(np.sqrt(((predicted - push) ** 2).mean() / max((push**2).mean(), 1e-300)))

@@ -1,0 +1,44 @@
+"""What pages colour an object by: the name, the unit that people read, and one colour map for each."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """name: in words; unit: that people read, '' for a count; scale: to it from SI; colour_map: its own.
+    least_share: of the middle value, that the colours span at least, so that 2 % look like 2 %."""
+
+    name: str
+    unit: str
+    scale: float
+    colour_map: str
+
+    least_share: float = 0.0
+
+    def limits(self, low: float, high: float) -> tuple[float, float]:
+        """Of its colours: from 0 where that is its least, and no narrower than a share of the middle."""
+        if self in FROM_ZERO:
+            return 0.0, max(high, 1e-12)
+        middle, half = (
+            0.5 * (low + high),
+            max(0.5 * (high - low), 0.5 * self.least_share * 0.5 * (low + high)),
+        )
+        return middle - half, middle + half
+
+    @property
+    def label(self) -> str:
+        """Of an axis or a bar: 'depth [mm]'."""
+        return f"{self.name} [{self.unit}]" if self.unit else self.name
+
+
+ORDER = Quantity("first touches, in order", "", 1.0, "plasma")
+DEPTH = Quantity("greatest depth", "mm", 1e3, "YlGnBu")
+ERROR = Quantity("force error", "mN", 1e3, "magma")
+STIFFNESS = Quantity("own stiffness", "N/m", 1.0, "viridis")
+KELVIN_VOIGT = Quantity("stiffness k_V of a press", "N/m", 1.0, "viridis")
+MODULUS = Quantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)
+UNCERTAINTY = Quantity("shape uncertainty", "mm", 1e3, "Purples")
+FROM_ZERO = (ERROR, UNCERTAINTY, DEPTH)
+"""Whose colours begin at nothing."""

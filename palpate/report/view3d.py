@@ -1,0 +1,328 @@
+"""The interactive view of an object that every page shares: turn it, colour it, ask a place, see its press.
+
+Drawn by three.js, whose script trimesh ships for its own notebook view, and by `view3d.js` beside this file;
+everything is inside the page. Without scripts, or where a browser has no WebGL, the page's picture stays.
+"""
+
+from __future__ import annotations
+
+import base64
+import html
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+import numpy as np
+from matplotlib import colormaps
+from matplotlib.colors import to_hex
+
+from mechanics.model import Model
+from mechanics.presses import Presses
+from palpate.report.object3d import AZIMUTH_DEG, ELEVATION_DEG, level_axes, spread_over
+from palpate.report.quantities import (
+    DEPTH,
+    MODULUS,
+    ORDER,
+    STIFFNESS,
+    UNCERTAINTY,
+    Quantity,
+)
+from render.felt import felt_surface
+
+SAMPLES, FEWEST, MOST = 20_000, 30, 120
+"""Points of all curves together, and of one curve at least and at most."""
+_SHOWN_SHARE = (2.0, 98.0)
+_STOPS = 24
+_THREE = re.compile(r'.*?Object\.defineProperty\(\w+,"__esModule",\{value:!0\}\)\}\)\);?', re.DOTALL)
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A surface to be turned: points, normals (v, 3) m, triangles (k, 3) outward, touchable (v,) bool; the
+    support's plane by a point (3,) m and its outward normal (3,)."""
+
+    points: np.ndarray
+    normals: np.ndarray
+    triangles: np.ndarray
+    touchable: np.ndarray
+    support_point: np.ndarray
+    up: np.ndarray
+
+
+@dataclass(frozen=True)
+class Colouring:
+    """What the object is coloured by, SI: surface (v,) a value at each point of the thing, NaN where none is
+    known; presses (p,) one a press. Of presses alone the surface takes what is near, and fades where nobody
+    touched. words: what the numbers are, if that is not plain. name: instead of the quantity's."""
+
+    quantity: Quantity
+    surface: np.ndarray | None = None
+    presses: np.ndarray | None = None
+    words: str = ""
+    name: str = ""
+
+    @property
+    def title(self) -> str:
+        """Its name."""
+        return self.name or self.quantity.name
+
+
+@dataclass(frozen=True)
+class Line:
+    """A force along the presses, (n, 3) N on the tool in the local frame (outward normal, tangent, tangent),
+    at each row (NaN: none).
+
+    kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start.
+    """
+
+    name: str
+    force_n: np.ndarray
+    kind: str = "rendered"
+    shown: bool = True
+
+
+@dataclass(frozen=True)
+class Traces:
+    """Curves of the presses: starts (p + 1,) first row of each; depth_m, time_s (n,) since first touch."""
+
+    starts: np.ndarray
+    depth_m: np.ndarray
+    time_s: np.ndarray
+    lines: Sequence[Line]
+
+
+@dataclass(frozen=True)
+class View:
+    """An object to be turned. places: (p, 3) m, where it was touched; selected: the press shown first; angles
+    as in `object3d`, degrees; force: of the curves, first "into" the surface or "sideways"."""
+
+    thing: Thing
+    places: np.ndarray
+    colourings: Sequence[Colouring]
+    traces: Traces | None = None
+    selected: int = 0
+    azimuth_deg: float = AZIMUTH_DEG
+    elevation_deg: float = ELEVATION_DEG
+    force: str = "into"
+
+    def html(self, still: str) -> str:
+        """The section; still: HTML of what is shown without scripts."""
+        data = json.dumps(_data(self), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
+        options = "".join(f"<option>{html.escape(c.title)}</option>" for c in self.colourings)
+        live = _file("view3d.html").replace("<!-- options -->", options)
+        if self.traces is None:
+            live = re.sub("<!-- curve -->.*<!-- end of curve -->", "", live, flags=re.DOTALL)
+        return (
+            f'<section class="view3d" data-state="still"><div class="still">{still}</div>{live}{_table(self)}'
+            f'<script type="application/json" class="data">{data}</script></section>'
+        )
+
+
+def usual_colourings(model: Model, presses: Presses | None = None) -> list[Colouring]:
+    """What every model can tell: order and depth of its touches, the presses' own moduli, own stiffness,
+    shape uncertainty; what is not known is left out. presses: those that are shown (None: the model's)."""
+    surface, presses = felt_surface(model), model.presses if presses is None else presses
+    order = np.arange(1.0, len(presses) + 1)
+    stiffness = np.where(surface.touchable, surface.own_stiffness_n_per_m, np.nan)
+    uncertainty = np.where(surface.touchable, surface.uncertainty_m, np.nan)
+    modulus = presses.fits["e_pa"]
+    of_press = "Of each press by itself; between presses what is near, paler where nobody touched."
+    found = [
+        Colouring(ORDER, None, order, "Each dot is where a press met the surface, in order of time."),
+        Colouring(MODULUS, None, modulus, of_press, name="modulus of a press"),
+        Colouring(STIFFNESS, stiffness, None, "Force over depth of a straight press of 1 mm there."),
+        Colouring(UNCERTAINTY, uncertainty, None, "Standard deviation of the surface along its normal."),
+        Colouring(DEPTH, None, presses.depth_m, "How deep each press went."),
+    ]
+    return [c for c in found if _known(c)]
+
+
+def thing_of(model: Model) -> Thing:
+    """What a tip meets of a model, on its support."""
+    surface, support = felt_surface(model), model.support
+    return Thing(
+        surface.points, surface.normals, surface.triangles, surface.touchable, support.point, support.normal
+    )
+
+
+def local(presses: Presses, force_n: np.ndarray) -> np.ndarray:
+    """(n, 3) N in the local frames of a table's rows, of forces in the device frame."""
+    return np.einsum("nij,nj->ni", presses.frame[presses.press], force_n)
+
+
+def traces_of(presses: Presses, lines: Sequence[Line]) -> Traces:
+    """Curves at the rows of a table of presses."""
+    return Traces(presses.starts, presses.depth, presses.t - presses.onset_s[presses.press], lines)
+
+
+def facing(up: np.ndarray, out: np.ndarray) -> float:
+    """Azimuth, degrees, from which a place with its outward normal (3,) is seen, slightly from aside; the
+    usual one where it faces up."""
+    across = level_axes(up) @ out
+    if np.linalg.norm(across) < 0.3 * np.linalg.norm(out):
+        return AZIMUTH_DEG
+    return float(np.degrees(np.arctan2(across[1], across[0]))) - 20.0
+
+
+def _known(colouring: Colouring) -> bool:
+    return any(v is not None and np.isfinite(v).any() for v in (colouring.surface, colouring.presses))
+
+
+def _data(view: View) -> dict[str, Any]:
+    thing = view.thing
+    middle = 0.5 * (thing.points.min(axis=0) + thing.points.max(axis=0))
+    up = thing.up / np.linalg.norm(thing.up)
+    head, rows = _rows(view)
+    data = {
+        "points": _floats(1e3 * (thing.points - middle)),
+        "normals": _floats(thing.normals),
+        "triangles": _whole(thing.triangles),
+        "places": _floats(1e3 * (view.places - middle)),
+        "middle": _rounded(1e3 * middle),
+        "up": _rounded(up, 9),
+        "aside": _rounded(level_axes(up)[0], 9),
+        # distances along up are counted from the middle in the page, which is its origin
+        "floor": round(float(1e3 * (thing.support_point - middle) @ up), 3),
+        "azimuth": view.azimuth_deg,
+        "elevation": view.elevation_deg,
+        "selected": int(view.selected),
+        "force": view.force,
+        "colourings": _scaled([_colouring(c, view) for c in view.colourings]),
+        "table": {"head": head, "rows": rows},
+    }
+    return data | ({"curves": _curves(view.traces)} if view.traces else {})
+
+
+def _colouring(colouring: Colouring, view: View) -> dict[str, Any]:
+    quantity, own, thing = colouring.quantity, colouring.presses, view.thing
+    values, known = colouring.surface, None
+    if values is None and own is not None and quantity is not ORDER:
+        used = np.isfinite(own)
+        values, known = spread_over(thing.points, view.places[used], own[used])
+        values = np.where(thing.touchable, values, np.nan)
+    every = np.concatenate([v[np.isfinite(v)] for v in (values, own) if v is not None]) * quantity.scale
+    low, high = np.percentile(every, _SHOWN_SHARE) if values is not None else (every.min(), every.max())
+    stops = colormaps[quantity.colour_map](np.linspace(0.0, 1.0, _STOPS))
+    return {
+        "name": colouring.title,
+        "unit": quantity.unit,
+        "words": colouring.words,
+        "stops": [to_hex(s) for s in stops],
+        "limits": (quantity, low, high, every.min(), every.max()),
+        "surface": None if values is None else _floats(values * quantity.scale),
+        "known": None if known is None else _floats(known),
+        "presses": None if own is None else _floats(own * quantity.scale),
+    }
+
+
+def _scaled(colourings: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """Limits of the colours: the same for all of one quantity, so that they can be compared."""
+    all_limits = [c.pop("limits") for c in colourings]
+    for c, (quantity, _, _, least, most) in zip(colourings, all_limits, strict=True):
+        alike = [limits for limits in all_limits if limits[0] is quantity]
+        low, high = quantity.limits(min(x[1] for x in alike), max(x[2] for x in alike))
+        slack = 1e-6 * (abs(low) + abs(high))
+        c |= {"low": float(low), "high": float(high)}
+        c |= {"cut_low": bool(least < low - slack), "cut_high": bool(most > high + slack)}
+    return colourings
+
+
+def _curves(traces: Traces) -> dict[str, Any]:
+    lengths = np.diff(traces.starts)
+    most = int(np.clip(SAMPLES // max(len(lengths), 1), FEWEST, MOST))
+    kept = [
+        first + np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+        for first, count in zip(traces.starts, lengths, strict=False)
+    ]
+    chosen = np.concatenate(kept) if kept else np.zeros(0, dtype=int)
+    along = _main_direction(traces)
+    return {
+        "starts": _whole(np.cumsum([0, *map(len, kept)])),
+        "depth": _floats(1e3 * traces.depth_m[chosen]),
+        "time": _floats(traces.time_s[chosen]),
+        "lines": [
+            {
+                "name": line.name,
+                "kind": line.kind,
+                "shown": line.shown,
+                "into": _floats(line.force_n[chosen, 0]),
+                "sideways": _floats((line.force_n[chosen, 1:] * along[chosen]).sum(axis=1)),
+            }
+            for line in traces.lines
+        ],
+    }
+
+
+def _main_direction(traces: Traces) -> np.ndarray:
+    """(n, 2) unit: where the first line's force points sideways in each press, for all its rows."""
+    sideways = traces.lines[0].force_n[:, 1:]
+    weighted = sideways * np.linalg.norm(sideways, axis=1, keepdims=True)
+    parts = zip(traces.starts[:-1], traces.starts[1:], strict=True)
+    total = np.array([np.nansum(weighted[a:b], axis=0) for a, b in parts]).reshape(-1, 2)
+    total /= np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-12)
+    return np.repeat(total, np.diff(traces.starts), axis=0)
+
+
+def _rows(view: View) -> tuple[list[str], list[list[str]]]:
+    """Head and rows, in words, of the presses: place, and what each colouring says of it."""
+    told = [(c, c.presses * c.quantity.scale) for c in view.colourings if c.presses is not None]
+    told = [(c, values) for c, values in told if c.quantity is not ORDER]
+    head = ["press", "at x, y, z [mm]"]
+    head += [c.title + (f" [{c.quantity.unit}]" if c.quantity.unit else "") for c, _ in told]
+    rows = []
+    for i, place in enumerate(1e3 * view.places):
+        row = [str(i + 1), ", ".join(f"{v:.0f}" for v in place.round() + 0.0)]
+        rows.append(row + ["–" if not np.isfinite(v[i]) else f"{v[i]:.3g}" for _, v in told])
+    return head, rows
+
+
+def _table(view: View) -> str:
+    head, rows = _rows(view)
+    top = "".join(f'<th scope="col">{html.escape(text)}</th>' for text in head)
+    body = "".join(
+        "<tr>" + "".join(f"<td>{html.escape(cell)}</td>" for cell in row) + "</tr>" for row in rows
+    )
+    return (
+        f'<details class="presses"><summary>The {len(rows)} presses as a table</summary><div class="scroll" '
+        f'tabindex="0"><table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div></details>'
+    )
+
+
+def _floats(values: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
+
+
+def _whole(values: np.ndarray) -> str:
+    return base64.b64encode(np.ascontiguousarray(values, dtype="<u4").tobytes()).decode()
+
+
+def _rounded(values: np.ndarray, digits: int = 4) -> list[float]:
+    return [round(float(v), digits) for v in values]
+
+
+@cache
+def scripts() -> str:
+    """The scripts that make views live, as HTML; '' where trimesh brings no three.js that is known here."""
+    three = _three()
+    if not three:
+        return ""
+    return f"<script>{three}</script>\n<script>{_file('view3d.js')}</script>"
+
+
+def _file(name: str) -> str:
+    return files("palpate.report").joinpath(name).read_text(encoding="utf-8")
+
+
+def _three() -> str:
+    """three.js with its licence's words, out of the page that trimesh makes for notebooks."""
+    import trimesh
+    from trimesh.viewer.notebook import scene_to_html
+
+    page = scene_to_html(trimesh.Scene(trimesh.primitives.Box()))
+    script = re.search(r"<script>(.*?)</script>", page, re.DOTALL)
+    found = _THREE.match(script[1]) if script else None
+    return found[0] if found and "Three.js Authors" in found[0][:200] else ""
