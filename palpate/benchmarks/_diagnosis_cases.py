@@ -25,15 +25,7 @@ INSTRUMENT = (
     "force_gain",
     "tool_gravity_inertia",
 )
-CHEAP = (
-    *INSTRUMENT,
-    "viscoelasticity",
-    "power_law_relaxation",
-    "poroelasticity",
-    "adhesion",
-    "jkr_adhesion",
-    "surface_offset",
-)
+CHEAP = (*INSTRUMENT, "viscoelasticity", "adhesion", "surface_offset")
 """Effects that act on a solved force: another strength costs seconds."""
 SOLID = (
     "inclusion",
@@ -198,6 +190,8 @@ def _hard(pool: Sequence[int], finite: Sequence[int], seed: int) -> list[Case]:
     for name in CHEAP:
         if name != "surface_offset":
             add("left-out", (name,), {name: 2.0}, name)
+    for strength in (1.0, 2.0, 4.0):
+        add("single", ("poroelasticity",), {"poroelasticity": strength})
     for name in ("plasticity", "anisotropy"):
         add("absent", (name,), {FINITE: 1.0, name: 1.0})
     for pair in PAIRS:
