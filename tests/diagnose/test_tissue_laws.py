@@ -82,7 +82,7 @@ def test_a_power_of_time_is_named_by_its_two_numbers(bench):
     found = scores(search, ("viscoelasticity", "power_law_relaxation"))
     assert _economical(list(found.values()), search.options.rival_share).name == "power_law_relaxation"
     share, exponent = found["power_law_relaxation"].candidate.found.of("power_law_relaxation")
-    assert share == pytest.approx(0.25, rel=0.1) and exponent == pytest.approx(0.3, abs=0.05)
+    assert share == pytest.approx(0.25, rel=0.2) and exponent == pytest.approx(0.3, abs=0.05)
 
 
 def test_laws_of_one_phenomenon_are_no_rivals():
