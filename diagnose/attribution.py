@@ -55,8 +55,17 @@ class Attribution:
     standing: dict[str, float]
 
 
-def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:
-    """Forward selection with backward check of effects to be tried; rivals of the first are declared."""
+def attribute(
+    search: Search,
+    effects: Sequence[Effect],
+    *,
+    seen: frozenset[str] = frozenset(),
+    progress: Progress = silent,
+) -> Attribution:
+    """Forward selection with backward check of effects to be tried; rivals of the first are declared.
+
+    seen: names that are known to be there from elsewhere: they are taken first, and stay.
+    """
     fs = search.finite_strain
     ideal, deep = search.judge([]), search.judge([fs])
     _, strain_gain = _with_strain(search, [])
@@ -74,6 +83,8 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
             if not chosen:
                 candidate = _with_hidden_strain(search, effect, candidate, current)
             scores[effect.name] = search.score([effect], candidate, current)
+        if not scores:
+            break
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
             if score.gain > search.options.plain_gain and not search.passes(score, first=first):
@@ -84,6 +95,8 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         off = sideways_off(search.forward, current)
         if off:
             passing = _not_blind_to_slip(search, passing, list(scores.values()), off)
+        known = [scores[n] for n in sorted(seen) if n in scores]
+        passing = [s for s in known if s.size_n > search.options.size_n] or passing
         if not passing:
             pair = None if step + 2 > search.options.most else _paired(search, effects, current)
             if pair is None:
@@ -97,11 +110,12 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
     picked = list(zip(steps, chosen, strict=False))
-    current, chosen = _without_idle(search, chosen, current)
+    current, chosen = _without_idle(search, chosen, current, seen)
     for effect in current.found.effects:
         current = _refined(search, effect, current)
     sets = [standing(scores) for scores in steps]
-    rivals = _rivals(search, picked, sets, chosen)
+    asked = [n for n in chosen if n not in seen]
+    rivals = tuple(n for n in _rivals(search, picked, sets, asked) if n not in seen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
         base,
@@ -217,12 +231,16 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
     return (deep if gain > LINEAR_UNLESS else without), float(gain)
 
 
-def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tuple[Candidate, list[str]]:
+def _without_idle(
+    search: Search, chosen: list[str], current: Candidate, seen: frozenset[str]
+) -> tuple[Candidate, list[str]]:
     """Drop effects that later ones made idle."""
     chosen = list(chosen)
     for name in list(chosen):
         if len(chosen) < 2:
             break
+        if name in seen:
+            continue
         without = search.judge([e for e in current.found.effects if e.name != name])
         effect = next(e for e in current.found.effects if e.name == name)
         if effect.slips and sideways_off(search.forward, without):

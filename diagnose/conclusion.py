@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnose.attribution import LINEAR_UNLESS, Attribution
 from diagnose.confusable import alike
+from diagnose.detectable import detectable
 from diagnose.gaps import closed_share, gap
 from diagnose.intervals import parameter_intervals
 from diagnose.judging import Score, Search
@@ -133,6 +134,7 @@ def _entries(
     noise, added = evidence.noise_n, evidence.forward.touches.thinned_away
     best = max((max(s.gain, 0.0) for s in found.scores.values()), default=0.0)
     draws = max(100, evidence.bootstrap // 4)
+    limits = detectable(search, found.base, [s.effect for s in found.scores.values()])
     entries = []
     for name, score in found.scores.items():
         own = score.effect
@@ -150,6 +152,7 @@ def _entries(
                 score.gain,
                 parameter_intervals(fitted, name, forward, search.dof, rng),
                 found.standing[name],
+                limits.get(name, float("nan")),
             )
         )
     strain = search.finite_strain

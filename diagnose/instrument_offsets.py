@@ -21,11 +21,13 @@ from diagnose.rigid import Rigid
 from diagnose.whiten import Whitener
 from mechanics.effects.force_bias import EFFECT as BIAS
 from mechanics.effects.force_drift import EFFECT as DRIFT
+from mechanics.effects.force_gain import EFFECT as GAIN
 from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
 Z = 6.0
+SIDEWAYS_Z = 4.0
 LEAST_BIAS_N = 0.008
 LEAST_MASS_KG = 0.003
 MASS_SHARE = 0.03
@@ -100,6 +102,11 @@ def find_instrument_offsets(
         (*offsets.reasons, yields),
         {**offsets.intervals, SPRING.name: {"stiffness_n_per_m": [float(low), float(high)]}},
     )
+
+
+def read_sideways(rigid: Rigid | None) -> frozenset[str]:
+    """What the support shows to be there, but does not tell wholly: a force that is read into other axes."""
+    return frozenset({GAIN.name} if rigid is not None and rigid.sideways_z > SIDEWAYS_Z else ())
 
 
 def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]) -> InstrumentOffsets:

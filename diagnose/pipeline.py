@@ -12,7 +12,7 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets
+from diagnose.instrument_offsets import find_instrument_offsets, read_sideways
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
@@ -97,7 +97,10 @@ def diagnose(
     misfit = misfit_of(forward, base.found, site_sd)
     search.starts = {e.name: e.seek(forward, misfit) for e in tried if e.seek is not None}
     lap("baseline")
-    found = attribute(search, tried, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
+    seen = read_sideways(rigid) & frozenset(e.name for e in tried)
+    if rigid is not None and seen:
+        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
+    found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
     evidence = Evidence(
         forward, search, found, free, offsets, site_sd, frozenset(excluded), options.shape_gain,
@@ -109,12 +112,15 @@ def diagnose(
 
 
 def untold_effects(presses: Presses) -> set[str]:
-    """Names of the effects that presses of this kind say nothing of: points have no time, one place has no
-    other place, and what never leaves the object has no free air."""
+    """Names of the effects that presses of this kind say nothing of: points have no time, one axis has
+    nothing sideways, one place has no other place, and what never leaves the object has no free air."""
     told_nothing: set[Scope] = set()
     if presses.quasi_static:
         told_nothing |= {Scope.TIME, Scope.READING}
     if presses.sites < LEAST_SITES:
         told_nothing |= {Scope.PLACES}
     names = {e.name for e in effects() if e.scope in told_nothing}
+    if not presses.local_force[:, 1:].any():
+        # a machine of one axis: nothing sideways, and no axis beside another
+        names |= {e.name for e in effects() if e.slips or e.common_factor > 0}
     return names - {e.name for e in effects() if e.role is Role.KNOWN}

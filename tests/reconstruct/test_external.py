@@ -137,10 +137,10 @@ def test_a_hold_is_told_by_its_own_ramp_whatever_the_depth_law(form):
 
 @pytest.mark.slow
 def test_unseen_holds_of_beef_are_told_by_two_numbers(measured):
-    from palpate.benchmarks.diagnose_real import unseen_holds
+    from palpate.benchmarks.tissue_laws import unseen_holds
 
     folder = measured / "meat_indentation_relaxation" / "csv"
-    told = unseen_holds(sorted(folder.glob("230331_[RF]*.csv"))[:16], diagnosing=False)
+    told = unseen_holds(sorted(folder.glob("230331_[RF]*.csv"))[:16])
     assert told["prony"]["closed"] > 0.9 and told["power law"]["closed"] > 0.9
 
 
