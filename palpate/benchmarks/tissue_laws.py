@@ -1,7 +1,7 @@
 """Laws of tissue on measured curves that no fit has seen: how silicones soften, and how beef relaxes.
 
-Silicones: 19 mixtures of Ecoflex and thinner, two specimens of five tests each (Dawood et al. 2026, CC BY 4.0).
-Each test is predicted by one modulus and one shape parameter (`c20_over_c10`) from the others of its mixture,
+Silicones: 19 mixtures of Ecoflex and thinner, two specimens of five tests each (Dawood et al. 2026, CC BY
+4.0). Each test is predicted by one modulus and one shape parameter (`c20_over_c10`) from the others of its mixture,
 and from those of the other specimen alone; the error is the median over samples between 2 % strain and the
 greatest, in shares of the stress.
 
