@@ -1,9 +1,9 @@
 """Laws of tissue on measured curves that no fit has seen: how silicones soften, and how beef relaxes.
 
 Silicones: 19 mixtures of Ecoflex and thinner, two specimens of five tests each (Dawood et al. 2026, CC BY
-4.0). Each test is predicted by one modulus and one shape parameter (`c20_over_c10`) from the others of its mixture,
-and from those of the other specimen alone; the error is the median over samples between 2 % strain and the
-greatest, in shares of the stress.
+4.0). Each test is predicted by one modulus and one shape parameter (`c20_over_c10`) from the others of its
+mixture, and from those of the other specimen alone; the error is the median over samples between 2 % strain
+and the greatest, in shares of the stress.
 
 Beef: indentations, a ramp and a hold (Iaquinta's set, GPL-3.0, read where it lies), forces scaled to 1 N at 3
 mm. The hold of each piece is told by that piece's own ramp, with a memory fitted to the other half of the
