@@ -20,13 +20,13 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import RecordingError
-from palpate.benchmarks.diagnose_real import FOLDERS
 from palpate.benchmarks.timing import table
 from reconstruct.external.compression import Compression, fit_elastomer, read_compression
 from reconstruct.external.relaxation import FORMS, Held, fit_holds, hold_error
 
 SUMMARY = "laws of tissue: silicones that soften and holds of beef, on unseen curves"
 FROM_STRAIN = 0.02
+SILICONES, BEEF = "tissue_phantom_compression", "meat_indentation_relaxation"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -40,13 +40,19 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Both tables."""
     root = Path(arguments.data)
-    for folder in (FOLDERS["silicones"], FOLDERS["beef"]):
+    for folder in (SILICONES, BEEF):
         if not (root / folder).is_dir():
             raise RecordingError(f"'{root / folder}' does not exist: --data names the folder of the sets")
-    figures = {"silicones": _silicones(root / FOLDERS["silicones"], arguments)}
-    pieces = sorted((root / FOLDERS["beef"] / "csv").glob(f"{arguments.session}_[RF]*.csv"))
-    figures["holds"] = unseen_holds(pieces[: arguments.pieces])
-    rows = [[form, f"{f['rms_n']:.3f} N", f"{f['closed']:.0%}"] for form, f in figures["holds"].items()]
+    return {
+        "silicones": _silicones(root / SILICONES, arguments),
+        "holds": holds_table(root / BEEF, arguments.session, arguments.pieces),
+    }
+
+
+def holds_table(folder: Path, session: str, most: int) -> dict[str, dict[str, float]]:
+    """Print and return `unseen_holds` of a session's pieces."""
+    figures = unseen_holds(sorted((folder / "csv").glob(f"{session}_[RF]*.csv"))[:most])
+    rows = [[form, f"{f['rms_n']:.3f} N", f"{f['closed']:.0%}"] for form, f in figures.items()]
     print(table(["memory", "unseen holds miss by (rms)", "closed of what none leaves"], rows))
     return figures
 
