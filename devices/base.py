@@ -23,6 +23,9 @@ Clock = Callable[[], float]
 
 host_clock: Clock = time.perf_counter
 
+LONGEST_HOLD_S = 0.02
+"""No force outlives the call that sent it by more: whoever sends has stalled."""
+
 
 @dataclass(frozen=True)
 class DeviceSpec:
@@ -89,8 +92,10 @@ class ForceSink(Protocol):
     def disable_force(self) -> None:
         """Zero at once, and nothing more is sent."""
 
-    def send_force(self, force_on_tool_n: np.ndarray) -> None:
-        """(3,) N on the tool, the device's frame; handed over at once, sent by the device's thread."""
+    def send_force(self, force_on_tool_n: np.ndarray, hold_s: float = LONGEST_HOLD_S) -> None:
+        """(3,) N on the tool, the device's frame; handed over at once, sent by the device's thread.
+
+        It acts until the next one, and no longer than `hold_s`: then zero is sent."""
 
 
 class OpenInWith(ABC):

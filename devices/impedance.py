@@ -14,7 +14,31 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numba import njit
 from scipy.linalg import expm
+
+
+@njit(cache=True, nogil=True)
+def follow(transition, position, velocity, intended, following, first, last, number, step_s, force):
+    """Steps `first` to `last` of the `number` in which the hand means to go evenly between two places.
+
+    transition: (2, 3), HandImpedance's over step_s. position, velocity: (3,) m, m/s, in place. force: (3,) N
+    on the tool, held meanwhile. Returns its work on the hand, J.
+    """
+    work = 0.0
+    for k in range(first, last):
+        for i in range(3):
+            whole = following[i] - intended[i]
+            here, there = intended[i] + whole * k / number, intended[i] + whole * (k + 1) / number
+            meant = whole / (number * step_s)
+            offset, speed = position[i] - here, velocity[i] - meant
+            moved = there + transition[0, 0] * offset + transition[0, 1] * speed + transition[0, 2] * force[i]
+            work += force[i] * (moved - position[i])
+            position[i] = moved
+            velocity[i] = (
+                meant + transition[1, 0] * offset + transition[1, 1] * speed + transition[1, 2] * force[i]
+            )
+    return work
 
 
 @dataclass(frozen=True)

@@ -4,8 +4,8 @@ A driver supplies a `Wire` (blocking calls); `ThreadedDevice` makes a device of 
 every wire:
 
 * force goes out only after `enable_force`, and zero goes out before the wire is released, whatever happened;
-* no fresh `send_force` for `STALE_FORCE_S`: zero goes out (the caller has stalled, which devices.safety
-  cannot know);
+* a force goes out for as long as its `send_force` allowed, then zero (the caller has stalled, which
+  devices.safety cannot know);
 * a reading with a fault, or not calibrated, disables force as well;
 * a wire that raises counts as unplugged: force is disabled, states say `connected=False`, and the thread
   tries again, waiting longer each time; force then needs a new `enable_force`.
@@ -22,11 +22,18 @@ from typing import Protocol
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, OpenInWith, finite_vector, host_clock
+from devices.base import (
+    LONGEST_HOLD_S,
+    Availability,
+    Clock,
+    DeviceSpec,
+    OpenInWith,
+    finite_vector,
+    host_clock,
+)
 from mechanics.errors import DeviceError
 from mechanics.state import IDENTITY_QUATERNION, TipState
 
-STALE_FORCE_S = 0.02
 POLL_S = 0.001
 FIRST_RETRY_S = 0.1
 LONGEST_RETRY_S = 2.0
@@ -96,7 +103,7 @@ class ThreadedDevice(OpenInWith):
         self.rate = Rate()
         self._clock = clock
         self._force: np.ndarray = ZERO
-        self._force_time_s = float("-inf")
+        self._force_until_s = float("-inf")
         self._force_enabled = False
         self._sent = False
         self._connected = False
@@ -177,8 +184,7 @@ class ThreadedDevice(OpenInWith):
             was, self._sent = self._sent, False
             return ZERO if was else None
         self._sent = True
-        fresh = self._clock() - self._force_time_s <= STALE_FORCE_S
-        return self._force if fresh else ZERO
+        return self._force if self._clock() <= self._force_until_s else ZERO
 
     def _run(self) -> None:
         retry_s = FIRST_RETRY_S
@@ -217,7 +223,7 @@ class ThreadedDevice(OpenInWith):
 
     def _lose(self, error: Exception) -> None:
         self._force_enabled = self._sent = False
-        self._force_time_s = float("-inf")
+        self._force_until_s = float("-inf")
         self._connected = False
         self.wire.disconnect()
         self._state = self._flagged(fault=f"disconnected: {_plain(error)}")
@@ -261,18 +267,20 @@ class ForcefulDevice(ThreadedDevice):
             )
         if state.fault:
             raise DeviceError(f"{self.spec.title} has a fault ({state.fault}): mend it, then enable force")
-        self._force, self._force_time_s = ZERO, float("-inf")
+        self._force, self._force_until_s = ZERO, float("-inf")
         self._force_enabled = True
 
     def disable_force(self) -> None:
         """The thread sends zero at its next turn, and nothing more."""
         self._force_enabled = False
 
-    def send_force(self, force_on_tool_n: np.ndarray) -> None:
-        """(3,) N on the tool, the device's frame; NaN counts as zero. Ignored until force is enabled."""
+    def send_force(self, force_on_tool_n: np.ndarray, hold_s: float = LONGEST_HOLD_S) -> None:
+        """(3,) N on the tool, the device's frame, for at most `hold_s`; NaN counts as zero.
+
+        Ignored until force is enabled."""
         force = finite_vector(force_on_tool_n)
         self._force = force if np.isfinite(force).all() else ZERO
-        self._force_time_s = self._clock()
+        self._force_until_s = self._clock() + hold_s
 
 
 def _plain(error: Exception) -> str:

@@ -1,8 +1,10 @@
 """The mouse in the touch window: the window writes where the hand means to be, this gives a 1 kHz tip from
 it.
 
-A mouse moves at the window's 60 Hz; a critically damped hand of `follow_s` follows it, so that the renderer
-gets a smooth path and a velocity. There is no force to feel: the window shows it as an arrow and a plot.
+A window writes a place a picture, sixty times a second or once: on the way to each the hand means to go
+evenly, in the time that the window took for it, so that slow pictures make late motion and not steps. A
+critically damped hand of `follow_s` follows that, so that the renderer gets a smooth path and a velocity.
+There is no force to feel: the window shows it as an arrow and a plot.
 """
 
 from __future__ import annotations
@@ -27,6 +29,8 @@ SPEC = DeviceSpec(
     buttons=3,
 )
 WINDOW_SILENT_S = 2.0
+MOST_STEPS = 500
+"""Made up for in one reading: a program that was paused for longer does not replay it."""
 _ZERO = np.zeros(3)
 _NOWHERE = np.full(3, np.nan)
 
@@ -73,6 +77,7 @@ class MouseDevice(OpenInWith):
             ) from error
         self._position = None
         self._time = self._clock()
+        self._written_s = float("-inf")
 
     def read(self) -> TipState:
         """The following tip, advanced to the clock; disconnected while the window is silent."""
@@ -86,14 +91,23 @@ class MouseDevice(OpenInWith):
             return TipState(self._time, self._sequence, _NOWHERE, connected=False, fault=fault)
         if self._position is None:
             self._position, self._velocity = np.array(pose.position_m), _ZERO
+            self._from = self._to = self._position
+            self._left = 0
             self._sequence += 1
-        target = np.array(pose.position_m)
+        if pose.time_s != self._written_s:
+            took_s = min(max(pose.time_s - self._written_s, 0.0), WINDOW_SILENT_S)
+            self._from, self._to = self._meant, np.array(pose.position_m)
+            # and no sooner than it was to be at the place before
+            self._left = self._number = max(1, self._left, round(took_s / self._hand.step_s))
+            self._written_s = pose.time_s
         steps = int((now - self._time) / self._hand.step_s)
         if steps > 0:
             self._sequence += 1
-        for _ in range(min(steps, 100)):
+        for _ in range(min(steps, MOST_STEPS)):
+            meant = self._meant
+            self._left = max(self._left - 1, 0)
             self._position, self._velocity = self._hand.step(
-                self._position, self._velocity, target, target, _ZERO
+                self._position, self._velocity, meant, self._meant, _ZERO
             )
         self._time += steps * self._hand.step_s
         silent = now - pose.time_s > WINDOW_SILENT_S
@@ -106,6 +120,13 @@ class MouseDevice(OpenInWith):
             connected=not silent,
             fault="the window is silent" if silent else "",
         )
+
+    @property
+    def _meant(self) -> np.ndarray:
+        """(3,) m, where the hand means to be now: on the way to the window's newest place."""
+        if not self._left:
+            return self._to
+        return self._to + self._left / self._number * (self._from - self._to)
 
     def pressed(self, button: int) -> bool:
         """Whether left (0), middle (1) or right (2) is down."""

@@ -29,8 +29,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from devices.base import Availability, Clock, DeviceSpec, host_clock
-from devices.io_thread import STALE_FORCE_S, ZERO, ForcefulDevice, Reading, found
+from devices.base import LONGEST_HOLD_S, Availability, Clock, DeviceSpec, host_clock
+from devices.io_thread import ZERO, ForcefulDevice, Reading, found
 from devices.vendor_library import load, need, offered
 from mechanics.errors import DeviceError
 from mechanics.options import option
@@ -178,7 +178,7 @@ class OpenHapticsWire:
         buttons = c_int()
         library.hdBeginFrame(handle)
         when, force = self._order
-        fresh = force is not None and time.perf_counter() - when <= STALE_FORCE_S
+        fresh = force is not None and time.perf_counter() - when <= LONGEST_HOLD_S
         out = (c_double * 3)(*(TO_FRAME.T @ force if fresh else ZERO))
         library.hdSetDoublev(FORCE, out)
         library.hdGetDoublev(POSITION, values)

@@ -123,7 +123,7 @@ class SafetyParameters(NamedTuple):
 class SafetyState(NamedTuple):
     """Memory between ticks, preallocated; `reasons` is the last tick's, `counts` how often each occurred.
 
-    force: (3,) N, the last output. gain: of the ramp, 0 to 1. since: s since the last fresh pose.
+    force: (3,) N, the last output. gain: of the ramp, 0 to 1. since: s since the last pose was read.
     """
 
     force: np.ndarray
@@ -196,7 +196,7 @@ def safety_state(workspace_centre_m: np.ndarray | None = None) -> SafetyState:
 
 SPEED_TIME_S = 0.005
 """Time constant of the speed estimate: one coarse encoder step in a tick must not look like over-speed."""
-LONGEST_STEP_S = 0.1
+LONGEST_STEP_S = 0.005
 """A longer tick raises the force no more than this one: a stall is no licence to skip ramp and slew."""
 LONGEST_GAP_S = 10.0
 
@@ -232,6 +232,7 @@ def _motion_faults(parameters, state, reading, dt_s):
     """Over-speed and jump, from fresh poses that can be ones."""
     faults = 0
     state.since[0] = min(state.since[0] + dt_s, LONGEST_GAP_S)
+    age_s = min(reading.age_s, LONGEST_GAP_S) if reading.age_s > 0.0 else 0.0
     if reading.sequence != state.sequence[0]:
         state.sequence[0] = reading.sequence
         if not within(reading.position, FARTHEST_M):
@@ -241,15 +242,16 @@ def _motion_faults(parameters, state, reading, dt_s):
             for i in range(3):
                 moved += (reading.position[i] - state.position[i]) ** 2
             moved = math.sqrt(moved)
-            # several ticks may pass between two poses of a slow device
-            between = state.since[0]
+            # by the readings' own times: several ticks may pass between two of a slow device, and a late
+            # tick sees in one reading what moved during all of its lateness
+            between = max(state.since[0] - age_s, 0.0)
             if moved > parameters.jump_m + parameters.max_speed_m_per_s * between:
                 faults |= JUMP
             # the low pass of moved / between, without a division that a clock could make infinite
             state.speed[0] += (moved - between * state.speed[0]) / (SPEED_TIME_S + between)
         for i in range(3):
             state.position[i] = reading.position[i]
-        state.since[0] = 0.0
+        state.since[0] = age_s
     fastest = parameters.max_speed_m_per_s
     if state.speed[0] > fastest or _norm3(reading.velocity) > fastest:
         faults |= OVER_SPEED

@@ -1,8 +1,9 @@
 """The simulated hand: a device without hardware, for demonstrations, tests and headless sessions.
 
 It has mass, damping, stiffness and tremor (devices.impedance), an intention (devices.intention), and feels
-the force that is sent to it. It advances in fixed steps up to the clock whenever it is read, so that with a
-fake clock a session is the same bit for bit.
+the force that is sent to it: from then on, until the next one or until it expires, whoever is late. It goes
+on in fixed steps up to the clock whenever it is read or sent a force, so that with a fake clock a session is
+the same bit for bit.
 """
 
 from __future__ import annotations
@@ -11,8 +12,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from devices.base import Availability, Clock, DeviceSpec, OpenInWith, finite_vector, host_clock
-from devices.impedance import HandImpedance
+from devices.base import (
+    LONGEST_HOLD_S,
+    Availability,
+    Clock,
+    DeviceSpec,
+    OpenInWith,
+    finite_vector,
+    host_clock,
+)
+from devices.impedance import HandImpedance, follow
 from devices.intention import FreeExploration, Intention
 from mechanics.errors import DeviceError
 from mechanics.options import check_ranges, option
@@ -30,8 +39,12 @@ SPEC = DeviceSpec(
     buttons=1,
     simulated=True,
 )
-LONGEST_CATCH_UP_S = 0.01
-"""A hand that leapt on by more in one reading would look like a device whose pose jumps."""
+INTENTION_S = 0.001
+"""How often the hand makes up its mind."""
+SUBSTEPS = 20
+"""Steps in that time, at which forces come and go."""
+LONGEST_CATCH_UP_S = 0.5
+"""A program that was paused for longer paused the hand as well: it must not replay minutes at once."""
 TREMOR_HZ = (8.0, 9.7, 11.3)
 
 
@@ -51,7 +64,7 @@ class SimulatedOptions:
 class SimulatedHand(OpenInWith):
     """A PositionSource and ForceSink. `intention` defaults to exploring a 10 cm ball round the origin.
 
-    buttons: a function from time (s since open) to the button mask, none by default.
+    work_j: what the forces that acted have given to the hand.
     """
 
     spec = SPEC
@@ -67,13 +80,18 @@ class SimulatedHand(OpenInWith):
         self.options = options or SimulatedOptions()
         self.intention = intention or FreeExploration(np.zeros(3), 0.1, seed=seed)
         self.impedance = HandImpedance(
-            self.options.mass_kg, self.options.damping_n_s_per_m, self.options.stiffness_n_per_m
+            self.options.mass_kg,
+            self.options.damping_n_s_per_m,
+            self.options.stiffness_n_per_m,
+            INTENTION_S / SUBSTEPS,
         )
+        self.work_j = 0.0
         self._clock = clock
         self._phases = np.random.default_rng(seed).uniform(0, 2 * np.pi, (len(TREMOR_HZ), 3))
         self._open = False
         self._force_enabled = False
         self._force = np.zeros(3)
+        self._until = 0
         self._sequence = -1
 
     def open(self) -> None:
@@ -82,6 +100,7 @@ class SimulatedHand(OpenInWith):
         self._steps = 0
         self._velocity = np.zeros(3)
         self._intended = self._intend(0.0, np.zeros(3))
+        self._following = self._intended
         self._position = self._intended.copy()
         self._open = True
         self._sequence += 1
@@ -94,34 +113,54 @@ class SimulatedHand(OpenInWith):
 
     @property
     def _felt(self) -> np.ndarray:
-        return self._force if self._force_enabled else np.zeros(3)
+        return self._force if self._force_enabled and self._steps < self._until else np.zeros(3)
 
-    def read(self) -> TipState:
-        """Advance to the clock and return the tip; raises DeviceError before `open`."""
+    def _advance(self) -> None:
+        """Go on to the clock; raises DeviceError before `open`."""
         if not self._open:
             raise DeviceError("the simulated hand is not open: call open() or use it in a with statement")
-        step = self.impedance.step_s
-        elapsed = self._clock() - self._start_s
-        due = int(elapsed / step + 1e-6)
-        if due - self._steps > LONGEST_CATCH_UP_S / step:
-            # a paused program must not replay seconds of hand at once; the hand's own time skips them
-            skipped = due - self._steps - int(LONGEST_CATCH_UP_S / step)
-            self._start_s += skipped * step
-            due -= skipped
+        step_s = self.impedance.step_s
+        due = self._step_at(self._clock())
+        most = round(LONGEST_CATCH_UP_S / step_s)
+        if due - self._steps > most:
+            # the hand's own time skips the pause
+            self._start_s += (due - self._steps - most) * step_s
+            due = self._steps + most
         if due > self._steps:
             self._sequence += 1
         while self._steps < due:
-            self._steps += 1
-            following = self._intend(self._steps * step, self._position)
-            self._position, self._velocity = self.impedance.step(
-                self._position, self._velocity, self._intended, following, self._felt
+            first = self._steps % SUBSTEPS
+            if first == 0:
+                self._intended = self._following
+                self._following = self._intend((self._steps + SUBSTEPS) * step_s, self._position)
+            force, last = self._felt, min(SUBSTEPS, first + due - self._steps)
+            if self._steps < self._until:
+                last = min(last, first + self._until - self._steps)
+            self.work_j += follow(
+                self.impedance.transition,
+                self._position,
+                self._velocity,
+                self._intended,
+                self._following,
+                first,
+                last,
+                SUBSTEPS,
+                step_s,
+                force,
             )
-            self._intended = following
+            self._steps += last - first
+
+    def _step_at(self, time_s: float) -> int:
+        return int((time_s - self._start_s) / self.impedance.step_s + 1e-6)
+
+    def read(self) -> TipState:
+        """Advance to the clock and return the tip; raises DeviceError before `open`."""
+        self._advance()
         return TipState(
-            time_s=self._start_s + self._steps * step,
+            time_s=self._start_s + self._steps * self.impedance.step_s,
             sequence=self._sequence,
-            position_m=self._position,
-            velocity_m_per_s=self._velocity,
+            position_m=self._position.copy(),
+            velocity_m_per_s=self._velocity.copy(),
             force_enabled=self._force_enabled,
         )
 
@@ -133,14 +172,18 @@ class SimulatedHand(OpenInWith):
 
     def disable_force(self) -> None:
         """The hand feels nothing any more."""
+        if self._open:
+            self._advance()
         self._force_enabled = False
         self._force = np.zeros(3)
 
-    def send_force(self, force_on_tool_n: np.ndarray) -> None:
-        """(3,) N on the tool, held until the next one; ignored until force is enabled."""
+    def send_force(self, force_on_tool_n: np.ndarray, hold_s: float = LONGEST_HOLD_S) -> None:
+        """(3,) N on the tool, until the next one and for at most `hold_s`; ignored until force is enabled."""
         force = finite_vector(force_on_tool_n)
         if self._force_enabled:
+            self._advance()
             self._force = np.where(np.isfinite(force), force, 0.0)
+            self._until = self._steps + round(hold_s / self.impedance.step_s)
 
     def close(self) -> None:
         """Let go."""

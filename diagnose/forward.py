@@ -66,7 +66,7 @@ class Forward:
 
     @property
     def lead(self) -> np.ndarray:
-        """(n, 3) side of the tip in a play that the reading follows (diagnose.leads)."""
+        """(n, 3) side of the tip in a play that the reading follows (mechanics.leads)."""
         return self.touches.columns["lead"]
 
     @property

@@ -272,6 +272,8 @@ def sideways_off(forward: Forward, candidate: Candidate) -> float:
     The nuisances trust the stick to a quarter only, press by press, so a fit may let that force go wrong.
     """
     t = forward.touches
+    if not t.local_force[t.counted, 1:].any():
+        return 0.0  # a machine of one axis reads none
     residual = candidate.residual[t.counted, 1:]
     predicted = t.local_force[t.counted, 1:] - residual
     missed, force = (float(np.sqrt((x**2).sum(axis=1).mean())) for x in (residual, predicted))

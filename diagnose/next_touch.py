@@ -16,9 +16,9 @@ import numpy as np
 from diagnose.fit import settings_of
 from diagnose.forward import Forward
 from diagnose.judging import Candidate
-from diagnose.leads import leads
 from diagnose.result import NextTouch
 from diagnose.whiten import NuisanceOptions, Whitener
+from mechanics.leads import leads
 from mechanics.presses import Presses
 
 DEPTHS = (0.35, 0.8, 1.2)

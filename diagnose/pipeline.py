@@ -112,12 +112,15 @@ def diagnose(
 
 
 def untold_effects(presses: Presses) -> set[str]:
-    """Names of the effects that presses of this kind say nothing of: points have no time, one place has no
-    other place, and what never leaves the object has no free air."""
+    """Names of the effects that presses of this kind say nothing of: points have no time, one axis has
+    nothing sideways, one place has no other place, and what never leaves the object has no free air."""
     told_nothing: set[Scope] = set()
     if presses.quasi_static:
         told_nothing |= {Scope.TIME, Scope.READING}
     if presses.sites < LEAST_SITES:
         told_nothing |= {Scope.PLACES}
     names = {e.name for e in effects() if e.scope in told_nothing}
+    if not presses.local_force[:, 1:].any():
+        # a machine of one axis: nothing sideways, and no axis beside another
+        names |= {e.name for e in effects() if e.slips or e.common_factor > 0}
     return names - {e.name for e in effects() if e.role is Role.KNOWN}

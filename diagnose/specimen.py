@@ -1,7 +1,7 @@
 """Bench instruments: one place of one specimen, or one place of many, pressed in a machine that logs travel
 and load.
 
-The curves are brought to the size of a hand's tip by similarity (lengths, and forces beside them), which
+The curves are brought to the size of a hand's tip by similarity (lengths, forces and times), which
 elasticity, memory and all effects here are indifferent to; so a cantilever of an AFM, a texture analyser and
 a finger are diagnosed by one machinery on a half-space or a layer. What is found is turned back into the
 machine's own units.
@@ -35,8 +35,11 @@ from reconstruct.unbroken import Loading, first_touches
 
 HAND_TIP_M, PEAK_N = 0.005, 1.0
 """The size to which curves are brought: tip's radius, and the force of the middle one at its peak."""
-RATE_HZ, LEAST_RATE_HZ = 200.0, 60.0
+HAND_S, RATE_HZ = 2.0, 200.0
+"""The pace to which they are brought: how long the middle curve takes, and readings a second at most."""
 _BETWEEN_S = 2.0
+_FLOOR = {False: 0.005, True: 0.02}
+"""Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""
 _CELLS = 20
 _MARGIN = 2.0
 _BASELINE = 0.1
@@ -59,22 +62,21 @@ class Curve:
 
 @dataclass(frozen=True)
 class Similarity:
-    """Factors from a machine's metres and newtons to those of a hand."""
+    """Factors from a machine's metres, newtons and seconds to those of a hand."""
 
     length: float
     force: float
+    time: float
 
     def back(self, keys: Mapping[str, Any]) -> dict[str, Any]:
         """Parameters in the machine's units; which unit is told by a key's ending, as everywhere."""
         return {key: _times(value, 1 / self._factor(key)) for key, value in keys.items()}
 
     def _factor(self, key: str) -> float:
-        metres, newtons = 0, 0
-        for ending, powers in _ENDINGS.items():
+        for ending, (metres, newtons, seconds) in _ENDINGS.items():
             if key.endswith(ending):
-                metres, newtons = powers
-                break
-        return self.length**metres * self.force**newtons
+                return self.length**metres * self.force**newtons * self.time**seconds
+        return 1.0
 
     @property
     def modulus(self) -> float:
@@ -83,8 +85,8 @@ class Similarity:
 
 
 _ENDINGS = {
-    "_pa_per_m": (-3, 1), "_n_per_m": (-1, 1), "_n_per_s": (0, 1), "_m_per_n": (1, -1), "_m_per_s": (1, 0),
-    "_pa": (-2, 1), "_n": (0, 1), "_m": (1, 0),
+    "_pa_per_m": (-3, 1, 0), "_n_per_m": (-1, 1, 0), "_n_per_s": (0, 1, -1), "_m_per_n": (1, -1, 0),
+    "_m_per_s": (1, 0, -1), "_pa": (-2, 1, 0), "_n": (0, 1, 0), "_m": (1, 0, 0), "_s": (0, 0, 1),
 }  # fmt: skip
 
 
@@ -124,7 +126,8 @@ def bench_of(
     another piece, so each force is taken over its own stiffness. Raises ContactError where no curve has a
     contact."""
     length = HAND_TIP_M / tip_radius_m
-    ready = [_levelled(c) for c in curves]
+    pace = HAND_S / float(np.median([np.ptp(c.t) for c in curves]))
+    ready = [_levelled(c, pace) for c in curves]
     found = [_way_in(c) for c in ready]
     used = np.array([f is not None for f in found])
     if not used.any():
@@ -167,26 +170,27 @@ def bench_of(
         lifted, onset_s=lifted.t[first], peak_s=lifted.t[peak], centre=centre,
         normal=np.tile(UP, (len(rows), 1)),
         onset_error_m=error, noise_n=noise / top,
+        others_s=[(lifted.t[a], lifted.t[b - 1]) for a, b in times],
     )  # fmt: skip
     model = Model(
         mesh=mesh.quadratic(), material=Material(middle, poisson_ratio), support=Support(np.zeros(3), UP),
         tool=Tool(HAND_TIP_M), mesh_size_m=0.01, presses=presses,
     )  # fmt: skip
-    similarity = Similarity(length, 1 / top)
+    similarity = Similarity(length, 1 / top, pace)
     every = np.full((2, len(curves)), np.nan)
     every[:, used] = onset / length, own / similarity.modulus
     return Bench(lifted, model, similarity, every[0], every[1], used, specimens)
 
 
-def _levelled(curve: Curve) -> Curve:
-    """At RATE_HZ, by means or straight between the readings."""
-    rate = (len(curve.t) - 1) / float(curve.t[-1] - curve.t[0])
+def _levelled(curve: Curve, pace: float) -> Curve:
+    """At a hand's pace, of at most RATE_HZ by means."""
+    rate = (len(curve.t) - 1) / float(curve.t[-1] - curve.t[0]) / pace
     block = max(1, round(rate / RATE_HZ))
     count = len(curve.t) // block
     t, travel, force = (
         v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
     )
-    return Curve(t - t[0], travel, force, curve.name)
+    return Curve(pace * (t - t[0]), travel, force, curve.name)
 
 
 def _way_in(curve: Curve) -> tuple[np.ndarray, np.ndarray, float] | None:
@@ -211,8 +215,7 @@ def _side_by_side(
     curves: Sequence[Curve], onset: np.ndarray, length: float, factor: np.ndarray, noise: float
 ) -> tuple[Recording, list[tuple[int, int]]]:
     """One recording of all curves in a hand's size, the surface at z = 0; (first, last) rows of each."""
-    slow = min((len(c.t) - 1) / float(np.ptp(c.t)) for c in curves)
-    rate = RATE_HZ if slow < LEAST_RATE_HZ else slow
+    rate = min((len(c.t) - 1) / float(np.ptp(c.t)) for c in curves)
     times, heights, forces, spans = [], [], [], []
     clock, rows = 0.0, 0
     for curve, at, scale in zip(curves, onset, factor, strict=True):
@@ -235,7 +238,6 @@ def _side_by_side(
         tip_radius_m=HAND_TIP_M,
         force_noise_std_n=noise,
         object_name="specimen",
-        description={"recording": {"read_rate_hz": slow}} if slow < LEAST_RATE_HZ else {},
     )
     return recording, spans
 
@@ -247,7 +249,10 @@ def diagnose_bench(
     if len(bench.model.presses) < LEAST_PRESSES:
         return None
     # pieces differ in more than their stiffness, and a machine's zero is worth what its load is
-    nuisance = NuisanceOptions(press_stiffness=0.07, law=0.1) if bench.specimens else NuisanceOptions()
+    floor = _FLOOR[bench.specimens] * PEAK_N
+    nuisance = NuisanceOptions(floor_n=floor)
+    if bench.specimens:
+        nuisance = NuisanceOptions(floor_n=floor, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
     return diagnose(
         bench.recording,
         bench.model,
@@ -296,9 +301,9 @@ def approach_of(bench: Bench) -> Approach:
             moduli.setdefault(name, []).append(modulus)
         for name, order in (("hunt-crossley", 0), ("regression", 5)):
             errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
-        work.append(
-            1 + np.trapezoid(push[top:], u[top:]) / max(np.trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
-        )
+        back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
+        given = max(np.trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
+        work.append(1 + np.trapezoid(push[back], u[back]) / given)
         pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
     law = min(APPROACH_LAWS, key=lambda name: medians[name])
@@ -322,10 +327,10 @@ def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[flo
         return k, float(e[k])
 
     block, predicted = _blocks(len(u)), np.zeros(len(u))
-    for b in range(_BLOCKS):
+    for b in range(1, _BLOCKS - 1):
         k, e = fitted(block != b)
         predicted[block == b] = e * shapes[k, block == b]
-    return _relative(predicted, push), fitted(np.ones(len(u), dtype=bool))[1]
+    return _relative(predicted, push, block), fitted(np.ones(len(u), dtype=bool))[1]
 
 
 def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
@@ -333,7 +338,7 @@ def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
     block, predicted = _blocks(len(u)), np.zeros(len(u))
     x = np.maximum(u, 0.0) / max(float(u.max()), 1e-300)
     exponents = np.linspace(0.5, 3.0, 26)
-    for b in range(_BLOCKS):
+    for b in range(1, _BLOCKS - 1):
         seen = block != b
         if order:
             basis = x[:, None] ** np.arange(1, order + 1)
@@ -345,8 +350,11 @@ def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
         cost = [float(((k[i] * x[seen] ** r - push[seen]) ** 2).sum()) for i, r in enumerate(exponents)]
         best = int(np.argmin(cost))
         predicted[~seen] = k[best] * x[~seen] ** exponents[best]
-    return _relative(predicted, push)
+    return _relative(predicted, push, block)
 
 
-def _relative(predicted: np.ndarray, push: np.ndarray) -> float:
-    return float(np.sqrt(((predicted - push) ** 2).mean() / max((push**2).mean(), 1e-300)))
+def _relative(predicted: np.ndarray, push: np.ndarray, block: np.ndarray) -> float:
+    """Over the blocks between the ends, where nothing has to be carried on."""
+    inner = (block > 0) & (block < _BLOCKS - 1)
+    missed, whole = (predicted - push)[inner], push[inner]
+    return float(np.sqrt((missed**2).mean() / max((whole**2).mean(), 1e-300)))

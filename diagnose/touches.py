@@ -7,8 +7,8 @@ import dataclasses
 
 import numpy as np
 
-from diagnose.leads import leads
 from mechanics.errors import DiagnosisError
+from mechanics.leads import leads
 from mechanics.presses import LEAD_S, STEP_S, Presses
 
 LEAST_PRESSES, LEAST_SITES = 6, 4
@@ -18,7 +18,7 @@ LEAST_POINTS = 3
 
 
 def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
-    """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (diagnose.leads).
+    """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (mechanics.leads).
 
     Presses of fewer places than 4 are a group each: they are held out press by press, and from place to place
     nothing is told (diagnose.pipeline). Raises DiagnosisError with fewer than 6 presses: nothing can be held

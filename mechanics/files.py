@@ -32,6 +32,7 @@ _WHOLE_BYTES = 1 << 26
 _TEXT_BYTES = 16 << 20
 _DEEPEST = 32
 _PROBE_BYTES = 1 << 16
+_SCRATCH_BYTES = 1 << 24
 
 _REMEDIES = {
     errno.ENOSPC: "free some space or write to another disk",
@@ -219,15 +220,16 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
             check_target(other, other_kind)
 
 
-def check_room(folder: Path, least_bytes: int) -> None:
-    """Raises FileError where a folder of the cache cannot be made or has less room than that."""
+def check_room(folder: Path, least_bytes: int, variable: str = "PALPATE_CACHE") -> None:
+    """Raises FileError where a folder, which a variable of the environment names, cannot be made or has less
+    room than that."""
     with writing(folder):
         folder.mkdir(parents=True, exist_ok=True)
         free = shutil.disk_usage(folder).free
     if free < least_bytes:
         raise FileError(
             f"'{folder}' has {free / 1e6:.1f} MB free, about {least_bytes / 1e6:.0f} MB are needed: free "
-            "some space or set PALPATE_CACHE to a folder on another disk"
+            f"some space or set {variable} to a folder on another disk"
         )
 
 
@@ -341,9 +343,13 @@ def temporary_prefix(label: str = "") -> str:
 
 @contextmanager
 def temporary_folder(label: str = "") -> Iterator[Path]:
-    """A folder for scratch files, removed at the end; what killed processes left is swept first."""
+    """A folder for scratch files, removed at the end; what killed processes left is swept first.
+
+    Raises FileError where the disk has no room for any.
+    """
+    sweep(Path(tempfile.gettempdir()))
+    check_room(Path(tempfile.gettempdir()), _SCRATCH_BYTES, "TMPDIR")
     with writing(tempfile.gettempdir()):
-        sweep(Path(tempfile.gettempdir()))
         with tempfile.TemporaryDirectory(prefix=temporary_prefix(label), ignore_cleanup_errors=True) as name:
             yield Path(name)
 

@@ -39,7 +39,11 @@ SCHEMA: Schema = {
         "quasi_static": Key(bool),
         "read_rate_hz": Key(low=1e-3, high=1e5, unit="Hz"),
     },
-    "tool": {"tip_radius_m": TIP_RADIUS, "mass_kg": Key(low=0.0, high=5.0, unit="kg")},
+    "tool": {
+        "tip_radius_m": TIP_RADIUS,
+        "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
+        "calibration": Key(str),
+    },
     "sensor": {
         "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
         "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
@@ -238,6 +242,8 @@ def recording_files(path: Path | str) -> tuple[Path, Path]:
 def read_recording(path: Path | str) -> Recording:
     """Read and validate a recording.
 
+    What [tool] calibration names is taken off (mechanics.calibration).
+
     Raises RecordingError for missing files or columns, values that are not finite, time that does not
     increase, keys of a wrong type or out of range (SCHEMA), a path, clock or size that no exploration has;
     the message names the first place. Warns of keys that are probably misspelt.
@@ -293,6 +299,11 @@ def read_recording(path: Path | str) -> Recording:
         _check_sane(recording)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
+    if "calibration" in tool:
+        from mechanics.calibration import read_calibration
+
+        named = named_in(description, str(tool["calibration"]), RecordingError)
+        return read_calibration(named).applied(recording)
     return recording
 
 

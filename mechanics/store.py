@@ -118,7 +118,9 @@ def load_or_build(
             return read_arrays(path, key)
         except CacheError:
             pass  # absent, damaged or of other content: built anew below
-    arrays = {name: np.ascontiguousarray(array) for name, array in build().items()}
+    arrays = {name: np.ascontiguousarray(array).view() for name, array in build().items()}
+    for array in arrays.values():
+        array.setflags(write=False)  # as mapped ones are: to the kernels' compiler others are another type
     if path is not None:
         try:
             write_arrays(path, key, arrays)

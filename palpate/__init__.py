@@ -27,6 +27,8 @@ if TYPE_CHECKING:
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
     from palpate.api import batch as batch
+    from palpate.api import calibrate as calibrate
+    from palpate.api import changes as changes
     from palpate.api import check as check
     from palpate.api import compare as compare
     from palpate.api import diagnose as diagnose
@@ -44,6 +46,8 @@ if TYPE_CHECKING:
     from palpate.api import simulate as simulate
     from palpate.keywords import options as options
     from palpate.results.batch import Batch as Batch
+    from palpate.results.calibration import Calibration as Calibration
+    from palpate.results.changes import Changes as Changes
     from palpate.results.check import Checkup as Checkup
     from palpate.results.comparison import Comparison as Comparison
     from palpate.results.curve import Curve as Curve
@@ -62,11 +66,13 @@ if TYPE_CHECKING:
 _DOOR = {
     "palpate.api": (
         "read_recording read_table import_table material check load model_of reconstruct renderer replay "
-        "press compare diagnose simulate export batch"
+        "press compare changes diagnose calibrate simulate export batch"
     ),
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.imported": "Imported",
+    "palpate.results.calibration": "Calibration",
+    "palpate.results.changes": "Changes",
     "palpate.results.check": "Checkup",
     "palpate.results.material": "Material",
     "palpate.results.model": "Model",

@@ -22,6 +22,8 @@ if TYPE_CHECKING:
     import mechanics.recording
     from mechanics.presses import Presses
     from palpate.results.batch import Batch
+    from palpate.results.calibration import Calibration
+    from palpate.results.changes import Changes
     from palpate.results.check import Checkup
     from palpate.results.comparison import Comparison
     from palpate.results.curve import Curve
@@ -147,7 +149,8 @@ def material(
 
     files: a curve each. kind: "auto" goes by their headers. tip_radius_m: of an indenter's sphere, where the
     files do not say; layer_m: thickness of the sample, None is a half-space; specimens: each indentation is
-    of another piece. columns {"t", "z", "fz": name}, units {kind: unit}: where names do not tell. From 6
+    of another piece. columns {"t", "z", "fz": name}, units {kind: unit}: where names do not tell.
+    poisson_ratio: of the sample; fast: fewer effects are tried. From 6
     indentations on, effects are searched for as `diagnose` does, each curve held out (docs/real-data.md).
     Raises RecordingError where a file cannot be read, ContactError where nothing is touched.
     """
@@ -416,6 +419,47 @@ def compare(
     return dressed(Comparison, result, recording=measured, model=model_of(result.model))
 
 
+def changes(
+    before: RecordingLike,
+    after: RecordingLike,
+    *,
+    diagnosed: bool = True,
+    fast: bool = True,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Changes:
+    """Two recordings of one object, before and after or with two tools: moduli, their difference, what
+    explains it.
+
+    Each is reconstructed and, where diagnosed, diagnosed (fast: fewer effects); the moduli, Pa, are compared
+    with their intervals, and place by place where the two share a frame. options: of both reconstructions,
+    see `pp.options("changes")`, m. Raises what `reconstruct` and `diagnose` raise.
+    """
+    from palpate.before_after import Side
+    from palpate.before_after import changes as weighed
+    from palpate.results.base import dressed
+    from palpate.results.changes import Changes
+
+    taken("changes", options)
+    sides = []
+    with _told("changes", progress) as tell:
+        for k, source in enumerate((before, after)):
+
+            def step(words: str, share: float, k: int = k) -> None:
+                tell(words, 0.5 * k + 0.5 * share)
+
+            measured = read_recording(source)
+            made = reconstruct(measured, seed=seed, progress=lambda s, x: step(s, 0.4 * x), **options)
+            found = None
+            if diagnosed:
+                found = diagnose(
+                    measured, made, fast=fast, seed=seed, progress=lambda s, x: step(s, 0.4 + 0.6 * x)
+                )
+            sides.append(Side(measured, made.model, found))
+    return dressed(Changes, weighed(*sides))
+
+
 def diagnose(
     recording: RecordingLike,
     model: ModelLike | None = None,
@@ -459,6 +503,62 @@ def diagnose(
             attribution=AttributionOptions(**given[AttributionOptions]),
         )
     return dressed(Diagnosis, result, recording=measured, model=made)
+
+
+def calibrate(
+    recording: RecordingLike,
+    *,
+    rigid: bool = False,
+    modulus_pa: float | None = None,
+    poisson_ratio: float | None = None,
+    trust: str = "tip",
+    save: str | Path | None = None,
+    seed: int = 0,
+    progress: bool | Progress = True,
+    **options: Any,
+) -> Calibration:
+    """The instrument, from presses on something known: tool's stiffness, sensor, bias, delay, play.
+
+    rigid: on a rigid plate; or modulus_pa and poisson_ratio of an object that the recording traces, or whose
+    geometry options give, see `pp.options("calibrate")`, m. trust: where a common factor is left, "tip"
+    gives it to the sensor, "gain" to the tip's radius. save: TOOL.toml to write, which recordings may name.
+    Raises OptionError unless one of rigid and modulus_pa is given, ContactError or DiagnosisError where
+    presses are too few.
+    """
+    from diagnose.calibrate import calibrate_on_object, calibrate_on_plate
+    from palpate.results.base import dressed
+    from palpate.results.calibration import Calibration
+    from reconstruct.contacts import explore
+    from reconstruct.known_shape import nowhere
+
+    taken("calibrate", options)
+    if rigid == (modulus_pa is not None):
+        raise OptionError(
+            "say on what it was pressed: rigid (--rigid), or modulus_pa (--modulus PA), one of them"
+        )
+    if modulus_pa is not None and not modulus_pa > 0:
+        raise OptionError(f"modulus_pa is {modulus_pa}; it must be greater than 0 Pa")
+    measured = read_recording(recording)
+    with _told("calibrate", progress) as tell:
+        if modulus_pa is None:
+            found = explore(measured, boundary=nowhere(measured), unbroken=True)
+            plain = calibrate_on_plate(measured, found)
+        else:
+            made = reconstruct(
+                measured,
+                poisson_ratio=poisson_ratio,
+                seed=seed,
+                progress=lambda s, x: tell(s, 0.3 * x),
+                **options,
+            )
+            plain = calibrate_on_object(
+                measured, made.model, modulus_pa, trust=trust, seed=seed,
+                progress=lambda s, x: tell(s, 0.3 + 0.7 * x),
+            )  # fmt: skip
+    result = dressed(Calibration, plain)
+    if save is not None:
+        result.save(save)
+    return result
 
 
 def simulate(

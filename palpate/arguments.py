@@ -55,7 +55,13 @@ def told_help(text: str) -> str:
 
 
 class HelpWords(argparse.RawDescriptionHelpFormatter):
-    """Help in the order of `told_help`."""
+    """Help in the order of `told_help`; a value that is called after its unit is a NUMBER."""
+
+    def _metavar_formatter(self, action: argparse.Action, default_metavar: str) -> Any:
+        unit = _UNIT.search(action.help or "")
+        if unit and action.metavar == unit[1].upper():
+            return lambda size: ("NUMBER",) * size
+        return super()._metavar_formatter(action, default_metavar)
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
         return told_help(action.help) if action.help else action.help

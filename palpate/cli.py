@@ -27,6 +27,7 @@ COMMANDS = {
     "press": "one scripted press on a model, headless",
     "compare": "FEM against interpolated 1D models on held-out palpations",
     "diagnose": "the sim-to-real gap: where, which effect, how far it shrinks",
+    "calibrate": "the instrument told from presses on something known",
     "touch": "feel a model or scene at 1 kHz",
     "devices": "which devices are there, and for the others why not",
     "simulate": "the virtual laboratory: a person's exploration of a phantom",

@@ -40,6 +40,8 @@ _KINDS: dict[str, tuple[str, ...]] = {
         "diagnose.judging:AttributionOptions",
         "diagnose.whiten:NuisanceOptions",
     ),
+    "changes": ("reconstruct.known_shape:GeometryOptions",),
+    "calibrate": ("reconstruct.known_shape:GeometryOptions",),
     "simulate": ("scenes.laboratory.session:SimulateOptions", "scenes.laboratory.hand:HandOptions"),
 }
 FUNCTIONS = tuple(_KINDS)
@@ -76,8 +78,8 @@ class Options(tuple[Option, ...]):
 def options(function: str) -> Options:
     """The keywords that a function of the door takes beside its own arguments: `print(pp.options("press"))`.
 
-    function: reconstruct, renderer, replay, press, compare, diagnose or simulate. Each option has a name,
-    default, unit and words. Raises OptionError for another name.
+    function: reconstruct, renderer, replay, press, compare, changes, diagnose, calibrate or simulate. Each
+    option has a name, default, unit and words. Raises OptionError for another name.
     """
     return Options(
         Option(f.name, f.default, f.metadata["unit"], f.metadata["help"], f.metadata["choices"], *span_of(f))

@@ -42,7 +42,6 @@ def warm_up() -> None:
     """Write, condense, replay and feel a block of 40 mm for a moment."""
     import render
     from mechanics.box_mesh import box_mesh
-    from mechanics.compliance import load_or_condense
     from mechanics.material import Material
     from mechanics.model import Model, Support, Tool, write_model
     from palpate.servo.headless import run_headless
@@ -53,7 +52,6 @@ def warm_up() -> None:
     with tempfile.TemporaryDirectory() as folder:
         block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(0.005), 0.0133)
         block = block.replaced(path=write_model(Path(folder) / "block", block))
-        load_or_condense(block)  # from now on it is mapped from disk, read-only: another type to the compiler
         renderer = render.create("fem", block)
         path = np.outer(np.linspace(0.05, 0.043, 50), up)
         t = np.arange(50) * 1e-3

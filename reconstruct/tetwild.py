@@ -14,7 +14,7 @@ import sys
 import numpy as np
 
 from mechanics.errors import MeshError
-from mechanics.files import temporary_folder
+from mechanics.files import reading, temporary_folder
 
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
@@ -82,10 +82,10 @@ def tetrahedralize(
                 f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size than {edge_m} m"
             )
         result = folder / "mesh.npz"
-        if not result.is_file():
+        if done.returncode or not result.is_file():
             words = done.stderr.decode(errors="replace").strip().splitlines()
             raise MeshError(f"the mesher gave no mesh ({words[-1] if words else f'exit {done.returncode}'})")
-        with np.load(result, allow_pickle=False) as found:
+        with reading(result, MeshError), np.load(result, allow_pickle=False) as found:
             points, cells = found["points"], found["cells"].astype(np.int64)
     if not len(cells):
         raise MeshError(f"the mesher gave no tetrahedra: --mesh-size {edge_m} m does not fit the object")

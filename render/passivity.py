@@ -1,14 +1,18 @@
-"""Time-domain passivity: no energy comes out of the rendering that did not go in.
+"""Time-domain passivity: no energy comes out of the rendering that did not go in, whenever ticks come.
 
 A force held over a tick does work on a moving hand that the model's continuous force would not do: a half
 tick late on the way in it absorbs too little, on the way out it gives too much, K |dx|^2 / 2 a tick for a
-stiffness K; every further tick of delay adds K |dx|^2. Two parts mend it:
+stiffness K; every further tick of delay adds K |dx|^2. Three parts mend it:
 
 1. *Reference following* (Ryu, Preusche, Hannaford, Hirzinger 2005): the energy that the model's force
    exchanges along the measured path, by the trapezoidal rule, is the reference; what the held force gave
    beyond it is owed, and a variable damper on the hand takes it back at once, spread over `payback_s`.
 2. *Net guard* (the passivity controller of Hannaford and Ryu 2002, acting before the energy leaves): over
    each contact, the part of the force along the motion is cut to what the observed energy still affords.
+3. *Expiry*: nobody knows when the next tick comes. Every force goes out with the time for which it may act,
+   the longest in which a hand of the least mass could not get more than is left; then the device lets go.
+
+What was given is no guess of the tick's: whoever holds the force books its work (palpate.servo.held).
 
 Signs: forces on the tool, device frame; energy is positive where it went into the rendering. Pure step on
 preallocated arrays; it knows no clock.
@@ -29,6 +33,10 @@ from mechanics.options import check_ranges, option
 
 LONGEST_DELAY_TICKS = 64
 MOST_OWED_J = 2e-3
+LONGEST_HOLD_S = 0.02
+"""No force outlives its tick by more, whatever energy is left."""
+AFFORDED_TICKS = 1.5
+"""The guard leaves a force that may act for at least so long: a tick and its usual lateness."""
 
 
 @dataclass(frozen=True)
@@ -80,22 +88,26 @@ class PassivityParameters(NamedTuple):
     least_mass_kg: float
     forgiven_w: float
     delay_ticks: float
+    period_s: float
 
 
 class PassivityState(NamedTuple):
     """Memory between ticks. energies: (5,) J: net in this contact, owed, dissipated by the damper, least net,
-    net since the start."""
+    net since the start. work: (1,) J that held forces had done by the last reading. hold: (1,) s for which
+    this tick's force may act."""
 
     position: np.ndarray
     velocity: np.ndarray
+    swift: np.ndarray
     moved: np.ndarray
     base: np.ndarray
     damping_force: np.ndarray
     commanded: np.ndarray
-    acting: np.ndarray
+    work: np.ndarray
     energies: np.ndarray
     ticks: np.ndarray
     cut: np.ndarray
+    hold: np.ndarray
 
 
 NET, OWED, DISSIPATED, LEAST, TOTAL = range(5)
@@ -125,6 +137,7 @@ def passivity_parameters(
         options.least_mass_kg,
         options.forgiven_w,
         delay_ticks,
+        1.0 / rate_hz,
     )
 
 
@@ -133,14 +146,16 @@ def passivity_state() -> PassivityState:
     return PassivityState(
         position=np.full(3, np.nan),
         velocity=np.zeros(3),
+        swift=np.zeros(3),
         moved=np.zeros(3),
         base=np.zeros(3),
         damping_force=np.zeros(3),
         commanded=np.zeros((LONGEST_DELAY_TICKS, 3)),
-        acting=np.zeros(3),
+        work=np.zeros(1),
         energies=np.zeros(5),
-        ticks=np.zeros(2, dtype=np.int64),
+        ticks=np.zeros(1, dtype=np.int64),
         cut=np.zeros(1),
+        hold=np.zeros(1),
     )
 
 
@@ -152,51 +167,44 @@ def passivity_restart(state):
     """
     for i in range(3):
         state.position[i] = math.nan
-        state.velocity[i] = state.moved[i] = state.base[i] = state.damping_force[i] = state.acting[i] = 0.0
+        state.velocity[i] = state.swift[i] = state.moved[i] = state.base[i] = state.damping_force[i] = 0.0
         for k in range(LONGEST_DELAY_TICKS):
             state.commanded[k, i] = 0.0
     state.energies[NET] = state.energies[OWED] = state.energies[TOTAL] = 0.0
-    state.ticks[0] = state.ticks[1] = 0
+    state.ticks[0] = 0
     state.cut[0] = 0.0
 
 
 @njit(cache=True, nogil=True)
-def passivity_before(parameters, state, wanted, position, fresh, dt_s):
-    """Observe the last interval and change `wanted` (3,) in place; True where it was changed.
+def passivity_before(parameters, state, wanted, position, work_j, fresh, between_s, dt_s, age_s):
+    """Observe what held forces did and change `wanted` (3,) in place; True where it was changed.
 
-    position: (3,) m, the device's. fresh: whether it is a new reading. Call `passivity_after` with the force
-    that was really sent, in the same tick.
+    position: (3,) m, the device's. work_j: what all held forces had given to the hand at that reading. fresh:
+    whether it is a new reading; between_s: since the one before, on the readings' own clock. dt_s: since the
+    last tick. age_s: of the reading. Call `passivity_after` with the force that was really sent, in the same
+    tick; it may act for `state.hold`.
     """
     energies = state.energies
     here = within(position, FARTHEST_M)
     known = here and math.isfinite(state.position[0])
-    whole = int(parameters.delay_ticks)
-    part = parameters.delay_ticks - whole
-    tick = state.ticks[0]
-    state.ticks[1] += 1
-    for i in range(3):
-        state.acting[i] += (1.0 - part) * state.commanded[(tick - 1 - whole) % LONGEST_DELAY_TICKS, i]
-        state.acting[i] += part * state.commanded[(tick - 2 - whole) % LONGEST_DELAY_TICKS, i]
     if fresh:
-        between = state.ticks[1] * dt_s
-        lag = parameters.velocity_time_s + between
-        given, force2, touch2 = 0.0, 0.0, 0.0
+        given = work_j - state.work[0] if known else 0.0
+        state.work[0] = work_j
+        lag = parameters.velocity_time_s + between_s
+        force2 = 0.0
         for i in range(3):
             moved = position[i] - state.position[i] if known else 0.0
             state.moved[i] = moved
             # the low pass of moved / between
-            state.velocity[i] += (moved - between * state.velocity[i]) / lag
-            given += state.acting[i] / state.ticks[1] * moved
+            state.velocity[i] += (moved - between_s * state.velocity[i]) / lag
+            state.swift[i] = moved / max(between_s, 0.1 * parameters.period_s)
             # the reference's half of this tick; the other half is added once this tick's force is known
             energies[OWED] -= 0.5 * state.base[i] * moved
             force2 += wanted[i] * wanted[i]
-            touch2 += state.acting[i] * state.acting[i]
-            state.acting[i] = 0.0
         energies[NET] -= given
         energies[TOTAL] -= given
         energies[OWED] += given
-        state.ticks[1] = 0
-        if force2 == 0.0 and touch2 == 0.0:
+        if force2 == 0.0 and _under_way(parameters, state) == 0.0:
             # out of contact nothing is stored: what was dissipated is no licence for the next contact
             energies[NET] = min(energies[NET], 0.0)
             energies[OWED] = 0.0
@@ -211,21 +219,34 @@ def passivity_before(parameters, state, wanted, position, fresh, dt_s):
     for i in range(3):
         state.damping_force[i] = 0.0
     state.cut[0] = 0.0
+    state.hold[0] = LONGEST_HOLD_S
     # what is no force becomes zero in the safety filter: it must not enter the books on the way
     if not (parameters.active and within(wanted, LARGEST_N)):
         return False
-    return _control(parameters, state, wanted, dt_s)
+    return _control(parameters, state, wanted, dt_s, age_s)
 
 
 @njit(cache=True, nogil=True)
-def _control(parameters, state, wanted, dt_s):
+def _under_way(parameters, state):
+    """The greatest force, N, that was sent and may still act or come to act."""
+    greatest2 = 0.0
+    for j in range(1 + int(math.ceil(parameters.delay_ticks))):
+        way2 = 0.0
+        for i in range(3):
+            way2 += state.commanded[(state.ticks[0] - 1 - j) % LONGEST_DELAY_TICKS, i] ** 2
+        greatest2 = max(greatest2, way2)
+    return math.sqrt(greatest2)
+
+
+@njit(cache=True, nogil=True)
+def _control(parameters, state, wanted, dt_s, age_s):
     velocity, energies = state.velocity, state.energies
     speed2 = velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2
     force2 = wanted[0] ** 2 + wanted[1] ** 2 + wanted[2] ** 2
     changed = False
-    if speed2 <= 1e-12 or force2 == 0.0:
+    if force2 == 0.0:
         return False
-    if energies[OWED] > 0.0:
+    if energies[OWED] > 0.0 and speed2 > 1e-12:
         damping = min(
             energies[OWED] / (speed2 * max(parameters.payback_s, dt_s)), parameters.max_damping_n_s_per_m
         )
@@ -233,40 +254,47 @@ def _control(parameters, state, wanted, dt_s):
             state.damping_force[i] = -damping * velocity[i]
             wanted[i] += state.damping_force[i]
         changed = True
-    _guard(parameters, state, wanted, math.sqrt(speed2), dt_s)
+    _guard(parameters, state, wanted, age_s)
     return changed or state.cut[0] > 0.0
 
 
 @njit(cache=True, nogil=True)
-def _guard(parameters, state, wanted, speed, dt_s):
-    """Cut what would give out more than the energy that is left; `state.cut` is the force taken, N."""
-    velocity, tick = state.velocity, state.ticks[0]
-    left = state.energies[NET] + parameters.allowance_j
-    along, size2 = 0.0, 0.0
+def _guard(parameters, state, wanted, age_s):
+    """Cut what could give out more than the energy that is left, and say for how long the rest may act.
+
+    A hand of the least mass m that moves at u along the force F, and pushes as hard itself, gets
+    F u h + F^2 h^2 / m in the time h.
+    """
+    mass, period_s = parameters.least_mass_kg, parameters.period_s
+    size2, smooth, last, speed2 = 0.0, 0.0, 0.0, 0.0
     for i in range(3):
-        along += wanted[i] * velocity[i] / speed
         size2 += wanted[i] ** 2
+        smooth += wanted[i] * state.velocity[i]
+        last += wanted[i] * state.swift[i]
+        speed2 += state.velocity[i] ** 2
+    if size2 == 0.0:
+        return
     size = math.sqrt(size2)
-    reach = speed * dt_s
-    scale = 1.0
-    if parameters.delay_ticks >= 0.5:
-        # what is under way, and what opposes the motion now, may drive it by the time that it acts
-        for j in range(int(math.ceil(parameters.delay_ticks))):
-            way2 = 0.0
-            for i in range(3):
-                way2 += state.commanded[(tick - 1 - j) % LONGEST_DELAY_TICKS, i] ** 2
-            left -= math.sqrt(way2) * reach
-        scale = min(1.0, max(left, 0.0) / (size * reach))
-    # on the way the force itself speeds the mass up: F (v T + F T^2 / 2m) <= left
-    half = 0.5 * dt_s * dt_s / parameters.least_mass_kg
-    affordable = 2.0 * max(left, 0.0) / (reach + math.sqrt(reach * reach + 4.0 * half * max(left, 0.0)))
-    excess = max(0.0, scale * along - affordable)
-    if scale < 1.0 or excess > 0.0:
+    # since the reading, and until this force acts, those before it go on and speed the hand up
+    way_s = max(age_s, parameters.delay_ticks * period_s)
+    before = _under_way(parameters, state)
+    left = state.energies[NET] + parameters.allowance_j - before * math.sqrt(speed2) * way_s
+    left = max(left, 0.0)
+    along = max(smooth, last) / size + before * way_s / mass
+    horizon = AFFORDED_TICKS * period_s
+    # the largest F with F (u T + F T^2 / m) <= left
+    reach, twice = along * horizon, 2.0 * horizon * horizon / mass
+    affordable = (math.sqrt(reach * reach + 2.0 * twice * left) - reach) / twice
+    if size > affordable:
+        state.cut[0] = size - affordable
         for i in range(3):
-            kept = scale * wanted[i] - excess * velocity[i] / speed
+            kept = wanted[i] * affordable / size
             state.damping_force[i] += kept - wanted[i]
             wanted[i] = kept
-        state.cut[0] = excess + (1.0 - scale) * size
+        size = affordable
+    if size > 0.0:
+        hold = 0.5 * mass / size * (math.sqrt(along * along + 4.0 * left / mass) - along)
+        state.hold[0] = max(min(hold, LONGEST_HOLD_S), horizon)
 
 
 @njit(cache=True, nogil=True)

@@ -3,6 +3,7 @@
 A TOML file whose keys carry their units. Allowed tables and keys:
 
     title, about
+    find         true: its inclusions are hidden, to be found (palpate touch)
     [object]     one of phantom (a name, or a closed surface, put with its base's centre on the origin),
     mesh (a
                  surface or mesh file in its own frame; unit, up, sink_m), model (a MODEL folder) or
@@ -40,6 +41,7 @@ _OPTIONAL_TIP = replace(TIP_RADIUS, required=False)
 SCHEMA: Schema = {
     "title": Key(str),
     "about": Key(str),
+    "find": Key(bool),
     "object": {
         "phantom": Key(str),
         "mesh": Key(str),
@@ -79,7 +81,7 @@ class Scene:
     young_modulus_pa, poisson_ratio: None keeps the object's own. inclusions: None keeps the phantom's own.
     beside: a second renderer that the same tip drives, '' for none. friction: Coulomb coefficient, None
     sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.standing). mesh_size_m: None takes 10 mm,
-    less for a small object.
+    less for a small object. find: the inclusions are hidden, to be found.
     """
 
     name: str
@@ -101,6 +103,7 @@ class Scene:
     unit: str = "m"
     up: str = "+z"
     sink_m: float = 0.0
+    find: bool = False
 
 
 def scene_names() -> list[str]:
@@ -180,6 +183,7 @@ def _scene(table: Mapping[str, Any], path: Path) -> Scene:
             beside=str(render.get("beside", "")),
             colour=render.get("colour", "displacement"),
             friction=render.get("friction"),
+            find=bool(table.get("find", False)),
         )
     except OptionError as error:
         raise SceneError(f"'{path}': {error}") from error

@@ -6,22 +6,11 @@ not taken off a recording: the tip's side of the play is not known in free air.
 """
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
+from mechanics.leads import play
 from mechanics.schema import Key
-
-
-@njit(cache=True)
-def play(start, y, width, out):
-    """Play operator, axis by axis: what follows is dragged once it is width / 2 behind. start: (p + 1,)."""
-    half = 0.5 * width
-    for p in range(start.shape[0] - 1):
-        for k in range(3):
-            out[start[p], k] = y[start[p], k]
-            for i in range(start[p] + 1, start[p + 1]):
-                out[i, k] = min(max(out[i - 1, k], y[i, k] - half), y[i, k] + half)
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

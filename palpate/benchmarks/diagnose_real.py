@@ -1,105 +1,144 @@
-"""Diagnosis on measured tissue: indentations of meat, a ramp and a hold, from a folder that is not shipped.
+"""Diagnosis on measured data of other instruments, from folders that are not shipped, all sets by one
+command.
 
-The set: github.com/SarahIaquinta/perineal_indentation (GPL-3.0), converted to CSVs with the columns t_s,
-force_N, indent_mm, tool_gap_mm at 10 Hz. Every piece is another animal's, so each force is scaled to 1 N at
-3 mm of its ramp, and the pieces become places on one slab. The indenter's shape is not stated; a sphere of
-5 mm is taken. What can be judged: whether the hold's decay is called viscoelasticity, and what its terms are.
+Each set of DATA (docs/real-data.md: origins and licences) goes through `pp.material`, as its owner's would:
+curves (or, of one curve, blocks of it) are held out, and what predicts them is set beside 1D models as floor
+and a regression without mechanics as ceiling. Errors are rms over rms. Indentations of beef are of other
+animals each, so each force is over its own piece's stiffness; the indenter's shape is not stated, and a
+sphere of 5 mm is taken.
 """
 
 from __future__ import annotations
 
 import argparse
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from mechanics.box_mesh import box_mesh
 from mechanics.errors import RecordingError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.press_cutting import cut
-from mechanics.recording import Recording
+from palpate import api
+from palpate.benchmarks.timing import table
+from palpate.results.material import CEILING, FLOORS, Material
 
-SUMMARY = "diagnosis of measured meat indentations (ramp and hold)"
-RADIUS_M = 0.005
-SPACING_M = 0.05
-FREE_S = 1.5
-RATE_HZ = 200.0
-NOISE_N = 0.005
+SUMMARY = "measured data of other instruments: held-out curves beside floor and ceiling"
+BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """Folder, session, how many pieces."""
-    parser.add_argument("--data", required=True, help="folder with the CSVs of the pieces")
-    parser.add_argument("--session", default="230331", help="the pieces whose names begin so")
-    parser.add_argument("--pieces", type=int, default=16, help="at most so many")
+    """Folder, which sets, how many pieces."""
+    parser.add_argument("--data", required=True, help="folder that holds the sets' folders")
+    parser.add_argument("--sets", default=",".join(SETS), help=f"which: {', '.join(SETS)}")
+    parser.add_argument("--session", default="230331", help="pieces of beef whose names begin so")
+    parser.add_argument("--pieces", type=int, default=16, help="at most so many of them")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
-    """Diagnose the pieces as one recording and print the verdict."""
-    from diagnose.pipeline import DiagnoseOptions, diagnose
-    from diagnose.whiten import NuisanceOptions
+    """Every set's row, and a median of each kind."""
+    root, rows = Path(arguments.data), []
+    names = arguments.sets.split(",")
+    strange = [n for n in names if n not in SETS]
+    if strange:
+        raise RecordingError(f"'{strange[0]}' is no set; allowed are {', '.join(SETS)}")
+    for name in names:
+        folder = root / FOLDERS[name]
+        if not folder.is_dir():
+            raise RecordingError(f"'{folder}' does not exist: --data names the folder that holds the sets'")
+        rows += [_row(name, label, made) for label, made in SETS[name](folder, arguments)]
+    print(table(HEAD, [_cells(row) for row in rows]))
+    medians = {}
+    for name in names:
+        own = [row for row in rows if row["set"] == name]
+        medians[name] = {key: float(np.median([row[key] for row in own])) for key in _SHARES}
+        shares = ", ".join(f"{key} {100 * value:.2g} %" for key, value in medians[name].items())
+        print(f"{name}, medians of {len(own)}: {shares}")
+    return {"rows": rows, "medians": medians}
 
-    pieces = sorted(Path(arguments.data).glob(f"{arguments.session}_[RF]*.csv"))[: arguments.pieces]
-    if len(pieces) < 6:
-        raise RecordingError(f"--data {arguments.data} holds {len(pieces)} pieces of session "
-                             f"{arguments.session}; at least 6 are needed")  # fmt: skip
-    recording, model = slab(pieces)
-    # pieces differ in thickness and grain: a tenth each
-    nuisance = NuisanceOptions(site_stiffness=0.1, onset_m=0.5e-3, law=0.1)
-    result = diagnose(recording, model, DiagnoseOptions(fast=True), nuisance=nuisance)
-    print(f"{len(pieces)} pieces")
-    print("\n".join(result.words()))
-    return {**result.as_json(), "pieces": len(pieces)}
+
+HEAD = ["set", "curves", "law or effects", "error", "floor (1D)", "ceiling", "closed", "95 % interval"]
 
 
-def slab(pieces: list[Path]) -> tuple[Recording, Model]:
-    """(recording, model): the pieces side by side on a slab as thick as they are in the median."""
-    tables = [_finer(np.loadtxt(p, delimiter=",", skiprows=1)) for p in pieces]
-    rng = np.random.default_rng(0)
-    height = float(np.median([t[0, 3] for t in tables])) * 1e-3
-    times, centres, forces, found = [], [], [], []
-    clock = 0.0
-    for k, table in enumerate(tables):
-        early = round(0.3 * RATE_HZ)
-        t, force, depth = table[:, 0], table[:, 1] - np.median(table[:early, 1]), table[:, 2] * 1e-3
-        force = force / np.interp(3e-3, depth[: depth.argmax()], force[: depth.argmax()])
-        x = (k - (len(tables) - 1) / 2) * SPACING_M
-        touched = np.flatnonzero(force > 0.02)[0]
-        # interpolated readings have lost their noise, and there is none in the air after a piece
-        force = force + rng.normal(0, NOISE_N, len(force))
-        surface = depth[touched]
-        peak = int(force.argmax())
-        lift = np.arange(1 / RATE_HZ, FREE_S, 1 / RATE_HZ)
-        t = t - t[0]
-        times.append(clock + np.concatenate([t, t[-1] + lift]))
-        z = height + RADIUS_M - np.concatenate([depth - surface, np.full(len(lift), -5e-3)])
-        centres.append(np.column_stack([np.full_like(z, x), np.zeros_like(z), z]))
-        pressed = np.concatenate([force, rng.normal(0, NOISE_N, len(lift))])
-        sideways = rng.normal(0, NOISE_N, (len(z), 2))
-        forces.append(np.column_stack([sideways, pressed]))
-        found.append((clock + t[touched], clock + t[peak], (x, 0.0, height + RADIUS_M)))
-        clock += t[-1] - t[0] + FREE_S
-    recording = Recording(
-        t=np.concatenate(times), position=np.concatenate(centres), force_on_tool=np.concatenate(forces),
-        sample_rate_hz=RATE_HZ, tip_radius_m=RADIUS_M, poisson_ratio=0.49, force_noise_std_n=NOISE_N,
-        object_name="meat",
-    )  # fmt: skip
-    length = SPACING_M * (len(tables) + 1)
-    mesh = box_mesh((round(length / 0.01), 5, 2), (length, 0.05, height)).quadratic()
-    model = Model(
-        mesh=mesh, material=Material(2e4, 0.49), support=Support(np.zeros(3), np.array([0, 0, 1.0])),
-        tool=Tool(RADIUS_M), mesh_size_m=0.01,
-        presses=cut(
-            recording, onset_s=np.array([f[0] for f in found]), peak_s=np.array([f[1] for f in found]),
-            centre=np.array([f[2] for f in found]), normal=np.tile([0.0, 0.0, 1.0], (len(found), 1)),
+def _row(name: str, label: str, made: Material) -> dict[str, Any]:
+    error = made.error["verdict" if "verdict" in made.error else made.law]
+    floor = min(made.error[k] for k in FLOORS[made.kind] if k in made.error)
+    return {
+        "set": name,
+        "label": label,
+        "curves": made.curves,
+        "law": made.law,
+        "effects": list(made.effects),
+        "error": error,
+        "floor": floor,
+        "ceiling": made.error[CEILING],
+        "closed": made.closed,
+        "closed_ci95": None if made.closed_ci95 is None else list(made.closed_ci95),
+        "young_modulus_pa": made.young_modulus_pa if np.isfinite(made.young_modulus_pa) else None,
+        "verdict": made.verdict,
+        "unknown": list(made.unknown),
+    }
+
+
+def _cells(row: dict[str, Any]) -> list[str]:
+    what = ", ".join(row["effects"]) if row["set"] == "beef" else row["law"]
+    closed = "" if row["closed"] is None else f"{100 * row['closed']:.0f} %"
+    between = row["closed_ci95"]
+    return [
+        row["label"], str(row["curves"]), what or "none", *(f"{100 * row[k]:.2f} %" for k in _SHARES), closed,
+        "" if between is None else f"{100 * between[0]:.0f} to {100 * between[1]:.0f} %",
+    ]  # fmt: skip
+
+
+_SHARES = ("error", "floor", "ceiling")
+Rows = Iterator[tuple[str, Material]]
+
+
+def _silicones(folder: Path, arguments: argparse.Namespace) -> Rows:
+    for each in sorted(p for p in folder.iterdir() if p.is_dir()):
+        files = sorted(each.glob("*.csv"))
+        if files:
+            yield each.name, api.material(*files, progress=False)
+
+
+def _elastomers(folder: Path, arguments: argparse.Namespace) -> Rows:
+    for path in sorted(folder.glob("*.csv")):
+        yield path.stem, api.material(path, progress=False)
+
+
+def _chiaro(folder: Path, arguments: argparse.Namespace) -> Rows:
+    for path in sorted(folder.glob("fmt-*.txt")):
+        yield path.stem[-16:], api.material(path, progress=False)
+
+
+def _fish(folder: Path, arguments: argparse.Namespace) -> Rows:
+    for path in sorted(folder.glob("*.csv")):
+        yield path.stem[-20:], api.material(path, progress=False)
+
+
+def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
+    files = sorted((folder / "csv").glob(f"{arguments.session}_[RF]*.csv"))[: arguments.pieces]
+    if len(files) < 6:
+        raise RecordingError(
+            f"'{folder}' holds {len(files)} pieces of session {arguments.session}; at least 6 are needed"
+        )
+    yield (
+        f"{len(files)} pieces of {arguments.session}",
+        api.material(
+            *files,
+            kind="indentation",
+            tip_radius_m=BEEF_TIP_M,
+            layer_m=BEEF_LAYER_M,
+            specimens=True,
+            fast=True,
+            progress=False,
         ),
-    )  # fmt: skip
-    return recording, model
+    )
 
 
-def _finer(table: np.ndarray) -> np.ndarray:
-    """The columns at RATE_HZ, straight between the machine's readings."""
-    t = np.arange(table[0, 0], table[-1, 0], 1 / RATE_HZ)
-    return np.column_stack([t, *(np.interp(t, table[:, 0], column) for column in table[:, 1:].T)])
+SETS: dict[str, Callable[[Path, argparse.Namespace], Rows]] = {
+    "silicones": _silicones, "elastomers": _elastomers, "chiaro": _chiaro, "fish": _fish, "beef": _beef,
+}  # fmt: skip
+FOLDERS = {
+    "silicones": "tissue_phantom_compression", "elastomers": "srmd_tensile", "chiaro": "chiaro_sphere_1khz",
+    "fish": "fishmuscle_relaxation", "beef": "meat_indentation_relaxation",
+}  # fmt: skip

@@ -16,6 +16,7 @@ from __future__ import annotations
 import argparse
 import json
 import shutil
+import sys
 import tempfile
 import time
 from collections import Counter
@@ -53,13 +54,17 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--interrupts", type=int, default=0, metavar="N",
                         help="end long commands at N random moments, in place of all that")  # fmt: skip
     parser.add_argument("--command", action="append", help="with --interrupts: only this one (repeatable)")
+    parser.add_argument("--minutes", type=float, default=np.inf, metavar="M",
+                        help="begin no further input after that [min] (default: no limit)")  # fmt: skip
     parser.add_argument("--keep", metavar="DIR", help="keep what broke something here")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Try, print the counts and what broke."""
     if arguments.interrupts:
-        return interrupted(arguments.interrupts, arguments.first, arguments.command, arguments.keep)
+        return interrupted(
+            arguments.interrupts, arguments.first, arguments.command, arguments.keep, arguments.minutes
+        )
     if arguments.strangers < 1:
         raise OptionError(f"--strangers is {arguments.strangers}; it must be 1 or greater")
     return _fuzzed(arguments, tuple(arguments.target or TARGETS))
@@ -74,10 +79,12 @@ def _fuzzed(arguments: argparse.Namespace, targets: tuple[str, ...]) -> dict[str
     shares = np.array([SHARES[TARGETS.index(t)] for t in targets], dtype=float)
     with tempfile.TemporaryDirectory(prefix="palpate-fuzz-") as folder:
         sound = Sound(Path(folder), arguments.deep)
-        child = Child(sound.warming())
+        child = Child()
         try:
             judge = _Judge(sound, child, deep="recording" in targets and arguments.deep > 0)
             for seed in tqdm(range(arguments.first, arguments.first + arguments.count), disable=None):
+                if time.perf_counter() - began > 60 * arguments.minutes:
+                    break
                 random = np.random.default_rng([29, seed])
                 target = str(random.choice(targets, p=shares / shares.sum()))
                 case = sound.drawn(target, random, Path(folder) / "case")
@@ -87,11 +94,14 @@ def _fuzzed(arguments: argparse.Namespace, targets: tuple[str, ...]) -> dict[str
                 outcome, words = judge.outcome(case, runner)
                 counts[target, outcome] += case.many
                 if outcome in BROKEN:
+                    print(f"{seed} {target}, {case.how}: {outcome}", file=sys.stderr, flush=True)
                     broken.append({"seed": seed, "target": target, "outcome": outcome, "how": case.how,
                                    "argv": case.argv, "words": words[-1200:]})  # fmt: skip
                     if arguments.keep:
                         kept = Path(arguments.keep) / f"{seed}-{target.replace(' ', '-')}"
                         shutil.copytree(case.folder, kept, dirs_exist_ok=True)
+        except KeyboardInterrupt:
+            print("interrupted: what was tried until then", file=sys.stderr)
         finally:
             child.end()
     seconds = time.perf_counter() - began
@@ -107,6 +117,7 @@ class _Judge:
         self._model_n = self._scene_n = self._modulus_pa = np.nan
         for argv in sound.warming():
             self._sound(child, argv)
+        child.first = sound.warming()[1:]  # what is compiled is on disk by now
         self._model_n = _force(sound.folder / "curve.csv")
         self._scene_n = _force(sound.folder / "scene.csv")
         if deep:

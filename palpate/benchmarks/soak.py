@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 from scipy.stats import theilslopes
 
-from devices.safety import LATCHING, WORDS
+from devices.safety import LATCHING, SILENT, WORDS
 from mechanics.files import cache_folder
 from mechanics.model import Model, read_model, write_model
 from mechanics.recording import read_recording
@@ -86,6 +86,7 @@ class Health:
             "ticks": float(counts[TICKS]),
             "late": float(counts[LATE]),
             "missed": float(counts[MISSED]),
+            "load": os.getloadavg()[0] if hasattr(os, "getloadavg") else float("nan"),
         }
         for name, pid in self._pids.items():
             row |= {f"{name}_{key}": value for key, value in process_size(pid).items()}
@@ -193,6 +194,7 @@ def _summary(health: Health, report: dict[str, Any], frames: int, recorded: dict
             name: health.slope(name)
             for name in ("window_rss_mb", "servo_rss_mb", "window_files", "servo_files", "servo_threads")
         },
+        "load": [float(v) for v in np.percentile(health.column("load"), [0, 50, 100])],
         "deadline_ahead_ms": [float(1e3 * v) for v in np.percentile(ahead, [0, 50, 100])],
         "ahead_first_ms": float(1e3 * np.median(ahead[:half])),
         "ahead_second_ms": float(1e3 * np.median(ahead[half:])),
@@ -218,6 +220,15 @@ def _print_session(seen: dict[str, Any]) -> None:
         f"ticks against deadlines {seen['phase_drift_us']:.3f} us, the next deadline a median of "
         f"{seen['ahead_first_ms']:.2f} ms ahead in the first half, {seen['ahead_second_ms']:.2f} in the "
         f"second; the system's wall clock went {seen['utc_drift_ms']:.2f} ms against the loop's"
+    )
+    low, usual, high = seen["load"]
+    latched = {word: n for word, n in report["reasons"].items() if word in LATCHED}
+    print(
+        f"energy given back at most {1e3 * report['energy_given_back_j']:.3f} mJ, damped "
+        f"{1e3 * report['energy_damped_j']:.1f} mJ, greatest force {report['peak_force_n']:.2f} N, in "
+        f"contact {100 * report['contact_share']:.0f} %, ticks with a latched fault: {latched or 'none'}, "
+        f"zeroed for silence {report['reasons'].get(WORDS[SILENT], 0)}; load {low:.1f} to {high:.1f}, "
+        f"median {usual:.1f}"
     )
 
 

@@ -25,7 +25,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--kind", choices=("auto", *KINDS), default="auto", help="of test (default: auto)")
     parser.add_argument("--tip-radius", type=finite, metavar="M", help="of an indenter's sphere [m]")
     parser.add_argument("--layer", type=finite, metavar="M", help="thickness (default: a half-space) [m]")
-    parser.add_argument("--poisson-ratio", type=finite, default=0.49, metavar="NU", help="(default: 0.49)")
+    parser.add_argument("--poisson-ratio", type=finite, default=0.49, help="of the material (default: 0.49)")
     parser.add_argument(
         "--specimens", action="store_true", help="each indentation is of another piece (default: one piece)"
     )

@@ -7,13 +7,15 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 
 from palpate.demo import DemoResult
+from palpate.report.diagnosis_figures import known
 from palpate.report.exploration_figures import force_over_time
 from palpate.report.object3d import draw_object
 from palpate.report.page import Page, save_figures
 from palpate.report.quantities import ERROR, UNCERTAINTY
-from palpate.report.view3d import Colouring, Line, View, local, thing_of, traces_of, usual_colourings
+from palpate.report.view3d import Colouring, Line, View, facing, local, thing_of, traces_of, usual_colourings
 from palpate.servo.histogram import lower_edge_ns
 from palpate.servo.report import ServoReport
 from reconstruct.uniaxial import low_passed
@@ -62,12 +64,14 @@ def view_of(result: DemoResult) -> View:
         "Rendered less measured, root mean square over each press; between presses what is near.",
     )
     first, *others = usual_colourings(model)
+    worst = int(np.argmax(each))
     return View(
         thing_of(model),
         model.presses.point,
         [first, error, *others],
         traces_of(shown, lines),
-        int(np.argmax(each)),
+        worst,
+        facing(model.support.normal, model.presses.normal[worst]),
     )
 
 
@@ -108,6 +112,9 @@ def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
         counts, _ = np.histogram(lower_us[:-1].clip(least), edges, weights=histogram.counts)
         ax.stairs(counts, edges, fill=True, color="#457b9d")
         ax.set(xlabel=name, ylabel="ticks", yscale="log", xscale="log", xlim=(edges[0], edges[-1]))
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter(NullFormatter())
     return axes
 
 
@@ -156,7 +163,9 @@ def write_report(result: DemoResult, folder: Path) -> Path:
         saved["object"],
         "Left: contact points and fixed base. Right: how uncertain the shape is.",
     )
-    page.paragraph(f"Surface: {result.reconstruction.surface.method}. {result.reconstruction.surface.reason}")
+    page.paragraph(
+        f"Surface: {result.reconstruction.surface.method}; {result.reconstruction.surface.reason}."
+    )
     page.heading("What the hand did")
     page.figure(saved["force"], "Force over time: the base is traced in phase I; circles are first touches.")
     page.heading("Measured against rendered")
@@ -197,9 +206,9 @@ def diagnosis_words(result: DemoResult) -> str:
     if found.effects:
         words += f", with what was found {1e3 * found.gap_after_n:.0f} mN"
     words += f"; the sensor's noise is {1e3 * found.noise_n:.0f} mN."
-    if deep and "finite_strain" in found.effects:
+    if deep and known() in found.effects:
         words += " Finite strain is in the rendered curves already: that is what the law stands for."
-    rest = [name.replace("_", " ") for name in found.effects if not (deep and name == "finite_strain")]
+    rest = [name.replace("_", " ") for name in found.effects if not (deep and name == known())]
     if rest:
         words += (
             f" The rendered curves do not have {' and '.join(rest)}: `palpate diagnose REC --apply` adds it."

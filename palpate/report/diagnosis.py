@@ -19,6 +19,7 @@ from palpate.report.diagnosis_figures import (
     modulus_picture,
     presses_picture,
     view_of,
+    with_strain,
 )
 from palpate.report.diagnosis_words import (
     AXIS_WORDS,
@@ -91,7 +92,7 @@ def _caption(result: Diagnosis) -> str:
 
 
 def _gains_caption(result: Diagnosis) -> str:
-    strain = any(" and finite strain" in beside(result, e.name) for e in result.entries)
+    strain = any(with_strain(result, e.name) for e in result.entries)
     return (
         "How much of the difference each effect takes away at places that the fit had not seen"
         + (

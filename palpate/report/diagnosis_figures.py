@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
 from scipy.spatial.distance import cdist
 
 from diagnose.result import Diagnosis
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effects
 from mechanics.model import Model
 from mechanics.presses import Presses
 from palpate.report.diagnosis_words import percent
@@ -25,7 +28,6 @@ from palpate.report.view3d import (
 from render.felt import felt_surface
 
 MEASURED, IDEAL, IMPROVED, PALE = "#1d3557", "#e76f51", "#2a9d8f", "#c9c9c9"
-STRAIN = "finite_strain"
 MOST_EFFECTS = 8
 
 
@@ -91,13 +93,19 @@ def sideways(result: Diagnosis) -> bool:
     return result.where.leading.axis == "direction"
 
 
+@cache
+def known() -> str:
+    """The effect that every solid has, which others are tried beside: finite strain."""
+    return next(e.name for e in effects() if e.role is Role.KNOWN)
+
+
 def residual_with(result: Diagnosis, name: str) -> np.ndarray | None:
     """(n, 3) N, measured less simulated with one effect (beside finite strain where that is part of it);
     None where it was not simulated."""
     found = result.attribution
     if found is None:
         return None
-    if name == STRAIN:
+    if name == known():
         return found.deep.residual
     return found.scores[name].candidate.residual if name in found.scores else None
 
@@ -107,15 +115,15 @@ def with_strain(result: Diagnosis, name: str) -> bool:
     found = result.attribution
     return bool(
         found
-        and name != STRAIN
+        and name != known()
         and name in found.scores
-        and STRAIN in found.scores[name].candidate.found.names
+        and known() in found.scores[name].candidate.found.names
     )
 
 
 def beside(result: Diagnosis, name: str) -> str:
     """An effect's name, and finite strain where it was tried beside it."""
-    return name.replace("_", " ") + (" and finite strain" if with_strain(result, name) else "")
+    return name.replace("_", " ") + (f" and {known().replace('_', ' ')}" if with_strain(result, name) else "")
 
 
 def _shown_entries(result: Diagnosis) -> list[Any]:
@@ -223,7 +231,7 @@ def gains(ax: Any, result: Diagnosis) -> None:
     values = [float(np.clip(e.gap_closed or 0.0, 0.0, 1.0)) for e in entries]
     names = [beside(result, e.name) for e in entries]
     ax.barh(names, values, color=colours)
-    strain = next((e.gap_closed or 0.0 for e in result.entries if e.name == STRAIN), 0.0)
+    strain = next((e.gap_closed or 0.0 for e in result.entries if e.name == known()), 0.0)
     both = [
         float(np.clip(strain, 0.0, v)) * with_strain(result, e.name)
         for v, e in zip(values, entries, strict=True)
@@ -236,7 +244,7 @@ def gains(ax: Any, result: Diagnosis) -> None:
             edgecolor="#4a5560",
             hatch="////",
             lw=0,
-            label="by finite strain itself",
+            label=f"by {known().replace('_', ' ')} itself",
         )
         ax.legend(fontsize=8.5, frameon=False, loc="lower right")
     for k, (value, entry) in enumerate(zip(values, entries, strict=True)):

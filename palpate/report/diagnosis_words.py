@@ -91,8 +91,8 @@ def force_words(newtons: float) -> str:
 
 
 def percent(share: float) -> str:
-    """A share as a percentage."""
-    return f"{100 * share:.0f} %"
+    """A share as a percentage, which no line breaks."""
+    return f"{100 * share:.0f}\u00a0%"
 
 
 def share_words(value: float | None) -> str:
@@ -132,10 +132,10 @@ def _where(result: Diagnosis) -> tuple[str, str, str]:
     if result.kind == "none":
         text = (
             f"No place, depth or speed stands out beyond what noise, first touch and shape may do. The "
-            f"largest difference is {force_words(rms)}, at {largest} (ringed)."
+            f"largest difference is {force_words(rms)}, at {largest} (marked)."
         )
         return question, "Nowhere in particular", text
-    there = f"largest at {largest} (ringed): {force_words(rms)} there."
+    there = f"largest at {largest} (marked): {force_words(rms)} there."
     if axis.share < LITTLE:
         text = f"What it follows most is {AXIS_WORDS[axis.axis]}, and that is {percent(axis.share)} of it. "
         text += f"It is {there}"

@@ -5,7 +5,6 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-import trimesh
 from matplotlib.figure import Figure
 
 from mechanics.frames import tangents
@@ -83,10 +82,15 @@ def view_of(result: Simulation, phantom: Phantom) -> View:
     frame = np.repeat([np.stack([n, *tangents(n)]) for n in normals], [len(r) for r in rows], axis=0)
     chosen = np.concatenate(rows)
     starts = np.cumsum([0, *map(len, rows)])
-    first = np.concatenate([np.full(len(r), r[0] if len(r) else 0) for r in rows])
+    met = [r[np.argmax(motion.s[r] >= 0.0)] if len(r) else 0 for r in rows]
+    first = np.repeat(met, [len(r) for r in rows])
+    depth_m = motion.s[chosen] * 1e-3
+    read = (1e3 * recording.position[chosen] - shift) @ turn
+    inward = -np.repeat([touch.normal for touch in result.touches], [len(r) for r in rows], axis=0)
+    read_m = depth_m + 1e-3 * ((read - motion.position[chosen]) * inward).sum(axis=1)
     lines = [
-        Line("read", _turned(frame, recording.force_on_tool[chosen]), "measured"),
-        Line("without noise", _turned(frame, result.clean_n[chosen]), "found", shown=False),
+        Line("read", _turned(frame, recording.force_on_tool[chosen]), "measured", depth_m=read_m),
+        Line("without noise", _turned(frame, result.clean_n[chosen]), "found", False, read_m),
     ]
     colourings = [
         Colouring(ORDER, None, np.arange(1.0, len(rows) + 1), "Each dot is a touch, in order of time."),
@@ -96,19 +100,18 @@ def view_of(result: Simulation, phantom: Phantom) -> View:
         lines.insert(1, Line("ideal object", _turned(frame, result.ideal_n[chosen]), "rendered"))
         change = result.clean_n - result.ideal_n
         each = np.array([np.sqrt((change[r] ** 2).sum(axis=1).mean()) for r in rows])
+    if result.ideal_n is not None and each.max() > _LEAST_CHANGE_N:
         words = "What the effects change, root mean square over each touch; between touches what is near."
         colourings.append(Colouring(ERROR, None, each, words, name="change of the force"))
-    body = trimesh.Trimesh(1e3 * phantom.vertices @ turn.T + shift, phantom.faces, process=False)
     places = np.array([touch.point for touch in result.touches]) @ turn.T + shift
     thing = Thing(
-        body.vertices * 1e-3,
-        np.array(body.vertex_normals),
+        phantom.vertices @ turn.T + 1e-3 * shift,
         phantom.faces,
         phantom.vertices[:, 2] > 1e-4,
         shift * 1e-3,
         turn[:, 2],
     )
-    traces = Traces(starts, motion.s[chosen] * 1e-3, (chosen - first) * (motion.t[1] - motion.t[0]), lines)
+    traces = Traces(starts, depth_m, (chosen - first) * (motion.t[1] - motion.t[0]), lines)
     return View(thing, places * 1e-3, colourings, traces)
 
 
@@ -116,6 +119,7 @@ def _turned(frame: np.ndarray, force_n: np.ndarray) -> np.ndarray:
     return np.einsum("nij,nj->ni", frame, force_n)
 
 
+_LEAST_CHANGE_N = 1e-4
 _BEFORE_MM = 1.0
 """Above the surface: where the curve of a touch begins and ends."""
 

@@ -33,7 +33,7 @@ from palpate.report.reconstruction_tables import (
     point_load_rows,
     table_one,
 )
-from palpate.report.view3d import Colouring, Line, View, local, thing_of, traces_of, usual_colourings
+from palpate.report.view3d import Colouring, Line, View, facing, local, thing_of, traces_of, usual_colourings
 from reconstruct.pipeline import Reconstruction
 from reconstruct.uniaxial import low_passed
 
@@ -123,7 +123,14 @@ def view_of(result: Reconstruction) -> View:
         )
         colourings.insert(1, Colouring(ERROR, None, each, words))
         selected = int(np.argmax(each))
-    return View(thing_of(model), model.presses.point, colourings, traces_of(shown, lines), selected)
+    return View(
+        thing_of(model),
+        model.presses.point,
+        colourings,
+        traces_of(shown, lines),
+        selected,
+        facing(model.support.normal, model.presses.normal[selected]),
+    )
 
 
 def object_figure(model: Model) -> Figure:

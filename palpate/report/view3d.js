@@ -34,13 +34,14 @@ function start(root) {
   const data = JSON.parse(root.querySelector("script.data").textContent);
   const part = name => root.querySelector("." + name);
   const stage = part("stage"), tip = part("tip"), by = part("by"), axis = part("axis");
-  const points = floats(data.points), triangles = whole(data.triangles);
+  const points = floats(data.points);
+  const triangles = data.wide ? whole(data.triangles) : new Uint16Array(bytes(data.triangles));
   const up = new THREE.Vector3(...data.up), aside = new THREE.Vector3(...data.aside);
   const across = new THREE.Vector3().crossVectors(up, aside);
   const places = floats(data.places), count = places.length / 3;
   const place = k => new THREE.Vector3().fromArray(places, 3 * k);
   const colourings = data.colourings.map(c => ({...c, ramp: ramp(c.stops), surface: c.surface && floats(c.surface),
-    known: c.known && floats(c.known), presses: c.presses && floats(c.presses)}));
+    known: c.known && Array.from(new Uint8Array(bytes(c.known)), v => v / 255), presses: c.presses && floats(c.presses)}));
   const style = name => getComputedStyle(root).getPropertyValue(name).trim();
 
   const renderer = new THREE.WebGLRenderer({antialias: true, alpha: true});
@@ -55,10 +56,10 @@ function start(root) {
 
   const geometry = new THREE.BufferGeometry();
   geometry.setAttribute("position", new THREE.BufferAttribute(points, 3));
-  geometry.setAttribute("normal", new THREE.BufferAttribute(floats(data.normals), 3));
   const shade = new Float32Array(points.length);
   geometry.setAttribute("color", new THREE.BufferAttribute(shade, 3));
   geometry.setIndex(new THREE.BufferAttribute(triangles, 1));
+  geometry.computeVertexNormals();
   geometry.computeBoundingSphere();
   const middle = geometry.boundingSphere.center.clone(), size = geometry.boundingSphere.radius;
   const body = new THREE.Mesh(geometry, new THREE.MeshPhongMaterial({vertexColors: true, shininess: 18, specular: 0x151515}));
@@ -216,7 +217,7 @@ function start(root) {
 
   // ---- one press: its numbers and its curve
   const curves = data.curves && {...data.curves, starts: whole(data.curves.starts), depth: floats(data.curves.depth),
-    time: floats(data.curves.time), lines: data.curves.lines.map((line, k) => ({...line, into: floats(line.into), sideways: floats(line.sideways),
+    time: floats(data.curves.time), lines: data.curves.lines.map((line, k) => ({...line, into: floats(line.into), sideways: floats(line.sideways), depth: line.depth && floats(line.depth),
       colour: FIXED[line.kind] || PALETTE[k % PALETTE.length]}))};
   function select(k, told = true) {
     if (!(k >= 0 && k < count)) return;
@@ -238,13 +239,13 @@ function start(root) {
     svg.replaceChildren();
     if (!curves || selected < 0) return;
     const [a, b] = [curves.starts[selected], curves.starts[selected + 1]];
-    const over = axis.value === "time" ? curves.time : curves.depth;
+    const over = (line, k) => axis.value === "time" ? curves.time[k] : (line.depth || curves.depth)[k];
     const [part_of, less] = part("what").value.split(" "), measured = curves.lines.find(line => line.kind === "measured");
     const shown = curves.lines.filter(line => line.shown && !(less && line === measured));
     const at = (line, k) => less ? line[part_of][k] - measured[part_of][k] : line[part_of][k];
     let [x0, x1, y0, y1] = [Infinity, -Infinity, 0, less ? 0.02 : 0.1];
     for (let k = a; k < b; k++) {
-      [x0, x1] = [Math.min(x0, over[k]), Math.max(x1, over[k])];
+      for (const line of shown) [x0, x1] = [Math.min(x0, over(line, k)), Math.max(x1, over(line, k))];
       for (const line of shown) if (Number.isFinite(at(line, k))) [y0, y1] = [Math.min(y0, at(line, k)), Math.max(y1, at(line, k))];
     }
     const [W, H, L, B, T] = [440, 270, 46, 40, 10];
@@ -257,7 +258,7 @@ function start(root) {
     svg.append(el("text", {x: 12, y: (H - B) / 2, class: "mid name", transform: `rotate(-90 12 ${(H - B) / 2})`}, NAMES[part("what").value]));
     for (const line of shown) {
       let d = "";
-      for (let k = a; k < b; k++) if (Number.isFinite(at(line, k))) d += (d ? "L" : "M") + X(over[k]).toFixed(1) + " " + Y(at(line, k)).toFixed(1);
+      for (let k = a; k < b; k++) if (Number.isFinite(at(line, k))) d += (d ? "L" : "M") + X(over(line, k)).toFixed(1) + " " + Y(at(line, k)).toFixed(1);
       const path = el("path", {d, class: "line " + line.kind});
       path.style.stroke = line.colour;
       svg.append(path);

@@ -33,20 +33,20 @@ from palpate.report.quantities import (
 )
 from render.felt import felt_surface
 
-SAMPLES, FEWEST, MOST = 20_000, 30, 120
+SAMPLES, FEWEST, MOST = 20_000, 30, 160
 """Points of all curves together, and of one curve at least and at most."""
 _SHOWN_SHARE = (2.0, 98.0)
 _STOPS = 24
+_SHORT = 65_535
 _THREE = re.compile(r'.*?Object\.defineProperty\(\w+,"__esModule",\{value:!0\}\)\}\)\);?', re.DOTALL)
 
 
 @dataclass(frozen=True)
 class Thing:
-    """A surface to be turned: points, normals (v, 3) m, triangles (k, 3) outward, touchable (v,) bool; the
-    support's plane by a point (3,) m and its outward normal (3,)."""
+    """A surface to be turned: points (v, 3) m, triangles (k, 3) outward, touchable (v,) bool; the support's
+    plane by a point (3,) m and its outward normal (3,)."""
 
     points: np.ndarray
-    normals: np.ndarray
     triangles: np.ndarray
     touchable: np.ndarray
     support_point: np.ndarray
@@ -76,13 +76,15 @@ class Line:
     """A force along the presses, (n, 3) N on the tool in the local frame (outward normal, tangent, tangent),
     at each row (NaN: none).
 
-    kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start.
+    kind: 'measured', 'rendered', 'found' (with what was found) or 'effect'. shown: from the start. depth_m:
+    (n,) where this line has depths of its own.
     """
 
     name: str
     force_n: np.ndarray
     kind: str = "rendered"
     shown: bool = True
+    depth_m: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -109,10 +111,15 @@ class View:
     elevation_deg: float = ELEVATION_DEG
     force: str = "into"
 
+    @property
+    def told(self) -> list[Colouring]:
+        """The colourings of which something is known."""
+        return [c for c in self.colourings if _known(c)]
+
     def html(self, still: str) -> str:
         """The section; still: HTML of what is shown without scripts."""
         data = json.dumps(_data(self), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-        options = "".join(f"<option>{html.escape(c.title)}</option>" for c in self.colourings)
+        options = "".join(f"<option>{html.escape(c.title)}</option>" for c in self.told)
         live = _file("view3d.html").replace("<!-- options -->", options)
         if self.traces is None:
             live = re.sub("<!-- curve -->.*<!-- end of curve -->", "", live, flags=re.DOTALL)
@@ -124,7 +131,7 @@ class View:
 
 def usual_colourings(model: Model, presses: Presses | None = None) -> list[Colouring]:
     """What every model can tell: order and depth of its touches, the presses' own moduli, own stiffness,
-    shape uncertainty; what is not known is left out. presses: those that are shown (None: the model's)."""
+    shape uncertainty. presses: those that are shown (None: the model's)."""
     surface, presses = felt_surface(model), model.presses if presses is None else presses
     order = np.arange(1.0, len(presses) + 1)
     stiffness = np.where(surface.touchable, surface.own_stiffness_n_per_m, np.nan)
@@ -138,15 +145,13 @@ def usual_colourings(model: Model, presses: Presses | None = None) -> list[Colou
         Colouring(UNCERTAINTY, uncertainty, None, "Standard deviation of the surface along its normal."),
         Colouring(DEPTH, None, presses.depth_m, "How deep each press went."),
     ]
-    return [c for c in found if _known(c)]
+    return found
 
 
 def thing_of(model: Model) -> Thing:
     """What a tip meets of a model, on its support."""
     surface, support = felt_surface(model), model.support
-    return Thing(
-        surface.points, surface.normals, surface.triangles, surface.touchable, support.point, support.normal
-    )
+    return Thing(surface.points, surface.triangles, surface.touchable, support.point, support.normal)
 
 
 def local(presses: Presses, force_n: np.ndarray) -> np.ndarray:
@@ -179,8 +184,8 @@ def _data(view: View) -> dict[str, Any]:
     head, rows = _rows(view)
     data = {
         "points": _floats(1e3 * (thing.points - middle)),
-        "normals": _floats(thing.normals),
-        "triangles": _whole(thing.triangles),
+        "wide": len(thing.points) > _SHORT,
+        "triangles": _whole(thing.triangles, "<u4" if len(thing.points) > _SHORT else "<u2"),
         "places": _floats(1e3 * (view.places - middle)),
         "middle": _rounded(1e3 * middle),
         "up": _rounded(up, 9),
@@ -191,7 +196,7 @@ def _data(view: View) -> dict[str, Any]:
         "elevation": view.elevation_deg,
         "selected": int(view.selected),
         "force": view.force,
-        "colourings": _scaled([_colouring(c, view) for c in view.colourings]),
+        "colourings": _scaled([_colouring(c, view) for c in view.told]),
         "table": {"head": head, "rows": rows},
     }
     return data | ({"curves": _curves(view.traces)} if view.traces else {})
@@ -214,7 +219,7 @@ def _colouring(colouring: Colouring, view: View) -> dict[str, Any]:
         "stops": [to_hex(s) for s in stops],
         "limits": (quantity, low, high, every.min(), every.max()),
         "surface": None if values is None else _floats(values * quantity.scale),
-        "known": None if known is None else _floats(known),
+        "known": None if known is None else _whole((255 * known).round(), "u1"),
         "presses": None if own is None else _floats(own * quantity.scale),
     }
 
@@ -235,7 +240,7 @@ def _curves(traces: Traces) -> dict[str, Any]:
     lengths = np.diff(traces.starts)
     most = int(np.clip(SAMPLES // max(len(lengths), 1), FEWEST, MOST))
     kept = [
-        first + np.unique(np.linspace(0, count - 1, min(most, count)).round().astype(int))
+        first + _telling(traces.depth_m[first : first + count], most)
         for first, count in zip(traces.starts, lengths, strict=False)
     ]
     chosen = np.concatenate(kept) if kept else np.zeros(0, dtype=int)
@@ -251,10 +256,23 @@ def _curves(traces: Traces) -> dict[str, Any]:
                 "shown": line.shown,
                 "into": _floats(line.force_n[chosen, 0]),
                 "sideways": _floats((line.force_n[chosen, 1:] * along[chosen]).sum(axis=1)),
+                "depth": None if line.depth_m is None else _floats(1e3 * line.depth_m[chosen]),
             }
             for line in traces.lines
         ],
     }
+
+
+def _telling(depth_m: np.ndarray, most: int) -> np.ndarray:
+    """Rows of a press, `most` at most: half spread over its time, half over the way that the tip goes."""
+    count = len(depth_m)
+    if count <= most:
+        return np.arange(count)
+    way = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(depth_m)))])
+    along = np.arange(count) / (count - 1) + way / max(float(way[-1]), 1e-12)
+    return np.unique(
+        np.interp(np.linspace(0.0, along[-1], most), along, np.arange(count)).round().astype(int)
+    )
 
 
 def _main_direction(traces: Traces) -> np.ndarray:
@@ -269,7 +287,7 @@ def _main_direction(traces: Traces) -> np.ndarray:
 
 def _rows(view: View) -> tuple[list[str], list[list[str]]]:
     """Head and rows, in words, of the presses: place, and what each colouring says of it."""
-    told = [(c, c.presses * c.quantity.scale) for c in view.colourings if c.presses is not None]
+    told = [(c, c.presses * c.quantity.scale) for c in view.told if c.presses is not None]
     told = [(c, values) for c, values in told if c.quantity is not ORDER]
     head = ["press", "at x, y, z [mm]"]
     head += [c.title + (f" [{c.quantity.unit}]" if c.quantity.unit else "") for c, _ in told]
@@ -296,8 +314,8 @@ def _floats(values: np.ndarray) -> str:
     return base64.b64encode(np.ascontiguousarray(values, dtype="<f4").tobytes()).decode()
 
 
-def _whole(values: np.ndarray) -> str:
-    return base64.b64encode(np.ascontiguousarray(values, dtype="<u4").tobytes()).decode()
+def _whole(values: np.ndarray, kind: str = "<u4") -> str:
+    return base64.b64encode(np.ascontiguousarray(values).astype(kind).tobytes()).decode()
 
 
 def _rounded(values: np.ndarray, digits: int = 4) -> list[float]:

@@ -17,7 +17,13 @@ if TYPE_CHECKING:
 
     from diagnose.result import Diagnosis
 
-FLOORS = ("spring", "linear", "kelvin-voigt", "hunt-crossley")
+FLOORS = {
+    "relaxation": ("spring",),
+    "compression": ("linear",),
+    "tension": ("linear",),
+    "indentation": ("kelvin-voigt", "hunt-crossley"),
+}
+"""1D models, by kind of test."""
 CEILING = "regression"
 
 

@@ -120,7 +120,7 @@ class Servo:
         Raises the PalpateError that the servo process met.
         """
         self._process = subprocess.Popen(
-            module_command("palpate.servo", self._block.path),
+            module_command("palpate.servo", self._block.path, str(os.getpid())),
             env=module_environment(),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,

@@ -1,7 +1,8 @@
 """The servo's own tick against a simulated hand, in virtual time: hand, device, loop and delay as one system.
 
-Between two ticks the hand moves in `SUBSTEPS` exact steps under the delayed, held force, so that the energy
-that passes between hand and force is that of the continuous motion, not of the samples.
+Within a tick's period the hand moves in `SUBSTEPS` exact steps under the delayed, held force, so that the
+energy that passes between hand and force is that of the continuous motion, not of the samples. Ticks come as
+`Timing` says: meanwhile a device holds the last force, for as long as it was allowed to.
 
     work = integral of F . v dt: what the force gave to the hand; its greatest value is what it got back net.
 """
@@ -16,8 +17,8 @@ import numpy as np
 from numba import njit
 
 from devices.base import DeviceSpec
-from devices.impedance import HandImpedance
-from devices.safety import SafetyOptions, safety_parameters
+from devices.impedance import HandImpedance, follow
+from devices.safety import WORDS, SafetyOptions, safety_parameters
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
 from palpate.servo.loop import kept, make_program, one_tick
 from palpate.servo.tick import (
@@ -33,7 +34,9 @@ from palpate.servo.tick import (
     IN_TIP_VELOCITY,
     IN_VELOCITY,
     IN_WIDTH,
+    IN_WORK,
     OUT_FORCE,
+    OUT_HOLD,
     TickParameters,
     put_pose,
     tick_arrays,
@@ -69,22 +72,20 @@ class Loop:
 class ClosedLoopResult:
     """position, command, rendered: (n, 3) a tick, m and N on the tool. work_j: (n,) given so far.
 
-    compliance_m_per_n: the coupling's at each tip, and stiffness_lost the
-    share that it takes of the stiffness of the object's stiffest place.
+    given_back_j: the greatest net energy that the hand ever got. reasons: the safety filter's, of any tick.
+    compliance_m_per_n: the coupling's at each tip, and stiffness_lost the share that it takes of the
+    stiffness of the object's stiffest place.
     """
 
     position: np.ndarray
     command: np.ndarray
     rendered: np.ndarray
     work_j: np.ndarray
+    given_back_j: float
+    reasons: tuple[str, ...]
     compliance_m_per_n: float
     stiffness_lost: float
     contact_share: float
-
-    @property
-    def given_back_j(self) -> float:
-        """The greatest net energy that the hand ever got."""
-        return max(0.0, float(self.work_j.max()))
 
     @property
     def force_distortion(self) -> float:
@@ -93,6 +94,23 @@ class ClosedLoopResult:
         rendered = np.sqrt((self.rendered[full] ** 2).sum(axis=1).mean())
         changed = np.sqrt(((self.command[full] - self.rendered[full]) ** 2).sum(axis=1).mean())
         return float(changed / rendered) if rendered > 0 else 0.0
+
+
+@dataclass(frozen=True)
+class Timing:
+    """When ticks come, in substeps.
+
+    read: (n + 1,) of the poses, increasing; lag: (n,) from a pose to its force taking over, before the next
+    pose.
+    """
+
+    read: np.ndarray
+    lag: np.ndarray
+
+    @classmethod
+    def regular(cls, ticks: int) -> Timing:
+        """One a period, answered at once."""
+        return cls(SUBSTEPS * np.arange(ticks + 1), np.zeros(ticks, dtype=np.int64))
 
 
 @njit(cache=True, nogil=True)
@@ -104,15 +122,18 @@ def _run(
     arrays,
     parameters,
     intended,
-    hand,
+    transition,
     start,
     throw,
     quantum,
     delay_steps,
     noise,
+    read,
+    lag,
     out,
 ):
-    """out: (n, 10) position, command, rendered, work. hand: (2, 3) transition over a substep."""
+    """out: (n, 11) position, command, rendered, work, the most of it until the next pose. transition: (2, 3)
+    over a substep. read, lag: Timing's."""
     position, velocity = start.copy(), throw.copy()
     pose = np.zeros(IN_WIDTH)
     pose[IN_CONNECTED] = 1.0
@@ -122,48 +143,50 @@ def _run(
     pose[IN_FORCE_MAP] = 1.0
     pose[IN_FORCE_MAP + 4] = 1.0
     pose[IN_FORCE_MAP + 8] = 1.0
-    lag = delay_steps + 1
-    line = np.zeros((lag, 3))
-    at = 0
-    work = 0.0
-    substep_s = parameters.period_ns * 1e-9 / SUBSTEPS
+    line = np.zeros((delay_steps + 1, 3))
+    work, until = 0.0, 0
+    substep_ns = parameters.period_ns // SUBSTEPS
     for tick in range(out.shape[0]):
-        now = START_NS + tick * parameters.period_ns
         for i in range(3):
-            read = position[i] + noise[tick, i]
+            read_at = position[i] + noise[tick, i]
             if quantum > 0.0:
-                read = quantum * math.floor(read / quantum + 0.5)
+                read_at = quantum * math.floor(read_at / quantum + 0.5)
             pose[IN_VELOCITY + i] = velocity[i]
             pose[IN_TIP_VELOCITY + i] = velocity[i]
-            pose[IN_POSITION + i] = read
-            pose[IN_TIP + i] = read
-        pose[IN_TIME] = now * 1e-9
-        pose[IN_SEQUENCE] = tick
-        put_pose(arrays, pose)
-        one_tick(kernel, model, state, support, arrays, parameters, now, now)
-        arrays.shared.counts[TICKS] += 1
-        for i in range(3):
+            pose[IN_POSITION + i] = read_at
+            pose[IN_TIP + i] = read_at
             out[tick, i] = position[i]
-            out[tick, 3 + i] = arrays.outbox[OUT_FORCE + i]
-            out[tick, 6 + i] = arrays.rendered[i]
-        out[tick, 9] = work
-        for s in range(SUBSTEPS):
+        pose[IN_TIME] = (START_NS + read[tick] * substep_ns) * 1e-9
+        pose[IN_SEQUENCE] = tick
+        pose[IN_WORK] = work
+        put_pose(arrays, pose)
+        out[tick, 9] = out[tick, 10] = work
+        for at in range(read[tick], read[tick + 1]):
+            if at == read[tick] + lag[tick]:
+                now = START_NS + at * substep_ns
+                one_tick(kernel, model, state, support, arrays, parameters, now, now)
+                arrays.shared.counts[TICKS] += 1
+                until = at + int(arrays.outbox[OUT_HOLD] * 1e9 / substep_ns + 0.5)
+                for i in range(3):
+                    out[tick, 3 + i] = arrays.outbox[OUT_FORCE + i]
+                    out[tick, 6 + i] = arrays.rendered[i]
             for i in range(3):
-                line[at % lag, i] = arrays.outbox[OUT_FORCE + i]
-            acting = (at + 1) % lag
-            at += 1
-            share, following = s / SUBSTEPS, (s + 1) / SUBSTEPS
-            for i in range(3):
-                low, high = intended[tick, i], intended[tick + 1, i]
-                here = low + share * (high - low)
-                there = low + following * (high - low)
-                meant = (there - here) / substep_s
-                offset, speed = position[i] - here, velocity[i] - meant
-                force = line[acting, i]
-                moved = there + hand[0, 0] * offset + hand[0, 1] * speed + hand[0, 2] * force
-                work += force * (moved - position[i])
-                position[i] = moved
-                velocity[i] = meant + hand[1, 0] * offset + hand[1, 1] * speed + hand[1, 2] * force
+                line[at % line.shape[0], i] = arrays.outbox[OUT_FORCE + i] if at < until else 0.0
+            segment = min(at // SUBSTEPS, intended.shape[0] - 2)
+            first = at - SUBSTEPS * segment
+            work += follow(
+                transition,
+                position,
+                velocity,
+                intended[segment],
+                intended[segment + 1],
+                first,
+                first + 1,
+                SUBSTEPS,
+                substep_ns * 1e-9,
+                line[(at + 1) % line.shape[0]],
+            )
+            out[tick, 10] = max(out[tick, 10], work)
 
 
 def closed_loop(
@@ -179,11 +202,12 @@ def closed_loop(
     tip_offsets_m: np.ndarray | None = None,
     tremor_m: float = 0.0,
     seed: int = 0,
+    timing: Timing | None = None,
 ) -> ClosedLoopResult:
-    """Run a hand that means to follow `intended_m` (n + 1, 3), one place a tick, for n ticks.
+    """Run a hand that means to follow `intended_m` (n + 1, 3), one place a period, for n periods.
 
     thrown_m_per_s: (3,) the hand's first velocity, for a free mass. tip_offsets_m: (m, 3) where on the tool
-    its tips are (one, in the middle). tremor_m: rms of noise on each reading.
+    its tips are (one, in the middle). tremor_m: rms of noise on each reading. timing: regular by default.
     Force is enabled from the first tick; it ramps in, so begin out of contact.
     """
     loop = loop or Loop()
@@ -212,8 +236,9 @@ def closed_loop(
     )
     program = make_program(in_the_air(renderer), arrays, parameters)
     arrays.shared.control[ENABLE] = 1
-    n = len(intended) - 1
-    out = np.zeros((n, 10))
+    timing = timing or Timing.regular(len(intended) - 1)
+    n = len(timing.lag)
+    out = np.zeros((n, 11))
     step = HandImpedance(
         hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m, period_ns * 1e-9 / SUBSTEPS
     )
@@ -232,6 +257,8 @@ def closed_loop(
         loop.quantisation_m,
         round(delay_ticks * SUBSTEPS),
         noise,
+        np.ascontiguousarray(timing.read, dtype=np.int64),
+        np.ascontiguousarray(timing.lag, dtype=np.int64),
         out,
     )
     return ClosedLoopResult(
@@ -239,6 +266,8 @@ def closed_loop(
         out[:, 3:6],
         out[:, 6:9],
         out[:, 9],
+        max(0.0, float(out[:, 10].max())),
+        tuple(word for bit, word in WORDS.items() if arrays.shared.reason_counts[bit.bit_length() - 1]),
         compliance,
         stiffness_distortion(stiffest, compliance),
         float(arrays.shared.counts[CONTACT_TICKS]) / n,

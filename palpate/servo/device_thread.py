@@ -1,8 +1,9 @@
 """The device's side of the servo process: reads it just before each tick, sends the force just after.
 
 The loop never waits for this thread, nor for the interpreter's lock that it needs; poses and commands pass
-through two seqlocked blocks. Where no tick has come for 20 ms it sends zero, and zero is the last thing it
-sends, whatever ended it. A driver's own dead man's switch comes after this one.
+through two seqlocked blocks. A command comes with the time for which it may act: where no tick has come by
+then it sends zero, and zero is the last thing it sends, whatever ended it. A driver's own dead man's switch
+comes after this one. Each pose carries the work of what was held (palpate.servo.held).
 """
 
 from __future__ import annotations
@@ -16,11 +17,12 @@ from typing import Any
 import numpy as np
 
 from devices import mapper
-from devices.base import ForceSink
+from devices.base import LONGEST_HOLD_S, ForceSink
 from devices.mapper import Mapping
 from mechanics.errors import PalpateError
 from mechanics.state import TipState
 from palpate.servo.clock import COMPILED
+from palpate.servo.held import HeldForce
 from palpate.servo.layout import DEADLINE, ENABLE, STOP
 from palpate.servo.loop import ServoLoop
 from palpate.servo.tick import (
@@ -38,14 +40,15 @@ from palpate.servo.tick import (
     IN_TIP_VELOCITY,
     IN_VELOCITY,
     IN_WIDTH,
+    IN_WORK,
     OUT_FORCE,
+    OUT_HOLD,
     OUT_TIME,
     OUT_WIDTH,
     put_pose,
     take_command,
 )
 
-STALE_COMMAND_S = 0.02
 ENABLING_S = 0.25
 ZERO = np.zeros(3)
 
@@ -54,7 +57,14 @@ class DeviceThread:
     """Owns the open device from `start` to `join`."""
 
     def __init__(
-        self, device: Any, mapping: Mapping, loop: ServoLoop, *, read_ahead_s: float, on_start: Any = None
+        self,
+        device: Any,
+        mapping: Mapping,
+        loop: ServoLoop,
+        *,
+        read_ahead_s: float,
+        delay_s: float = 0.0,
+        on_start: Any = None,
     ) -> None:
         self.device = device
         self.mapping = mapping
@@ -68,6 +78,8 @@ class DeviceThread:
         self._mapped: tuple[int, TipState] | None = None
         self._pose = np.zeros(IN_WIDTH)
         self._command = np.zeros(OUT_WIDTH)
+        self._held = HeldForce(delay_s)
+        self._until_s = float("-inf")
         self._enabled = 0
         self._enabled_s = 0.0
         self._sink = device if isinstance(device, ForceSink) else None
@@ -93,7 +105,7 @@ class DeviceThread:
 
     def read_pose(self) -> None:
         """Read the device and hand its pose to the next tick."""
-        raw = self.device.read()
+        raw = self._look()
         if self._mapped is None or raw.sequence != self._mapped[0]:
             self._mapper_state, tip = mapper.step(self.mapping, self._mapper_state, raw)
             self._mapped = raw.sequence, tip
@@ -113,6 +125,7 @@ class DeviceThread:
         pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3] = tip.velocity_m_per_s
         pose[IN_QUATERNION : IN_QUATERNION + 4] = tip.quaternion
         pose[IN_FORCE_MAP : IN_FORCE_MAP + 9] = mapper.force_map(self.mapping).ravel()
+        pose[IN_WORK] = self._held.work_j
         put_pose(self._arrays, pose)
 
     def send_command(self, *, fresh: bool = True) -> None:
@@ -120,12 +133,26 @@ class DeviceThread:
         if self._sink is None:
             return
         self._follow_enable(self._sink)
+        left = 0.0
         if fresh and take_command(self._arrays, self._command) >= 0:
-            age = time.perf_counter() - self._command[OUT_TIME]
-            if age <= STALE_COMMAND_S:
-                self._sink.send_force(self._command[OUT_FORCE : OUT_FORCE + 3])
-                return
-        self._sink.send_force(ZERO)
+            left = float(self._command[OUT_TIME] + self._command[OUT_HOLD]) - time.perf_counter()
+        self._send(self._sink, self._command[OUT_FORCE : OUT_FORCE + 3] if left > 0.0 else ZERO, left)
+
+    def _look(self) -> TipState:
+        """Read the device, and book what the held force did meanwhile."""
+        raw: TipState = self.device.read()
+        self._held.move(raw.time_s, raw.position_m)
+        return raw
+
+    def _send(self, sink: ForceSink, force_n: np.ndarray, hold_s: float) -> None:
+        """Let another force take over, and book the one before."""
+        self._look()
+        hold_s = max(hold_s, 0.0)
+        now = time.perf_counter()
+        sink.send_force(force_n, hold_s)
+        acts = self._enabled != 0
+        self._held.take(force_n if acts else ZERO, now, hold_s)
+        self._until_s = now + hold_s if acts and force_n.any() else float("inf")
 
     def _refuses_force(self, raw: TipState) -> bool:
         """Whether the driver takes no force although enabled (it came back after an unplugging, say)."""
@@ -148,29 +175,37 @@ class DeviceThread:
             self.words.append(str(error))
 
     def _run(self) -> None:
-        poll = None
-        if COMPILED:
-            poll = select.poll()
-            poll.register(self._loop.wake_descriptor, select.POLLIN)
         try:
             if self._on_start is not None:
                 self._on_start()
             while self._arrays.shared.control[STOP] == 0:
                 sleep_to_read(int(self._arrays.shared.counts[DEADLINE]) - self._read_ahead_ns)
                 self.read_pose()
-                self.send_command(fresh=self._await_tick(poll))
+                self.send_command(fresh=self._await_tick())
         except Exception as error:  # whatever a driver raises must end in zero force, with its reason
             self.failure = f"the device failed: {str(error) or type(error).__name__}"
             self._arrays.shared.control[STOP] = 1
         finally:
             self._release()
 
-    def _await_tick(self, poll: Any) -> bool:
-        if poll is None:
-            came = self._loop.ticked.wait(STALE_COMMAND_S)
+    def _await_tick(self) -> bool:
+        """Until the next tick; lets the force go where it expires before. False where none comes."""
+        now = time.perf_counter()
+        end = now + LONGEST_HOLD_S
+        while now < end:
+            if self._ticked_within(max(0.0, min(end, self._until_s) - now)):
+                return True
+            now = time.perf_counter()
+            if self._sink is not None and now >= self._until_s:
+                self._send(self._sink, ZERO, 0.0)
+        return False
+
+    def _ticked_within(self, seconds: float) -> bool:
+        if not COMPILED:
+            came = self._loop.ticked.wait(seconds)
             self._loop.ticked.clear()
             return came
-        if not poll.poll(STALE_COMMAND_S * 1000):
+        if not select.select([self._loop.wake_descriptor], [], [], seconds)[0]:
             return False
         os.eventfd_read(self._loop.wake_descriptor)
         return True
@@ -188,4 +223,4 @@ def sleep_to_read(deadline_ns: int) -> None:
     """Sleep until the reading is due; imprecise by the operating system's timer, which is enough here."""
     left = deadline_ns * 1e-9 - time.perf_counter()
     if left > 0:
-        time.sleep(min(left, STALE_COMMAND_S))
+        time.sleep(min(left, LONGEST_HOLD_S))

@@ -45,10 +45,12 @@ ROW = np.dtype(
         ("enabled", "f8"),
         ("lateness_s", "f8"),
         ("compute_s", "f8"),
+        ("depth", "f8"),
     ]
 )
 """One tick in the ring. position, command: device frame; tip (the first), rendered (the sum over tips, on the
-tool): scene frame; compute_s is of the tick before."""
+tool): scene frame; compute_s is of the tick before; depth (m) of the first tip in the object, 0 in air and on
+the support."""
 
 ROW_WIDTH = ROW.itemsize // 8
 

@@ -69,10 +69,15 @@ def kernel_pointer(renderer: Any, state: Any) -> Any:
     Passing the compiled function itself would make the loop a new one in every process; behind a pointer it
     is compiled once for each kind of renderer and kept on disk.
     """
-    kernel = renderer.kernel
     signature = types.void(typeof(renderer.parameters), typeof(state), types.float64[:, ::1])
+    return _pointer(renderer.kernel, signature, _is_ours(renderer))
+
+
+@cache
+def _pointer(kernel: Any, signature: Any, ours: bool) -> Any:
+    """Once a process for each kind of renderer: a swap loads no code that is there already."""
     options = {k: v for k, v in kernel.targetoptions.items() if k in ("fastmath", "error_model", "_nrt")}
-    return cfunc(signature, cache=_is_ours(renderer), **options)(kernel.py_func)
+    return cfunc(signature, cache=ours, **options)(kernel.py_func)
 
 
 class Program(NamedTuple):

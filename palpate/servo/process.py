@@ -1,8 +1,9 @@
 """The servo process: makes renderer and device, warms up, ticks until told to stop.
 
-Started by palpate.servo.client as `python -m palpate.servo BLOCK` with a pickled `Job` on standard
+Started by palpate.servo.client as `python -m palpate.servo BLOCK PARENT` with a pickled `Job` on standard
 input, further pickled commands after it, and one JSON line a message on standard output. Threads: this one
-waits for commands (end of input: the parent is gone), the loop ticks, the device thread talks to the device.
+waits for the loop's end, one for commands, one for the parent's end (palpate.servo.orphan), the loop ticks,
+the device thread talks to the device.
 """
 
 from __future__ import annotations
@@ -28,6 +29,7 @@ from palpate.servo.device_thread import DeviceThread
 from palpate.servo.layout import ENABLE, MOST_TIPS, STOP, SharedBlock
 from palpate.servo.loop import Program, ServoLoop, make_program
 from palpate.servo.options import ServoOptions
+from palpate.servo.orphan import end_with_parent
 from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.source import RendererSource
 from palpate.servo.tick import TickParameters, tick_arrays
@@ -154,6 +156,7 @@ class ServoProcess:
             self._mapping,
             self._loop,
             read_ahead_s=self.job.options.read_ahead_s,
+            delay_s=self._device_delay_ticks() / self.job.options.rate_hz,
             on_start=lambda: real_time_thread(max(priority - 5, 0)),
         )
         self._pump = pump
@@ -234,6 +237,10 @@ def main(argv: list[str]) -> int:
 
     block = SharedBlock(argv[1])
     control = block.arrays.control
+    jobs: list[Job] = []
+    end_with_parent(
+        int(argv[2]), block.arrays, lambda: bool(jobs) and jobs[0].options.on_orphan == "continue"
+    )
 
     def end(number: int, frame: Any) -> None:
         control[ENABLE] = 0
@@ -243,7 +250,8 @@ def main(argv: list[str]) -> int:
     signal.signal(signal.SIGINT, end)
     commands = sys.stdin.buffer
     try:
-        ServoProcess(block, pickle.load(commands), tell).run(commands)
+        jobs.append(pickle.load(commands))
+        ServoProcess(block, jobs[0], tell).run(commands)
     except PalpateError as error:
         tell({"error": str(error), "kind": type(error).__name__})
         return 2

@@ -15,6 +15,7 @@ from numba import njit
 
 from devices.safety import (
     LATCHING,
+    LONGEST_GAP_S,
     PASSIVITY,
     SILENT,
     Reading,
@@ -64,10 +65,11 @@ from render.support import add_support_force
     IN_TIP_VELOCITY,
     IN_QUATERNION,
     IN_FORCE_MAP,
-) = (0, 1, 2, 3, 4, 5, 6, 7, 10, 13, 16, 19, 23)
-IN_WIDTH = 32
-OUT_TICK, OUT_TIME, OUT_FORCE = 0, 1, 2
-OUT_WIDTH = 5
+    IN_WORK,
+) = (0, 1, 2, 3, 4, 5, 6, 7, 10, 13, 16, 19, 23, 32)
+IN_WIDTH = 33
+OUT_TICK, OUT_TIME, OUT_FORCE, OUT_HOLD = 0, 1, 2, 5
+OUT_WIDTH = 6
 
 
 class TickParameters(NamedTuple):
@@ -80,9 +82,9 @@ class TickParameters(NamedTuple):
     silence_s: float = 0.0
 
 
-SEQUENCE, LAST_S, COMPUTE_S, LAST_BEAT, SILENT_S, LAST_ENABLE = range(6)
-"""Cells of `previous`, all of the tick before: the pose's sequence, its deadline, what it took, the parent's
-heartbeat and how long that has stood still, and the enabling."""
+SEQUENCE, LAST_S, COMPUTE_S, LAST_BEAT, SILENT_S, LAST_ENABLE, LAST_POSE_S = range(7)
+"""Cells of `previous`, all of the tick before: the pose's sequence, when it started, what it took, the
+parent's heartbeat and how long that has stood still, the enabling, and when its pose was read."""
 
 
 class TickArrays(NamedTuple):
@@ -125,7 +127,7 @@ def tick_arrays(shared: SharedArrays, offsets_m: np.ndarray, workspace_centre_m:
         forces=np.zeros(offsets.shape),
         rendered=np.zeros(3),
         wanted=np.zeros(3),
-        previous=np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        previous=np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1e9]),
         timespec=np.zeros(2, dtype=np.int64),
         word=np.ones(1, dtype=np.int64),
         safety=safety_state(workspace_centre_m),
@@ -175,7 +177,8 @@ def after(
 ):
     """From the renderer's forces `felt` and the support to the command; writes outbox, snapshot and ring."""
     pose, wanted, rendered, forces = arrays.pose, arrays.wanted, arrays.rendered, arrays.forces
-    dt_s = _elapsed(arrays, parameters, deadline_ns)
+    dt_s = _elapsed(arrays, parameters, now_ns)
+    age_s = now_ns * 1e-9 - pose[IN_TIME]
     velocity = pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3]
     contacts = 0
     # loops, not slice assignments, which take numba seconds to compile
@@ -201,11 +204,23 @@ def after(
     position = pose[IN_POSITION : IN_POSITION + 3]
     fresh = pose[IN_SEQUENCE] != arrays.previous[SEQUENCE]
     arrays.previous[SEQUENCE] = pose[IN_SEQUENCE]
-    damped = passivity_before(parameters.passivity, arrays.passivity, wanted, position, fresh, dt_s)
+    between_s = min(max(pose[IN_TIME] - arrays.previous[LAST_POSE_S], 0.0), LONGEST_GAP_S)
+    arrays.previous[LAST_POSE_S] = pose[IN_TIME]
+    damped = passivity_before(
+        parameters.passivity,
+        arrays.passivity,
+        wanted,
+        position,
+        pose[IN_WORK],
+        fresh,
+        between_s,
+        dt_s,
+        age_s,
+    )
     reading = Reading(
         position,
         pose[IN_VELOCITY : IN_VELOCITY + 3],
-        now_ns * 1e-9 - pose[IN_TIME],
+        age_s,
         int(pose[IN_SEQUENCE]),
         pose[IN_CONNECTED] != 0.0,
         pose[IN_CALIBRATED] != 0.0,
@@ -231,8 +246,12 @@ def after(
     arrays.outbox[OUT_FORCE] = command[0]
     arrays.outbox[OUT_FORCE + 1] = command[1]
     arrays.outbox[OUT_FORCE + 2] = command[2]
+    arrays.outbox[OUT_HOLD] = arrays.passivity.hold[0]
     end_write(arrays.outbox_version)
-    _publish(arrays, reasons, contacts, now_ns, deadline_ns, parameters.period_ns)
+    if parameters.safety.max_force_n <= 0.0:
+        reasons = 0  # there is no force that anything could be wrong with
+    depth = depths[0] if touching[0] != 0 else 0.0
+    _publish(arrays, reasons, contacts, depth, now_ns, deadline_ns, parameters.period_ns)
     _publish_tips(arrays, forces, points, normals, depths, touching, stiffness)
 
 
@@ -249,18 +268,17 @@ def _parent_is_silent(arrays, parameters, dt_s):
 
 
 @njit(cache=True, nogil=True)
-def _elapsed(arrays, parameters, deadline_ns):
-    """Seconds since the last tick by deadlines, so that jitter is no acceleration; at most five ticks."""
-    period_s = parameters.period_ns * 1e-9
-    elapsed = period_s
+def _elapsed(arrays, parameters, now_ns):
+    """Seconds since the last tick started; what moved meanwhile is told by the readings' own times."""
+    elapsed = parameters.period_ns * 1e-9
     if arrays.previous[LAST_S] > 0.0:
-        elapsed = deadline_ns * 1e-9 - arrays.previous[LAST_S]
-    arrays.previous[LAST_S] = deadline_ns * 1e-9
-    return min(max(elapsed, period_s), 5.0 * period_s)
+        elapsed = now_ns * 1e-9 - arrays.previous[LAST_S]
+    arrays.previous[LAST_S] = now_ns * 1e-9
+    return elapsed
 
 
 @njit(cache=True, nogil=True)
-def _publish(arrays, reasons, contacts, now_ns, deadline_ns, period_ns):
+def _publish(arrays, reasons, contacts, depth, now_ns, deadline_ns, period_ns):
     """The tick's row in the ring and the statistics."""
     pose, command, counts = arrays.pose, arrays.safety.force, arrays.shared.counts
     if counts[STARTED] == 0:
@@ -284,6 +302,7 @@ def _publish(arrays, reasons, contacts, now_ns, deadline_ns, period_ns):
     row[21] = arrays.shared.control[ENABLE]
     row[22] = (now_ns - deadline_ns) * 1e-9
     row[23] = arrays.previous[COMPUTE_S]
+    row[24] = depth
     fence()
     arrays.shared.ring_head[0] += 1
     if contacts:

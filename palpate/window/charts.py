@@ -13,11 +13,17 @@ DEPTH_COLOUR = "#2e7d32"
 
 
 class LiveCharts:
-    """Two charts on the plotter's active subplot; the second renderer's force is dashed over the first's."""
+    """Two charts on the plotter's active subplot; the second renderer's force is dashed over the first's.
 
-    def __init__(self, plotter: pyvista.Plotter, seconds: float, names: tuple[str, ...]) -> None:
-        self._force = self._chart(plotter, (0.0, 0.0), "force (N)", seconds)
-        self._depth = self._chart(plotter, (0.5, 0.0), "depth (mm)", seconds)
+    left: the share of the subplot's width that stays free.
+    """
+
+    def __init__(
+        self, plotter: pyvista.Plotter, seconds: float, names: tuple[str, ...], *, left: float = 0.0
+    ) -> None:
+        width = 0.5 * (1.0 - left)
+        self._force = self._chart(plotter, left, width, "force (N)", seconds)
+        self._depth = self._chart(plotter, left + width, width, "depth (mm)", seconds)
         nothing = np.zeros(2), np.zeros(2)
         self._lines = [
             self._force.line(*nothing, color=colour, width=2.0, style=style, label=name)
@@ -30,9 +36,9 @@ class LiveCharts:
 
     @staticmethod
     def _chart(
-        plotter: pyvista.Plotter, corner: tuple[float, float], label: str, seconds: float
+        plotter: pyvista.Plotter, left: float, width: float, label: str, seconds: float
     ) -> pyvista.Chart2D:
-        chart = pyvista.Chart2D(size=(0.5, 1.0), loc=corner, x_label="time (s)", y_label=label)
+        chart = pyvista.Chart2D(size=(width, 1.0), loc=(left, 0.0), x_label="time (s)", y_label=label)
         chart.x_range = [-seconds, 0.0]
         chart.background_color = "white"
         for axis in (chart.x_axis, chart.y_axis):

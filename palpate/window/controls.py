@@ -12,6 +12,9 @@ import numpy as np
 import pyvista
 import vtk
 
+from palpate.window.game import Game
+from palpate.window.keys import KEYS
+from palpate.window.orbit import Orbit
 from palpate.window.pointer import Pointer
 from palpate.window.session import MODULUS_STEP, TouchSession
 from scenes.phantoms import Region
@@ -19,7 +22,6 @@ from scenes.phantoms import Region
 INCLUSION_RADIUS_M = 0.008
 INCLUSION_RATIO = 8.0
 STEP_M = 0.002
-BESIDES = ("hunt-crossley", "kelvin-voigt")
 MOVES = {
     "Left": (-1, 0, 0),
     "Right": (1, 0, 0),
@@ -29,6 +31,15 @@ MOVES = {
     "Next": (0, 0, -1),
 }
 """Key symbols that move the inclusion, in steps along the scene's axes."""
+NAMES = {
+    "equal": "plus",
+    "KP_Add": "plus",
+    "KP_Subtract": "minus",
+    "Escape": "q",
+    "Home": "v",
+    "KP_Enter": "Return",
+}
+"""Key symbols that do what another does."""
 
 
 class Controlled(Protocol):
@@ -37,6 +48,8 @@ class Controlled(Protocol):
     session: TouchSession
     plotter: pyvista.Plotter
     pointer: Pointer
+    orbit: Orbit
+    game: Game | None
     notice: str
 
     @property
@@ -52,6 +65,9 @@ class Controlled(Protocol):
     def toggle_help(self) -> None:
         """Show it, or not."""
 
+    def answer(self) -> None:
+        """The game's: the nodule is here."""
+
     def close(self) -> None:
         """End."""
 
@@ -63,7 +79,7 @@ class Controls:
         self._window = window
         self._session = window.session
         self._dragged: tuple[np.ndarray, np.ndarray] | None = None
-        self._turning = False
+        self._viewed: tuple[Callable[[float, float], None], int, int] | None = None
         plotter = window.plotter
         iren = plotter.iren
         assert iren is not None, "pyvista makes an interactor with its plotter"
@@ -80,8 +96,8 @@ class Controls:
             ("LeftButtonReleaseEvent", lambda *_: self._left(False)),
             ("MiddleButtonPressEvent", lambda *_: self.grab()),
             ("MiddleButtonReleaseEvent", lambda *_: self.let_go()),
-            ("RightButtonPressEvent", lambda *_: self._turn(True)),
-            ("RightButtonReleaseEvent", lambda *_: self._turn(False)),
+            ("RightButtonPressEvent", lambda *_: self._view(True)),
+            ("RightButtonReleaseEvent", lambda *_: self._view(False)),
             ("MouseWheelForwardEvent", lambda *_: self.wheel(1)),
             ("MouseWheelBackwardEvent", lambda *_: self.wheel(-1)),
             ("MouseMoveEvent", lambda *_: self._moved()),
@@ -102,18 +118,23 @@ class Controls:
         """The tip goes in, or comes out again."""
         self._window.pointer.pressing = on
 
-    def _turn(self, on: bool) -> None:
-        self._turning = on
-        self._style.FindPokedRenderer(*self.interactor.GetEventPosition())
-        (self._style.StartRotate if on else self._style.EndRotate)()
+    def _view(self, on: bool) -> None:
+        """The right button turns the view, with Shift it moves it."""
+        orbit = self._window.orbit
+        move = orbit.pan if self.interactor.GetShiftKey() else orbit.turn
+        self._viewed = (move, *self.interactor.GetEventPosition()) if on else None
 
     def _moved(self) -> None:
         x, y = self.interactor.GetEventPosition()
         if self._dragged is not None:
             self._drag(x, y)
-        elif not self._turning:
+        elif self._viewed is not None:
+            move, last_x, last_y = self._viewed
+            height = self._window.plotter.window_size[1]
+            move((x - last_x) / height, (y - last_y) / height)
+            self._viewed = move, x, y
+        else:
             self.point(x, y)
-        self._style.OnMouseMove()
 
     def point(self, x: int, y: int) -> None:
         """The mouse is over pixel (x, y), counted from the lower left."""
@@ -127,16 +148,16 @@ class Controls:
         return next((renderer for renderer in pictures if renderer.IsInViewport(x, y)), None)
 
     def wheel(self, steps: int) -> None:
-        """Depth of a press; with Ctrl held the distance of the eye; with a ball in hand its distance."""
-        if self.interactor.GetControlKey():
-            self._window.plotter.camera.Dolly(1.1**steps)
+        """Nearer or farther; with Ctrl or while pressing: how deep; with a ball in hand: its distance."""
+        if self.interactor.GetControlKey() or self._window.pointer.pressing:
+            self._window.pointer.deeper(steps)
         elif self._dragged is not None:
             away = np.array(self._window.plotter.camera.direction)
             centre, start = self._dragged
             self._dragged = centre + steps * STEP_M * away, start
             self._drag(*self.interactor.GetEventPosition())
         else:
-            self._window.pointer.deeper(steps)
+            self._window.orbit.zoom(steps)
 
     def grab(self) -> None:
         """Take the inclusion in hand: the mouse drags it in a plane parallel to the picture."""
@@ -168,13 +189,29 @@ class Controls:
 
     def key(self, symbol: str) -> None:
         """A key by VTK's symbol; see palpate.window.keys."""
-        action = self._actions().get(symbol)
-        if action is not None:
-            action()
-        elif symbol in MOVES and self._session.inclusion is not None:
+        name = "arrows" if symbol in MOVES else NAMES.get(symbol, symbol)
+        if name not in self.offered:
+            return
+        if name != "arrows":
+            self._actions()[name]()
+        elif self._session.inclusion is not None:
             centre = np.array(self._session.inclusion.centre_m) + STEP_M * np.array(MOVES[symbol])
             moved = replace(self._session.inclusion, centre_m=_triple(centre))
             self._window.set_inclusion(moved)
+
+    @property
+    def offered(self) -> frozenset[str]:
+        """Which of palpate.window.keys do something now."""
+        session = self._session
+        missing = {
+            "space": session.has_force,
+            "b": bool(session.beside_name),
+            "f": session.feels_inside,
+            "i": session.feels_inside and self._window.game is None,
+            "arrows": session.inclusion is not None and self._window.game is None,
+            "Return": self._window.game is not None,
+        }
+        return frozenset(key for key in KEYS if missing.get(key, True))
 
     def _actions(self) -> dict[str, Callable[[], object]]:
         session, window = self._session, self._window
@@ -188,12 +225,13 @@ class Controls:
         return {
             "space": session.toggle_force,
             "Tab": session.next_renderer,
-            "b": self._next_beside,
+            "b": session.next_beside,
             "plus": stiffer,
-            "equal": stiffer,
-            "KP_Add": stiffer,
             "minus": softer,
-            "KP_Subtract": softer,
+            "bracketleft": lambda: window.pointer.deeper(-1),
+            "bracketright": lambda: window.pointer.deeper(1),
+            "v": window.orbit.reset,
+            "Return": window.answer,
             "f": session.next_friction,
             "c": window.toggle_colour,
             "i": self._toggle_inclusion,
@@ -201,13 +239,7 @@ class Controls:
             "p": self._save_picture,
             "h": window.toggle_help,
             "q": window.close,
-            "Escape": window.close,
         }
-
-    def _next_beside(self) -> None:
-        now = self._session.beside_name
-        if now:  # the layout stays as it began
-            self._session.set_beside(BESIDES[(BESIDES.index(now) + 1) % 2] if now in BESIDES else BESIDES[0])
 
     def _toggle_inclusion(self) -> None:
         if self._session.inclusion is not None:

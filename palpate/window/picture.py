@@ -10,6 +10,7 @@ import pyvista
 from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
 from palpate.window.frames import Frame, View
+from palpate.window.stiffness import DEPTH_M
 from render.base import Renderer
 from render.press import BESIDE
 from render.support import support_plane
@@ -18,6 +19,7 @@ from scenes.phantoms import Region
 ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
+STIFFNESS = f"secant stiffness at {1000 * DEPTH_M:.0f} mm (N/m)"
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
 Colours = Literal["viridis", "YlOrRd"]
@@ -76,14 +78,11 @@ class ObjectPicture:
         """As far as each point has moved, mm."""
         self._colour_by("displacement (mm)", "YlOrRd", DISPLACEMENT_RANGE_MM)
 
-    def colour_by_stiffness(self, stiffness_n_per_m: np.ndarray) -> None:
-        """(n,) N/m a point, 0 where it cannot be pressed; the colours span all but the outermost two per
-        cent."""
-        name = "stiffness (N/m)"
-        pressed = stiffness_n_per_m > 0
-        shown = stiffness_n_per_m[pressed] if pressed.any() else stiffness_n_per_m
+    def colour_by_stiffness(self, stiffness_n_per_m: np.ndarray, limits: tuple[float, float]) -> None:
+        """(n,) N/m a point, 0 where it cannot be pressed: the secant of a press; limits: of the colours."""
+        name = STIFFNESS
         self._surface[name] = stiffness_n_per_m
-        self._colour_by(name, "viridis", tuple(np.percentile(shown, [2, 98])))
+        self._colour_by(name, "viridis", limits)
 
     def _colour_by(self, name: str, colours: Colours, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
@@ -170,4 +169,5 @@ def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> 
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
     middle = middle - ((middle - support.point) @ support.normal) * support.normal
     plane = pyvista.Plane(center=middle, direction=support.normal, i_size=size, j_size=size)
-    plotter.add_mesh(plane, color="#d9dee5", lighting=False)
+    # never seen from below: the eye stays over it
+    plotter.add_mesh(plane, color="#d9dee5", lighting=False, culling="back")

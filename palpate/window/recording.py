@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, replace
+from collections.abc import Mapping as MappingType
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,6 @@ from mechanics.recording import write_recording
 from palpate.servo import Servo
 from palpate.servo.recorder import Recorder
 from palpate.window.tracing import BaseTracing
-from scenes.phantoms import Region
 
 MARGIN_S = 0.05
 
@@ -53,8 +53,8 @@ class SessionRecording:
             self._last = int(rows["tick"][-1])
             self._tracing.add(rows["tip"], rows["tick"])
 
-    def write(self, title: str, young_modulus_pa: float, inclusion: Region | None) -> Path:
-        """Write it; young_modulus_pa, inclusion: what was rendered at the end.
+    def write(self, title: str, rendered: MappingType[str, Any]) -> Path:
+        """Write it; rendered: what was felt at the end, as it stands in [truth].
 
         Where the base was traced, the recording states when; else the model's own base stands in.
         """
@@ -71,9 +71,7 @@ class SessionRecording:
             base_model=None if base is None else base.resolve(),
             boundary_phase=phase,
         )
-        truth: dict[str, Any] = {"young_modulus_pa": young_modulus_pa, "effects": sorted(self._model.effects)}
+        truth = dict(rendered)
         if self._servo.options.loosened:
             truth["protection_loosened"] = list(self._servo.options.loosened)
-        if inclusion is not None:
-            truth["inclusion"] = {k: v for k, v in asdict(inclusion).items() if k != "name"}
         return write_recording(self.path, recording, truth=truth)

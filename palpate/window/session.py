@@ -8,9 +8,11 @@ that it feels the same path at 1 kHz.
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import asdict
 from pathlib import Path
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 
@@ -35,6 +37,7 @@ from render.registry import create, names
 from render.scene import scene_of
 from scenes.phantoms import Region
 
+BESIDES = ("hunt-crossley", "kelvin-voigt")
 FRICTIONS = (math.inf, 1.0, 0.5, 0.2, 0.05)
 MODULUS_STEP = 1.25
 
@@ -153,11 +156,11 @@ class TouchSession:
         beside = self._beside  # the worker may put another in its place
         sizes = np.zeros(len(rows)) if beside is None else beside.follow(rows["tip"])
         if not self._inclusion.settled:
-            self.worker.run("moving the inclusion", self._follow_inclusion)
+            self.worker.offer("moving the inclusion", self._follow_inclusion)
         snapshot = self._servo.snapshot()
         if snapshot is None:
             return None
-        self._add_to_trace(rows, sizes, snapshot)
+        self._add_to_trace(rows, sizes)
         felt = snapshot.forces_n.sum(axis=0)
         views = [View(self.renderer_name, felt, self._displacement(snapshot))]
         if beside is not None:
@@ -199,14 +202,11 @@ class TouchSession:
             scene = scene.no_stiffer_than(spec.max_stiffness_n_per_m)
         self._beside = Beside(name, scene, self._servo.tip_radius_m)
 
-    def _add_to_trace(self, rows: np.ndarray, beside: np.ndarray, snapshot: ServoSnapshot) -> None:
+    def _add_to_trace(self, rows: np.ndarray, beside: np.ndarray) -> None:
         if not len(rows):
             return
         force = np.linalg.norm(rows["rendered"], axis=1)
-        normal = snapshot.normals[0]
-        first_touch = snapshot.points[0] + self._servo.tip_radius_m * normal
-        depth = np.where(rows["touching"] > 0, -(rows["tip"] - first_touch) @ normal, 0.0)
-        self.trace.add(np.column_stack([rows["time_s"], force, depth, beside]))
+        self.trace.add(np.column_stack([rows["time_s"], force, rows["depth"], beside]))
 
     def begin_recording(self, path: Path) -> None:
         """Record from now on; the file is written by `end_recording` or on close."""
@@ -217,41 +217,59 @@ class TouchSession:
         recording, self.recording = self.recording, None
         if recording is None:
             return None
-        return recording.write(self.title, self.young_modulus_pa, self.inclusion)
+        rendered: dict[str, Any] = {"renderer": self.renderer_name}
+        if self.feels_inside:
+            rendered["young_modulus_pa"] = self.young_modulus_pa
+            rendered["effects"] = sorted(self.model.effects)
+            if math.isfinite(self.friction):
+                rendered["friction"] = self.friction
+            if self.inclusion is not None:
+                rendered["inclusion"] = {k: v for k, v in asdict(self.inclusion).items() if k != "name"}
+        return recording.write(self.title, rendered)
 
     def set_renderer(self, name: str) -> None:
         """Feel another renderer of the same model."""
-
-        def job() -> None:
-            if self._pictures and name not in self._renderers:
-                self._renderers[name] = self._create(name)
-            self._servo.set_renderer(name)
-            self._apply()
-
-        if name != self.renderer_name:
-            self.worker.run(f"loading {name}", job)
+        self.worker.run(f"loading {name}", lambda: self._feel(name))
 
     def next_renderer(self) -> None:
         """The next of the registry."""
-        every = names()
-        self.set_renderer(every[(every.index(self.renderer_name) + 1) % len(every)])
+        self.worker.run("loading the next renderer", lambda: self._feel(_after(self.renderer_name, names())))
 
-    def set_beside(self, name: str) -> None:
-        """Another second renderer, '' for none."""
+    def _feel(self, name: str) -> None:
+        if name == self.renderer_name:
+            return
+        if self._pictures and name not in self._renderers:
+            self._renderers[name] = self._create(name)
+        self._servo.set_renderer(name)
+        self._apply()
 
-        def job() -> None:
-            if name and name not in self._renderers:
-                self._renderers[name] = self._create(name)
-            self._beside_name = name
-            self._restart_beside()
+    def next_beside(self) -> None:
+        """The next second renderer, where there is one."""
+        self.worker.run(
+            "loading the next renderer", lambda: self._compare(_after(self._beside_name, BESIDES))
+        )
 
-        self.worker.run(f"loading {name}", job)
+    def _compare(self, name: str) -> None:
+        if name not in self._renderers:
+            self._renderers[name] = self._create(name)
+        self._beside_name = name
+        self._restart_beside()
+
+    @property
+    def feels_inside(self) -> bool:
+        """Whether what is felt knows friction and the object's inside: one-dimensional models do not."""
+        return self.renderer_name == "fem"
+
+    @property
+    def has_force(self) -> bool:
+        """Whether the device gives any."""
+        return self._has_force
 
     def scale_modulus(self, factor: float) -> None:
         """Stiffer or softer; costs nothing."""
-        modulus = self.young_modulus_pa * factor
 
         def job() -> None:
+            modulus = self.young_modulus_pa * factor
             self.young_modulus_pa = modulus
             self._servo.set_modulus(modulus)
             for name, renderer in list(self._renderers.items()):
@@ -263,9 +281,9 @@ class TouchSession:
 
     def next_friction(self) -> None:
         """Stick, then ever more slippery, then stick again."""
-        friction = next((f for f in FRICTIONS if f < self.friction), FRICTIONS[0])
 
         def job() -> None:
+            friction = next((f for f in FRICTIONS if f < self.friction), FRICTIONS[0])
             self._servo.set_friction(friction)
             self.friction = friction
 
@@ -313,3 +331,8 @@ class TouchSession:
 
     def __exit__(self, *error: object) -> None:
         self.close()
+
+
+def _after(name: str, every: Sequence[str]) -> str:
+    """The next of them all, round about; the first for one that is none of them."""
+    return every[(every.index(name) + 1) % len(every)] if name in every else every[0]

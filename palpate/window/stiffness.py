@@ -25,7 +25,10 @@ class StiffnessMap:
         self._shown, self._ready = (), None
 
     def of(self, renderers: tuple[Renderer, ...]) -> list[np.ndarray]:
-        """(n,) N/m for each renderer, once, when they are ready; an empty list before and after."""
+        """(n,) N/m for each renderer, once, when they are ready; an empty list before and after.
+
+        Secant stiffness: force over depth of a press of DEPTH_M.
+        """
         if self._ready is not None:
             (shown, maps), self._ready = self._ready, None
             if _same(shown, renderers):
@@ -39,8 +42,16 @@ class StiffnessMap:
                     [np.nan_to_num(local_stiffness(r, self._radius_m, DEPTH_M)) for r in renderers],
                 )
 
-            self._worker.run("pressing every place for its stiffness", job)
+            self._worker.offer("pressing every place for its stiffness", job)
         return []
+
+
+def common_limits(maps: list[np.ndarray]) -> tuple[float, float]:
+    """One scale over all pictures: all but the outermost two per cent of what can be pressed, N/m."""
+    pressed = [values[values > 0] for values in maps]
+    shown = np.concatenate([*pressed, np.zeros(0 if any(map(len, pressed)) else 1)])
+    low, high = np.percentile(shown, [2, 98])
+    return float(low), float(high)
 
 
 def _same(a: tuple[Renderer, ...], b: tuple[Renderer, ...]) -> bool:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
+from textwrap import wrap
 
 import numpy as np
 import pyvista
@@ -18,11 +19,13 @@ from mechanics.files import PNG, atomic_file
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
 from palpate.window.frames import Frame
+from palpate.window.game import Game
 from palpate.window.keys import help_text
+from palpate.window.orbit import Orbit
 from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
-from palpate.window.stiffness import StiffnessMap
+from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.words import heading, hint, status
 from render.base import Renderer
 from scenes.phantoms import Region
@@ -31,6 +34,11 @@ from scenes.scene import Scene
 PERIOD_MS = 16
 SIZE = (1280, 800)
 CHARTS_SHARE = 0.28
+PANEL_SHARE = 0.42
+"""Of the charts' row: the panel of words, which covers nothing."""
+LEAST_TYPE = 9
+LETTER = 0.62
+"""Mean width of a letter over its type's size."""
 
 
 class TouchWindow:
@@ -55,6 +63,9 @@ class TouchWindow:
         self._last_s = time.perf_counter()
         self._end_s = float("inf")
         self._map = StiffnessMap(session.worker, session.servo.tip_radius_m)
+        nodules = tuple(session.model.material.inclusions.values())
+        up = session.model.support.normal
+        self.game = Game(nodules, up) if scene.find and nodules else None
         self._coloured = scene.colour == "stiffness"
         halves = [(0, slice(None)), (1, slice(None))]
         self.plotter = pyvista.Plotter(
@@ -73,19 +84,22 @@ class TouchWindow:
         assert window is not None, "a plotter has one until it is closed"
         window.SetMultiSamples(0)
         self._headings: list[pyvista.Text] = []
+        self._texts: list[tuple[pyvista.Text, int]] = []
+        self._scaled_for = (0, 0)
         self.pictures = [self._picture(side) for side in range(self.sides)]
         self.plotter.subplot(1, 0)
-        self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names)
+        self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names, left=PANEL_SHARE)
+        self._status = self._text("", (0.008, 0.95), "top")
+        self._hint = self._text(hint(mouse=channel is not None), (0.008, 0.04), "bottom", size=11)
         self.plotter.subplot(0, 0)
-        self._status = self._text("", (0.01, 0.985), "top")
-        self._hint = self._text(hint(mouse=channel is not None), (0.01, 0.02), "bottom", size=11)
-        self._help = self._text(help_text(), (0.01, 0.02), "bottom", font="courier")
+        self._help = self._text("", (0.01, 0.98), "top", font="courier")
+        self._help.prop.background_color, self._help.prop.background_opacity = "white", 0.9
         self._help.SetVisibility(False)
         points, triangles = self.pictures[0].rest_surface
         model = session.model
         radius = session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, model.support.point, model.support.normal)
-        self._look()
+        self.orbit = self._look()
         self.controls = Controls(self)
 
     @property
@@ -115,6 +129,7 @@ class TouchWindow:
         actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
         actor.SetPosition(*place)
         actor.prop.justification_vertical = anchor
+        self._texts.append((actor, size))
         self.plotter.add_actor(actor, reset_camera=False)
         return actor
 
@@ -134,7 +149,7 @@ class TouchWindow:
             label=name if side else "",
         )
 
-    def _look(self) -> None:
+    def _look(self) -> Orbit:
         """From the person's side, a little above; both pictures share the camera."""
         model = self.session.model
         up = model.support.normal
@@ -144,10 +159,10 @@ class TouchWindow:
         distance = 2.1 * np.linalg.norm(np.ptp(model.mesh.points, axis=0))
         eye = middle + distance * (-0.8 * away + 0.6 * up)
         self.plotter.subplot(0, 0)
-        self.plotter.camera_position = [tuple(eye), tuple(middle), tuple(up)]
-        self.plotter.camera.clipping_range = (0.05 * distance, 5.0 * distance)
-        if self.sides == 2:
-            self.plotter.renderers[1].camera = self.plotter.renderers[0].camera
+        camera = self.plotter.camera
+        for renderer in self.picture_renderers[1:]:
+            renderer.camera = camera
+        return Orbit(camera, middle, up, eye)
 
     def toggle_colour(self) -> None:
         """Colour by displacement, or by local stiffness as soon as that is computed."""
@@ -158,9 +173,36 @@ class TouchWindow:
                 picture.colour_by_displacement()
 
     def toggle_help(self) -> None:
-        """Show every key, or not."""
+        """Show every key that does something now, or not."""
+        self._help.input = help_text(self.controls.offered)
         self._help.SetVisibility(not self._help.GetVisibility())
-        self._hint.SetVisibility(not self._help.GetVisibility())
+
+    def answer(self) -> None:
+        """The game's: the nodule is where the mouse points; it is shown until the next touch."""
+        target = self.pointer.target
+        point = self.pointer.tip_m if target is None else target.point
+        if self.game is not None and self.game.answer(point, time.perf_counter(), self.session.renderer_name):
+            self._reveal(True)
+
+    def _reveal(self, on: bool) -> None:
+        assert self.game is not None
+        region = None
+        if on:
+            ball = self.game.hidden[0]
+            region = Region("nodule", ball.centre_m, ball.radius_m, ball.modulus_ratio)
+        for picture in self.pictures:
+            picture.show_inclusion(region)
+        self._map.forget()
+        if not on and self._coloured:
+            for picture in self.pictures:
+                picture.colour_by_displacement()
+
+    def _play(self, frame: Frame) -> None:
+        """The clock runs from a touch, which hides the nodule again."""
+        if self.game is not None and frame.touching:
+            if self.game.answered:
+                self._reveal(False)
+            self.game.touched(time.perf_counter())
 
     def set_inclusion(self, region: Region | None) -> None:
         """Draw it there, and let it be felt there as soon as that is computed."""
@@ -185,15 +227,32 @@ class TouchWindow:
     def _draw(self, frame: Frame) -> None:
         for picture, view in zip(self.pictures, frame.views, strict=False):
             picture.update(frame, view)
-        if self._coloured and self.session.inclusion_felt:
+        self._play(frame)
+        if self._coloured and self.session.inclusion_felt and (self.game is None or self.game.answered):
             maps = self._map.of(self._drawing())
+            limits = common_limits(maps)
             for picture, stiffness in zip(self.pictures, maps, strict=False):
-                picture.colour_by_stiffness(stiffness)
+                picture.colour_by_stiffness(stiffness, limits)
         self._charts.update(self.session.trace)
-        self._status.input = status(self.session, self.scene, self.pointer, frame, self.notice)
+        lines = status(self.session, self.scene, self.pointer, frame, self.notice)
+        if self.game is not None:
+            lines += self.game.lines(time.perf_counter())
+        self._scale_type()
+        width, _ = self.plotter.window_size
+        letters = int(PANEL_SHARE * width / (LETTER * self._status.prop.font_size))
+        self._status.input = "\n".join(part for line in lines for part in wrap(line, max(letters, 20)))
         for side, (over, name) in enumerate(zip(self._headings, self._names, strict=True)):
             over.input = heading(name, felt=side == 0)
         self.frames += 1
+
+    def _scale_type(self) -> None:
+        """Type grows and shrinks with the window."""
+        size = tuple(self.plotter.window_size)
+        if size != self._scaled_for:
+            self._scaled_for = size
+            share = min(size[0] / SIZE[0], size[1] / SIZE[1])
+            for text, points in self._texts:
+                text.prop.font_size = max(LEAST_TYPE, round(points * share))
 
     def run(self, seconds: float | None = None, *, screenshot: Path | None = None) -> None:
         """Show until closed or the time is up."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import queue
 import threading
 from collections.abc import Callable
 
@@ -9,7 +10,7 @@ from mechanics.errors import PalpateError
 
 
 class Worker:
-    """Runs one job at a time; a request that comes meanwhile is dropped.
+    """Runs one job after the other, in the order in which they were asked for.
 
     busy: what is being done, in words, '' for nothing. failure: why the last job failed, '' where it did not.
     """
@@ -17,31 +18,34 @@ class Worker:
     def __init__(self) -> None:
         self.busy = ""
         self.failure = ""
-        self._thread: threading.Thread | None = None
+        self._jobs: queue.Queue[tuple[str, Callable[[], None]]] = queue.Queue()
+        threading.Thread(target=self._work, name="touch worker", daemon=True).start()
 
-    def run(self, words: str, job: Callable[[], None]) -> bool:
-        """Begin a job; False where one is still running."""
-        if self._thread is not None and self._thread.is_alive():
+    def run(self, words: str, job: Callable[[], None]) -> None:
+        """Do a job, after those that were asked for before."""
+        self._jobs.put((words, job))
+
+    def offer(self, words: str, job: Callable[[], None]) -> bool:
+        """Do a job at once, which will be offered again where it could not; False while there are others."""
+        if self._jobs.unfinished_tasks:
             return False
+        self.run(words, job)
+        return True
 
-        def work() -> None:
+    def _work(self) -> None:
+        while True:
+            self.busy, job = self._jobs.get()
             try:
                 job()
                 self.failure = ""
             except PalpateError as error:
                 self.failure = str(error)
-            except Exception as error:
+            except Exception as error:  # the next job must find its worker
                 self.failure = f"{type(error).__name__}: {error}"
-                raise
             finally:
                 self.busy = ""
-
-        self.busy = words
-        self._thread = threading.Thread(target=work, name="touch worker", daemon=True)
-        self._thread.start()
-        return True
+                self._jobs.task_done()
 
     def wait(self) -> None:
-        """Until the job is done."""
-        if self._thread is not None:
-            self._thread.join()
+        """Until every job is done."""
+        self._jobs.join()

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.interpolate import PchipInterpolator
 
 from mechanics.errors import RecordingError
 from reconstruct.external.compression import read_compression
@@ -108,7 +108,6 @@ class Law:
     shapes: tuple[float, ...]
     columns: Callable[[np.ndarray, float], np.ndarray]
     young: Callable[[np.ndarray, float], float]
-    positive: bool = False
 
 
 def _powers(stretch: np.ndarray, count: int) -> np.ndarray:
@@ -178,10 +177,7 @@ def fit_law(curves: Sequence[Uniaxial], law: Law) -> Fitted:
     for zero in _ZEROS:
         for shape in law.shapes:
             columns = law.columns(stretch - zero, shape) * weight[:, None]
-            if law.positive:
-                coefficients = nnls(columns, stress * weight)[0]
-            else:
-                coefficients = np.linalg.lstsq(columns, stress * weight, rcond=None)[0]
+            coefficients = np.linalg.lstsq(columns, stress * weight, rcond=None)[0]
             cost = float(((columns @ coefficients - stress * weight) ** 2).sum())
             if best is None or cost < best[0]:
                 best = cost, Fitted(law, coefficients, float(shape), float(zero))
@@ -209,20 +205,23 @@ def held_out(curves: Sequence[Uniaxial], strain: float = MOST_STRAIN) -> dict[st
 def _by_blocks(curve: Uniaxial) -> dict[str, np.ndarray]:
     block = np.minimum(np.arange(len(curve.stress)) * BLOCKS // len(curve.stress), BLOCKS - 1)
     predicted = {name: np.zeros(len(block)) for name in (*(law.name for law in LAWS), CEILING)}
-    for k in range(BLOCKS):
+    for k in range(1, BLOCKS - 1):
         held = block == k
         rest = Uniaxial(curve.stretch[~held], curve.stress[~held], curve.name)
         for law in LAWS:
             predicted[law.name][held] = fit_law([rest], law).stress(curve.stretch[held])
         predicted[CEILING][held] = _interpolated(rest, curve.stretch[held])
-    return {name: np.array([_missed(curve, p)]) for name, p in predicted.items()}
+    inner = (block > 0) & (block < BLOCKS - 1)
+    between = Uniaxial(curve.stretch[inner], curve.stress[inner], curve.name)
+    return {name: np.array([_missed(between, p[inner])]) for name, p in predicted.items()}
 
 
 def _interpolated(curve: Uniaxial, stretch: np.ndarray) -> np.ndarray:
     order = np.argsort(curve.stretch)
     x, y = np.append(curve.stretch[order], 1.0), np.append(curve.stress[order], 0.0)
     order = np.argsort(x)
-    return np.interp(stretch, x[order], y[order])
+    x, first = np.unique(x[order], return_index=True)
+    return PchipInterpolator(x, y[order][first])(stretch)
 
 
 def _missed(curve: Uniaxial, predicted: np.ndarray) -> float:

@@ -64,7 +64,7 @@ class Wild:
         # from the nearest place between zero and the last force, no further than slew allows in the tick
         dt = one["dt"] if np.isfinite(one["dt"]) and one["dt"] > 0 else 0.0
         share = np.clip(force @ before / max(before @ before, 1e-300), 0.0, 1.0)
-        assert np.linalg.norm(force - share * before) <= SLEW * min(dt, 0.1) * (1 + 1e-9) + 1e-12
+        assert np.linalg.norm(force - share * before) <= SLEW * min(dt, 0.005) * (1 + 1e-9) + 1e-12
 
     def good(self, enable: int, number: int) -> list[np.ndarray]:
         forces = []

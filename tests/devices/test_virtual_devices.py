@@ -15,7 +15,6 @@ from devices.intention import FreeExploration, Path, minimum_jerk
 from devices.mouse import WINDOW_SILENT_S, MouseDevice
 from devices.registry import DEVICES, DeviceChoice, find_devices, make_device
 from devices.replay import ReplayDevice, ReplayOptions
-from devices.safety import SafetyOptions
 from devices.simulated import SimulatedHand, SimulatedOptions
 from mechanics.errors import DeviceError
 from mechanics.recording import Recording
@@ -144,18 +143,22 @@ def test_a_pause_is_not_replayed() -> None:
         late = hand.read()
         clock.now += 5.0
         later = hand.read()
-    assert later.position_m[0] - late.position_m[0] < 0.011
+    assert later.position_m[0] - late.position_m[0] < 0.051
     assert later.time_s == pytest.approx(clock.now)
 
 
-def test_a_pause_is_no_jump_to_the_safety_filter() -> None:
+def test_a_hand_goes_on_during_a_stall_with_the_force_that_it_feels_until_that_expires() -> None:
     clock = Clock()
-    travel = Path([0.0, 10.0], [[0, 0, 0], [2.0, 0, 0]], even=True)
-    with SimulatedHand(STILL, travel, clock=clock) as hand:
-        before = run(hand, clock, 2.0)[-1]
+    free = SimulatedOptions(mass_kg=0.5, damping_n_s_per_m=0.0, stiffness_n_per_m=0.0, tremor_m=0.0)
+    with SimulatedHand(free, _rest(), clock=clock) as hand:
+        hand.enable_force()
+        hand.send_force(np.array([2.0, 0.0, 0.0]), hold_s=0.01)
         clock.now += 0.3
         after = hand.read()
-    assert np.linalg.norm(after.position_m - before.position_m) < SafetyOptions().jump_m
+    # 2 N on 0.5 kg for 10 ms, then 290 ms of free flight
+    assert after.velocity_m_per_s == pytest.approx([0.04, 0.0, 0.0])
+    assert after.position_m[0] == pytest.approx(0.5 * 4.0 * 0.01**2 + 0.04 * 0.29)
+    assert hand.work_j == pytest.approx(0.5 * 0.5 * 0.04**2)
 
 
 def test_channel_carries_the_newest_and_survives_torn_writes() -> None:
@@ -223,6 +226,26 @@ def test_mouse_follows_smoothly_and_goes_stale_with_its_window() -> None:
         MouseDevice(clock=clock).open()
     with pytest.raises(DeviceError, match="gone"):
         MouseDevice(channel.path, clock=clock).open()
+
+
+@pytest.mark.parametrize("frames_per_s", [60.0, 8.0, 2.0])
+def test_slow_pictures_make_late_motion_and_no_steps(frames_per_s: float) -> None:
+    """A place moved at 40 mm/s, told rarely: the tip goes at no more than that, between any two ticks."""
+    clock = Clock()
+    channel = PoseChannel.create()
+    with MouseDevice(channel.path, clock=clock) as mouse:
+        start, xs, told = clock.now, [], -1
+        while clock.now < start + 4.0:
+            if int((clock.now - start) * frames_per_s + 1e-6) > told:
+                told += 1
+                channel.write(clock.now, (0.04 * (clock.now - start), 0, 0), 1)
+            clock.now += 0.001
+            xs.append(mouse.read().position_m[0])
+    channel.close()
+    steps = np.diff(xs)
+    assert steps.max() < 1.1 * 0.04e-3 and steps[len(steps) // 2 :].min() > 0.9 * 0.04e-3
+    assert np.abs(np.diff(steps)).max() < 0.04e-3 / 20, "and its speed changes smoothly"
+    assert xs[-1] == pytest.approx(0.16, abs=0.04 * (0.05 + 2.0 / frames_per_s))
 
 
 def _recording() -> Recording:

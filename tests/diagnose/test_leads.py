@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.leads import leads
+from mechanics.leads import leads
 
 WIDTH = 0.25e-3
 

@@ -7,9 +7,10 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import cKDTree
 
 from palpate.cli import main
-from palpate.report.laboratory import PRESSES_SHOWN, simulation_figure
+from palpate.report.laboratory import PRESSES_SHOWN, simulation_figure, view_of
 from scenes.laboratory.simulate import SimulateOptions, simulate
 from scenes.phantoms import phantom
 
@@ -63,3 +64,20 @@ def test_command_draws_a_picture(springs, tmp_path: Path) -> None:
     assert main([*arguments, "--effect", "time_delay=1", "--pictures", str(picture)]) == 0
     assert picture.read_bytes()[:4] == b"\x89PNG"
     assert picture.stat().st_size > 50_000
+
+
+def test_command_writes_a_page_whose_places_lie_on_the_phantom(springs, tmp_path: Path) -> None:
+    page = tmp_path / "c.html"
+    arguments = ["simulate", "cylinder", "-o", str(tmp_path / "c.csv.gz"), "--protocol", "brief", "--frame"]
+    assert main([*arguments, "--effect", "tool_compliance=1", "--report", str(page)]) == 0
+    text = page.read_text(encoding="utf-8")
+    assert 'class="view3d"' in text and "with tool compliance 1" in text and "palpate reconstruct" in text
+    result, _ = _figure({"tool_compliance": 1})
+    body = phantom("cylinder")
+    view = view_of(result, body)
+    near = cKDTree(view.thing.points).query(view.places)[0]
+    assert near.max() < 2e-3, "the places are in the frame of the surface"
+    read, ideal, _ = view.traces.lines
+    assert np.abs(read.force_n - ideal.force_n).max() < 0.1, "noise alone: a soft tool moves the depth"
+    deeper = read.depth_m - view.traces.depth_m
+    assert deeper[ideal.force_n[:, 0] > 0.4].min() > 0.2e-3 and deeper.max() < 5e-3

@@ -82,6 +82,7 @@ def test_a_folder_that_cannot_be_written_still_serves(tmp_path):
     blocked.write_text("no folder")
     found = load_or_build(blocked / "x.bin", "key", lambda: ARRAYS)
     assert np.array_equal(found["a"], ARRAYS["a"])
+    assert not any(a.flags.writeable for a in found.values()), "of the type that mapped ones have"
 
 
 def test_keys_tell_every_change():

@@ -41,7 +41,7 @@ def a_view() -> View:
         Line("with viscoelasticity", 0.5 * measured, "effect", shown=False),
     ]
     thing = Thing(
-        ball.vertices, np.array(ball.vertex_normals), ball.faces, ball.vertices[:, 2] > -0.02,
+        ball.vertices, ball.faces, ball.vertices[:, 2] > -0.02,
         np.array([0, 0, -RADIUS]), np.array([0, 0, 1.0]),
     )  # fmt: skip
     colourings = [

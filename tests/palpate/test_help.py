@@ -28,9 +28,8 @@ def test_help_says_units_before_defaults_and_nothing_that_only_python_has(name):
             continue
         words = told_help(action.help or "")
         assert words and not words.startswith("("), f"{action.option_strings} has no words"
-        assert str(action.metavar).lower() not in UNITS, (
-            f"{action.option_strings}: the unit belongs in brackets"
-        )
+        shown = parser._get_formatter()._format_args(action, "VALUE")
+        assert shown.lower() not in UNITS, f"{action.option_strings}: the unit belongs in brackets"
         unit = re.search(r"\[([^\]]+)\]", words)
         ending = action.option_strings[0].rsplit("-", 1)[-1]
         assert not (unit and ending == unit[1].lower() and ending in UNITS), f"{action.option_strings[0]}"

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 
 from devices.impedance import HandImpedance
+from devices.safety import CLOCK, JUMP, OVER_SPEED, WORDS
 from devices.simulated import SPEC
 from palpate.benchmarks._stability_objects import dome
 from palpate.benchmarks._stability_objects import one as one_on_dome
-from palpate.benchmarks.stability import one, plane_stiffness_n_per_m, press_hold_release
-from palpate.servo.closed_loop import Loop, closed_loop
+from palpate.benchmarks.stability import IMPEDANCES, one, plane_stiffness_n_per_m, press_hold_release
+from palpate.servo.closed_loop import SUBSTEPS, Loop, Timing, closed_loop
 from palpate.servo.elastic_plane import ElasticPlane
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
 from render.fem import FemRenderer
@@ -63,6 +64,50 @@ def test_energy_owed_is_half_a_tick_of_stiffness_without_a_controller():
     depth = np.maximum(0.005 - result.position[:, 2], 0.0)
     expected = 0.5 * k * (np.diff(depth) ** 2).sum()
     np.testing.assert_allclose(result.work_j[-1], expected, rtol=0.05)
+
+
+def late(periods: int, random: np.random.Generator, share: float, usual_ms: float) -> Timing:
+    """Ticks that jitter by a fifth of a period, a share of them late by up to 200 ms, whenever they please.
+
+    The late ones' poses are of any time since the tick before, and what they answer comes late as well.
+    """
+    is_late = random.random(2 * periods) < share
+    stall = np.minimum(random.exponential(usual_ms, 2 * periods), 200.0) * SUBSTEPS
+    jitter = SUBSTEPS + random.integers(-4, 5, 2 * periods)
+    gaps = np.maximum(np.where(is_late, stall, jitter), 4).astype(np.int64)
+    read = np.concatenate([[0], gaps.cumsum()])
+    number = int(np.searchsorted(read, periods * SUBSTEPS))
+    gaps = gaps[:number]
+    lag = np.where(is_late[:number], random.random(number) * gaps, np.minimum(8, gaps - 1))
+    return Timing(read[: number + 1], lag.astype(np.int64))
+
+
+def worst_when_late(seeds, modulus: float) -> tuple[float, set[str]]:
+    """J that light hands got at most, and what the safety filter said, over loops drawn at random."""
+    given, said = 0.0, set()
+    for seed in seeds:
+        random = np.random.default_rng(seed)
+        path = press_hold_release(1000.0, times=3)
+        grasp = IMPEDANCES[1 + random.integers(3)]
+        timing = late(len(path) - 1, random, random.uniform(0.0, 0.5), 10 ** random.uniform(0.0, 1.5))
+        result = closed_loop(
+            ElasticPlane(plane_stiffness_n_per_m(modulus)),
+            SPEC,
+            HandImpedance(random.choice([0.05, 0.1, 0.2]), *grasp),
+            path,
+            loop=Loop(quantisation_m=random.choice([0.0, 5e-5])),
+            timing=timing,
+        )
+        given, said = max(given, result.given_back_j), said | set(result.reasons)
+    return given, said
+
+
+@pytest.mark.parametrize("modulus", [20e3, 1e6])
+def test_whenever_ticks_come_no_hand_gets_a_millijoule_and_none_is_too_fast(modulus):
+    given, said = worst_when_late(range(8), modulus)
+    assert given < 1e-3
+    assert "damped to stay passive" in said
+    assert not said & {WORDS[bit] for bit in (OVER_SPEED, JUMP, CLOCK)}
 
 
 @pytest.mark.parametrize("delay_ticks, expected", [(0.0, 3000.0), (0.5, 3000.0 / 4.0)])

@@ -202,6 +202,51 @@ def test_a_killed_window(fake, on_orphan):
     assert fake.force_n() == (0.0, 0.0, 0.0)
 
 
+FORKING = """
+import os, sys, time
+from palpate.servo import Servo
+from palpate.servo.elastic_plane import PlaneSource
+
+servo = Servo(PlaneSource(500.0))
+if sys.argv[1] == "loading":
+    servo._listen = lambda: None
+    servo._await = lambda *_: (print(servo.process_id, flush=True), time.sleep(60.0))
+servo.start()
+if os.fork() == 0:
+    time.sleep(60.0)  # it holds the other end of the servo's input
+    os._exit(0)
+print(servo.process_id, flush=True)
+time.sleep(60.0)
+"""
+
+
+@pytest.mark.parametrize("when", ["loading", "touching"])
+def test_a_servo_whose_parent_was_killed_ends_though_its_input_does_not(when):
+    parent = subprocess.Popen([sys.executable, "-c", FORKING, when], stdout=subprocess.PIPE)
+    assert parent.stdout is not None
+    process_id = int(parent.stdout.readline())
+    assert process_runs(process_id)
+    parent.kill()
+    parent.wait()
+    assert eventually(lambda: not process_runs(process_id), 5.0)
+
+
+def test_a_servo_that_outlives_its_window_ends_with_its_force(fake):
+    """Nobody is left who could enable it again."""
+    states, events = fake.ports
+    uris = [f"ws://localhost:{port}" for port in (states, events)]
+    parent = subprocess.Popen([sys.executable, "-c", PARENT, *uris, "continue"], stdout=subprocess.PIPE)
+    assert parent.stdout is not None
+    process_id = int(parent.stdout.readline())
+    assert eventually(lambda: pressing(fake))
+    parent.kill()
+    parent.wait()
+    fake.event("device-disconnected")
+    fake.status["calibrated"] = False
+    assert eventually(lambda: not process_runs(process_id), 5.0)
+    assert fake.force_n() == (0.0, 0.0, 0.0)
+
+
 def test_what_stops_the_servo_from_starting_is_told(fake):
     fake.devices = []
     with Servo(PlaneSource(), device=choice(fake)) as servo, pytest.raises(PalpateError, match="Inverse3"):

@@ -27,7 +27,9 @@ from palpate.servo.tick import (
     IN_TIME,
     IN_TIP,
     IN_WIDTH,
+    IN_WORK,
     OUT_FORCE,
+    OUT_HOLD,
     TickParameters,
     account,
     put_pose,
@@ -58,13 +60,20 @@ class FakeServo:
         self.arrays.shared.counts[DEADLINE] = START
         self.arrays.shared.control[ENABLE] = 1
         self.sequence = 0
+        self.work_j, self.place = 0.0, None
 
     def pose(self, position, time_s, **cells) -> None:
+        """The hand is at `position`; the last command was held on the way."""
         self.sequence += 1
+        if np.abs(position).max() < 100.0:
+            if self.place is not None:
+                held = self.arrays.outbox[OUT_FORCE : OUT_FORCE + 3]
+                self.work_j += float(held @ (np.asarray(position) - self.place))
+            self.place = np.array(position, dtype=float)
         pose = np.zeros(IN_WIDTH)
         pose[[IN_CONNECTED, IN_CALIBRATED, IN_ENABLED, IN_QUATERNION]] = 1.0
         pose[[IN_FORCE_MAP, IN_FORCE_MAP + 4, IN_FORCE_MAP + 8]] = 1.0
-        pose[IN_TIME], pose[IN_SEQUENCE] = time_s, self.sequence
+        pose[IN_TIME], pose[IN_SEQUENCE], pose[IN_WORK] = time_s, self.sequence, self.work_j
         pose[IN_POSITION : IN_POSITION + 3] = pose[IN_TIP : IN_TIP + 3] = position
         for name, value in cells.items():
             cell = {"fault": IN_FAULT, "enabled": IN_ENABLED, "connected": IN_CONNECTED}[name]
@@ -130,6 +139,35 @@ def test_a_stall_is_counted_as_missed_ticks_and_the_loop_stays_in_phase():
     assert head == 3 and after["tick"][0] - rows["tick"][-1] == 7
     done = report(servo.shared, PERIOD, (), 0.0, 0.0)
     assert (done.ticks, done.missed_ticks, done.lateness.number) == (3, 6, 3)
+
+
+def test_a_hand_that_moved_during_a_late_tick_moved_no_faster_and_did_not_jump():
+    """0.5 m/s for 40 ms without a tick: 20 mm in one reading."""
+    servo = FakeServo()
+    for _ in range(200):
+        late = 40_000_000 if servo.sequence % 10 == 9 else 0
+        now = servo.arrays.shared.counts[DEADLINE] + late
+        servo.pose([0.5 * (now - START) * 1e-9 - 0.5, 0.0, 0.1], now * 1e-9)
+        servo.tick(late_ns=late)
+    assert "too fast" not in servo.reasons and "jumped" not in servo.reasons
+    np.testing.assert_allclose(servo.arrays.safety.speed, 0.5, rtol=1e-6)
+    np.testing.assert_allclose(servo.arrays.passivity.velocity, [0.5, 0.0, 0.0], rtol=1e-6)
+
+
+def test_a_force_comes_with_the_time_for_which_it_may_act():
+    servo = FakeServo(stiffness=2000.0)
+    servo.press(-0.001, 600)
+    for depth in np.linspace(0.0, 0.002, 100):
+        servo.press(depth, 1)
+    stored = 0.5 * 2000.0 * 0.002**2
+    pressed = servo.arrays.outbox[OUT_HOLD]
+    for depth in 0.002 - 0.0001 * np.arange(8):
+        force = servo.press(depth, 1)[2]
+    released = servo.arrays.outbox[OUT_HOLD]
+    assert 0.0015 <= released < pressed <= 0.02
+    # at 0.1 m/s out: what it can give until then is not more than is left
+    left = stored + 1e-4 - servo.work_j
+    assert force * 0.1 * released < left
 
 
 def test_a_device_that_stops_talking_gets_zero_after_20_ms():

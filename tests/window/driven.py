@@ -54,9 +54,11 @@ class Driven:
     def button(self, down: bool, which: str = "Left") -> None:
         self.interactor.InvokeEvent(f"{which}Button{'Press' if down else 'Release'}Event")
 
-    def wheel(self, steps: int) -> None:
+    def wheel(self, steps: int, *, ctrl: bool = False) -> None:
+        self.interactor.SetControlKey(int(ctrl))
         for _ in range(abs(steps)):
             self.interactor.InvokeEvent(f"MouseWheel{'Forward' if steps > 0 else 'Backward'}Event")
+        self.interactor.SetControlKey(0)
 
     def key(self, symbol: str) -> None:
         self.interactor.SetKeySym(symbol)

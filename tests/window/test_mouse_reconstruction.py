@@ -71,7 +71,7 @@ def test_what_a_mouse_touched_is_reconstructed(block: Model, tmp_path: Path) -> 
             driven.look_from(np.arctan2(side[1], side[0]))
             along_the_foot(driven, side)
         assert session.recording.traced > 0.95
-        driven.wheel(2)  # deeper than at the beginning
+        driven.wheel(2, ctrl=True)  # deeper than at the beginning
         for side in SIDES:
             right = np.array([-side[1], side[0], 0.0])
             driven.look_from(np.arctan2(side[1], side[0]))

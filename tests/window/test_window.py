@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -12,8 +13,9 @@ from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
 from mechanics.model import Model
 from mechanics.recording import read_recording
+from palpate.window.picture import STIFFNESS
 from palpate.window.session import TouchSession
-from palpate.window.window import TouchWindow
+from palpate.window.window import CHARTS_SHARE, TouchWindow
 from scenes.scene import Scene
 
 from .driven import Driven, eventually
@@ -125,8 +127,8 @@ def test_colour_by_stiffness(driven: Driven) -> None:
     before = driven.picture()
     driven.key("c")
     surface = driven.window.pictures[0]._surface
-    driven.until(lambda f: "stiffness (N/m)" in surface.array_names)
-    values = surface["stiffness (N/m)"]
+    driven.until(lambda f: STIFFNESS in surface.array_names)
+    values = surface[STIFFNESS]
     assert 20 < np.median(values) < 300
     changed = np.abs(driven.picture().astype(int) - before).mean()
     driven.key("c")
@@ -179,10 +181,63 @@ def test_a_session_is_recorded(driven: Driven, block: Model, tmp_path: Path) -> 
     recording = read_recording(path)
     assert recording.base_model == block.path and recording.poisson_ratio == 0.49
     assert recording.truth["young_modulus_pa"] == pytest.approx(20e3)
+    assert recording.truth["renderer"] == "fem"
     assert np.median(np.diff(recording.t)) == pytest.approx(0.001)
     assert recording.force_on_tool[:, 2].max() > 0.1
     deepest = recording.position[:, 2].min()
     assert deepest == pytest.approx(0.045 - driven.window.pointer.press_depth_m, abs=3e-4)
+
+
+def test_the_view_keeps_up_with_drags_zooms_and_comes_home(driven: Driven) -> None:
+    camera = driven.window.plotter.camera
+    home = np.array(camera.GetPosition())
+    for _ in range(3):
+        driven.mouse(0.5, 0.5)
+        driven.button(True, "Right")
+        for x in np.linspace(0.5, 0.9, 9):
+            driven.mouse(x, 0.5)
+        driven.button(False, "Right")
+    turned = np.array(camera.GetPosition())
+    assert np.linalg.norm(turned - home) > 0.05 and turned[2] == pytest.approx(home[2])
+    driven.wheel(3)
+    assert camera.GetDistance() == pytest.approx(np.linalg.norm(home - camera.GetFocalPoint()) / 1.12**3)
+    driven.key("v")
+    assert np.array(camera.GetPosition()) == pytest.approx(home)
+
+
+def test_keys_pressed_while_the_worker_is_busy_are_done_after(driven: Driven) -> None:
+    gate = threading.Event()
+    before = driven.session.young_modulus_pa
+    driven.session.worker.run("waiting", lambda: gate.wait(20.0) and None)
+    for _ in range(3):
+        driven.window.controls.key("plus")
+    gate.set()
+    driven.session.worker.wait()
+    assert driven.session.young_modulus_pa == pytest.approx(before * 1.25**3)
+    for _ in range(3):
+        driven.key("minus")
+
+
+def test_only_what_does_something_is_offered(driven: Driven) -> None:
+    offered = driven.window.controls.offered
+    assert {"f", "i", "b", "v"} <= offered and not {"space", "Return", "arrows"} & offered
+    driven.session.set_renderer("kelvin-voigt")
+    driven.session.worker.wait()
+    assert not {"f", "i"} & driven.window.controls.offered, "a 1D model knows neither friction nor a ball"
+    driven.session.set_renderer("fem")
+    driven.session.worker.wait()
+
+
+def test_the_panel_covers_no_picture(driven: Driven) -> None:
+    """With all words off and on, the pictures' pixels are the same."""
+    driven.until(lambda f: not any(sizes(f)))
+    rows = slice(0, int((1.0 - CHARTS_SHARE) * SIZE[1]) - 2)
+    shown = driven.picture()[rows]
+    driven.window._status.SetVisibility(False)
+    driven.window._hint.SetVisibility(False)
+    assert (driven.picture()[rows] == shown).all()
+    driven.window._status.SetVisibility(True)
+    driven.window._hint.SetVisibility(True)
 
 
 def test_help_and_screenshot(driven: Driven, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

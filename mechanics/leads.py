@@ -33,3 +33,14 @@ def _decayed(t, x):
                 level, at = x[i, axis], t[i]
             out[i, axis] = sign * np.exp(-(t[i] - at) / MEMORY_S)
     return out
+
+
+@njit(cache=True)
+def play(start, y, width, out):
+    """Play operator, axis by axis: what follows is dragged once it is width / 2 behind. start: (p + 1,)."""
+    half = 0.5 * width
+    for p in range(start.shape[0] - 1):
+        for k in range(3):
+            out[start[p], k] = y[start[p], k]
+            for i in range(start[p] + 1, start[p + 1]):
+                out[i, k] = min(max(out[i - 1, k], y[i, k] - half), y[i, k] + half)

@@ -1,0 +1,68 @@
+"""The page of two recordings of one object: what differs, and what explains it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from palpate.before_after import Changes
+from palpate.report.page import Page
+
+_COLOURS = ("#1d3557", "#c1121f")
+
+
+def write_report(path: Path | str, result: Changes) -> Path:
+    """One self-contained page; returns its path."""
+    page = Page(f"Before and after: {result.before.recording.name} and {result.after.recording.name}")
+    page.lead(result.summary[:1].upper() + result.summary[1:] + ".")
+    low, high = (100 * (r - 1) for r in result.ratio_ci95)
+    cause = " and ".join(n.replace("_", " ") for n in result.explained_by) or "nothing"
+    beside = "no diagnosis was asked for"
+    if result.beside is not None:
+        beside = f"beside the effects of both the second modulus is {100 * (result.beside[0] - 1):+.0f} % off"
+    page.cards([
+        ("Do they differ?", "yes" if result.differs else "not beyond their intervals",
+         f"the second modulus is {100 * (result.ratio - 1):+.1f} % off the first "
+         f"({low:+.0f} to {high:+.0f} %)"),
+        ("What explains it?", cause, beside),
+        ("Where?", f"{len(result.places)} shared places" if result.places else "no shared places",
+         "places within 12 mm of one another, each with its own ratio" if result.places
+         else "the two recordings share too few places, or no frame"),
+    ])  # fmt: skip
+    rows = []
+    for side in (result.before, result.after):
+        interval = side.model.material.young_modulus_ci95_pa
+        verdict = side.diagnosis.summary if side.diagnosis is not None else "not diagnosed"
+        rows.append([side.recording.name, side.modulus_pa, *interval, side.beside_effects_pa, verdict])
+    page.heading("Both by themselves")
+    page.table(["recording", "modulus, Pa", "from", "to", "beside effects, Pa", "verdict"], rows)
+    for reason in result.reasons:
+        page.paragraph(reason[:1].upper() + reason[1:] + ".")
+    figure = Figure(figsize=(8, 3.4))
+    draw(result, figure.subplots())
+    page.figure(figure, "Moduli with 95 % intervals, and the ratio at every place that both pressed.")
+    return page.write(path)
+
+
+def draw(result: Changes, ax: Axes) -> None:
+    """Both moduli over one another where no place is shared, else each place's ratio."""
+    if result.places:
+        order = np.argsort([p.ratio for p in result.places])
+        ratio = np.array([result.places[i].ratio for i in order])
+        ends = np.array([result.places[i].ci95 for i in order])
+        x = np.arange(len(ratio))
+        ax.errorbar(x, ratio, np.abs(ends.T - ratio), fmt="o", ms=4, color=_COLOURS[0], label="at a place")
+        ax.axhspan(*result.ratio_ci95, color=_COLOURS[1], alpha=0.2, label="of the whole")
+        ax.axhline(1.0, color="0.5", lw=1, ls="--")
+        ax.set(xlabel="place, sorted", ylabel="second over first modulus")
+        ax.legend(frameon=False, fontsize=8)
+        return
+    for k, side in enumerate((result.before, result.after)):
+        value = side.modulus_pa / 1e3
+        low, high = (v / 1e3 for v in side.model.material.young_modulus_ci95_pa)
+        ax.errorbar([k], [value], [[value - low], [high - value]], fmt="o", color=_COLOURS[k], capsize=4)
+    ax.set_xticks([0, 1], [result.before.recording.name, result.after.recording.name])
+    ax.set(ylabel="Young's modulus [kPa]", xlim=(-0.5, 1.5))
