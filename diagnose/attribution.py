@@ -55,8 +55,17 @@ class Attribution:
     standing: dict[str, float]
 
 
-def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress = silent) -> Attribution:
-    """Forward selection with backward check of effects to be tried; rivals of the first are declared."""
+def attribute(
+    search: Search,
+    effects: Sequence[Effect],
+    *,
+    seen: frozenset[str] = frozenset(),
+    progress: Progress = silent,
+) -> Attribution:
+    """Forward selection with backward check of effects to be tried; rivals of the first are declared.
+
+    seen: names that are known to be there from elsewhere: they are taken first, and stay.
+    """
     fs = search.finite_strain
     ideal, deep = search.judge([]), search.judge([fs])
     _, strain_gain = _with_strain(search, [])
@@ -67,13 +76,15 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
     for step in range(search.options.most):
         scores: dict[str, Score] = {}
         for i, effect in enumerate(effects):
-            if effect.name in current.found.names:
+            if effect.name in current.found.names or _of_one(effect, current.found.effects):
                 continue
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
             candidate = search.judge([*current.found.effects, effect], like=current)
             if not chosen:
                 candidate = _with_hidden_strain(search, effect, candidate, current)
             scores[effect.name] = search.score([effect], candidate, current)
+        if not scores:
+            break
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
             if score.gain > search.options.plain_gain and not search.passes(score, first=first):
@@ -84,6 +95,8 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         off = sideways_off(search.forward, current)
         if off:
             passing = _not_blind_to_slip(search, passing, list(scores.values()), off)
+        known = [scores[n] for n in sorted(seen) if n in scores]
+        passing = [s for s in known if s.size_n > search.options.size_n] or passing
         if not passing:
             pair = None if step + 2 > search.options.most else _paired(search, effects, current)
             if pair is None:
@@ -92,16 +105,17 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
-        best = max(passing, key=lambda s: s.gain)
+        best = _economical(passing, search.options.rival_share)
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
     picked = list(zip(steps, chosen, strict=False))
-    current, chosen = _without_idle(search, chosen, current)
+    current, chosen = _without_idle(search, chosen, current, seen)
     for effect in current.found.effects:
         current = _refined(search, effect, current)
     sets = [standing(scores) for scores in steps]
-    rivals = _rivals(search, picked, sets, chosen)
+    asked = [n for n in chosen if n not in seen]
+    rivals = tuple(n for n in _rivals(search, picked, sets, asked) if n not in seen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
         base,
@@ -116,6 +130,21 @@ def attribute(search: Search, effects: Sequence[Effect], *, progress: Progress =
         float(strain_gain),
         sets[0],
     )
+
+
+def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
+    """Whether one of the others is another law of the same phenomenon."""
+    return bool(effect.phenomenon) and any(
+        o.phenomenon == effect.phenomenon and o.name != effect.name for o in others
+    )
+
+
+def _economical(passing: Sequence[Score], share: float) -> Score:
+    """The score that gains most, or a law of the same phenomenon with fewer parameters whose gain is within
+    this share of it."""
+    best = max(passing, key=lambda s: s.gain)
+    near = [s for s in passing if _of_one(s.effect, [best.effect]) and s.gain > (1 - share) * best.gain]
+    return min([best, *near], key=lambda s: len(s.effect.parameters))
 
 
 def _with_hidden_strain(
@@ -138,6 +167,8 @@ def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Ca
     if current.chi < search.options.unknown_chi:
         return None
     able = [e for e in effects if e.scope is Scope.TIME and e.name not in current.found.names]
+    # of the laws of one phenomenon the first stands for all
+    able = list({e.phenomenon or e.name: e for e in reversed(able)}.values())
     found = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
@@ -200,12 +231,16 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
     return (deep if gain > LINEAR_UNLESS else without), float(gain)
 
 
-def _without_idle(search: Search, chosen: list[str], current: Candidate) -> tuple[Candidate, list[str]]:
+def _without_idle(
+    search: Search, chosen: list[str], current: Candidate, seen: frozenset[str]
+) -> tuple[Candidate, list[str]]:
     """Drop effects that later ones made idle."""
     chosen = list(chosen)
     for name in list(chosen):
         if len(chosen) < 2:
             break
+        if name in seen:
+            continue
         without = search.judge([e for e in current.found.effects if e.name != name])
         effect = next(e for e in current.found.effects if e.name == name)
         if effect.slips and sideways_off(search.forward, without):
@@ -240,6 +275,8 @@ def _rivals(
         first = scores[name]
         for score in scores.values():
             if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
+                continue
+            if _of_one(score.effect, first.added):
                 continue
             if score.share < RIVAL_CLOSES * max(first.share, 0.0) and not score.effect.few_places:
                 continue

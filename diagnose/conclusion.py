@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnose.attribution import LINEAR_UNLESS, Attribution
 from diagnose.confusable import alike
+from diagnose.detectable import detectable
 from diagnose.gaps import closed_share, gap
 from diagnose.intervals import parameter_intervals
 from diagnose.judging import Score, Search
@@ -50,6 +51,11 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
     before_n = gap(gaps.before, counts, added)
     after_n = gap(gaps.after, counts, added) if answer.names else before_n
     closed, interval = closed_share(gaps.before, gaps.after, counts, noise, added, rng, evidence.bootstrap)
+    if answer.names and interval is not None and interval[1] < 0:
+        # resamples of the share may say what those of the growth left open: then nothing is named either
+        answer.candidates[:0] = answer.names
+        answer.names, answer.remainder, after_n = [], True, before_n
+        answer.reasons.append("the gap grows with what would be named on places that were not fitted")
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
     sure = sureness(answer.remainder, closed, bool(answer.candidates))
@@ -133,6 +139,7 @@ def _entries(
     noise, added = evidence.noise_n, evidence.forward.touches.thinned_away
     best = max((max(s.gain, 0.0) for s in found.scores.values()), default=0.0)
     draws = max(100, evidence.bootstrap // 4)
+    limits = detectable(search, found.base, [s.effect for s in found.scores.values()])
     entries = []
     for name, score in found.scores.items():
         own = score.effect
@@ -150,6 +157,7 @@ def _entries(
                 score.gain,
                 parameter_intervals(fitted, name, forward, search.dof, rng),
                 found.standing[name],
+                limits.get(name, float("nan")),
             )
         )
     strain = search.finite_strain

@@ -21,11 +21,15 @@ from diagnose.rigid import Rigid
 from diagnose.whiten import Whitener
 from mechanics.effects.force_bias import EFFECT as BIAS
 from mechanics.effects.force_drift import EFFECT as DRIFT
+from mechanics.effects.force_gain import EFFECT as GAIN
 from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
 Z = 6.0
+SIDEWAYS_Z = 4.0
+SPRING_SHARE = 0.005
+"""Of a spring's compliance, beyond scatter: what a turning tool's weight adds to the force on the support."""
 LEAST_BIAS_N = 0.008
 LEAST_MASS_KG = 0.003
 MASS_SHARE = 0.03
@@ -91,7 +95,8 @@ def find_instrument_offsets(
     if np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) < t.noise.raw_n:
         forward.touches = t  # too little to matter
         return offsets
-    low, high = (1 / max(rigid.compliance + s * 1.96 * rigid.error, 1e-9) for s in (1, -1))
+    error = np.hypot(rigid.error, SPRING_SHARE * rigid.compliance)
+    low, high = (1 / max(rigid.compliance + s * 1.96 * error, 1e-9) for s in (1, -1))
     yields = f"on the rigid support the tip's reading gives by {1e3 * rigid.compliance:.3f} mm a newton"
     return InstrumentOffsets(
         (*offsets.names, SPRING.name),
@@ -100,6 +105,11 @@ def find_instrument_offsets(
         (*offsets.reasons, yields),
         {**offsets.intervals, SPRING.name: {"stiffness_n_per_m": [float(low), float(high)]}},
     )
+
+
+def read_sideways(rigid: Rigid | None) -> frozenset[str]:
+    """What the support shows to be there, but does not tell wholly: a force that is read into other axes."""
+    return frozenset({GAIN.name} if rigid is not None and rigid.sideways_z > SIDEWAYS_Z else ())
 
 
 def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]) -> InstrumentOffsets:

@@ -12,7 +12,7 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets
+from diagnose.instrument_offsets import find_instrument_offsets, read_sideways
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
@@ -71,6 +71,7 @@ def diagnose(
 
     progress("touches", 0.02)
     presses = presses_on(recording, model)
+    model = with_tip_of(model, presses)
     touches = touches_of(presses)
     free = free_air_of(recording, presses)
     lap("touches")
@@ -97,7 +98,10 @@ def diagnose(
     misfit = misfit_of(forward, base.found, site_sd)
     search.starts = {e.name: e.seek(forward, misfit) for e in tried if e.seek is not None}
     lap("baseline")
-    found = attribute(search, tried, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
+    seen = read_sideways(rigid) & frozenset(e.name for e in tried)
+    if rigid is not None and seen:
+        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
+    found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
     evidence = Evidence(
         forward, search, found, free, offsets, site_sd, frozenset(excluded), options.shape_gain,
@@ -106,6 +110,14 @@ def diagnose(
     result = conclude(evidence, lap)
     progress("done", 1.0)
     return dataclasses.replace(result, seconds=seconds, left_out=tuple(sorted(left_out | untold)))
+
+
+def with_tip_of(model: Model, presses: Presses) -> Model:
+    """The model with the tip that the presses were made with: another recording's may be of another size."""
+    if model.tool.tip_radius_m == presses.tip_radius_m:
+        return model
+    tool = dataclasses.replace(model.tool, tip_radius_m=presses.tip_radius_m)
+    return model.replaced(tool=tool)
 
 
 def untold_effects(presses: Presses) -> set[str]:

@@ -42,6 +42,7 @@ class EffectEntry:
 
     intervals: [low, high] of each parameter at 95 %. standing: p value of the model confidence set (nan where
     it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
+    detectable_n: N rms of its force from which these presses show it at all (nan: not told).
     """
 
     name: str
@@ -54,6 +55,7 @@ class EffectEntry:
     gain: float = 0.0
     intervals: dict[str, Any] = field(default_factory=dict)
     standing: float = float("nan")
+    detectable_n: float = float("nan")
 
 
 @dataclass(frozen=True)
@@ -168,6 +170,7 @@ class Diagnosis:
                     "parameters": e.parameters,
                     "parameters_ci95": e.intervals,
                     "confidence_set_p": e.standing if np.isfinite(e.standing) else None,
+                    "detectable_n": e.detectable_n if np.isfinite(e.detectable_n) else None,
                 }
                 for e in self.entries
             ],

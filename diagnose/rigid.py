@@ -1,9 +1,13 @@
-"""The rigid support: what yields there is the instrument.
+"""The rigid support: what yields there, or reads sideways there, is the instrument.
 
 While the base is traced (or something rigid is pressed) the tip's centre lies in a plane, a tip radius above
 the support. A spring between position sensor and tip puts the reading off that plane by the force over its
 stiffness, so a plane fitted to readings with the force as one more column tells the spring before any press
 is looked at. Segments of one kind share a plane's height; its tilt is the support's.
+
+Sideways the support answers with friction, against the motion, and the object's foot pushes across it: both
+turn with the way around the base. What is left along fixed directions, in proportion to the force along the
+support's normal, is that force read into other axes.
 """
 
 from __future__ import annotations
@@ -27,62 +31,114 @@ PRESSING = 5.0
 """Of a sample's noise: a force along the support's normal from which the tip touches it."""
 OUTLIER = 3.0
 """Robust standard deviations: farther off the plane the tip rides on the object's foot or has lifted."""
+TILT = 0.01
+"""rad, by which the support's normal may be off: as much of its force looks sideways."""
 
 
 @dataclass(frozen=True)
 class Rigid:
     """compliance, error: m/N along the support's normal and its standard error. off_m: what is left off the
-    plane, robust standard deviation. seconds: of contact that were used. force_n: spread of the force."""
+    plane, robust standard deviation. seconds: of contact that were used. sideways, sideways_error: (2,)
+    shares of the normal force that are read along the support's tangents, and their standard errors."""
 
     compliance: float
     error: float
     off_m: float
     seconds: float
-    force_n: float
+    sideways: tuple[float, float] = (0.0, 0.0)
+    sideways_error: tuple[float, float] = (np.inf, np.inf)
+
+    @property
+    def sideways_z(self) -> float:
+        """Standard errors by which the sideways shares differ from none, the normal's own among them."""
+        spread = np.hypot(self.sideways_error, TILT)
+        return float(np.linalg.norm(np.asarray(self.sideways) / spread))
+
+    @property
+    def words(self) -> str:
+        """What is read sideways, for a reason."""
+        share = float(np.linalg.norm(self.sideways))
+        return f"on the rigid support {share:.0%} of the force along its normal is read sideways"
 
 
 def rigid_of(recording: Recording, presses: Presses, normal: np.ndarray) -> Rigid | None:
-    """Read the instrument off its contact with the support; normal (3,): out of the support.
+    """Read the instrument off its contact with the support; normal (3,): about the support's, outward.
 
     None where it was touched for too short a time to tell.
     """
+    seen = _contact(recording, presses, normal)
+    if seen is None:
+        return None
+    plane, place, force, way = seen
+    for _ in range(2):  # the plane's own normal, whatever the model's support was made from
+        across, along = tangents(normal)
+        push = force @ normal
+        columns = np.column_stack([-push, place @ across, place @ along, plane])
+        found, error, off = _fitted(columns, place @ normal)
+        normal = normal - found[1] * across - found[2] * along
+        normal = normal / np.linalg.norm(normal)
+    push = (force @ normal)[:, None]
+    axes = np.stack(tangents(normal), axis=1)
+    columns = np.hstack([push, push * (way @ axes), np.ones_like(push)])
+    sideways = [_fitted(columns, force @ axis) for axis in axes.T]
+    return Rigid(
+        compliance=float(found[0]),
+        error=error,
+        off_m=off,
+        seconds=len(push) * BLOCK_S,
+        sideways=(float(sideways[0][0][0]), float(sideways[1][0][0])),
+        sideways_error=(sideways[0][1], sideways[1][1]),
+    )
+
+
+def _contact(
+    recording: Recording, presses: Presses, normal: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
+    """Means over blocks in which the support is touched: of which kind (b, kinds) 0 or 1, place (b, 3) m,
+    force on the tool (b, 3) N, way (b, 3), a unit vector; None where they are too few."""
     size = max(1, round(BLOCK_S * recording.sample_rate_hz))
-    columns, heights, forces = [], [], []
-    across, along = tangents(normal)
+    found = []
     for number, kind in enumerate(KINDS):
         for a, b in runs(presses.within(kind, recording.t)):
             blocks = (b - a) // size
-            if not blocks:
+            if blocks < 2:
                 continue
             part = slice(a, a + blocks * size)
-            x = recording.position[part].reshape(blocks, size, 3).mean(axis=1)
-            f = recording.force_on_tool[part].reshape(blocks, size, 3).mean(axis=1) @ normal
-            own = np.zeros((blocks, len(KINDS)))
-            own[:, number] = 1.0
-            columns.append(np.column_stack([-f, x @ across, x @ along, own]))
-            heights.append(x @ normal)
-            forces.append(f)
-    if not columns:
+            place, force = (
+                x[part].reshape(blocks, size, 3).mean(axis=1)
+                for x in (recording.position, recording.force_on_tool)
+            )
+            way = np.gradient(place, axis=0)
+            way /= np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
+            own = np.tile(np.eye(len(KINDS))[number], (blocks, 1))
+            found.append(np.hstack([own, place, force, way]))
+    if not found:
         return None
-    a, h, f = np.vstack(columns), np.concatenate(heights), np.concatenate(forces)
-    touching = f > PRESSING * presses.noise.raw_n
+    rows = np.vstack(found)
+    plane, place, force, way = np.split(rows, np.cumsum([len(KINDS), 3, 3]), axis=1)
+    touching = force @ normal > PRESSING * presses.noise.raw_n
     if touching.sum() < LEAST_BLOCKS:
         return None
-    a, h, f = a[touching], h[touching], f[touching]
-    a = a[:, np.abs(a).max(axis=0) > 0]
-    a[:, 1:3] -= a[:, 1:3].mean(axis=0)
-    h = h - h.mean()
-    kept = np.ones(len(h), dtype=bool)
+    plane = plane[touching]
+    place = place[touching] - place[touching].mean(axis=0)
+    return plane[:, plane.any(axis=0)], place, force[touching], way[touching]
+
+
+def _fitted(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """(coefficients (k,), standard error of the first by stretches left out, robust scatter of the rest) of
+    least squares without outliers. columns: (n, k); target: (n,)."""
+    kept = np.ones(len(target), dtype=bool)
+    found, scale = np.zeros(columns.shape[1]), 0.0
     for _ in range(20):
-        found = np.linalg.lstsq(a[kept], h[kept], rcond=None)[0]
-        off = h - a @ found
-        scale = 1.4826 * float(np.median(np.abs(off[kept]))) + 1e-9
-        again = np.abs(off) < OUTLIER * scale
+        found = np.linalg.lstsq(columns[kept], target[kept], rcond=None)[0]
+        off = np.abs(target - columns @ found)
+        scale = 1.4826 * float(np.median(off[kept])) + 1e-9
+        again = off < OUTLIER * scale
         if (again == kept).all() or again.sum() < LEAST_BLOCKS:
             break
         kept = again
     rows = np.array_split(np.flatnonzero(kept), GROUPS)
     left = [np.concatenate([r for j, r in enumerate(rows) if j != k]) for k in range(GROUPS)]
-    each = np.array([np.linalg.lstsq(a[r], h[r], rcond=None)[0][0] for r in left])
+    each = np.array([np.linalg.lstsq(columns[r], target[r], rcond=None)[0][0] for r in left])
     error = np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum())
-    return Rigid(float(found[0]), float(error), scale, float(kept.sum() * BLOCK_S), float(f[kept].std()))
+    return found, float(error), scale

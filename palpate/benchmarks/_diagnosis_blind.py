@@ -185,6 +185,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
             "intervals": {e["name"]: e.get("parameters_ci95", {}) for e in data["effects"]},
             "closed_by": {e["name"]: e["gap_closed"] for e in data["effects"]},
             "probability": {e["name"]: e["probability"] for e in data["effects"]},
+            "detectable_n": {e["name"]: e["detectable_n"] for e in data["effects"]},
             "bic": best_by_bic(result.attribution),
             "regression_gap_n": regressed_gap(result.forward, result.residual_before),
             "seconds": sum(data["seconds"].values()),

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.benchmarks._rates import wilson
 
-FAMILIES = {"poroelasticity": ("viscoelasticity",), "plasticity": ("mullins_softening",)}
+FAMILIES = {"plasticity": ("mullins_softening",)}
 """What effects that the library has never had may be taken for, as declared; 'unknown' is right as well."""
 SIZES_IN_NOISE = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 1e9)
 """Edges of the detection curve: the effect's own force (best factor taken off) over the vector noise."""
@@ -119,6 +119,14 @@ class _Tally:
         self.by_effect[(name, strength)].append((answer.detected, hit))
         if size >= 2:
             self.rates["detected, effect at least twice the noise"].append(answer.detected)
+        seen = size_in_limits(item, name)
+        if seen >= 2:
+            self.rates["detected, effect at least twice what can be seen"].append(answer.detected)
+        if seen >= 4:
+            self.rates["first place, effect at least 4 times what can be seen"].append(hit)
+            self.rates["first place or declared equal, at least 4 times what can be seen"].append(either)
+        if seen < 1:
+            self.rates["effect too small to be seen: named all the same"].append(hit)
         if size >= 4:
             self.rates["first place, effect at least 4 times the noise"].append(hit)
             self.rates["first place or declared equal, at least 4 times the noise"].append(either)
@@ -222,6 +230,14 @@ def size_in_noise(item: dict[str, Any], name: str) -> float:
     about = item["truth"].get("sizes", {}).get(name, {})
     value = about.get("rms_after_best_scale_n", about.get("rms_n", np.nan))
     return float(value) / (np.sqrt(3) * item["truth"]["noise_rms_n"])
+
+
+def size_in_limits(item: dict[str, Any], name: str) -> float:
+    """The effect's rms force, a common factor taken off, over the smallest that these presses show; nan where
+    that is not told (readings that free air or the support settle)."""
+    about = item["truth"].get("sizes", {}).get(name, {})
+    limit = item["verdict"].get("detectable_n", {}).get(name)
+    return float(about.get("rms_after_best_scale_n", np.nan)) / limit if limit else float("nan")
 
 
 def _median(values: list[float]) -> float | None:

@@ -20,7 +20,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from palpate.benchmarks._diagnosis_blind import opened_case, tasks_of, unfinished, verdict_path
-from palpate.benchmarks._diagnosis_cases import Case, cases
+from palpate.benchmarks._diagnosis_cases import SEEDS, Case, cases
 from palpate.benchmarks._diagnosis_scores import summarise
 from palpate.benchmarks._diagnosis_tables import pictures, show
 from palpate.benchmarks.timing import table
@@ -73,7 +73,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="leave cases with a verdict in this folder out of the table: rules were chosen after those",
     )
     parser.add_argument("--picture", metavar="PNG", help="write the pictures")
-    parser.add_argument("--seed", type=int, default=0, help="first seed")
+    parser.add_argument(
+        "--cases",
+        choices=tuple(SEEDS),
+        default="development",
+        help="whose seeds: to look at, to calibrate on unseen, or to be opened once a release",
+    )
+    parser.add_argument("--seed", type=int, help="first seed, instead of that of --cases")
     add_engine(parser)
 
 
@@ -85,7 +91,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Do what is missing, open the truths, print the table."""
     work = Path(arguments.work)
     fast = arguments.size == "quick" if arguments.fast is None else arguments.fast
-    todo = cases(arguments.size, arguments.phantom, arguments.seed)
+    first = SEEDS[arguments.cases] if arguments.seed is None else arguments.seed
+    todo = cases(arguments.size, arguments.phantom, first)
     outcomes: dict[str, Outcome] = {}
     if arguments.stage != "table":
         chosen = _chosen(part_of(todo, arguments.part), work, arguments, fast)

@@ -7,32 +7,42 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.attribution import attribute
 from diagnose.forward import build_forward
-from diagnose.instrument_offsets import find_instrument_offsets
+from diagnose.instrument_offsets import find_instrument_offsets, read_sideways
+from diagnose.judging import AttributionOptions, Search
 from diagnose.rigid import Rigid, rigid_of
 from diagnose.touches import touches_of
+from diagnose.whiten import NuisanceOptions
+from mechanics.effects.registry import effect
+from mechanics.frames import tangents
 from mechanics.recording import Recording
 
 NORMAL = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
 
 
-def traced(compliance: float, *, lift: bool = False) -> tuple[Recording, SimpleNamespace]:
-    """A tip that is led around on a leaning plane, pressed with 1 to 3 N, read through a spring."""
+def traced(
+    compliance: float, *, lift: bool = False, gain: np.ndarray | None = None
+) -> tuple[Recording, SimpleNamespace]:
+    """A tip that is led around on a leaning plane, pressed with 1 to 3 N, read through a spring; friction
+    drags at it, and what it is led around pushes it outwards."""
     rng = np.random.default_rng(1)
     t = np.arange(0, 12, 1e-3)
     across = np.cross(NORMAL, [1.0, 0, 0])
     along = np.cross(NORMAL, across)
     place = 0.05 * (np.cos(t)[:, None] * across + np.sin(t)[:, None] * along)
     push = 2 + np.sin(0.7 * t) + 0.3 * np.sin(3.1 * t)
-    force = push[:, None] * NORMAL - 0.2 * push[:, None] * np.gradient(place, t, axis=0) / 0.05
+    way = np.gradient(place, t, axis=0) / 0.05
+    force = push[:, None] * (NORMAL - 0.2 * way + 0.1 * place / 0.05)
     tip = place
     if lift:
         up = np.clip(np.sin(1.3 * t) - 0.8, 0, None)
         tip = tip + 0.02 * up[:, None] * NORMAL
         force = np.where(up[:, None] > 0, 0.0, force)
     read = np.round((tip - compliance * force) / 3e-5) * 3e-5
+    seen = force if gain is None else force @ gain.T
     recording = Recording(
-        t=t, position=read, force_on_tool=force + rng.normal(0, 0.012, force.shape), sample_rate_hz=1e3,
+        t=t, position=read, force_on_tool=seen + rng.normal(0, 0.012, force.shape), sample_rate_hz=1e3,
         tip_radius_m=0.005,
     )  # fmt: skip
     table = SimpleNamespace(
@@ -47,6 +57,12 @@ def test_a_spring_in_the_tool_is_read_off_the_support(stiffness, lift):
     found = rigid_of(*traced(1 / stiffness, lift=lift), NORMAL)
     assert found.error < 0.02 / 1200
     assert abs(found.compliance - 1 / stiffness) < 4 * found.error + 1e-6
+
+
+def test_a_support_that_leans_otherwise_than_the_model_says_is_no_gain():
+    about = NORMAL + np.array([0.03, 0.0, -0.02])
+    found = rigid_of(*traced(1e-3), about / np.linalg.norm(about))
+    assert abs(found.compliance - 1e-3) < 5e-6 and not read_sideways(found)
 
 
 def test_a_stiff_tool_reads_none():
@@ -65,7 +81,7 @@ def test_what_the_support_tells_is_taken_off_the_presses(bench):
     altered, model = bench.record(lambda t, x, f: (x - f / stiffness, f))
     forward = build_forward(touches_of(bench.table(altered)), model)
     read = forward.touches.travel.copy()
-    found = find_instrument_offsets(forward, None, Rigid(1 / stiffness, 1e-6, 1e-6, 10.0, 0.5), set())
+    found = find_instrument_offsets(forward, None, Rigid(1 / stiffness, 1e-6, 1e-6, 10.0), set())
     assert found.names == ("tool_compliance",)
     assert found.parameters["tool_compliance"]["stiffness_n_per_m"] == pytest.approx(stiffness)
     plain, _ = bench.record()
@@ -80,5 +96,37 @@ def test_a_spring_that_changes_no_force_is_not_named(bench):
     altered, model = bench.record()
     forward = build_forward(touches_of(bench.table(altered)), model)
     before = forward.touches
-    assert find_instrument_offsets(forward, None, Rigid(1e-6, 1e-8, 1e-6, 10.0, 0.5), set()).names == ()
+    assert find_instrument_offsets(forward, None, Rigid(1e-6, 1e-8, 1e-6, 10.0), set()).names == ()
     assert forward.touches is before
+
+
+def test_a_force_that_is_read_into_other_axes_shows_on_the_support():
+    gain = np.array([[1.1, 0.05, -0.05], [0.05, 1.1, 0.05], [-0.05, 0.05, 1.1]])
+    found = rigid_of(*traced(0.0, gain=gain), NORMAL)
+    across, along = tangents(NORMAL)
+    read = gain @ NORMAL
+    expected = np.array([across @ read, along @ read]) / (NORMAL @ read)
+    # friction that gains as well turns a little into it
+    assert np.abs(np.array(found.sideways) - expected).max() < 0.006
+    assert read_sideways(found) == {"force_gain"}
+
+
+def test_friction_and_a_push_across_the_way_are_no_gain():
+    recording, table = traced(1e-3, lift=True)
+    found = rigid_of(recording, table, NORMAL)
+    assert np.abs(found.sideways).max() < 0.005 and not read_sideways(found)
+
+
+def test_what_the_support_shows_is_named_before_what_presses_show(bench):
+    """Cross-talk too weak for the presses alone."""
+    gain = np.eye(3) + 0.02 * (1 - np.eye(3))
+    altered, model = bench.record(lambda t, x, f: (x, f @ gain.T))
+    forward = build_forward(touches_of(bench.table(altered)), model)
+    search = Search(
+        forward, 20e3, nuisance=NuisanceOptions(), options=AttributionOptions(), site_sd=None,
+        finite_strain=effect("finite_strain"),
+    )  # fmt: skip
+    tried = [effect("force_gain")]
+    alone = attribute(search, tried)
+    seen = attribute(search, tried, seen=frozenset({"force_gain"}))
+    assert alone.chosen == () and seen.chosen == ("force_gain",) and not seen.rivals

@@ -9,7 +9,7 @@ import pytest
 
 from mechanics.errors import OptionError
 from palpate.benchmarks._diagnosis_blind import tasks_of, unfinished
-from palpate.benchmarks._diagnosis_cases import FINITE, WEIGHT, Case, cases
+from palpate.benchmarks._diagnosis_cases import FINITE, SEEDS, WEIGHT, Case, cases
 from palpate.benchmarks._diagnosis_scores import answer_of, summarise
 from palpate.tasks.graph import Graph
 
@@ -22,6 +22,12 @@ def test_every_case_is_another_and_the_same_next_time(size: str) -> None:
     assert len(found) == len({case.key for case in found}) == KNOWN[size]
     assert found == cases(size, None, 40000)
     assert len({case.seed for case in found}) == len(found)
+
+
+def test_no_case_to_develop_on_is_one_to_judge_by() -> None:
+    seeds = [{case.seed for case in cases("full", None, first)} for first in SEEDS.values()]
+    assert len(set.union(*seeds)) == sum(map(len, seeds))
+    assert all(max(a) < min(b) for a, b in zip(seeds, seeds[1:], strict=False))
 
 
 def test_nuisances_vary_from_case_to_case_and_are_no_second_tool_weight() -> None:
@@ -58,6 +64,18 @@ def test_what_a_drawn_tool_weighs_is_no_false_alarm_and_another_name_is() -> Non
     for name, alarm in (("tool_gravity_inertia", False), ("force_bias", False), ("backlash", True)):
         verdict = {"kind": "effect", "effects": [name], "candidates": []}
         assert answer_of({"case": case, "verdict": verdict}).detected == alarm
+
+
+def test_a_size_counts_against_what_can_be_seen() -> None:
+    case = Case("single", 0, 1, ("time_delay",), {"time_delay": 1.0}).as_json()
+    verdict = {"kind": "none", "effects": [], "candidates": [], "probability": {}}
+    truth = {"noise_rms_n": 0.01, "sizes": {"time_delay": {"rms_after_best_scale_n": 0.1}}}
+    for limit, counted in ((0.02, 1), (0.06, 0)):
+        seen = {**verdict, "detectable_n": {"time_delay": limit}}
+        rates = summarise([{"key": "one", "case": case, "verdict": seen, "truth": truth}])["rates"]
+        assert rates["detected, effect at least twice the noise"]["of"] == 1
+        name = "first place, effect at least 4 times what can be seen"
+        assert rates.get(name, {"of": 0})["of"] == counted
 
 
 def test_a_control_without_an_answer_is_a_miss_and_no_evidence_of_silence() -> None:
