@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import base64
+import logging
 import warnings
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
 
 from mechanics.errors import PalpateError
 from mechanics.files import reading
@@ -27,10 +32,16 @@ def vtk_bytes(dataset: Any) -> bytes:
 def read_vtk(path: Path, error: type[PalpateError]) -> Any:
     """What a VTK file holds; raises `error` in one line where the reader complains."""
     import pyvista
+    from vtkmodules.vtkCommonCore import vtkLogger
 
     with reading(path, error):
-        path.open("rb").close()
+        data = path.read_bytes()
+    said, logged = vtkLogger.GetCurrentVerbosityCutoff(), logging.root.manager.disable
     try:
+        _check_arrays(data)
+        # what it complains about is raised: not printed, and logged, too
+        vtkLogger.SetStderrVerbosity(vtkLogger.VERBOSITY_OFF)
+        logging.disable(logging.CRITICAL)
         with pyvista.VtkErrorCatcher(raise_errors=True), warnings.catch_warnings():
             warnings.simplefilter("ignore")
             return pyvista.read(path)
@@ -38,3 +49,36 @@ def read_vtk(path: Path, error: type[PalpateError]) -> Any:
         raise error(
             f"'{path}' is damaged: VTK cannot read it ({' '.join(str(wrong).split())[:200]})"
         ) from wrong
+    finally:
+        vtkLogger.SetStderrVerbosity(said)
+        logging.disable(logged)
+
+
+def _check_arrays(data: bytes) -> None:
+    """Raises ValueError where an array in the file's own text (as this program writes them) is not as long as
+    its header says: VTK believes that header, and ends the whole process where it asks for too much."""
+    if b"<AppendedData" in data:
+        return
+    try:
+        root = ElementTree.fromstring(data)
+    except ElementTree.ParseError as wrong:
+        raise ValueError(str(wrong)) from wrong
+    count = np.dtype("<u8" if root.get("header_type") == "UInt64" else "<u4")
+    for array in root.iter("DataArray"):
+        if array.get("format") != "binary":
+            continue
+        text = (array.text or "").strip()
+        if not root.get("compressor"):
+            continue
+        blocks = int(np.frombuffer(base64.b64decode(text[:12]), count, 1)[0])
+        if blocks * count.itemsize > len(text):
+            raise ValueError(f"the array {array.get('Name')} declares {blocks} blocks")
+        length = (3 + blocks) * count.itemsize
+        head = 4 * -(-length // 3)  # header and blocks are packed each by itself
+        sizes = np.frombuffer(base64.b64decode(text[:head]), count, 3 + blocks)
+        body = base64.b64decode(text[head:])
+        if int(sizes[3:].sum()) != len(body) or max(sizes[1], sizes[2]) > _BLOCK_BYTES:
+            raise ValueError(f"the array {array.get('Name')} is not as long as it declares")
+
+
+_BLOCK_BYTES = 1 << 26

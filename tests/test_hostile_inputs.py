@@ -323,13 +323,23 @@ def test_a_model_cut_off_anywhere_is_refused(folder):
             read_model(folder)
 
 
-def test_a_damaged_mesh_is_refused_in_one_line(folder):
+def test_a_damaged_mesh_is_refused_in_one_line(folder, capfd):
     whole = (folder / "mesh.vtu").read_bytes()
-    for data in (b"", b"no mesh", whole[: len(whole) // 2], whole.replace(b"fixed", b"fluid")):
+    for data in (
+        b"",
+        b"no mesh",
+        whole[: len(whole) // 2],
+        whole.replace(b"fixed", b"fluid"),
+        whole.replace(b"AQAAAACA", b"/////wCA", 1),  # VTK makes room for 2^32 blocks, and ends the process
+        whole.replace(b'"Points"', b'"Points>', 1),
+        whole.replace(b'NumberOfPoints="', b'NumberOfPoints="9', 1),
+    ):
+        assert data != whole
         (folder / "mesh.vtu").write_bytes(data)
         with pytest.raises(ModelError) as error:
             read_model(folder)
         one_line(error, folder)
+    assert capfd.readouterr() == ("", ""), "what VTK says beside is not said"
 
 
 def test_every_effect_says_which_keys_a_model_may_hold():
@@ -512,6 +522,7 @@ def test_an_output_replaces_no_input_and_nothing_of_another_kind(folder, record,
 
 ABSURD = {
     "a mesh of 1e-5": ("from 0.0005 to 0.2 m", "reconstruct", "REC", "-o", "new", "--mesh-size", "1e-5"),
+    "a memory of nan": ("not a finite number", "batch", "REC", "-o", "new", "--memory", "nan"),
     "a mesh of nan": ("from 0.0005 to 0.2 m", "reconstruct", "REC", "-o", "new", "--mesh-size", "nan"),
     "a negative seed": ("0 or greater", "simulate", "block", "-o", "new.csv", "--seed", "-1"),
     "a negative person": ("0 or greater", "simulate", "block", "-o", "new.csv", "--person", "-1"),

@@ -11,6 +11,7 @@ from typing import Any
 
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
+from palpate.arguments import finite
 from palpate.tasks.driver import Outcome, run
 from palpate.tasks.graph import Graph
 from palpate.tasks.words import Status
@@ -27,7 +28,7 @@ def add_engine(parser: argparse.ArgumentParser) -> None:
     )
     group.add_argument(
         "--memory",
-        type=float,
+        type=finite,
         metavar="NUMBER",
         help="what they may take together [GB] (default: 90 %% of what is free)",
     )
