@@ -31,7 +31,8 @@ _DRAINED = 1e3  # time constants that are more than any memory lasts
 @njit(cache=True, error_model="numpy")
 def poroelastic_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     """Add what the fluid bears. numbers: share, D / R, m/s; memory: as of `prony_step`."""
-    change = changed(memory, force)
+    changed(memory, force)
+    change = memory[3:6]
     run = numbers[1] * dt / depth if depth > 0.0 else _DRAINED
     for k in range(_TERMS):
         recall(numbers[0] * WEIGHTS[k], min(RATES[k] * run, _DRAINED), k, memory, change, force)

@@ -34,12 +34,13 @@ def recall(weight, spans, k, memory, change, force):
 
 @njit(cache=True, error_model="numpy")
 def changed(memory, force):
-    """(3,) of the memory: how the quasi-static force changed since the last step, which it then is."""
-    change = memory[3:6]
+    """Put into memory[3:6] how the quasi-static force changed since the last step, and that into memory[:3].
+
+    Nothing is returned: a renderer's kernels count no references (render.kernels), so they return no view.
+    """
     for axis in range(3):
-        change[axis] = force[axis] - memory[axis]
+        memory[3 + axis] = force[axis] - memory[axis]
         memory[axis] = force[axis]
-    return change
 
 
 @njit(cache=True, error_model="numpy")
@@ -53,7 +54,8 @@ def let_go(normal, force):
 def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     """Add the memory of the force. numbers: (2 k,) pairs of g and tau, s; memory: (6 + 3 k,) the last force,
     its change, then each branch."""
-    change = changed(memory, force)
+    changed(memory, force)
+    change = memory[3:6]
     for k in range(numbers.shape[0] // 2):
         if numbers[2 * k] != 0.0:
             recall(numbers[2 * k], dt / numbers[2 * k + 1], k, memory, change, force)
