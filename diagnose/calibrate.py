@@ -47,6 +47,9 @@ _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)
 _BRISK, _TAKES_UP, _PRESSED = 0.2, 0.3, 0.1
 _CORRELATED = 10.0
 _PLAIN_Z = 4.0
+_LAW_SD = (1e-3, 5e-6, 2e-4)
+"""What filter and sampling leave besides noise: share of the tool's give, m of half the play, s of the delay
+(twenty drawn plates; `palpate bench calibrate`)."""
 
 
 def calibrate_on_object(
@@ -230,6 +233,8 @@ def calibrate_on_plate(recording: Recording, exploration: Exploration) -> Calibr
     delay, delay_sd = _refined(costs, best, len(travel))
     _, found, sd = fitted(_DELAYS_S[best])
     give, half = float(found[0]), float(found[1])
+    sd = np.hypot(sd, [_LAW_SD[0] * abs(give), _LAW_SD[1]])
+    delay_sd = float(np.hypot(delay_sd, _LAW_SD[2]))
     stiff = give > _PLAIN_Z * sd[0]
     interval: dict[str, Any] = {"delay_s": [delay - 1.96 * delay_sd, delay + 1.96 * delay_sd]}
     if stiff:

@@ -51,6 +51,11 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
     before_n = gap(gaps.before, counts, added)
     after_n = gap(gaps.after, counts, added) if answer.names else before_n
     closed, interval = closed_share(gaps.before, gaps.after, counts, noise, added, rng, evidence.bootstrap)
+    if answer.names and interval is not None and interval[1] < 0:
+        # resamples of the share may say what those of the growth left open: then nothing is named either
+        answer.candidates[:0] = answer.names
+        answer.names, answer.remainder, after_n = [], True, before_n
+        answer.reasons.append("the gap grows with what would be named on places that were not fitted")
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
     sure = sureness(answer.remainder, closed, bool(answer.candidates))

@@ -71,6 +71,7 @@ def diagnose(
 
     progress("touches", 0.02)
     presses = presses_on(recording, model)
+    model = with_tip_of(model, presses)
     touches = touches_of(presses)
     free = free_air_of(recording, presses)
     lap("touches")
@@ -109,6 +110,14 @@ def diagnose(
     result = conclude(evidence, lap)
     progress("done", 1.0)
     return dataclasses.replace(result, seconds=seconds, left_out=tuple(sorted(left_out | untold)))
+
+
+def with_tip_of(model: Model, presses: Presses) -> Model:
+    """The model with the tip that the presses were made with: another recording's may be of another size."""
+    if model.tool.tip_radius_m == presses.tip_radius_m:
+        return model
+    tool = dataclasses.replace(model.tool, tip_radius_m=presses.tip_radius_m)
+    return model.replaced(tool=tool)
 
 
 def untold_effects(presses: Presses) -> set[str]:

@@ -14,7 +14,7 @@ from mechanics.presses import Presses
 FOLDS = 8
 _EXPONENTS = np.linspace(0.5, 3.0, 26)
 _POWERS = (0.5, 1.0, 1.5, 2.0, 3.0)
-_TIMES_S = (0.03, 0.1, 0.3, 1.0, 3.0, 10.0, 30.0)
+_TIMES_S = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 20.0)
 _RIDGES = np.geomspace(1e-8, 1e1, 10)
 
 

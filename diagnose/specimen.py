@@ -16,16 +16,18 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.fit import Descent, settings_of
 from diagnose.judging import AttributionOptions
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.result import Diagnosis
 from diagnose.touches import LEAST_PRESSES
-from diagnose.whiten import NuisanceOptions
+from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.press_cutting import cut
+from mechanics.presses import HOLDING
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
@@ -248,19 +250,64 @@ def diagnose_bench(
     """The sim-to-real gap of the curves, each held out; None with fewer than 6, of which none can be."""
     if len(bench.model.presses) < LEAST_PRESSES:
         return None
-    # pieces differ in more than their stiffness, and a machine's zero is worth what its load is
-    floor = _FLOOR[bench.specimens] * PEAK_N
-    nuisance = NuisanceOptions(floor_n=floor)
-    if bench.specimens:
-        nuisance = NuisanceOptions(floor_n=floor, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
     return diagnose(
         bench.recording,
         bench.model,
         DiagnoseOptions(fast=fast, seed=seed),
         progress,
-        nuisance=nuisance,
+        nuisance=_nuisance(bench),
         attribution=AttributionOptions(most=1 if fast else 3),
     )
+
+
+def _nuisance(bench: Bench) -> NuisanceOptions:
+    """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is."""
+    floor = _FLOOR[bench.specimens] * PEAK_N
+    if not bench.specimens:
+        return NuisanceOptions(floor_n=floor)
+    return NuisanceOptions(floor_n=floor, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
+
+
+_FOLDS, _ITERATIONS, _LEAST_HOLD = 6, 6, 8
+
+
+def unseen_holds(bench: Bench, made: Diagnosis) -> tuple[float, float] | None:
+    """rms error over rms force of holds that nothing has seen, by the ideal model and by the verdict: law
+    and effects from the other curves, the curve's own stiffness from its way in. None where fewer than 6
+    curves hold."""
+    forward, found = made.forward, made.attribution
+    if forward is None or found is None:
+        return None
+    t = forward.touches
+    hold = (t.phase == HOLDING) & (t.t > t.peak_s[t.press])
+    way = t.counted & (t.t <= t.peak_s[t.press]) & (t.travel[:, 0] > 0)
+    holds = np.flatnonzero(np.bincount(t.press[hold], minlength=len(t)) >= _LEAST_HOLD)
+    if len(holds) < LEAST_PRESSES:
+        return None
+    errors = []
+    named = set(made.effects)
+    for candidate in (found.ideal, found.final):
+        fit = candidate.found
+        effects = tuple(
+            e for e in fit.effects if candidate is found.ideal or e.name in named or not e.parameters
+        )
+        values = np.concatenate([fit.values[:1], *(fit.of(e.name) for e in effects)])
+        settings = settings_of(forward, effects, values, fit.onset)
+        whitener = Whitener(forward, settings, _nuisance(bench))
+        missed = 0.0
+        for k in range(_FOLDS):
+            held = np.arange(len(t)) % _FOLDS == k
+            weights = np.where([held[t.site == s].any() for s in range(t.sites)], 0.0, 1.0)
+            again = Descent(forward, whitener, effects, weights).run(values, fit.onset, _ITERATIONS)
+            predicted = forward.predict(settings_of(forward, effects, again.values, again.onset))[:, 0]
+            for press in np.intersect1d(holds, np.flatnonzero(held)):
+                own, rest = way & (t.press == press), hold & (t.press == press)
+                f = predicted[own]
+                scale = float(f @ t.local_force[own, 0] / max(float(f @ f), 1e-300))
+                missed += float(((scale * predicted[rest] - t.local_force[rest, 0]) ** 2).sum())
+        rows = hold & np.isin(t.press, holds)
+        errors.append(float(np.sqrt(missed / (t.local_force[rows, 0] ** 2).sum())))
+    return errors[0], errors[1]
 
 
 APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
@@ -274,8 +321,8 @@ class Approach:
     turn.
 
     error: dent law (and 'hunt-crossley', 'regression') -> rms error over rms force, median of the curves.
-    law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does not come back;
-    pull_n: (c,) N, greatest pull on the way out.
+    law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does not come back
+    (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
     """
 
     error: dict[str, float]
@@ -303,7 +350,9 @@ def approach_of(bench: Bench) -> Approach:
             errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
         back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
         given = max(np.trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
-        work.append(1 + np.trapezoid(push[back], u[back]) / given)
+        # a curve that ends in its hold gives nothing back to be weighed
+        gone = 1 + np.trapezoid(push[back], u[back]) / given
+        work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
         pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
     law = min(APPROACH_LAWS, key=lambda name: medians[name])

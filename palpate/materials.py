@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnose.rivals import held_out_rivals
-from diagnose.specimen import Approach, Bench, approach_of, bench_of, diagnose_bench
+from diagnose.specimen import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
 from diagnose.touches import touches_of
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
@@ -150,6 +150,10 @@ def _indentation(
         for name, force in held_out_rivals(touches).items()
     }
     error |= {"ideal": made.gap_before_n / size, "verdict": made.gap_after_n / size}
+    holds = unseen_holds(bench, made)
+    if holds is not None:
+        error |= {"ideal, holds": holds[0], "verdict, holds": holds[1]}
+        notes.append(f"of unseen holds {100 * (1 - (holds[1] / holds[0]) ** 2):.0f} % is closed")
     low, high = np.quantile(own, [0.025, 0.975]) if bench.specimens else _mean_interval(own)
     factor = bench.similarity.modulus
     entries = {e.name: bench.similarity.back(e.parameters) for e in made.entries if e.name in made.effects}
@@ -183,6 +187,8 @@ def _few(bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[s
     own = approach.modulus_pa
     low, high = _mean_interval(own)
     gone = f"{100 * approach.hysteresis:.0f} % of the work does not come back"
+    if not np.isfinite(approach.hysteresis):
+        gone = "it ends in its hold"
     pull = float(approach.pull_n.max())
     if pull > 0:
         gone += f", and it pulls by up to {pull:.2g} N on the way out"

@@ -24,6 +24,7 @@ from reconstruct.external.uniaxial import Uniaxial, of_compression, read_tension
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
+_TIPS_M = (1e-9, 0.1)
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
 
 
@@ -121,8 +122,11 @@ def _indentations(
             curves.append(_generic(path, columns, units))
     if tip_radius_m is None:
         raise RecordingError("the tip's radius is in no file: give --tip-radius M")
-    if not tip_radius_m > 0:
-        raise OptionError(f"--tip-radius is {tip_radius_m} m; it must be greater than 0")
+    if not _TIPS_M[0] <= tip_radius_m <= _TIPS_M[1]:
+        raise OptionError(
+            f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and "
+            f"{_TIPS_M[1]:g} m: give metres"
+        )
     good = [s for s in stated if np.isfinite(s)]
     return Tests(
         "indentation", curves=tuple(curves), tip_radius_m=tip_radius_m,

@@ -58,7 +58,7 @@ def draw(result: Changes, ax: Axes) -> None:
         ax.axhspan(*result.ratio_ci95, color=_COLOURS[1], alpha=0.2, label="of the whole")
         ax.axhline(1.0, color="0.5", lw=1, ls="--")
         ax.set(xlabel="place, sorted", ylabel="second over first modulus")
-        ax.legend(frameon=False, fontsize=8)
+        ax.legend(frameon=False, fontsize=8, ncol=2, loc="lower right", bbox_to_anchor=(1.0, 1.0))
         return
     for k, side in enumerate((result.before, result.after)):
         value = side.modulus_pa / 1e3

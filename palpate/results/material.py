@@ -34,7 +34,7 @@ class Material(Result):
     rms (of N, Pa): 1D models are the floor, 'regression' has no physics and is the ceiling. closed: share of
     the gap beyond the noise that the verdict closes on held-out curves, with its interval. effects: what was
     named. parameters: by law or effect, SI. unknown: what such a test cannot tell. seen: (x, measured,
-    predicted, axes' words) for the plot.
+    predicted, axes' words). `plot`: measured and predicted. `show`: nothing, it has no place in space.
     """
 
     kind: str

@@ -104,7 +104,7 @@ def test_what_is_found_is_turned_back_into_the_machines_units():
 def test_a_relaxation_is_predicted_where_it_was_left_out():
     t = np.geomspace(0.01, 100, 200)
     errors, fit = held_out_relaxation(t, 3e4 * (0.3 + 0.4 * np.exp(-t / 0.5) + 0.3 * np.exp(-t / 20)))
-    assert errors["prony-2"] < 0.04 < errors["spring"] and errors["spectrum"] < 0.05
+    assert errors["prony-2"] < 0.04 < errors["spring"] and errors["spectrum"] < 0.07
     assert sorted(fit.tau_s) == pytest.approx([0.5, 20], rel=0.2)
 
 
@@ -132,6 +132,8 @@ def test_what_is_no_test_or_two_kinds_is_one_line(tmp_path, capsys):
     )
     with pytest.raises(RecordingError, match="--tip-radius"):
         pp.material(tmp_path / "up.csv", progress=False)
+    with pytest.raises(OptionError, match="give metres"):
+        pp.material(tmp_path / "up.csv", tip_radius_m=5, progress=False)
     with pytest.raises(ContactError, match="signs"):
         pp.material(tmp_path / "up.csv", tip_radius_m=0.005, progress=False)
     assert cli.main(["material", *map(str, files), "--json", str(tmp_path / "out.json")]) == 0

@@ -5,14 +5,20 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from flat_contact import cyclic, points, pushed, recorded
-from flat_ground import NOISE_N, TIP_M, raster
+from flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster
 
 import palpate as pp
+from diagnose.pipeline import untold_effects, with_tip_of
+from mechanics.box_mesh import box_mesh
 from mechanics.errors import ContactError, OptionError
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.presses import CANNOT_TELL
+from mechanics.tetmesh import TetMesh
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.filtering import low_pass, noise_gain
 from reconstruct.known_shape import nowhere
+from reconstruct.placing import presses_on
 from reconstruct.points import explore_points
 from reconstruct.unbroken import free_air_seen
 
@@ -80,6 +86,28 @@ def test_a_raster_of_219_places_at_3_mm_is_219_places():
     recording = points((73, 3), 0.003, 5)
     found = explore_points(recording, nowhere(recording), ContactOptions()).presses
     assert len(found) == found.sites == 219
+
+
+@pytest.fixture(scope="module")
+def slab():
+    """A slab of 30 mm under the raster, as some other recording gave it, with another tip."""
+    size = (0.09, 0.09, 0.03)
+    mesh = box_mesh((9, 9, 3), size)
+    points = mesh.points + [-0.036, -0.036, -0.03]
+    mesh = TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable)
+    support = Support(np.array([0.0, 0.0, -0.03]), np.array([0.0, 0.0, 1.0]))
+    return Model(mesh, Material(MODULUS_PA, 0.49), support, Tool(0.006), 0.01)
+
+
+@pytest.mark.parametrize("made", [cyclic, points])
+def test_a_model_of_another_recording_needs_no_tracing(slab, made):
+    recording = made()
+    found = presses_on(recording, slab)
+    assert set(found.kinds) == {"cycle" if made is cyclic else "points"}
+    assert np.abs(found.point[:, 2]).max() < 1e-6
+    # the tip is the recording's, in places and in the law alike
+    assert with_tip_of(slab, found).tool.tip_radius_m == TIP_M == found.tip_radius_m
+    assert untold_effects(found) >= ({"time_delay", "viscoelasticity"} if made is points else set())
 
 
 def test_points_that_cannot_be_read_are_one_line():

@@ -1,0 +1,42 @@
+"""The real-data table: what held-out curves of others' instruments are predicted to, so that a change that
+spoils it is seen. Limits are the figures of docs/real-data.md with some room."""
+
+from __future__ import annotations
+
+from argparse import Namespace
+
+import numpy as np
+import pytest
+
+from palpate.benchmarks.diagnose_real import FOLDERS, SETS, _row
+
+
+def rows(measured_data, name: str, **options):
+    given = Namespace(session="230331", pieces=16, **options)
+    return [_row(name, label, made) for label, made in SETS[name](measured_data / FOLDERS[name], given)]
+
+
+@pytest.mark.slow
+def test_elastomers_in_tension_stay_predicted(measured_data):
+    found = rows(measured_data, "elastomers")
+    assert len(found) == 19
+    assert np.median([r["error"] for r in found]) < 0.015 < np.median([r["floor"] for r in found])
+
+
+@pytest.mark.slow
+def test_silicones_in_compression_stay_within_3_percent(measured_data):
+    found = rows(measured_data, "silicones", every=3)
+    assert len(found) == 7
+    errors, floors = ([r[key] for r in found] for key in ("error", "floor"))
+    assert np.median(errors) < 0.02 and max(errors) < 0.06 < np.median(floors)
+
+
+@pytest.mark.slow
+def test_beef_is_closed_and_never_made_worse(measured_data):
+    (found,) = rows(measured_data, "beef")
+    assert "viscoelasticity" in found["effects"]
+    assert found["closed_ci95"][1] > 0 and found["closed"] > BEEF_CLOSED
+    assert found["ceiling"] < found["error"] < found["floor"]
+
+
+BEEF_CLOSED = 0.3
