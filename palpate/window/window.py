@@ -89,7 +89,7 @@ class TouchWindow:
         self.pictures = [self._picture(side) for side in range(self.sides)]
         self.plotter.subplot(1, 0)
         self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names, left=PANEL_SHARE)
-        self._status = self._text("", (0.008, 0.95), "top")
+        self._status = self._text("", (0.008, 0.95), "top", size=15)
         self._hint = self._text(hint(mouse=channel is not None), (0.008, 0.04), "bottom", size=11)
         self.plotter.subplot(0, 0)
         self._help = self._text("", (0.01, 0.98), "top", font="courier")

@@ -178,6 +178,7 @@ def test_a_force_comes_with_the_time_for_which_it_may_act():
 def test_a_device_that_stops_talking_gets_zero_after_20_ms():
     servo = FakeServo()
     servo.press_in(0.002)
+    servo.press(0.002, 50)
     forces = np.array([servo.tick() for _ in range(40)])
     assert (forces[:19, 2] == forces[0, 2]).all() and forces[0, 2] > 0.99
     assert (forces[21:] == 0).all()
