@@ -61,6 +61,10 @@ class Path:
         return self.waypoints_m[k - 1] + share * (self.waypoints_m[k] - self.waypoints_m[k - 1])
 
 
+TURN_S, TURN_M_PER_S = 0.6, 0.8
+"""A turn to the next direction takes so long, longer where it would go faster than this."""
+
+
 class FreeExploration:
     """Presses from random directions towards a centre until it feels `target_force_n`, holds, draws back.
 
@@ -125,9 +129,15 @@ class FreeExploration:
                 self._from, self._direction = self._direction, self._new_direction()
                 self._turn_start_s = time_s
         if self._phase == "around":
-            share = minimum_jerk((time_s - self._turn_start_s) / 0.6)
+            angle = float(np.arccos(np.clip(self._from @ self._direction, -1.0, 1.0)))
+            # a minimum-jerk stroke is 15 / 8 as fast in its middle as on the way
+            turn_s = max(TURN_S, 1.875 * angle * self.radius_m / TURN_M_PER_S)
+            share = minimum_jerk((time_s - self._turn_start_s) / turn_s)
             if share >= 1.0:
                 self._phase = "in"
-            between = (1.0 - share) * self._from + share * self._direction
+            # along the great circle: the straight way between opposite directions leads past the middle
+            between = self._direction
+            if angle > 1e-6:
+                between = np.sin((1.0 - share) * angle) * self._from + np.sin(share * angle) * between
             return self.centre_m + self.radius_m * between / np.linalg.norm(between)
         return self.centre_m + self._reach_m * self._direction

@@ -92,7 +92,7 @@ class MouseDevice(OpenInWith):
         if self._position is None:
             self._position, self._velocity = np.array(pose.position_m), _ZERO
             self._from = self._to = self._position
-            self._left = 0
+            self._left, self._written_s = 0, pose.time_s
             self._sequence += 1
         if pose.time_s != self._written_s:
             took_s = min(max(pose.time_s - self._written_s, 0.0), WINDOW_SILENT_S)
@@ -100,14 +100,15 @@ class MouseDevice(OpenInWith):
             # and no sooner than it was to be at the place before
             self._left = self._number = max(1, self._left, round(took_s / self._hand.step_s))
             self._written_s = pose.time_s
-        steps = int((now - self._time) / self._hand.step_s)
+        steps = int((now - self._time) / self._hand.step_s + 1e-6)
         if steps > 0:
             self._sequence += 1
         for _ in range(min(steps, MOST_STEPS)):
-            meant = self._meant
             self._left = max(self._left - 1, 0)
+            # towards where it means to be and no farther: no press overshoots its depth
+            meant = self._meant
             self._position, self._velocity = self._hand.step(
-                self._position, self._velocity, meant, self._meant, _ZERO
+                self._position, self._velocity, meant, meant, _ZERO
             )
         self._time += steps * self._hand.step_s
         silent = now - pose.time_s > WINDOW_SILENT_S

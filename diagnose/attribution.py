@@ -76,7 +76,7 @@ def attribute(
     for step in range(search.options.most):
         scores: dict[str, Score] = {}
         for i, effect in enumerate(effects):
-            if effect.name in current.found.names:
+            if effect.name in current.found.names or _of_one(effect, current.found.effects):
                 continue
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
             candidate = search.judge([*current.found.effects, effect], like=current)
@@ -105,7 +105,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
-        best = max(passing, key=lambda s: s.gain)
+        best = _economical(passing, search.options.rival_share)
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
@@ -132,6 +132,21 @@ def attribute(
     )
 
 
+def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
+    """Whether one of the others is another law of the same phenomenon."""
+    return bool(effect.phenomenon) and any(
+        o.phenomenon == effect.phenomenon and o.name != effect.name for o in others
+    )
+
+
+def _economical(passing: Sequence[Score], share: float) -> Score:
+    """The score that gains most, or a law of the same phenomenon with fewer parameters whose gain is within
+    this share of it."""
+    best = max(passing, key=lambda s: s.gain)
+    near = [s for s in passing if _of_one(s.effect, [best.effect]) and s.gain > (1 - share) * best.gain]
+    return min([best, *near], key=lambda s: len(s.effect.parameters))
+
+
 def _with_hidden_strain(
     search: Search, effect: Effect, candidate: Candidate, current: Candidate
 ) -> Candidate:
@@ -152,6 +167,8 @@ def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Ca
     if current.chi < search.options.unknown_chi:
         return None
     able = [e for e in effects if e.scope is Scope.TIME and e.name not in current.found.names]
+    # of the laws of one phenomenon the first stands for all
+    able = list({e.phenomenon or e.name: e for e in reversed(able)}.values())
     found = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
@@ -258,6 +275,8 @@ def _rivals(
         first = scores[name]
         for score in scores.values():
             if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
+                continue
+            if _of_one(score.effect, first.added):
                 continue
             if score.share < RIVAL_CLOSES * max(first.share, 0.0) and not score.effect.few_places:
                 continue

@@ -18,7 +18,9 @@ from mechanics.effects.base import Effect
 SEEN = 4.7
 """Standard deviations: 3.1 for 2 % false alarms among twenty effects, 1.6 more to be seen 19 times of 20."""
 STARTS = 4
-"""Forms of an effect that are tried at most; the one that shows best counts."""
+"""Forms of an effect that are tried, about; the one that shows best counts."""
+MOVES = 5
+"""Steps of a parameter that is moved from where it does nothing."""
 
 
 def detectable(search: Search, base: Candidate, effects: Sequence[Effect]) -> dict[str, float]:
@@ -33,8 +35,7 @@ def detectable(search: Search, base: Candidate, effects: Sequence[Effect]) -> di
     for effect in effects:
         if effect.name in found.names:
             continue
-        starts = search.starts.get(effect.name) or effect.starts()
-        for start in starts[:: max(1, len(starts) // STARTS)]:
+        for start in _forms(search, effect):
             settings = settings_of(forward, found.effects, found.values, found.onset)
             effect.act(settings, start, forward)
             names.append(effect.name)
@@ -51,3 +52,13 @@ def detectable(search: Search, base: Candidate, effects: Sequence[Effect]) -> di
         limit = SEEN * size / np.sqrt(left) if left > 1e-12 else np.inf
         limits[name] = min(float(limit), limits.get(name, np.inf))
     return limits
+
+
+def _forms(search: Search, effect: Effect) -> list[np.ndarray]:
+    """Values (k,) at which an effect is there: some of its starts, or a move of each parameter where it
+    starts from nothing."""
+    starts = search.starts.get(effect.name) or effect.starts()
+    there = [s for s in starts if not np.allclose(s, effect.ideal)]
+    if not there:
+        return [effect.ideal + move for move in np.diag([MOVES * p.step for p in effect.parameters])]
+    return there[:: max(1, len(there) // STARTS)]

@@ -28,6 +28,8 @@ from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
 Z = 6.0
 SIDEWAYS_Z = 4.0
+SPRING_SHARE = 0.005
+"""Of a spring's compliance, beyond scatter: what a turning tool's weight adds to the force on the support."""
 LEAST_BIAS_N = 0.008
 LEAST_MASS_KG = 0.003
 MASS_SHARE = 0.03
@@ -93,7 +95,8 @@ def find_instrument_offsets(
     if np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) < t.noise.raw_n:
         forward.touches = t  # too little to matter
         return offsets
-    low, high = (1 / max(rigid.compliance + s * 1.96 * rigid.error, 1e-9) for s in (1, -1))
+    error = np.hypot(rigid.error, SPRING_SHARE * rigid.compliance)
+    low, high = (1 / max(rigid.compliance + s * 1.96 * error, 1e-9) for s in (1, -1))
     yields = f"on the rigid support the tip's reading gives by {1e3 * rigid.compliance:.3f} mm a newton"
     return InstrumentOffsets(
         (*offsets.names, SPRING.name),

@@ -78,7 +78,12 @@ def plain_words(app, what, name, obj, options, lines):
 
 def _escaped(line: str) -> str:
     parts = _TICKS.split(line)
-    return "".join(f"``{p}``" if k % 2 else _MARKS.sub(r"\\\1\2", p) for k, p in enumerate(parts))
+    # a letter right after code needs a mark between them that nobody sees
+    joined = ["\\ " if part[:1].isalnum() else "" for part in [*parts[1:], ""]]
+    return "".join(
+        f"``{p}``{after}" if k % 2 else _MARKS.sub(r"\\\1\2", p)
+        for k, (p, after) in enumerate(zip(parts, joined, strict=True))
+    )
 
 
 def setup(app):

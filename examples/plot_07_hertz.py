@@ -14,10 +14,10 @@ import trimesh
 import palpate as pp
 
 E, NU, RADIUS = 20e3, 0.49, 0.005
-block = trimesh.creation.box((0.16, 0.16, 0.08))
-block.apply_translation((0, 0, 0.04))
-model = pp.model_of(block, E, poisson_ratio=NU, tip_radius_m=RADIUS, mesh_size_m=0.016)
-curve = pp.press(model, at=(0, 0, 0.08), depth_m=0.003)
+block = trimesh.creation.box((0.10, 0.10, 0.05))
+block.apply_translation((0, 0, 0.025))
+model = pp.model_of(block, E, poisson_ratio=NU, tip_radius_m=RADIUS, mesh_size_m=0.012)
+curve = pp.press(model, at=(0, 0, 0.05), depth_m=0.003)
 print(curve)
 
 # %%

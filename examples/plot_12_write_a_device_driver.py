@@ -23,7 +23,7 @@ class Handle:
     spec = DeviceSpec("handle", "a make-believe handle", actuated_axes=("x", "y", "z"), max_force_n=5.0)
 
     def connect(self):
-        self.position, self.velocity = np.array([0.0, 0.0, 0.02]), np.zeros(3)
+        self.position, self.velocity = np.array([0.0, 0.0, 0.025]), np.zeros(3)
         self.hand = np.array([0.0, 0.0, -0.6])  # N, a light push
         self.last = time.perf_counter()
 
@@ -47,7 +47,8 @@ class Handle:
 block = trimesh.creation.box((0.06, 0.06, 0.03))
 model = pp.model_of(block, 20e3, mesh_size_m=0.012)
 felt = pp.renderer(model, "fem")
-state, seen = felt.start(), []
+state, _ = felt.step(felt.start(), np.full((1, 3), 1.0))  # far away: what is compiled is ready now
+seen = []
 with ForcefulDevice(Handle()) as device:
     while not device.read().connected or device.read().sequence < 1:
         time.sleep(0.01)

@@ -30,6 +30,7 @@ COMMANDS = {
     "calibrate": "the instrument told from presses on something known",
     "touch": "feel a model or scene at 1 kHz",
     "devices": "which devices are there, and for the others why not",
+    "explore": "where to touch next and why, and when to stop",
     "simulate": "the virtual laboratory: a person's exploration of a phantom",
     "bench": "benchmarks: medians, spreads and ratios",
     "batch": "many recordings at once",

@@ -266,7 +266,8 @@ def _searched(filtered: Filtered, given: _Given) -> _Found:
     except ContactError as error:
         if not wanders:
             raise
-        raise type(error)(f"{error}; {hint}") from error
+        # what the error itself advises would not help: its cause is the tool
+        raise type(error)(f"{hint} ({str(error).rsplit(': ', 1)[0]})") from error
     peaks = signals.magnitude[[c.peak for c in found.contacts]]
     automatic = given.method == "noise" and given.contact.contact_threshold_n is None
     if automatic and np.median(peaks) < _CLEAR * found.threshold_n:

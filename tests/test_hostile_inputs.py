@@ -680,6 +680,40 @@ def test_room_and_permission_are_seen_before_the_work(tmp_path):
         check_target(tmp_path / "a", MODEL)
 
 
+def test_a_full_scratch_disk_is_seen_before_the_work(monkeypatch):
+    import shutil
+
+    full = shutil.disk_usage("/")._replace(free=1000)
+    monkeypatch.setattr("mechanics.files.shutil.disk_usage", lambda _: full)
+    with pytest.raises(FileError, match="set TMPDIR to a folder on another disk") as error:
+        with temporary_folder("x-"):
+            pytest.fail("nothing can be written there")
+    one_line(error)
+
+
+def test_a_process_that_follows_its_parent_ends_with_it():
+    code = "import time; from palpate.child import end_with_parent; end_with_parent(); time.sleep(60)"
+    child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
+    child.stdin.close()
+    assert child.wait(20) == 1
+
+
+def test_a_worker_of_the_laboratory_ends_when_its_parent_is_killed(tmp_path):
+    code = (
+        "import os, signal\n"
+        "from scenes.laboratory.curves import workers_of_ours\n"
+        "if __name__ == '__main__':\n"
+        "    with workers_of_ours(1) as pool:\n"
+        "        print(pool.submit(os.getpid).result(), flush=True)\n"
+        "        os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    path = tmp_path / "main.py"
+    path.write_text(code)
+    # its pipes close, and this returns, when the last process that holds them is gone
+    done = subprocess.run([sys.executable, path], capture_output=True, text=True, timeout=30)
+    assert done.returncode == -signal.SIGKILL and int(done.stdout) > 0
+
+
 def test_two_writers_of_one_folder_do_not_mix(tmp_path):
     with sole_writer(tmp_path / "demo"):
         with pytest.raises(FileError, match="another palpate is writing to"), sole_writer(tmp_path / "demo"):

@@ -1,5 +1,8 @@
 """Adhesion: on the way out the surface pulls the tip back, most where it is level again, not beyond its
-range. A share of the pull may hold deeper in the contact as well, after a millimetre of the way back."""
+range. A share of the pull may hold deeper in the contact as well, after a fifth of the tip's
+radius of the way back.
+
+A form without a theory; where the work of adhesion is what matters, jkr_adhesion has it."""
 
 from __future__ import annotations
 
@@ -15,27 +18,28 @@ from mechanics.model import Model
 from mechanics.schema import Key
 
 _TURN = 0.25  # of the range: the way back over which the pull sets in, so that no force steps
-_TURN_INSIDE_M = 1e-3  # the same deeper in the contact
+_TURN_INSIDE = 0.2  # of the tip's radius: the same deeper in the contact
 
 
 @njit(cache=True, error_model="numpy")
-def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside):
+def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside, turn_m):
     """Pull towards the object, N, at least 0; depth (negative: above the surface), the touch's deepest, m.
 
-    inside: 0 to 1, the share of it that holds wherever the tip is in the object.
+    inside: 0 to 1, the share of it that holds wherever the tip is in the object. turn_m: after so much of the
+    way back.
     """
     if deepest_m <= 0.0:
         return 0.0
     returned = deepest_m - depth_m
     reach = max(1.0 - abs(depth_m) / range_m, 0.0) * min(max(returned / (_TURN * range_m), 0.0), 1.0)
     if depth_m > 0.0:
-        reach = max(reach, inside * min(max(returned / _TURN_INSIDE_M, 0.0), 1.0))
+        reach = max(reach, inside * min(max(returned / turn_m, 0.0), 1.0))
     return pull_off_n * reach
 
 
 @njit(cache=True, error_model="numpy")
 def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
-    pull = adhesive_pull(depth, deepest, numbers[0], numbers[1], numbers[2])
+    pull = adhesive_pull(depth, deepest, numbers[0], numbers[1], numbers[2], numbers[3])
     for k in range(3):
         force[k] -= pull * normal[k]
 
@@ -50,7 +54,7 @@ def _touch(touch: Touch, keys: Keys, model: Model) -> None:
         "adhesion",
         "pull_off_n at least 0, range_m above 0, inside from 0 to 1",
     )
-    touch.numbers[LAW] = np.array([pull, reach, inside])
+    touch.numbers[LAW] = np.array([pull, reach, inside, _TURN_INSIDE * model.tool.tip_radius_m])
 
 
 def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
@@ -76,5 +80,6 @@ EFFECT = Effect(
     touch=_touch,
     law=LAW,
     apply=unchanged,
+    phenomenon="stickiness",
     systematic_share=(0.1, 0.2, 0.0),
 )

@@ -1,14 +1,22 @@
-"""Strain stiffening: Yeoh's second coefficient makes the dent's force grow faster than neo-Hookean.
+"""Strain stiffening, or softening: a family of isotropic solids with one shape parameter r, signed.
 
-Fitted to the axisymmetric finite-strain solution of mechanics.dent at c20 / c10 = 0.35 (nu = 0.49, a
-sticking sphere, to 1.8 radii; within 0.3 % of the force): normal 1 + 0.197 c20/c10 x^1.25, sideways 1 +
-0.129 c20/c10 x^1.7, x = delta / R. 'palpate bench dent-table --stiffening' recomputes it. The far field is
-left as it is.
+The energy grows with I1 as 2 dW/dI1 = mu h(I1 - 3): h(J) = exp(2 r J) where r is above 0 (Demiray 1972; the
+isotropic part of Fung and of Veronda & Westmann), and 1 / sqrt(1 - 4 r J) below 0 (Knowles 1977 with n =
+1/2, the softest power at which no deformation loses ellipticity). Both begin as 1 + 2 r J: r is Yeoh's
+c20 / c10 at small strains, and 0 is neo-Hookean.
+
+The dent's force and sideways stiffness over the neo-Hookean ones were solved for some r by the axisymmetric
+finite-strain solver and stand in mechanics/dent_stiffening.csv; 'palpate bench dent-table --family' makes it.
+The far field is left as it is.
 """
 
 from __future__ import annotations
 
+from functools import cache
+from pathlib import Path
+
 import numpy as np
+from scipy.interpolate import PchipInterpolator
 
 from mechanics.dent import grid
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
@@ -16,17 +24,46 @@ from mechanics.effects.settings import Touch
 from mechanics.model import Model
 from mechanics.schema import Key
 
-FORCE_PER_C20, FORCE_POWER = 0.197, 1.25
-SIDEWAYS_PER_C20, SIDEWAYS_POWER = 0.129, 1.7
+FAMILY = Path(__file__).parents[1] / "dent_stiffening.csv"
+"""Columns ratio, depth / R, ln of the factor on the force over ratio, the same of the sideways stiffness."""
+LEAST, GREATEST = -0.5, 4.0
+"""Of the ratio: what the table spans."""
+_SPREAD = 0.2  # ratios are told apart on this scale: nodes lie about evenly in asinh(ratio / _SPREAD)
+
+
+def hardening(excess: np.ndarray, ratio: float) -> tuple[np.ndarray, np.ndarray]:
+    """(h, dh/dJ) at J = I1 - 3: 2 dW/dI1 over the shear modulus, and its slope. ratio: r above."""
+    if ratio >= 0:
+        h = np.exp(2 * ratio * excess)
+        return h, 2 * ratio * h
+    inside = 1 - 4 * ratio * excess
+    return inside**-0.5, 2 * ratio * inside**-1.5
+
+
+@cache
+def _family() -> PchipInterpolator:
+    """asinh(ratio / _SPREAD) to (2, k): ln of the factors over ratio, at mechanics.dent.grid()."""
+    ratio, x, force, sideways = np.loadtxt(FAMILY, delimiter=",", unpack=True)
+    ratios = np.unique(ratio)
+    logs = []
+    for each in ratios:
+        own = ratio == each
+        columns = (np.concatenate([[0.0], c[own]]) for c in (force, sideways))
+        at = np.sqrt(np.concatenate([[0.0], x[own]]))
+        # smooth in the root of the depth; beyond the deepest solution it is held
+        within = np.minimum(np.sqrt(grid()), at[-1])
+        logs.append([PchipInterpolator(at, c)(within) for c in columns])
+    return PchipInterpolator(np.arcsinh(ratios / _SPREAD), np.array(logs), axis=0)
 
 
 def stiffening(c20_over_c10: float) -> tuple[np.ndarray, np.ndarray]:
-    """Factors (k,) on the dent's normal force and sideways stiffness at mechanics.dent.grid()."""
-    x = grid()
-    return (
-        1 + FORCE_PER_C20 * c20_over_c10 * x**FORCE_POWER,
-        1 + SIDEWAYS_PER_C20 * c20_over_c10 * x**SIDEWAYS_POWER,
-    )
+    """Factors (k,) on the dent's normal force and sideways stiffness at mechanics.dent.grid().
+
+    Beyond LEAST or GREATEST the logarithm goes on in proportion to the ratio.
+    """
+    within = float(np.clip(c20_over_c10, LEAST, GREATEST))
+    force, sideways = np.exp(c20_over_c10 * _family()(np.arcsinh(within / _SPREAD)))
+    return force, sideways
 
 
 def _touch(touch: Touch, keys: Keys, model: Model) -> None:
@@ -38,9 +75,9 @@ EFFECT = Effect(
     name="strain_stiffening",
     domain="object",
     scope=Scope.EVERYWHERE,
-    words="the material stiffens as it is strained",
-    parameters=(Parameter("c20_over_c10", "1", 0.0, 4.0, 0.0, (0.3,), 0.02),),
-    keys={"c20_over_c10": Key(low=0.0, high=100.0, required=True)},
+    words="the material stiffens or softens as it is strained",
+    parameters=(Parameter("c20_over_c10", "1", LEAST, GREATEST, 0.0, (0.3, -0.05), 0.02),),
+    keys={"c20_over_c10": Key(low=LEAST, high=GREATEST, required=True)},
     report=lambda values, scene, modulus_pa: {"c20_over_c10": float(values[0])},
     touch=_touch,
     apply=unchanged,

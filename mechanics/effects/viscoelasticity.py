@@ -21,28 +21,52 @@ from mechanics.schema import Key
 
 
 @njit(cache=True, error_model="numpy")
-def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
-    """Add the memory of the force. numbers: (2 k,) pairs of g and tau, s; memory: (3 + 3 k,) the last force,
-    then each branch."""
-    push = 0.0
+def recall(weight, spans, k, memory, change, force):
+    """Let branch k of a memory fade over `spans` of its time constants and follow a change (3,) of the
+    quasi-static force that ran straight meanwhile; add it to the force."""
+    decay = np.exp(-spans)
+    gain = (1.0 - decay) / spans if spans > 0.0 else 1.0
     for axis in range(3):
-        change = force[axis] - memory[axis]
+        branch = 6 + 3 * k + axis
+        memory[branch] = decay * memory[branch] + gain * change[axis]
+        force[axis] += weight * memory[branch]
+
+
+@njit(cache=True, error_model="numpy")
+def changed(memory, force):
+    """(3,) of the memory: how the quasi-static force changed since the last step, which it then is."""
+    change = memory[3:6]
+    for axis in range(3):
+        change[axis] = force[axis] - memory[axis]
         memory[axis] = force[axis]
-        for k in range(numbers.shape[0] // 2):
-            g, tau = numbers[2 * k], numbers[2 * k + 1]
-            if g == 0.0:
-                continue
-            decay = np.exp(-dt / tau)
-            gain = tau / dt * (1.0 - decay) if dt > 0.0 else 1.0
-            branch = 3 + 3 * k + axis
-            memory[branch] = decay * memory[branch] + gain * change
-            force[axis] += g * memory[branch]
-        push += force[axis] * normal[axis]
-    if not push > 0.0:
+    return change
+
+
+@njit(cache=True, error_model="numpy")
+def let_go(normal, force):
+    """No force where it would pull: the tip has left the slower surface."""
+    if not force[0] * normal[0] + force[1] * normal[1] + force[2] * normal[2] > 0.0:
         force[0] = force[1] = force[2] = 0.0
 
 
-LAW = Law(prony_step, order=1, memory=lambda numbers: 3 + 3 * (len(numbers) // 2))
+@njit(cache=True, error_model="numpy")
+def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
+    """Add the memory of the force. numbers: (2 k,) pairs of g and tau, s; memory: (6 + 3 k,) the last force,
+    its change, then each branch."""
+    change = changed(memory, force)
+    for k in range(numbers.shape[0] // 2):
+        if numbers[2 * k] != 0.0:
+            recall(numbers[2 * k], dt / numbers[2 * k + 1], k, memory, change, force)
+    let_go(normal, force)
+
+
+LAW = Law(prony_step, order=1, memory=lambda numbers: 6 + 3 * (len(numbers) // 2))
+
+
+def add_terms(touch: Touch, g: np.ndarray, tau_s: np.ndarray) -> None:
+    """Let a touch remember by further terms g, tau_s (k,), beside those that it has."""
+    there = touch.numbers.get(LAW, np.zeros(0))
+    touch.numbers[LAW] = np.concatenate([there, np.column_stack([g, tau_s]).ravel()])
 
 
 def _touch(touch: Touch, keys: Keys, model: Model) -> None:
@@ -53,7 +77,7 @@ def _touch(touch: Touch, keys: Keys, model: Model) -> None:
             f"viscoelasticity has g = {g.tolist()} and tau_s = {tau.tolist()}: as many of each, g at least "
             "0, tau_s greater than 0 s"
         )
-    touch.numbers[LAW] = np.column_stack([g, tau]).ravel()
+    add_terms(touch, g, tau)
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -110,6 +134,7 @@ EFFECT = Effect(
     change=_change,
     law=LAW,
     apply=unchanged,
+    phenomenon="relaxation",
     candidates=_starts,
     # a contact that shrinks is slower than the elastic force, and two terms stand for what may be more
     systematic=(0.015, 0.06, 0.015, 0.3),

@@ -11,6 +11,7 @@ from scipy.linalg import solve_triangular
 from diagnose.first_touch import first_touches
 from diagnose.fit import Descent, Fit, bounds_of, settings_of
 from diagnose.forward import Forward
+from diagnose.whiten import Whitener as FixedWhitener
 from mechanics.effects.base import Effect
 from palpate.benchmarks._density_covariance import (
     FLOOR,
@@ -128,8 +129,11 @@ class Weighing:
         )  # fmt: skip
 
 
-class Whitener:
-    """Weighs residuals and sensitivities (n, 3, k) place by place with own errors of settled sizes."""
+class Whitener(FixedWhitener):
+    """Weighs residuals and sensitivities (n, 3, k) place by place with own errors of settled sizes.
+
+    It stands in for the diagnosis's, of which it keeps the interface and none of the numbers.
+    """
 
     def __init__(self, forward: Forward, columns: list[Column], x: dict[str, float], eta: float) -> None:
         t = self.touches = forward.touches
@@ -140,7 +144,7 @@ class Whitener:
         self.onset_sd = USUAL["onset"] * size["onset"]
         self.onset_column = columns[0].change / USUAL["onset"]
         site_of_row = t.site[t.press]
-        self.blocks: list[tuple[np.ndarray, np.ndarray]] = []
+        self.places: list[tuple[np.ndarray, np.ndarray]] = []
         for s in range(t.sites):
             rows = np.flatnonzero((site_of_row == s) & t.counted)
             stack = []
@@ -151,7 +155,7 @@ class Whitener:
                 stack.append(part)
             white = self._white(rows, np.concatenate(stack, axis=2))
             factor = np.linalg.cholesky(np.eye(white.shape[1]) + white.T @ white / eta)
-            self.blocks.append((rows, solve_triangular(factor, white.T, lower=True)))
+            self.places.append((rows, solve_triangular(factor, white.T, lower=True)))
         self.stiffness_sd = np.full(len(t), USUAL["repeat"] * size["repeat"])
 
     def _white(self, rows: np.ndarray, x: np.ndarray) -> np.ndarray:
@@ -161,12 +165,12 @@ class Whitener:
     @property
     def groups(self) -> int:
         """Places."""
-        return len(self.blocks)
+        return len(self.places)
 
     def gram(self, x: np.ndarray) -> np.ndarray:
         """(g, k, k) whitened inner products of the columns of x (n, 3, k) in each group."""
         out = np.empty((self.groups, x.shape[2], x.shape[2]))
-        for i, (rows, halved) in enumerate(self.blocks):
+        for i, (rows, halved) in enumerate(self.places):
             white = self._white(rows, x[rows])
             side = halved @ white
             out[i] = (white.T @ white - side.T @ side / self.eta) / self.eta
@@ -175,8 +179,8 @@ class Whitener:
     def raw_gram(self, x: np.ndarray) -> np.ndarray:
         """(g, k, k) plain inner products, N^2 where x is in N: for gaps."""
         k = x.shape[2]
-        return np.array([x[rows].reshape(-1, k).T @ x[rows].reshape(-1, k) for rows, _ in self.blocks])
+        return np.array([x[rows].reshape(-1, k).T @ x[rows].reshape(-1, k) for rows, _ in self.places])
 
     def counts(self) -> np.ndarray:
         """(g,) thinned contact samples of each group."""
-        return np.array([len(rows) for rows, _ in self.blocks])
+        return np.array([len(rows) for rows, _ in self.places])

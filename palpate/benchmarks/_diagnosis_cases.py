@@ -194,7 +194,7 @@ def _hard(pool: Sequence[int], finite: Sequence[int], seed: int) -> list[Case]:
         if name != "surface_offset":
             add("left-out", (name,), {name: 2.0}, name)
     for strength in (1.0, 2.0, 4.0):
-        add("absent", ("poroelasticity",), {"poroelasticity": strength})
+        add("single", ("poroelasticity",), {"poroelasticity": strength})
     for name in ("plasticity", "anisotropy"):
         add("absent", (name,), {FINITE: 1.0, name: 1.0})
     for pair in PAIRS:

@@ -11,7 +11,7 @@ import numpy as np
 
 from palpate.benchmarks._rates import wilson
 
-FAMILIES = {"poroelasticity": ("viscoelasticity",), "plasticity": ("mullins_softening",)}
+FAMILIES = {"plasticity": ("mullins_softening",)}
 """What effects that the library has never had may be taken for, as declared; 'unknown' is right as well."""
 SIZES_IN_NOISE = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 1e9)
 """Edges of the detection curve: the effect's own force (best factor taken off) over the vector noise."""

@@ -32,8 +32,7 @@ from mechanics.errors import OptionError, PalpateError
 from mechanics.files import temporary_prefix
 from mechanics.model import read_model, write_model
 from mechanics.recording import read_recording
-from palpate.benchmarks._fuzz_cases import PRESS
-from palpate.benchmarks._servo_load import block_model
+from palpate.benchmarks._fuzz_cases import PRESS, cube
 from palpate.benchmarks.timing import table
 from palpate.child import module_command, module_environment
 from scenes.embedded import embedded_names, embedded_recording
@@ -140,7 +139,7 @@ class _Place:
         self.out, self.scratch, self.kept = folder / "out", folder / "scratch", folder / "kept"
         for each in (self.out, self.scratch, self.kept):
             each.mkdir()
-        self.model = write_model(folder / "block", block_model(60))
+        self.model = write_model(folder / "block", cube())
         self.jobs = _jobs(self.model, self.out)
         self._environment = module_environment(TMPDIR=str(self.scratch))
 

@@ -4,12 +4,14 @@ A rigid sphere of radius 1 is pressed into a half-space that sticks to it where 
 ring of the surface comes into contact, and the depth at which the next ring touches is found to rounding.
 Nine-node quadrilaterals, the volumetric part integrated at the four reduced points. `linear`: small
 strains, the contact followed on the displaced surface. `neo-hookean`: psi = mu/2 (I1 - 3 - 2 ln J) +
-lambda/2 (ln J)^2. `--stiffening` g adds mu/2 g (I1 - 3)^2 (Yeoh, g = c20 / c10).
+lambda/2 (ln J)^2. `--stiffening` r makes of mu/2 (I1 - 3) the family of mechanics.effects.strain_stiffening.
+`--family` solves for all ratios of that family's table and writes what they are over the neo-Hookean dent.
 """
 
 from __future__ import annotations
 
 import argparse
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +19,7 @@ import scipy.sparse as sp
 from pypardiso import PyPardisoSolver
 
 from mechanics.dent import dent_law, grid
+from mechanics.effects.strain_stiffening import hardening
 from mechanics.elasticity import lame_parameters
 from mechanics.files import atomic_file
 
@@ -28,7 +31,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--law", choices=("neo-hookean", "linear"), default="neo-hookean")
     parser.add_argument("--poisson-ratio", type=float, default=0.49)
     parser.add_argument(
-        "--stiffening", type=float, default=0.0, help="Yeoh's c20 / c10 of the neo-hookean law"
+        "--stiffening", type=float, default=0.0, help="c20 / c10 of the neo-hookean law at small strains"
+    )
+    parser.add_argument(
+        "--family", action="store_true", help="the table of all stiffening and softening laws"
     )
     parser.add_argument("--element", type=float, default=0.06, help="smallest element over the tip's radius")
     parser.add_argument("--until", type=float, default=2.0, help="greatest depth over the tip's radius")
@@ -56,14 +62,33 @@ def lagrange(x: float) -> tuple[np.ndarray, np.ndarray]:
     return np.array([x * (x - 1) / 2, 1 - x * x, x * (x + 1) / 2]), np.array([x - 0.5, -2 * x, x + 0.5])
 
 
+@dataclass(frozen=True)
+class Grading:
+    """How far a body goes, in tip radii, and by how much elements grow, along the surface and down."""
+
+    extent: float = 400.0
+    along: float = 1.18
+    down: float = 1.12
+
+
+COARSE = Grading(60.0, 1.3, 1.3)
+"""Enough for one law over another on the same elements."""
+
+
 class HalfSpace:
-    """Axisymmetric body r >= 0, z <= 0 out to 400 radii, fixed there; displacements (n, 2)."""
+    """Axisymmetric body r >= 0, z <= 0, fixed at its far ends; displacements (n, 2)."""
 
     def __init__(
-        self, element: float, poisson_ratio: float, law: str, until: float, stiffening: float = 0.0
+        self,
+        element: float,
+        poisson_ratio: float,
+        law: str,
+        until: float,
+        stiffening: float = 0.0,
+        grading: Grading = Grading(),
     ) -> None:
-        r = graded(element, 1.0 + 0.35 * until, 1.18, 400.0)
-        z = -graded(element, 0.5, 1.12, 400.0)
+        r = graded(element, 1.0 + 0.35 * until, grading.along, grading.extent)
+        z = -graded(element, 0.5, grading.down, grading.extent)
         r, z = _halved(r), _halved(z)
         nr, nz = len(r), len(z)
         self.points = np.stack(np.meshgrid(r, z, indexing="ij"), -1).reshape(-1, 2)
@@ -147,8 +172,8 @@ class HalfSpace:
         cross[:, 4, 4] = g[:, 4] ** 2
         if part == "shear":
             excess = (f * f).sum(axis=1) - 3  # I1 - 3
-            factor = (1 + 2 * self.stiffening * excess)[:, None]
-            steeper = 4 * self.stiffening * f[:, :, None] * f[:, None, :]
+            factor, slope = (each[:, None] for each in hardening(excess, self.stiffening))
+            steeper = 2 * slope[:, :, None] * f[:, :, None] * f[:, None, :]
             tangent = self.mu * (factor[:, :, None] * np.eye(5) + steeper + cross)
             return self.mu * (factor * f - g), tangent
         log = np.log(j)[:, None]
@@ -205,7 +230,7 @@ class HalfSpace:
         factor = self.mu if part == "shear" else -self.lam * np.log(plane * f[:, 4])
         if part == "shear":
             excess = (f * f).sum(axis=1) - 3
-            result += self.mu * (1 + 2 * self.stiffening * excess)[:, None, None] * np.eye(4)
+            result += self.mu * hardening(excess, self.stiffening)[0][:, None, None] * np.eye(4)
         # G_iL G_kJ couples (r theta) or (z theta) with (theta R) or (theta Z)
         for a, i in ((0, 0), (1, 1)):
             for b, c in ((2, 0), (3, 1)):
@@ -291,13 +316,14 @@ def press_curve(
     until: float,
     *,
     stiffening: float = 0.0,
+    grading: Grading = Grading(),
     quiet: bool = True,
 ) -> np.ndarray:
     """(k, 4): depth / R, force / (E* R^2), contact radius / R, sideways stiffness / (R 8 G / (2 - nu)).
 
     A row a ring of the surface, at the depth where it touches.
     """
-    body = HalfSpace(element, poisson_ratio, law, until, stiffening)
+    body = HalfSpace(element, poisson_ratio, law, until, stiffening, grading)
     press = Press(body)
     depth, rows, before = 0.0, [], 0.0
     stick = 4 / ((1 + poisson_ratio) * (2 - poisson_ratio))
@@ -338,8 +364,56 @@ def smooth_table(rows: np.ndarray) -> np.ndarray:
     return np.stack(columns, axis=1)
 
 
+FAMILY_RATIOS = (-0.5, -0.15, 0.15, 0.6, 1.6, 4.0)
+FAMILY_DEPTHS = np.round(np.linspace(0.3, 1.25, 11) ** 2, 4)
+"""Even in the root of the depth."""
+
+
+def logarithms(rows: np.ndarray) -> np.ndarray:
+    """(k, 2) ln of the force and of the sideways stiffness over Sneddon's sphere at FAMILY_DEPTHS, from the
+    rows of `press_curve`; NaN beyond the deepest.
+
+    A quartic in the root of the depth is fitted to the corner rings, as in `smooth_table`, to the logarithm.
+    """
+    x, force, _, sideways = rows[1::2][rows[1::2, 0] > 0.05].T
+    sphere, powers = dent_law("sphere").table, np.arange(1, 5)
+    columns = []
+    for values, k in ((force / x**1.5, 0), (sideways / np.sqrt(x), 2)):
+        log = np.log(values / np.interp(x, grid(), sphere[:, k]))
+        fit = np.linalg.lstsq(np.sqrt(x)[:, None] ** powers, log, rcond=None)[0]
+        columns.append(np.sqrt(FAMILY_DEPTHS)[:, None] ** powers @ fit)
+    deepest = x[-1] * 1.02  # of a ring's step
+    return np.where(FAMILY_DEPTHS[:, None] <= deepest, np.stack(columns, axis=1), np.nan)
+
+
+def family(poisson_ratio: float, element: float, ratios: tuple[float, ...] = FAMILY_RATIOS) -> np.ndarray:
+    """(k, 4) ratio, depth / R, ln(force over the neo-Hookean one) / ratio, the same of the sideways
+    stiffness: what mechanics.effects.strain_stiffening reads."""
+    until = float(FAMILY_DEPTHS[-1])
+    plain = logarithms(press_curve("neo-hookean", poisson_ratio, element, until, grading=COARSE))
+    table = []
+    for ratio in ratios:
+        rows = press_curve("neo-hookean", poisson_ratio, element, until, stiffening=ratio, grading=COARSE)
+        print(f"c20/c10 {ratio:+.2f}: to {rows[-1, 0]:.2f} R", flush=True)
+        logs = (logarithms(rows) - plain) / ratio
+        solved = np.isfinite(logs[:, 0])
+        table.append(np.column_stack([np.full(solved.sum(), ratio), FAMILY_DEPTHS[solved], logs[solved]]))
+    return np.concatenate(table)
+
+
 def run(arguments: argparse.Namespace) -> dict:
     """Press, print, and write the table."""
+    if arguments.family:
+        table = family(arguments.poisson_ratio, arguments.element)
+        if arguments.output:
+            header = (
+                f"half-spaces that stiffen or soften, over the neo-Hookean one; Poisson's ratio "
+                f"{arguments.poisson_ratio};\nmade by 'palpate bench dent-table --family --element "
+                f"{arguments.element}'\nc20/c10, depth/R, ln(force ratio) over c20/c10, the same sideways"
+            )
+            with atomic_file(Path(arguments.output)) as temporary:
+                np.savetxt(temporary, table, fmt=("%g", "%g", "%.5f", "%.5f"), delimiter=",", header=header)
+        return {"table": table}
     rows = press_curve(
         arguments.law,
         arguments.poisson_ratio,

@@ -33,7 +33,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Read every recording's support and weigh its presses; print two tables."""
-    support, limits, noise = [], defaultdict(dict), {}
+    support: list[dict[str, Any]] = []
+    limits: dict[str, dict[str, float]] = defaultdict(dict)
+    noise: dict[str, float] = {}
     for path in map(Path, arguments.recordings):
         name = path.name.split(".")[0]
         recording = read_recording(path)

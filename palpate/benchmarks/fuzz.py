@@ -193,8 +193,11 @@ def _print(
     counts: Counter[tuple[str, str]], targets: tuple[str, ...], broken: list[dict[str, Any]], seconds: float
 ) -> None:
     outcomes = ["refused in one line", *ACCEPTED, *(o for o in BROKEN if any(o == b for _, b in counts))]
-    rows = [[t, *(counts[t, o] for o in outcomes), sum(counts[t, o] for o in outcomes)] for t in targets]
-    rows.append(["all", *(sum(row[i] for row in rows) for i in range(1, len(outcomes) + 2))])
+    named = [(t, (t,)) for t in targets] + [("all", targets)]
+    rows = []
+    for name, kinds in named:
+        each = [sum(counts[t, o] for t in kinds) for o in outcomes]
+        rows.append([name, *each, sum(each)])
     print(table(["damaged", *outcomes, "tried"], rows))
     print(f"{seconds:.0f} s, {len(broken)} broken")
     for case in broken:

@@ -66,7 +66,8 @@ def _verification() -> dict[str, float]:
     mesh = box(20.0, 12.0, 6.0, 0.8)
     for name, changes in (
         ("neo-Hookean", {}),
-        ("Yeoh", {"stiffening": 0.35}),
+        ("stiffening", {"stiffening": 0.35}),
+        ("softening", {"stiffening": -0.35}),
         ("fibres", {"fibre": np.array([2.0, 1.0, 0.0, 0.0])}),
         ("Maxwell branch", {"prony": np.array([[0.3, 0.3]])}),
     ):

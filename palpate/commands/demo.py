@@ -93,13 +93,13 @@ def _run(arguments: argparse.Namespace, folder: Path) -> None:
             "servo": result.servo.as_dict(),
             "seconds": result.seconds,
             "report": str(report.resolve()),
-            "diagnosis": _found(result.diagnosis),
+            "diagnosis": diagnosis_json(result.diagnosis),
         },
         arguments.json,
     )
 
 
-def _found(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
+def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
     """The diagnosis's answer, by the keys of `palpate diagnose --json`; None where none was made."""
     if diagnosis is None:
         return None

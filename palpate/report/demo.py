@@ -210,9 +210,8 @@ def diagnosis_words(result: DemoResult) -> str:
         words += " Finite strain is in the rendered curves already: that is what the law stands for."
     rest = [name.replace("_", " ") for name in found.effects if not (deep and name == known())]
     if rest:
-        words += (
-            f" The rendered curves do not have {' and '.join(rest)}: `palpate diagnose REC --apply` adds it."
-        )
+        words += f" The rendered curves do not have {' and '.join(rest)}: what to do about that stands in "
+        words += "the page of `palpate diagnose REC --report PAGE.html`."
     return words
 
 

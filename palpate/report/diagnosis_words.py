@@ -27,6 +27,8 @@ ERROR_WORDS = {
 }
 
 UNITS = (
+    ("_m2_per_s", 1e6, "mm²/s"),
+    ("_j_per_m2", 1.0, "J/m²"),
     ("_n_per_m", 1e-3, "N/mm"),
     ("_n_per_s", 1e3, "mN/s"),
     ("_pa_per_m", 1e-6, "kPa/mm"),
@@ -40,7 +42,12 @@ WORDS = {
     "mu": "friction coefficient",
     "g": "extra force right after a fast press, shares of the lasting force",
     "tau_s": "that extra force fades within",
-    "c20_over_c10": "stiffening (Yeoh's c20 over c10)",
+    "share": "extra force right after a fast press, share of the lasting force",
+    "exponent": "it fades by this power of time",
+    "diffusivity_m2_per_s": "fluid drains at",
+    "work_j_per_m2": "work to separate the surfaces",
+    "healed": "share of it that pulls on first touch",
+    "c20_over_c10": "stiffening (c20 over c10; below 0 it softens)",
     "r": "softening on repeats (r; smaller is more)",
     "m_rel": "width of the softening (m, of the greatest load)",
     "matrix": "reading per true force, 3 x 3",

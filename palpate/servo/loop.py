@@ -30,6 +30,12 @@ SWAP = 7
 def one_tick(kernel, model, state, support, arrays, parameters, now_ns, deadline_ns):
     """A whole tick with the renderer's kernel in its middle, and the support beside it."""
     before(arrays)
+    answer(kernel, model, state, support, arrays, parameters, now_ns, deadline_ns)
+
+
+@njit(inline="always", nogil=True)
+def answer(kernel, model, state, support, arrays, parameters, now_ns, deadline_ns):
+    """The tick once its pose is taken; now_ns: not before that."""
     kernel(model, state, arrays.tips)
     after(
         arrays,
@@ -56,7 +62,10 @@ def compiled_loop(kernel, model, state, support, arrays, parameters, wake, most_
         deadline = arrays.shared.counts[DEADLINE]
         compiled_sleep_until(arrays.timespec, deadline)
         started = compiled_now_ns(arrays.timespec)
-        one_tick(kernel, model, state, support, arrays, parameters, started, deadline)
+        before(arrays)
+        # a stall in between makes the pose younger than the tick, and no clock run backwards
+        read = compiled_now_ns(arrays.timespec)
+        answer(kernel, model, state, support, arrays, parameters, read, deadline)
         ended = compiled_now_ns(arrays.timespec)
         account(arrays, parameters, deadline, started, ended)
         if wake >= 0:
@@ -220,6 +229,7 @@ def run_tick(program: Program, arrays: TickArrays, now_ns: int, deadline_ns: int
     """One tick at a time that is handed in: what the compiled loop does between two deadlines."""
     renderer, support = program.scene.renderer, program.scene.support
     state, parameters = program.state, program.parameters
-    one_tick.py_func(
+    before(arrays)
+    answer.py_func(
         renderer.kernel, renderer.parameters, state, support, arrays, parameters, now_ns, deadline_ns
     )

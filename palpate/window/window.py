@@ -247,10 +247,10 @@ class TouchWindow:
 
     def _scale_type(self) -> None:
         """Type grows and shrinks with the window."""
-        size = tuple(self.plotter.window_size)
-        if size != self._scaled_for:
-            self._scaled_for = size
-            share = min(size[0] / SIZE[0], size[1] / SIZE[1])
+        width, height = self.plotter.window_size
+        if (width, height) != self._scaled_for:
+            self._scaled_for = width, height
+            share = min(width / SIZE[0], height / SIZE[1])
             for text, points in self._texts:
                 text.prop.font_size = max(LEAST_TYPE, round(points * share))
 

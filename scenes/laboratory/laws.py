@@ -1,4 +1,5 @@
-"""Laws at a material point: isochoric stress and moduli of a neo-Hookean or Yeoh solid with fibres.
+"""Laws at a material point: isochoric stress and moduli of a solid with fibres, neo-Hookean or one that
+stiffens (exponentially) or softens as it is strained.
 
 Voigt order 11 22 33 12 23 13; stresses in units of the matrix's Young's modulus.
 """
@@ -32,9 +33,18 @@ def isochoric(c, shear, c20, fibre, stress, moduli):
     trace = c[0] + c[1] + c[2]
     first = scale * trace
     c10 = 0.5 * shear
-    w1 = c10 * (1 + 2 * c20 * (first - 3))
-    w11 = 2 * c10 * c20
-    energy = c10 * (first - 3) * (1 + c20 * (first - 3))
+    strained = first - 3
+    if c20 > 0.0:
+        w1 = c10 * np.exp(2 * c20 * strained)
+        w11 = 2 * c20 * w1
+        energy = (w1 - c10) / (2 * c20)
+    elif c20 < 0.0:
+        root = np.sqrt(1 - 4 * c20 * strained)
+        w1 = c10 / root
+        w11 = 2 * c20 * w1 / (root * root)
+        energy = c10 * (1 - root) / (2 * c20)
+    else:
+        w1, w11, energy = c10, 0.0, c10 * strained
     d = np.empty(6)
     for a in range(6):
         d[a] = (scale if a < 3 else 0.0) - first / 3 * inverse[a]

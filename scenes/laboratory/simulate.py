@@ -65,11 +65,10 @@ def simulate(
     hand = hand or HandOptions()
     strengths = {name: float(value) for name, value in (effects or {}).items() if float(value) != 0}
     for name, value in strengths.items():
-        effect(name)
-        if not (np.isfinite(value) and 0 < value <= 16):
-            raise OptionError(
-                f"effect '{name}' has strength {value}; it must be greater than 0 and at most 16"
-            )
+        least = effect(name).least_strength
+        if not (np.isfinite(value) and value != 0 and least <= value <= 16):
+            above = f"at least {least:g}, not 0," if least else "greater than 0"
+            raise OptionError(f"effect '{name}' has strength {value}; it must be {above} and at most 16")
     if any(effect(name).needs_finite for name in strengths):
         strengths.setdefault("finite_strain", 1.0)
     modulus = options.young_modulus_pa or phantom.young_modulus_pa

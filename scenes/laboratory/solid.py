@@ -20,10 +20,11 @@ _UNIT_GRADIENTS = np.array([shape_gradients(*b) for b in GAUSS])
 class Material:
     """Per Gauss point of a mesh (m elements, 4 points): what the solid is made of.
 
-    shear, bulk: (m, 4), (m,) units of E. stiffening: (m,) C20 / C10 (Yeoh). fibre: (stiffness, direction) of
-    a transversely isotropic term k/2 (I4bar - 1)^2, or stiffness 0. prony: g (share of the equilibrium
-    stress) and tau (s) of each Maxwell branch. yields: (branch share g, yield stress) of an elastoplastic
-    branch, or 0. mullins: (r, m) of Ogden & Roxburgh (1999) with m in energy units, r = 0 without.
+    shear, bulk: (m, 4), (m,) units of E. stiffening: c20 / c10 at small strains (laws.isochoric). fibre:
+    (stiffness, direction) of a transversely isotropic term k/2 (I4bar - 1)^2, or stiffness 0. prony: g (share
+    of the equilibrium stress) and tau (s) of each Maxwell branch. yields: (branch share g, yield stress) of
+    an elastoplastic branch, or 0. mullins: (r, m) of Ogden & Roxburgh (1999) with m in energy units, r = 0
+    without.
     """
 
     def __init__(self, cells: int, poisson_ratio: float) -> None:

@@ -125,6 +125,18 @@ def test_exploration_presses_to_the_force_it_means_and_comes_back() -> None:
     assert min(heights) > 0, "directions stay within the given spread of 'up'"
 
 
+@pytest.mark.parametrize("radius_m", [0.02, 0.09, 0.5])
+def test_an_exploring_hand_never_hurries(radius_m: float) -> None:
+    """Whatever the next direction: its 128th turn once went at 2.1 m/s, faster than its own device allows."""
+    explorer = FreeExploration(np.zeros(3), radius_m, speed_m_per_s=1.0, hold_s=0.0, seed=0)
+    times = np.arange(0.0, 300.0, 0.004)
+    places = np.array([explorer.place(t, np.zeros(3), np.zeros(3)) for t in times])
+    speeds = np.linalg.norm(np.diff(places, axis=0), axis=1) / 0.004
+    assert speeds.max() < 2.01, "out at twice its own pace"
+    around = np.abs(np.linalg.norm(places[:-1], axis=1) - radius_m) < 1e-9
+    assert 0.1 < speeds[around].max() <= 1.01
+
+
 def test_path_reaches_its_waypoints_without_a_jerk() -> None:
     path = Path([0.0, 1.0, 2.0], [[0, 0, 0], [0.1, 0, 0], [0.1, 0.1, 0]])
     assert path.place(1.0, None, None) == pytest.approx([0.1, 0, 0])
@@ -230,7 +242,7 @@ def test_mouse_follows_smoothly_and_goes_stale_with_its_window() -> None:
 
 @pytest.mark.parametrize("frames_per_s", [60.0, 8.0, 2.0])
 def test_slow_pictures_make_late_motion_and_no_steps(frames_per_s: float) -> None:
-    """A place moved at 40 mm/s, told rarely: the tip goes at no more than that, between any two ticks."""
+    """A place moved at 40 mm/s, told rarely: the tip goes no faster, between any two ticks."""
     clock = Clock()
     channel = PoseChannel.create()
     with MouseDevice(channel.path, clock=clock) as mouse:
@@ -243,8 +255,8 @@ def test_slow_pictures_make_late_motion_and_no_steps(frames_per_s: float) -> Non
             xs.append(mouse.read().position_m[0])
     channel.close()
     steps = np.diff(xs)
-    assert steps.max() < 1.1 * 0.04e-3 and steps[len(steps) // 2 :].min() > 0.9 * 0.04e-3
-    assert np.abs(np.diff(steps)).max() < 0.04e-3 / 20, "and its speed changes smoothly"
+    assert steps.max() < 1.05 * 0.04e-3 and steps[len(steps) // 2 :].min() > 0.9 * 0.04e-3
+    assert np.abs(np.diff(steps)).max() < 0.25 * 0.04e-3, "and its speed changes smoothly"
     assert xs[-1] == pytest.approx(0.16, abs=0.04 * (0.05 + 2.0 / frames_per_s))
 
 

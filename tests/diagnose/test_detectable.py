@@ -50,3 +50,8 @@ def test_an_effect_as_large_as_its_limit_stands_out_by_as_much(judged):
 def test_a_spring_in_the_tool_hides_behind_modulus_and_first_touch_as_a_delay_does_not(judged):
     limits = detectable(*judged, [effect("time_delay"), effect("tip_radius"), effect("tool_compliance")])
     assert limits["time_delay"] < 0.5 * min(limits["tip_radius"], limits["tool_compliance"])
+
+
+def test_an_effect_that_starts_from_nothing_has_a_limit_as_well(judged):
+    limits = detectable(*judged, [effect("force_gain"), effect("surface_offset")])
+    assert all(1e-4 < limit < 1.0 for limit in limits.values())

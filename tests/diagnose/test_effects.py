@@ -15,6 +15,8 @@ from mechanics.errors import OptionError
 
 CONTRACT = {
     "viscoelasticity": {"g", "tau_s"},
+    "power_law_relaxation": {"share", "exponent"},
+    "poroelasticity": {"share", "diffusivity_m2_per_s"},
     "mullins_softening": {"r", "m_rel"},
     "strain_stiffening": {"c20_over_c10"},
     "poisson_ratio": {"poisson_ratio"},
@@ -28,6 +30,7 @@ CONTRACT = {
     "tip_radius": {"tip_radius_m"},
     "friction_slip": {"mu"},
     "adhesion": {"pull_off_n", "range_m", "inside"},
+    "jkr_adhesion": {"work_j_per_m2", "healed", "range_m"},
     "tool_compliance": {"stiffness_n_per_m"},
     "force_bias": {"bias_n"},
     "force_drift": {"rate_n_per_s"},
@@ -48,7 +51,7 @@ MODULUS = 20e3
 
 
 def test_every_name_of_the_contract_is_an_effect():
-    assert {*CONTRACT, "finite_strain", "surface_shape"} == set(NAMES) and len(NAMES) == 23
+    assert {*CONTRACT, "finite_strain", "surface_shape"} == set(NAMES) and len(NAMES) == 26
     assert [e.name for e in effects()] == list(NAMES)
     assert all(e.domain in DOMAINS for e in effects())
 

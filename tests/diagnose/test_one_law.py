@@ -34,6 +34,8 @@ VALUES = {
     "finite_strain": (),
     "strain_stiffening": (0.8,),
     "viscoelasticity": (0.3, np.log(0.08), 0.2, np.log(0.9)),
+    "power_law_relaxation": (0.3, 0.3),
+    "poroelasticity": (0.4, np.log(2.0)),
     "mullins_softening": (0.25, 0.4),
     "poisson_ratio": (0.4,),
     "inclusion": (0.0, 0.0, 0.02, 0.009, np.log(4.0)),
@@ -45,6 +47,7 @@ VALUES = {
     "tip_radius": (1.3,),
     "friction_slip": (0.15,),
     "adhesion": (0.1, 3e-3, 0.4),
+    "jkr_adhesion": (0.02, 0.3, 1e-3),
 }
 SINGLE = tuple((name,) for name in VALUES)
 PAIRS = tuple(itertools.combinations(VALUES, 2))

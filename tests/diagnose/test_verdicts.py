@@ -4,6 +4,7 @@ name."""
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,6 +16,8 @@ from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.validation import held_out_by_refit
 from diagnose.whiten import NuisanceOptions
+from palpate.commands import demo
+from palpate.report.demo import diagnosis_words
 from palpate.report.diagnosis import write_report
 from palpate.report.diagnosis_figures import gains, view_of
 from reconstruct.placing import presses_on
@@ -216,3 +219,12 @@ def test_a_bar_says_what_finite_strain_takes_away_beside_an_effect(delayed):
             result.attribution.scores[entry.name].candidate.found.names
         )
         assert ("and finite strain" in name) != alone
+
+
+def test_the_demo_says_which_simulation_is_diagnosed_and_its_json_has_the_verdict(delayed):
+    _, model, result = delayed
+    words = diagnosis_words(SimpleNamespace(diagnosis=result, model=model))
+    assert "starts from the simplest one" in words and "do not have time delay" in words
+    found = demo.diagnosis_json(result)
+    assert found["verdict"]["effects"] == ["time_delay"] and found["gap_after_n"] < found["gap_before_n"]
+    assert demo.diagnosis_json(None) is None

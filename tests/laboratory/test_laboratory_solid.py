@@ -29,7 +29,8 @@ from scenes.phantoms import phantom
 
 LAWS = {
     "neo-hookean": {},
-    "yeoh": {"stiffening": 0.35},
+    "stiffening": {"stiffening": 0.35},
+    "softening": {"stiffening": -0.35},
     "fibres": {"fibre": np.array([2.0, 1.0, 0.0, 0.0])},
     "maxwell": {"prony": np.array([[0.3, 0.3], [0.2, 1.5]])},
 }

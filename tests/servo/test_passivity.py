@@ -88,7 +88,8 @@ def test_energy_that_never_went_in_does_not_come_out():
 def test_a_passive_push_is_left_alone():
     z = np.linspace(0.0, -0.01, 500)
     _, sent = run(line(z), line(np.full(500, 3.0)), active=True)
-    np.testing.assert_allclose(sent[5:, 2], 3.0, rtol=1e-3)
+    # it begins at 3 N out of nothing: let in as the energy comes that it could give back
+    np.testing.assert_allclose(sent[40:, 2], 3.0, rtol=1e-3)
 
 
 def test_what_was_dissipated_in_one_contact_is_no_licence_for_the_next():

@@ -50,7 +50,8 @@ class Effect:
     the solid. on_force(force, motion, normals, parameters): acts on the elastic force (n, 3) N, object
     frame. on_readings( readings, parameters): acts in the instrument. on_shape(phantom, parameters):
     changes the object's surface.
-    needs_finite: whether it has no meaning at small strains.
+    needs_finite: whether it has no meaning at small strains. least_strength: below 0 where it may be the
+    other way round.
     """
 
     name: str
@@ -61,6 +62,7 @@ class Effect:
     on_readings: Callable[[Readings, Parameters], Readings] | None = None
     on_shape: Callable[[Phantom, Parameters], Phantom] | None = None
     needs_finite: bool = False
+    least_strength: float = 0.0
 
 
 def unit(rng: np.random.Generator) -> np.ndarray:

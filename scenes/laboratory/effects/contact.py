@@ -6,10 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.signal import fftconvolve
 
 from scenes.laboratory.effects.base import Bench, Effect, Parameters
 from scenes.laboratory.motion import Motion
-from scenes.laboratory.paths import WAY_OUT
+from scenes.laboratory.paths import SIDEWAYS, WAY_OUT
 from scenes.laboratory.tracing import RATE_HZ
 
 
@@ -57,30 +58,122 @@ def _adhere(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameter
     return out
 
 
-def _poroelastic(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameters) -> np.ndarray:
-    """Drainage under the tip: the force relaxes at a rate that falls with the square of the contact's radius.
+def _power_law(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameters) -> np.ndarray:
+    """A springpot beside the solid: each touch's force and its fractional derivative, exact between
+    samples."""
+    out, rest = force.copy(), 1 - p["exponent"]
+    for number in np.unique(motion.touch[motion.touch >= 0]):
+        rows = np.flatnonzero(motion.touch == number)
+        lags = np.arange(len(rows) + 1) / RATE_HZ
+        kernel = np.diff(lags**rest) * RATE_HZ / rest  # the mean of a power over each step
+        change = np.diff(force[rows], axis=0, prepend=0.0)
+        for axis in range(3):
+            out[rows, axis] += p["share"] * fftconvolve(change[:, axis], kernel)[: len(rows)]
+    return let_go(out, force, motion, normals)
 
-    A law on the force with the time constants of Hu, Zhao, Vlassak & Suo (2010), not a solved pore pressure.
+
+def _jkr_branch(give: float, lift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(travel, force, contact radius) from pull-off on, of a sphere of radius 1 on a half-space with E* 1, in
+    series with a spring; lift: 2 pi times the work of adhesion."""
+    a = np.geomspace(1e-4, 3.0, 20001)
+    force = 4 / 3 * a**3 - 2 * a * np.sqrt(lift * a)
+    travel = a**2 - np.sqrt(lift * a) + give * force
+    first = int(np.argmin(travel))
+    return travel[first:], force[first:], a[first:]
+
+
+def _sticky(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameters) -> np.ndarray:
+    """Johnson, Kendall & Roberts: the contact holds until it is unstable, and begins with another work.
+
+    Dents are Hertz's, in series with what the object gives as a whole, told by the deepest state. A contact
+    whose edge is pinned, at the turn, is a flat punch.
+    """
+    out, radius = force.copy(), p["tip_radius_m"]
+    unit = p["plane_strain_modulus_pa"] * radius**2
+    lift = 2 * np.pi * p["work_j_per_m2"] / (p["plane_strain_modulus_pa"] * radius)
+    for number in np.unique(motion.touch[motion.touch >= 0]):
+        rows = np.flatnonzero(motion.touch == number)
+        aside = motion.leg[rows] == SIDEWAYS
+        deepest = motion.s[rows[~aside]].max()
+        travel = 1e-3 * np.where(aside, deepest, motion.s[rows]) / radius
+        push = np.maximum((force[rows] * normals[rows]).sum(axis=1), 0.0) / unit
+        inside = (travel > 0) & (push > 0)
+        if not inside.any():
+            continue
+        give = np.zeros(len(rows))
+        give[inside] = (travel[inside] - (0.75 * push[inside]) ** (2 / 3)) / push[inside]
+        usual = max(float(give[np.argmax(push)]), 0.0)
+        pulled = _jkr_branch(usual, lift)
+        begun = _jkr_branch(usual, p["healed"] * lift)
+        elastic = 4 / 3 * np.where(travel > 0, np.interp(travel, *_without(usual)), 0.0) ** 3
+        a, touched = 0.0, False
+        for k, row in enumerate(rows):
+            if not touched and not inside[k]:
+                continue
+            touched = True
+            grown, kept = (
+                np.interp(travel[k], b[0], b[2]) if travel[k] >= b[0][0] else 0.0 for b in (begun, pulled)
+            )
+            a = max(min(a, kept), grown) if (a > 0 or travel[k] >= 0) else 0.0
+            punch = 4 / 3 * a**3
+            now = punch - 2 * a * (a**2 + usual * punch - travel[k]) / (1 + 2 * a * usual)
+            out[row] += (now - elastic[k]) * unit * normals[row]
+    return out
+
+
+def _without(give: float) -> tuple[np.ndarray, np.ndarray]:
+    """(travel, contact radius) of the same without adhesion."""
+    a = np.geomspace(1e-4, 3.0, 4001)
+    return a**2 + give * 4 / 3 * a**3, a
+
+
+def _sticking(strength: float, bench: Bench) -> dict[str, Any]:
+    plane_strain = bench.modulus_pa / (1 - 0.49**2)
+    return {
+        "work_j_per_m2": 0.02 * strength * plane_strain * bench.tip_radius_m,
+        "healed": 0.2,
+        "range_m": 1e-6,
+        "tip_radius_m": bench.tip_radius_m,
+        "plane_strain_modulus_pa": plane_strain,
+    }
+
+
+_THINNED = 8
+
+
+def _poroelastic(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameters) -> np.ndarray:
+    """Drainage under the tip: the fluid's share of the force relaxes by the master curve of Hu, Zhao, Vlassak
+    & Suo (2010) for a sphere, in a time that goes with the square of the contact's radius.
+
+    A law on the force, not a solved pore pressure. Every `_THINNED`-th sample is summed, what lies between is
+    interpolated.
     """
     out = force.copy()
     for number in np.unique(motion.touch[motion.touch >= 0]):
         rows = np.flatnonzero(motion.touch == number)
-        branch, last = np.zeros(3), np.zeros(3)
-        for k in rows:
-            radius2 = max(p["tip_radius_m"] * 1e-3 * max(motion.s[k], 0.0), 1e-8)
-            if motion.leg[k] == 1:
-                radius2 = p["tip_radius_m"] * 1e-3 * max(motion.s[rows].max(), 0.1)
-            decay = np.exp(-p["diffusivity_m2_per_s"] / radius2 / RATE_HZ)
-            branch = decay * (branch + p["share"] * (force[k] - last))
-            last = force[k]
-            out[k] = force[k] + branch
+        aside = motion.leg[rows] == SIDEWAYS
+        depth = np.where(aside, motion.s[rows[~aside]].max(), motion.s[rows])
+        rows, depth = rows[depth > 0], 1e-3 * depth[depth > 0]
+        if len(rows) < 2:
+            continue
+        drained = np.cumsum(p["diffusivity_m2_per_s"] / (p["tip_radius_m"] * depth)) / RATE_HZ
+        at = np.unique(np.append(np.arange(0, len(rows), _THINNED), len(rows) - 1))
+        change = np.diff(force[rows[at]], axis=0, prepend=0.0)
+        # a change between two samples happened half way between them
+        middle = 0.5 * (drained[at] + drained[np.append(0, at[:-1])])
+        since = drained[at][:, None] - middle[None, :]
+        with np.errstate(invalid="ignore"):
+            left = 0.491 * np.exp(-0.908 * np.sqrt(since)) + 0.509 * np.exp(-1.679 * since)
+        fluid = np.where(since >= 0, left, 0.0) @ change
+        for axis in range(3):
+            out[rows, axis] += p["share"] * np.interp(np.arange(len(rows)), at, fluid[:, axis])
     return let_go(out, force, motion, normals)
 
 
 def _seeping(strength: float, bench: Bench) -> dict[str, Any]:
     return {
         "share": 0.35 * strength,
-        "diffusivity_m2_per_s": 4e-5,
+        "diffusivity_m2_per_s": 3e-5,
         "tip_radius_m": bench.tip_radius_m,
     }
 
@@ -101,6 +194,13 @@ EFFECTS = (
         on_force=_viscoelastic,
     ),
     Effect(
+        "power_law_relaxation",
+        "object",
+        lambda strength, bench: {"share": 0.15 * strength, "exponent": 0.3},
+        on_force=_power_law,
+    ),
+    Effect("poroelasticity", "object", _seeping, on_force=_poroelastic),
+    Effect(
         "tip_radius",
         "contact",
         lambda strength, bench: {"tip_radius_m": bench.tip_radius_m * (1 + 0.3 * strength)},
@@ -118,6 +218,7 @@ EFFECTS = (
         lambda strength, bench: {"pull_off_n": 0.1 * strength, "range_m": 0.0006},
         on_force=_adhere,
     ),
+    Effect("jkr_adhesion", "contact", _sticking, on_force=_sticky),
 )
 """Effects of contact and of relaxation."""
 
@@ -136,6 +237,5 @@ UNNAMED = (
         lambda s, p: replace(s, fibre=(p["fibre_over_shear"], *p["direction"])),
         needs_finite=True,
     ),
-    Effect("poroelasticity", "object", _seeping, on_force=_poroelastic),
 )
 """Effects that no library entry names: for these "unknown" is the right answer."""

@@ -127,6 +127,7 @@ EFFECTS = (
         lambda strength, bench: {"c20_over_c10": 0.35 * strength},
         lambda s, p: replace(s, stiffening=p["c20_over_c10"]),
         needs_finite=True,
+        least_strength=-1.4,
     ),
     Effect(
         "mullins_softening",

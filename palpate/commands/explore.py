@@ -1,0 +1,167 @@
+"""Guided exploration: where to touch next and why, what is known so far, and when to stop.
+
+In the virtual laboratory (--phantom NAME) a simulated robot follows the suggestions with errors of place,
+way and depth. A robot of your own talks over standard input and output (--robot): one line of JSON a
+suggestion and a segment, as docs/exploring.md tells. The recording so far is written after every touch, so an
+exploration that was interrupted is whole.
+At the end `palpate reconstruct` makes a MODEL of it like any other.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from pathlib import Path
+
+from mechanics.errors import OptionError
+from mechanics.recording import SAMPLES
+from palpate.arguments import (
+    add_json,
+    add_options,
+    add_output,
+    add_seed,
+    emit_json,
+    options_from,
+    say,
+)
+from palpate.commands.simulate import effects_from
+from palpate.exploring.candidates import ReachOptions
+from palpate.exploring.explorer import Explorer, State, Suggestion, check_goals
+from palpate.exploring.goals import GoalOptions
+from palpate.exploring.robot import RobotOptions
+
+SUMMARY = "where to touch next, and when to stop"
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Who touches, what is asked for, where it goes."""
+    who = parser.add_mutually_exclusive_group(required=True)
+    who.add_argument(
+        "--phantom", metavar="NAME", help="explore this phantom of the laboratory, or a surface file"
+    )
+    who.add_argument("--robot", action="store_true", help="talk with a robot: lines of JSON, in and out")
+    add_output(
+        parser, "-o", "--output", kind=SAMPLES, required=True, metavar="REC",
+        help="recording to write (.csv.gz, .csv), after every touch",
+    )  # fmt: skip
+    parser.add_argument(
+        "--effect",
+        action="append",
+        default=[],
+        metavar="NAME=STRENGTH",
+        help="with --phantom: an effect (repeatable)",
+    )
+    parser.add_argument(
+        "--tip-radius",
+        type=float,
+        default=0.005,
+        metavar="M",
+        help="of the spherical tip [m] (default: 0.005)",
+    )
+    parser.add_argument(
+        "--rate",
+        type=float,
+        default=1000.0,
+        metavar="HZ",
+        help="with --robot: samples a second [Hz] (default: 1000)",
+    )
+    parser.add_argument(
+        "--poisson-ratio", type=float, default=0.49, metavar="NU", help="of the object (default: 0.49)"
+    )
+    parser.add_argument(
+        "--modulus",
+        type=float,
+        metavar="PA",
+        help="with --phantom: its Young's modulus [Pa] (default: its own)",
+    )
+    for kind in (GoalOptions, ReachOptions, RobotOptions):
+        add_options(parser, kind)
+    add_seed(parser)
+    add_json(parser)
+
+
+def run(arguments: argparse.Namespace) -> int:
+    """Explore until a goal, the limit or the robot ends it."""
+    goals = options_from(arguments, GoalOptions)
+    check_goals(goals)
+    reach = options_from(arguments, ReachOptions)
+    if arguments.robot:
+        return _robot(arguments, goals, reach)
+    return _phantom(arguments, goals, reach)
+
+
+def _robot(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
+    from palpate.exploring.protocol import serve
+    from palpate.exploring.rows import Instrument
+
+    if not (arguments.rate > 0 and arguments.tip_radius > 0):
+        raise OptionError("--rate and --tip-radius must be greater than 0")
+    about = {"poisson_ratio": arguments.poisson_ratio}
+    instrument = Instrument(arguments.tip_radius, arguments.rate, about)
+    explorer = Explorer(instrument, goals, reach, poisson_ratio=arguments.poisson_ratio, seed=arguments.seed)
+
+    def tell(line: str) -> None:
+        print(line, flush=True)
+
+    serve(explorer, sys.stdin, tell, lambda e: _keep(e, arguments.output))
+    emit_json({"recording": arguments.output, **explorer.state.table()}, arguments.json)
+    return 0
+
+
+def _phantom(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
+    from palpate.exploring.robot import LaboratoryRobot
+    from scenes.laboratory.session import SimulateOptions
+    from scenes.phantoms import phantom
+
+    thing = phantom(arguments.phantom)
+    robot = LaboratoryRobot(
+        thing,
+        effects_from(arguments.effect),
+        seed=arguments.seed,
+        options=SimulateOptions(young_modulus_pa=arguments.modulus, tip_radius_m=arguments.tip_radius),
+        robot=options_from(arguments, RobotOptions),
+    )
+    explorer = Explorer(
+        robot.instrument, goals, reach, poisson_ratio=thing.poisson_ratio, seed=arguments.seed
+    )
+    steps: list[dict] = []
+    while True:
+        suggestion = explorer.suggest()
+        say(arguments, _line(suggestion, explorer.state))
+        if suggestion.kind == "stop":
+            break
+        state = explorer.add(robot.carry_out(suggestion))
+        _keep(explorer, arguments.output)
+        steps.append({"suggest": suggestion.table(), "state": state.table()})
+    state = explorer.state
+    say(
+        arguments,
+        f"written to {arguments.output}: palpate reconstruct {arguments.output} -o MODEL makes the model",
+    )
+    summary = {"recording": arguments.output, "steps": steps, **state.table()}
+    if robot.last is not None:
+        summary["truth"] = dict(robot.last.truth)
+    emit_json(summary, arguments.json)
+    return 0
+
+
+def _keep(explorer: Explorer, path: str | Path) -> None:
+    explorer.save(path)
+
+
+def _line(suggestion: Suggestion, state: State) -> str:
+    """One touch a line: what is known, what comes next, why."""
+    known = "nothing is known yet"
+    if state.presses and state.surface:
+        known = (
+            f"{state.made} presses, {state.seconds:.0f} s: {state.modulus_pa / 1e3:.1f} kPa "
+            f"({state.modulus_ci95_pa[0] / 1e3:.1f} to {state.modulus_ci95_pa[1] / 1e3:.1f}), "
+            f"surface within {1e3 * state.surface_error_m:.1f} mm"
+        )
+    if suggestion.point is None:
+        return f"{known}; {suggestion.kind}: {suggestion.why}"
+    x, y, z = (1e3 * float(v) for v in suggestion.point)
+    return (
+        f"{known}; press at ({x:.0f}, {y:.0f}, {z:.0f}) mm, {1e3 * suggestion.depth_m:.1f} mm deep: "
+        f"{suggestion.why}"
+    )

@@ -1,0 +1,1 @@
+"""Guided exploration: a running estimate, the touch that would tell the most, and when to stop."""

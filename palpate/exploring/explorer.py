@@ -1,0 +1,304 @@
+"""The explorer: takes what was felt, says what is known, what to touch next and why, and when to stop."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from mechanics.errors import ContactError, MeshError, OptionError, SurfaceError
+from mechanics.recording import Recording, write_recording
+from palpate.exploring.candidates import Candidate, ReachOptions, first_places, vertex_areas, weighed
+from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
+from palpate.exploring.goals import GoalOptions, Standing, surface_error
+from palpate.exploring.orders import Order
+from palpate.exploring.rows import Instrument, Segment, together
+from reconstruct.boundary import Boundary
+from reconstruct.contacts import ContactOptions, explore
+from reconstruct.modulus import ModulusOptions
+
+
+@dataclass(frozen=True)
+class Suggestion:
+    """The next touch. kind: 'trace', 'press', or 'stop'; the rest holds for a press; device frame, SI units.
+
+    point: (3,) where the surface is expected; normal: (3,) outward there. Come from outside along -normal,
+    begin clearance_m above, go on until the force rises, then depth_m deeper at speed_m_per_s, hold hold_s,
+    and go back. seconds: how long it is expected to take. why: one sentence.
+    """
+
+    kind: str
+    why: str
+    point: np.ndarray | None = None
+    normal: np.ndarray | None = None
+    depth_m: float = 0.0
+    speed_m_per_s: float = 0.0
+    hold_s: float = 0.0
+    clearance_m: float = 0.0
+    seconds: float = 0.0
+
+    def table(self) -> dict[str, Any]:
+        """As JSON has it."""
+        if self.kind != "press":
+            return {"kind": self.kind, "why": self.why}
+        assert self.point is not None and self.normal is not None
+        return {
+            "kind": self.kind,
+            "point": [float(x) for x in self.point],
+            "normal": [float(x) for x in self.normal],
+            "depth_m": self.depth_m,
+            "speed_m_per_s": self.speed_m_per_s,
+            "hold_s": self.hold_s,
+            "clearance_m": self.clearance_m,
+            "seconds": self.seconds,
+            "why": self.why,
+        }
+
+
+@dataclass(frozen=True)
+class State:
+    """What is known. modulus_pa, interval: nan where nothing is known. standing: goal by goal.
+
+    presses: found and used; made: segments of presses that were added. seconds: of exploring so far.
+    update_s: wall time of the last update by step. trouble: why the last update could not be made, or "".
+    """
+
+    presses: int
+    made: int
+    seconds: float
+    modulus_pa: float
+    modulus_ci95_pa: tuple[float, float]
+    surface_error_m: float
+    surface: str
+    standing: tuple[Standing, ...]
+    update_s: dict[str, float] = field(default_factory=dict)
+    trouble: str = ""
+
+    @property
+    def done(self) -> bool:
+        """Whether every goal is met."""
+        return bool(self.standing) and all(s.met for s in self.standing)
+
+    def table(self) -> dict[str, Any]:
+        """As JSON has it; what is unknown is null."""
+
+        def known(x: float) -> float | None:
+            return float(x) if np.isfinite(x) else None
+
+        return {
+            "presses": self.presses,
+            "made": self.made,
+            "seconds": self.seconds,
+            "young_modulus_pa": known(self.modulus_pa),
+            "young_modulus_ci95_pa": [known(x) for x in self.modulus_ci95_pa],
+            "surface_error_m": known(self.surface_error_m),
+            "surface": self.surface,
+            "goals": {s.name: {"now": known(s.now), "goal": s.goal, "met": s.met} for s in self.standing},
+            "done": self.done,
+            "update_s": self.update_s,
+            "trouble": self.trouble,
+        }
+
+
+class Explorer:
+    """A running exploration: `add` what was felt, read `state`, ask `suggest`.
+
+    instrument: what is known of the device. poisson_ratio: of the object. order: None goes where most is
+    told; another order of touching stands in for it where guidance is measured. Segments that were added
+    stay, whatever happens after: `recording` and `save` hold them all.
+    """
+
+    def __init__(
+        self,
+        instrument: Instrument,
+        goals: GoalOptions | None = None,
+        reach: ReachOptions | None = None,
+        *,
+        poisson_ratio: float = 0.49,
+        seed: int = 0,
+        order: Order | None = None,
+    ) -> None:
+        self.instrument = instrument
+        self.goals = goals or GoalOptions()
+        self.reach = reach or ReachOptions()
+        self.segments: list[Segment] = []
+        self._nu, self._seed = poisson_ratio, seed
+        self._order, self._rng = order, np.random.default_rng([seed, 61])
+        self._estimate = Estimate()
+        self._base: Boundary | None = None
+        self._trouble = ""
+
+    @property
+    def recording(self) -> Recording:
+        """All that was felt, as a recording. Raises RecordingError where that is nothing."""
+        return together(self.instrument, self.segments)
+
+    @property
+    def estimate(self) -> Estimate:
+        """Shape, sites and modulus behind `state`."""
+        return self._estimate
+
+    def save(self, path: str | Path) -> Path:
+        """Write what was felt so far; an earlier file stays whole until the new one is. Returns its path."""
+        return write_recording(path, self.recording)
+
+    def add(self, segment: Segment) -> State:
+        """Take what was felt in, and bring the estimate up to date.
+
+        A press that cannot be used is kept in the recording and named in `state.trouble`.
+        """
+        self.segments.append(segment)
+        began = time.perf_counter()
+        try:
+            if self._base is None or self._made < LEAST_PRESSES:
+                self._trace_only()
+            if self._made >= LEAST_PRESSES:
+                self._estimate = updated(self.recording, self._estimate, self._nu, self._seed)
+            self._trouble = ""
+        except (ContactError, SurfaceError, MeshError) as error:
+            self._trouble = str(error)
+        self._last_s = time.perf_counter() - began
+        return self.state
+
+    @property
+    def _made(self) -> int:
+        return sum(s.kind == "press" for s in self.segments)
+
+    def _trace_only(self) -> None:
+        """The base's outline and the height of the highest touch, before there are presses enough."""
+        found = explore(self.recording, contact_options=ContactOptions(least_palpations=min(self._made, 1)))
+        self._base = found.boundary
+        self._heights = found.boundary.height(found.presses.point) if len(found.presses) else np.zeros(0)
+
+    @property
+    def state(self) -> State:
+        """What is known now."""
+        e = self._estimate
+        nan = float("nan")
+        modulus, interval = (nan, (nan, nan)) if e.fit is None else (e.fit.modulus_pa, e.fit.ci95_pa)
+        error = nan
+        if e.surface is not None:
+            s = e.surface
+            free = (s.vertices - s.support_point) @ s.support_normal > 1e-6
+            error = surface_error(s.uncertainty_m[free], vertex_areas(s.vertices, s.triangles)[free])
+        standing = []
+        if self.goals.modulus_within is not None:
+            half = (interval[1] - interval[0]) / (2 * modulus) if e.fit is not None else float("inf")
+            standing.append(Standing("modulus", float(half), self.goals.modulus_within))
+        if self.goals.surface_within_m is not None:
+            now = error if e.surface is not None else float("inf")
+            standing.append(Standing("surface", now, self.goals.surface_within_m))
+        return State(
+            presses=e.presses,
+            made=self._made,
+            seconds=sum(s.seconds for s in self.segments),
+            modulus_pa=modulus,
+            modulus_ci95_pa=interval,
+            surface_error_m=error,
+            surface="" if e.surface is None else e.surface.method,
+            standing=tuple(standing),
+            update_s=dict(e.seconds),
+            trouble=self._trouble,
+        )
+
+    def suggest(self) -> Suggestion:
+        """The touch that tells the most a second, or the word to stop, each with its reason."""
+        if not any(s.kind == "trace" for s in self.segments):
+            return Suggestion("trace", "the base's outline is not known: slide once around the object's foot")
+        if self._base is None:
+            return Suggestion("trace", f"the tracing could not be understood ({self._trouble}): trace again")
+        state = self.state
+        if state.done and state.presses >= LEAST_PRESSES:
+            return Suggestion("stop", "every goal is met: " + self._words(state))
+        if self._made >= self.goals.most:
+            return Suggestion(
+                "stop", f"{self._made} presses were made, as many as allowed; " + self._words(state)
+            )
+        if self._estimate.surface is None:
+            return self._first()
+        best = self._best(state)
+        if best is None or (best.worth <= 0 and self._order is None):
+            return Suggestion(
+                "stop",
+                "no touch in reach is expected to bring a goal nearer at this noise; " + self._words(state),
+            )
+        return self._press(best.point, best.normal, best.depth_m, best.seconds, self._why(best, state))
+
+    def _first(self) -> Suggestion:
+        assert self._base is not None
+        height = float(self._heights.max()) if len(self._heights) else None
+        places = first_places(self._base, self.instrument.tip_radius_m, height)
+        # one that could not be used counts as made: come back to it last
+        point, normal = places[self._made % len(places)] if height is not None else places[0]
+        depth = min(0.004, self.reach.deepest_m)
+        what = "how high the object is" if height is None else "where its sides and its top are"
+        why = f"nothing is known yet of {what}"
+        return self._press(point, normal, depth, 3.0, why)
+
+    def _press(
+        self, point: np.ndarray, normal: np.ndarray, depth: float, seconds: float, why: str
+    ) -> Suggestion:
+        return Suggestion(
+            "press", why, point, normal, float(depth), self.reach.press_speed_m_per_s, self.reach.hold_s,
+            self.reach.clearance_m, float(seconds),
+        )  # fmt: skip
+
+    def _best(self, state: State) -> Candidate | None:
+        e = self._estimate
+        if e.surface is None or e.exploration is None or e.fit is None:
+            return None
+        low, high = e.fit.ci95_pa
+        sd = float(np.log(high / low) / 3.92)
+        presses = e.exploration.presses
+        used = e.fit.weights > 0 if (e.fit.weights > 0).any() else np.ones(len(presses), dtype=bool)
+        ranked = weighed(
+            e.surface,
+            list(state.standing),
+            presses.point[used],
+            presses.depth_m[used],
+            self.segments[-1].position[-1],
+            sd,
+            min(ModulusOptions().law_bias, sd),
+            e.fit.modulus_pa,
+            self.instrument.tip_radius_m,
+            self.reach,
+        )
+        if self._order is None or not ranked:
+            return ranked[0] if ranked else None
+        places = np.array([c.point for c in ranked])
+        return ranked[self._order(places, presses.point, presses.point[-1], self._rng)]
+
+    def _why(self, best: Candidate, state: State) -> str:
+        by_name = {s.name: s for s in state.standing}
+        if best.for_goal == "modulus":
+            now = by_name["modulus"]
+            return (
+                f"the modulus is known within {100 * now.now:.0f} % and {100 * now.goal:.0f} % is asked for: "
+                "this place shares least with those pressed"
+            )
+        now = by_name["surface"]
+        return (
+            f"95 % of the surface is known within {1e3 * now.now:.1f} mm and {1e3 * now.goal:.1f} mm is "
+            "asked for: here it is least known"
+        )
+
+    @staticmethod
+    def _words(state: State) -> str:
+        parts = []
+        for s in state.standing:
+            if not np.isfinite(s.now):
+                parts.append(f"{s.name} unknown")
+            elif s.name == "modulus":
+                parts.append(f"modulus {state.modulus_pa / 1e3:.1f} kPa within {100 * s.now:.1f} %")
+            else:
+                parts.append(f"95 % of the surface within {1e3 * s.now:.2f} mm")
+        return ", ".join(parts)
+
+
+def check_goals(goals: GoalOptions) -> None:
+    """Raises OptionError where nothing is asked for."""
+    if goals.modulus_within is None and goals.surface_within_m is None:
+        raise OptionError("no goal is given: ask for --modulus-within or --surface-within")

@@ -1,0 +1,64 @@
+"""What an exploration is for, how far it has come, and when it may end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import erf
+
+from mechanics.errors import OptionError
+from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class GoalOptions:
+    """When to stop; a goal that is None is not asked for."""
+
+    modulus_within: float | None = option(
+        0.05, "half the 95 % interval of the modulus, as a share of it", flag="--modulus-within"
+    )
+    surface_within_m: float | None = option(
+        0.002, "where 95 % of the surface must lie within", unit="m", flag="--surface-within"
+    )
+    most: int = option(40, "never more presses than these", flag="--most")
+
+    def __post_init__(self) -> None:
+        """Raises OptionError for goals that cannot be."""
+        if self.modulus_within is not None and not 0 < self.modulus_within < 1:
+            raise OptionError(f"--modulus-within is {self.modulus_within}; it must lie between 0 and 1")
+        if self.surface_within_m is not None and not self.surface_within_m > 0:
+            raise OptionError(f"--surface-within is {self.surface_within_m} m; it must be greater than 0")
+        if self.most < 4:
+            raise OptionError(f"--most is {self.most}; a reconstruction needs 4 presses or more")
+
+
+@dataclass(frozen=True)
+class Standing:
+    """How far one goal has come. now, goal: in its own unit; inf where nothing is known yet."""
+
+    name: str
+    now: float
+    goal: float
+
+    @property
+    def met(self) -> bool:
+        """Whether it is reached."""
+        return self.now <= self.goal
+
+    @property
+    def missing(self) -> float:
+        """Log of how many times too uncertain it still is; 0 where it is met."""
+        return max(0.0, float(np.log(min(self.now, 1e3 * self.goal) / self.goal)))
+
+
+def surface_error(deviation_m: np.ndarray, area: np.ndarray, share: float = 0.95) -> float:
+    """m: `share` of a surface's area lies within this, for Gaussian errors of standard deviation (n,) m."""
+    deviation = np.maximum(np.asarray(deviation_m, dtype=float), 1e-9)
+    weight = np.asarray(area, dtype=float) / np.sum(area)
+
+    def short(x: float) -> float:
+        return float(weight @ erf(x / (deviation * np.sqrt(2)))) - share
+
+    return float(brentq(short, 0.0, 10 * float(deviation.max())))

@@ -1,0 +1,94 @@
+"""What was felt so far: segments of samples, put together to a recording like any other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from mechanics.errors import RecordingError
+from mechanics.recording import Recording
+
+KINDS = ("trace", "press")
+
+
+@dataclass(frozen=True)
+class Segment:
+    """Samples of one tracing or press, air before and after it included; device frame.
+
+    t: (n,) s, increasing, from any zero. position: (n, 3) m, centre of the tip. force: (n, 3) N on the tool.
+    quaternion: (n, 4) unit (w, x, y, z), tool frame to device frame, or None.
+    """
+
+    kind: str
+    t: np.ndarray
+    position: np.ndarray
+    force: np.ndarray
+    quaternion: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        """Raises RecordingError for shapes that do not fit, NaN, or time that goes back."""
+        if self.kind not in KINDS:
+            raise RecordingError(f"a segment's kind is '{self.kind}'; allowed are {', '.join(KINDS)}")
+        for name, width in (("t", None), ("position", 3), ("force", 3), ("quaternion", 4)):
+            if getattr(self, name) is None:
+                continue
+            value = np.asarray(getattr(self, name), dtype=float)
+            wanted = (len(self.t),) if width is None else (len(self.t), width)
+            if value.shape != wanted or len(value) < 2 or not np.isfinite(value).all():
+                raise RecordingError(
+                    f"a segment's {name} has shape {value.shape}; it must be {wanted}, 2 samples or more, "
+                    "all finite"
+                )
+            object.__setattr__(self, name, value)
+        if not (np.diff(self.t) > 0).all():
+            raise RecordingError("a segment's time goes back or stands still: send samples in order")
+
+    @property
+    def seconds(self) -> float:
+        """How long it lasted."""
+        return float(self.t[-1] - self.t[0])
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """What is known of the device before anything is touched, SI. about: further fields of Recording."""
+
+    tip_radius_m: float
+    sample_rate_hz: float = 1000.0
+    about: dict[str, Any] = field(default_factory=dict)
+
+
+def together(instrument: Instrument, segments: list[Segment]) -> Recording:
+    """The recording of all segments in order; their clocks are joined end to end.
+
+    Phase I is the tracing where there is one. Raises RecordingError where there is no segment, or where some
+    tell the tool's orientation and others do not.
+    """
+    if not segments:
+        raise RecordingError("nothing was felt yet: add a segment first")
+    turned = [s.quaternion is not None for s in segments]
+    if any(turned) and not all(turned):
+        raise RecordingError(
+            "some segments tell the tool's orientation and some do not: send it always or never"
+        )
+    step = 1.0 / instrument.sample_rate_hz
+    clocks, phase, now = [], None, 0.0
+    for segment in segments:
+        clock = segment.t - segment.t[0] + now
+        clocks.append(clock)
+        now = float(clock[-1]) + step
+        if segment.kind == "trace":
+            phase = (phase[0] if phase else float(clock[0]), float(clock[-1]))
+    first = segments[0]
+    made = Recording(
+        t=np.concatenate(clocks),
+        position=np.concatenate([s.position for s in segments]),
+        force_on_tool=np.concatenate([s.force for s in segments]),
+        sample_rate_hz=instrument.sample_rate_hz,
+        tip_radius_m=instrument.tip_radius_m,
+        quaternion=None if first.quaternion is None else np.concatenate([s.quaternion for s in segments]),
+        boundary_phase=phase,
+    )
+    return replace(made, **instrument.about) if instrument.about else made

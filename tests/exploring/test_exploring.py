@@ -1,0 +1,124 @@
+"""Guided exploration: goals, gains, rows, the protocol; a whole exploration of a phantom is slow."""
+
+import io
+import json
+
+import numpy as np
+import pytest
+
+from mechanics.errors import OptionError, RecordingError
+from palpate.exploring.candidates import after_touch, modulus_after
+from palpate.exploring.explorer import Explorer
+from palpate.exploring.goals import GoalOptions, Standing, surface_error
+from palpate.exploring.protocol import segment_of, serve
+from palpate.exploring.rows import Instrument, Segment, together
+
+
+def test_the_surfaces_error_is_the_quantile_of_a_gaussian():
+    assert surface_error(np.full(50, 1e-3), np.ones(50)) == pytest.approx(1.96e-3, rel=1e-3)
+    # a tenth of the area is bad: it alone holds the quantile
+    mixed = np.r_[np.full(90, 1e-5), np.full(10, 1e-2)]
+    assert surface_error(mixed, np.ones(100)) == pytest.approx(0.6745e-2, rel=1e-3)
+
+
+def test_a_touch_tells_of_its_surroundings_and_not_of_the_far_side():
+    vertices = np.column_stack([np.linspace(0, 0.2, 21), np.zeros(21), np.zeros(21)])
+    after = after_touch(vertices, np.full(21, 1e-3), 0)
+    assert after[0] < 0.25e-3
+    assert (np.diff(after) >= 0).all() and after[-1] == pytest.approx(1e-3, rel=1e-3)
+
+
+def test_a_press_far_from_the_others_and_a_deep_one_tell_more_of_the_modulus():
+    touched = np.array([[0.0, 0, 0], [0.005, 0, 0], [0, 0.005, 0]])
+    depths = np.full(3, 0.005)
+
+    def after(point, depth):
+        return modulus_after(touched, depths, np.array(point), depth, 0.05, 0.02)
+
+    assert after([0.1, 0, 0], 0.005) < after([0.004, 0.004, 0], 0.005) < 0.05
+    assert after([0.1, 0, 0], 0.005) < after([0.1, 0, 0], 0.001)
+    assert after([0.1, 0, 0], 0.005) > 0.02
+
+
+def test_goals_are_met_from_above():
+    assert Standing("modulus", 0.04, 0.05).met and Standing("modulus", 0.04, 0.05).missing == 0
+    assert not Standing("surface", float("inf"), 0.002).met
+    with pytest.raises(OptionError, match="--most"):
+        GoalOptions(most=2)
+
+
+def _rows(kind="press", n=400, late=0.0):
+    t = late + np.arange(n) / 1000
+    return Segment(kind, t, np.zeros((n, 3)) + [0, 0, 0.05], np.zeros((n, 3)))
+
+
+def test_segments_are_joined_end_to_end():
+    made = together(Instrument(0.005), [_rows("trace", late=7.0), _rows(late=100.0)])
+    assert len(made.t) == 800
+    np.testing.assert_allclose(np.diff(made.t), 1e-3)
+    assert made.boundary_phase == pytest.approx((0.0, 0.399))
+
+
+@pytest.mark.parametrize(
+    ("kind", "change", "word"),
+    [
+        ("poke", {}, "allowed are"),
+        ("press", {"t": np.zeros(400)}, "stands still"),
+        ("press", {"force": np.full((400, 3), np.nan)}, "finite"),
+        ("press", {"position": np.zeros((399, 3))}, "shape"),
+    ],
+)
+def test_a_segment_that_cannot_be_says_why(kind, change, word):
+    good = _rows()
+    with pytest.raises(RecordingError, match=word):
+        Segment(kind, **{"t": good.t, "position": good.position, "force": good.force, **change})
+
+
+def test_a_robot_is_told_to_trace_first_and_its_bad_lines_keep_nothing():
+    explorer, said, kept = Explorer(Instrument(0.005)), [], []
+    lines = ["no json\n", '{"segment": "press"}\n', "[1]\n", '{"end": true}\n', '{"segment": "press"}\n']
+    serve(explorer, io.StringIO("".join(lines)), said.append, kept.append)
+    first, *errors = map(json.loads, said)
+    assert first["suggest"]["kind"] == "trace" and first["suggest"]["why"]
+    assert first["state"]["young_modulus_pa"] is None and not first["state"]["done"]
+    assert len(errors) == 3 and all("error" in e for e in errors)
+    assert not explorer.segments and not kept
+
+
+def test_a_line_is_a_segment():
+    rows = _rows()
+    line = json.dumps({"segment": "press", "t": rows.t.tolist(), "position": rows.position.tolist(),
+                       "force": rows.force.tolist()})  # fmt: skip
+    made = segment_of(line)
+    assert made is not None and made.kind == "press" and len(made.t) == 400
+
+
+@pytest.mark.slow
+def test_a_phantom_is_explored_by_the_command_until_its_goals_are_met(tmp_path, capsys):
+    from palpate import cli
+
+    recording, figures = tmp_path / "rec.csv.gz", tmp_path / "out.json"
+    words = ["--phantom", "cylinder", "--modulus", "30000", "--modulus-within", "0.08", "--most", "10"]
+    assert cli.main(["explore", *words, "-o", str(recording), "--json", str(figures)]) == 0
+    result = json.loads(figures.read_text())
+    assert result["done"] and result["made"] <= 10
+    low, high = result["young_modulus_ci95_pa"]
+    assert low < 30000 < high
+    assert result["young_modulus_pa"] == pytest.approx(30000, rel=0.1)
+    assert all(step["suggest"]["why"] for step in result["steps"])
+    # what was written is a recording like any other
+    assert cli.main(["reconstruct", str(recording), "-o", str(tmp_path / "MODEL")]) == 0
+
+
+@pytest.mark.slow
+def test_the_robots_example_runs_against_the_laboratory(tmp_path):
+    import importlib.util
+    from pathlib import Path
+
+    path = Path(__file__).parents[2] / "examples" / "robot_client.py"
+    spec = importlib.util.spec_from_file_location("robot_client", path)
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    state = module.main(str(tmp_path / "rec.csv.gz"), most=6)
+    assert state["presses"] >= 4 and np.isfinite(state["young_modulus_pa"])
+    assert (tmp_path / "rec.csv.gz").exists()
