@@ -270,7 +270,7 @@ def _searched(filtered: Filtered, given: _Given) -> _Found:
         raise type(error)(f"{hint} ({str(error).rsplit(': ', 1)[0]})") from error
     peaks = signals.magnitude[[c.peak for c in found.contacts]]
     automatic = given.method == "noise" and given.contact.contact_threshold_n is None
-    if automatic and np.median(peaks) < _CLEAR * found.threshold_n:
+    if automatic and len(peaks) and np.median(peaks) < _CLEAR * found.threshold_n:
         raise ContactError(
             f"the presses reach {np.median(peaks):.2g} N in the middle, where free motion alone reaches "
             f"{found.threshold_n:.2g} N: weaker ones are lost; {hint if wanders else 'press deeper'}"

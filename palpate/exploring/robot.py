@@ -83,8 +83,9 @@ class LaboratoryRobot:
         made = self._simulated(self._touches)
         rows = np.flatnonzero(made.motion.touch == len(self._touches) - 1)
         # after the touch before, or where the tracing's segment ended
-        last = made.motion.touch == len(self._touches) - 2
-        start = int(np.flatnonzero(last)[-1]) + 1 if last.any() else int((made.motion.phase[1] + 0.6) * 1000)
+        start = int((made.motion.phase[1] + 0.6) * 1000)
+        if len(self._touches) > 1:
+            start = int(np.flatnonzero(made.motion.touch == len(self._touches) - 2)[-1]) + 1
         return self._part(made, "press", start, int(rows[-1]) + 1)
 
     def _simulated(self, touches: list[Touch]) -> Simulation:
