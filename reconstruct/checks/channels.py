@@ -67,6 +67,10 @@ def _dead(sight: Sight) -> Iterator[Finding]:
     )
 
 
+_ALONG = 0.8
+"""Share of a force that lies along one axis, from which on it counts as pressing along it."""
+
+
 def _stuck(sight: Sight) -> Iterator[Finding]:
     """Windows in which a channel stands still although its companions move: how long in a row."""
     n = len(sight.t)
@@ -81,6 +85,9 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
     least = np.where(sight.step > 0, sight.step, 1e-12)
     move = np.ptp(sight.path[: count * size].reshape(count, size, 3), axis=1)
     felt = np.ptp(sight.net[: count * size].reshape(count, size, 3), axis=1).max(axis=1)
+    load = np.abs(sight.net[: count * size].reshape(count, size, 3).mean(axis=1))
+    # what presses mostly along an axis may slide on something flat and hard across it: the traced support
+    held = (load > _ALONG * np.linalg.norm(load, axis=1, keepdims=True)) & (load > _FELT * sight.spread_n)
     resolution = max(float(np.median(least[:3])), 1e-6)
     worst: tuple[float, int, int, list[int]] | None = None
     for k in range(6):
@@ -91,7 +98,7 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         still = (spread[:, k] < 0.5 * least[k]) & ~limit[:, k]
         if k < 3:
             others = move[:, [j for j in range(3) if j != k]].max(axis=1) > _MOVED * resolution
-            active = others | (felt > _FELT * sight.spread_n)
+            active = np.where(others, ~held[:, k], felt > _FELT * sight.spread_n)
         else:  # noise alone keeps a force channel moving
             active = np.ones(count, dtype=bool)
         row = active & still
