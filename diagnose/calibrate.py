@@ -85,7 +85,10 @@ def calibrate_on_object(
     # a bending that a rigid support shows is settled there
     tried = [effect(n) for n in FITTED if n not in offsets.names]
     kept, found = _kept(search, base, tried, progress)
-    return _told(recording, search, found.found, kept, offsets, modulus_pa, trust, seed)
+    # what was dropped may still hide behind the modulus: the fit with all of it is as good
+    whole = search.judge([*base, *tried]).found
+    told = _told(recording, search, found.found, kept, offsets, modulus_pa, trust, seed)
+    return _widened(told, search, whole, modulus_pa, trust)
 
 
 def _kept(
@@ -176,6 +179,25 @@ def _told(
         interval=interval,
         about=about,
     )
+
+
+def _widened(told: Calibration, search: Search, whole: Fit, modulus_pa: float, trust: str) -> Calibration:
+    """With an interval of the common factor that holds what the fit of all effects allows as well."""
+    spread = covariance(whole, search.forward.touches.noise.variance_inflation, search.dof)
+    level = 1.0
+    if "force_gain" in whole.names:
+        level = float(np.trace(whole.of("force_gain").reshape(3, 3))) / 3
+    scale, sd = (
+        level * whole.modulus / modulus_pa,
+        float(np.hypot(np.sqrt(max(spread[0, 0], 0.0)), MODULUS_SD)),
+    )
+    ends = scale * np.exp(1.96 * sd * np.array([-1, 1]))
+    key = "common_gain"
+    if trust == "gain":
+        key, ends = "tip_radius_m", search.forward.tip_radius * ends**2
+    low, high = told.interval[key]
+    wider = [float(min(low, ends[0])), float(max(high, ends[1]))]
+    return dataclasses.replace(told, interval={**told.interval, key: wider})
 
 
 def _absent(names: set[str], bias: Any) -> list[str]:

@@ -36,7 +36,8 @@ def test_beef_is_closed_and_never_made_worse(measured_data):
     (found,) = rows(measured_data, "beef")
     assert "viscoelasticity" in found["effects"]
     assert found["closed_ci95"][1] > 0 and found["closed"] > BEEF_CLOSED
+    assert found["holds_closed"] > HOLDS_CLOSED
     assert found["ceiling"] < found["error"] < found["floor"]
 
 
-BEEF_CLOSED = 0.3
+BEEF_CLOSED, HOLDS_CLOSED = 0.45, 0.9
