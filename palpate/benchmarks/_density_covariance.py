@@ -171,7 +171,7 @@ def terms_of(
         stack = [residual[own_rows][:, :, None], jacobian[own_rows]]
         for c in waved:
             stack.append(c.change[own_rows][:, :, None] * modes[s])
-        own = []
+        own: list[int] = []
         for c in columns:
             if c.level == PLACE:
                 stack.append(c.change[own_rows][:, :, None])
@@ -188,12 +188,12 @@ def terms_of(
     q = max(map(len, owns))
     first = 1 + jacobian.shape[2] + m
     gram = np.zeros((t.sites, first + q, first + q))
-    own = np.full((t.sites, q), -1)
-    for s, each in enumerate(grams):
-        gram[s, : len(each), : len(each)] = each
-        own[s, : len(owns[s])] = owns[s]
+    whose = np.full((t.sites, q), -1)
+    for s, gained in enumerate(grams):
+        gram[s, : len(gained), : len(gained)] = gained
+        whose[s, : len(owns[s])] = owns[s]
     field_of = np.repeat([names.index(c.name) for c in waved], modes.shape[1])
-    return Terms(gram, np.array(rows), names, own, field_of.astype(int), pull, prior, low, high)
+    return Terms(gram, np.array(rows), names, whose, field_of.astype(int), pull, prior, low, high)
 
 
 @dataclass(frozen=True)
