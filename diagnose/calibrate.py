@@ -25,8 +25,14 @@ from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of
 from diagnose.whiten import NuisanceOptions
 from mechanics.calibration import Calibration
+from mechanics.effects.backlash import EFFECT as PLAY
 from mechanics.effects.base import Effect
-from mechanics.effects.registry import effect
+from mechanics.effects.finite_strain import EFFECT as FINITE
+from mechanics.effects.force_bias import EFFECT as BIAS
+from mechanics.effects.force_gain import EFFECT as GAIN
+from mechanics.effects.time_delay import EFFECT as DELAY
+from mechanics.effects.tool_compliance import EFFECT as SPRING
+from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.errors import ContactError, OptionError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
@@ -37,7 +43,7 @@ from reconstruct.filtering import low_pass
 from reconstruct.placing import presses_on
 
 TRUSTED = ("tip", "gain")
-FITTED = ("tool_compliance", "force_gain", "time_delay", "backlash")
+FITTED = (SPRING, GAIN, DELAY, PLAY)
 """Effects that a press on a known object shows, fitted together."""
 LEAST_GAIN = 10.0
 """Log likelihood on held-out presses for which one of them is kept."""
@@ -76,14 +82,14 @@ def calibrate_on_object(
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, set())
     nuisance = NuisanceOptions()
-    strain = effect("finite_strain")
+    strain = FINITE
     search = Search(
         forward, modulus_pa, nuisance=nuisance, options=AttributionOptions(),
         site_sd=site_stiffness_sd(touches, model, nuisance), finite_strain=strain,
     )  # fmt: skip
     base = [strain] if material.dent_law == "neo-hookean" else []
     # a bending that a rigid support shows is settled there
-    tried = [effect(n) for n in FITTED if n not in offsets.names]
+    tried = [e for e in FITTED if e.name not in offsets.names]
     kept, found = _kept(search, base, tried, progress)
     # what was dropped may still hide behind the modulus: the fit with all of it is as good
     whole = search.judge([*base, *tried]).found
@@ -133,7 +139,7 @@ def _told(
     spread = covariance(found, forward.touches.noise.variance_inflation, search.dof)
     scale_sd = float(np.hypot(np.sqrt(max(spread[0, 0], 0.0)), MODULUS_SD))
     scale = found.modulus / modulus_pa
-    matrix = np.asarray(keys["force_gain"]["matrix"]) if "force_gain" in names else np.eye(3)
+    matrix = np.asarray(keys[GAIN.name]["matrix"]) if GAIN.name in names else np.eye(3)
     level = float(np.trace(matrix)) / 3
     matrix, scale = matrix / level, scale * level
     interval: dict[str, Any] = {}
@@ -145,20 +151,20 @@ def _told(
     else:
         matrix = scale * matrix
         interval["common_gain"] = (scale * wide).tolist()
-    stiffness = keys.get("tool_compliance", {}).get("stiffness_n_per_m")
-    play = float(found.of("backlash")[0]) if "backlash" in names else None
+    stiffness = keys.get(SPRING.name, {}).get("stiffness_n_per_m")
+    play = float(found.of(PLAY.name)[0]) if PLAY.name in names else None
     for name, key, label in (
-        ("tool_compliance", "stiffness_n_per_m", "stiffness_n_per_m"),
-        ("time_delay", "delay_s", "delay_s"),
-        ("backlash", "width_m", "play_m"),
-        ("force_gain", "matrix", "cross_talk"),
+        (SPRING.name, "stiffness_n_per_m", "stiffness_n_per_m"),
+        (DELAY.name, "delay_s", "delay_s"),
+        (PLAY.name, "width_m", "play_m"),
+        (GAIN.name, "matrix", "cross_talk"),
     ):
         if key in between.get(name, {}):
             interval[label] = between[name][key]
-    bias = offsets.parameters.get("force_bias", {}).get("bias_n")
+    bias = offsets.parameters.get(BIAS.name, {}).get("bias_n")
     if bias is not None:
-        interval["bias_n"] = offsets.intervals["force_bias"]["bias_n"]
-    mass = offsets.parameters.get("tool_gravity_inertia", {}).get("mass_kg")
+        interval["bias_n"] = offsets.intervals[BIAS.name]["bias_n"]
+    mass = offsets.parameters.get(INERTIA.name, {}).get("mass_kg")
     about = {
         "on": f"an object of {modulus_pa:g} Pa",
         "recording": recording.name,
@@ -175,7 +181,7 @@ def _told(
         play_m=play,
         matrix=matrix,
         bias_n=None if bias is None else np.asarray(bias),
-        delay_s=keys.get("time_delay", {}).get("delay_s"),
+        delay_s=keys.get(DELAY.name, {}).get("delay_s"),
         interval=interval,
         about=about,
     )
@@ -185,8 +191,8 @@ def _widened(told: Calibration, search: Search, whole: Fit, modulus_pa: float, t
     """With an interval of the common factor that holds what the fit of all effects allows as well."""
     spread = covariance(whole, search.forward.touches.noise.variance_inflation, search.dof)
     level = 1.0
-    if "force_gain" in whole.names:
-        level = float(np.trace(whole.of("force_gain").reshape(3, 3))) / 3
+    if GAIN.name in whole.names:
+        level = float(np.trace(whole.of(GAIN.name).reshape(3, 3))) / 3
     scale, sd = (
         level * whole.modulus / modulus_pa,
         float(np.hypot(np.sqrt(max(spread[0, 0], 0.0)), MODULUS_SD)),
@@ -203,10 +209,10 @@ def _widened(told: Calibration, search: Search, whole: Fit, modulus_pa: float, t
 def _absent(names: set[str], bias: Any) -> list[str]:
     """What was not found: too small, or not asked for by these presses."""
     words = {
-        "tool_compliance": "tool's bending",
-        "force_gain": "cross-talk",
-        "time_delay": "delay",
-        "backlash": "play",
+        SPRING.name: "tool's bending",
+        GAIN.name: "cross-talk",
+        DELAY.name: "delay",
+        PLAY.name: "play",
     }
     return [w for n, w in words.items() if n not in names] + (["bias"] if bias is None else [])
 

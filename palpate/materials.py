@@ -10,7 +10,10 @@ import numpy as np
 from diagnose.rivals import held_out_rivals
 from diagnose.specimen import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
 from diagnose.touches import touches_of
+from mechanics.effects.finite_strain import EFFECT as FINITE
 from mechanics.effects.registry import effects
+from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
+from mechanics.effects.viscoelasticity import EFFECT as PRONY
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from palpate.results.material import Material
@@ -89,7 +92,7 @@ def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
         error=error,
         verdict=f"{words}: {law.name} misses held-out stress by {100 * error[law.name]:.2g} % to "
         f"{100 * MOST_STRAIN:.0f} % strain ({CEILING} {100 * error[CEILING]:.2g} %)",
-        effects=("finite_strain", "strain_stiffening") if stiffens else (),
+        effects=(FINITE.name, STIFFENING.name) if stiffens else (),
         closed=closed if stiffens else None,
         parameters=parameters,
         unknown=UNIAXIAL_UNKNOWN,
@@ -122,9 +125,9 @@ def _relaxation(tests: Tests, names: tuple[str, ...]) -> Material:
         error=error,
         verdict=f"{100 * fit.loss:.0f} % of the force is lost in the hold, which "
         + ("a Kelvin-Voigt element could do" if fit.kelvin_voigt_can else "neither 1D model can do"),
-        effects=() if fit.kelvin_voigt_can else ("viscoelasticity",),
+        effects=() if fit.kelvin_voigt_can else (PRONY.name,),
         closed=closed,
-        parameters={"viscoelasticity": {"g": [g / fit.end for g in fit.g] if fit.end > 0 else list(fit.g),
+        parameters={PRONY.name: {"g": [g / fit.end for g in fit.g] if fit.end > 0 else list(fit.g),
                                         "tau_s": list(fit.tau_s)}},
         unknown=RELAXATION_UNKNOWN,
     )  # fmt: skip
