@@ -78,6 +78,8 @@ def attribute(
         for i, effect in enumerate(effects):
             if effect.name in current.found.names or _of_one(effect, current.found.effects):
                 continue
+            if _of_one(effect, effects[:i]):
+                continue  # of the laws of one phenomenon the first stands for all until it is picked
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
             candidate = search.judge([*current.found.effects, effect], like=current)
             if not chosen:
@@ -105,6 +107,12 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
+        best = max(passing, key=lambda score: score.gain)
+        for effect in effects:
+            if _of_one(effect, [best.effect]) and effect.name not in scores:
+                candidate = search.judge([*current.found.effects, effect], like=current)
+                scores[effect.name] = search.score([effect], candidate, current)
+                passing.append(scores[effect.name])
         best = _economical(passing, search.options.rival_share)
         chosen.append(best.name)
         search.renew(best.candidate.found)
