@@ -56,9 +56,12 @@ def call(name, recording, **options):
         "press": (block, (0, 0, 0.03)),
         "compare": (recording, block),
         "diagnose": (recording, block),
+        "changes": (recording, recording),
+        "calibrate": (recording,),
         "simulate": ("block",),
     }
-    return getattr(pp, name)(*arguments[name], progress=False, **options)
+    needed = {"calibrate": {"modulus_pa": 20e3}}.get(name, {})
+    return getattr(pp, name)(*arguments[name], progress=False, **needed, **options)
 
 
 def other(option):
