@@ -112,8 +112,7 @@ def attribute(
             if _of_one(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
                 scores[effect.name] = search.score([effect], candidate, current)
-                passing.append(scores[effect.name])
-        best = _economical(passing, search.options.rival_share)
+        best = _best_law(list(scores.values()), best)
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
@@ -147,12 +146,12 @@ def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
     )
 
 
-def _economical(passing: Sequence[Score], share: float) -> Score:
-    """The score that gains most, or a law of the same phenomenon with fewer parameters whose gain is within
-    this share of it."""
-    best = max(passing, key=lambda s: s.gain)
-    near = [s for s in passing if _of_one(s.effect, [best.effect]) and s.gain > (1 - share) * best.gain]
-    return min([best, *near], key=lambda s: len(s.effect.parameters))
+def _best_law(scores: Sequence[Score], best: Score) -> Score:
+    """Of the laws of the best one's phenomenon that with the most evidence: gain less what parameters cost by
+    BIC, an observation a group of presses."""
+    each = 0.5 * np.log(len(best.per_group))
+    laws = [best, *(s for s in scores if _of_one(s.effect, [best.effect]))]
+    return max(laws, key=lambda s: s.gain - each * len(s.effect.parameters))
 
 
 def _with_hidden_strain(

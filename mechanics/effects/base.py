@@ -107,8 +107,8 @@ class Effect:
     hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
     stands_for_strain: once it is named, finite strain may have been taken for it. costly: a quick diagnosis
     leaves it out.
-    phenomenon: what several effects are laws of: these are no rivals of one another, and of those that do as
-    well the one of fewest parameters is named.
+    phenomenon: what several effects are laws of: the first stands for all until it is picked, then the law
+    with the most evidence is named; they are no rivals of one another.
     slack: factor on the lack of fit that its law may leave. systematic: (k,) standard deviations of its
     values that no noise tells, from known cases; systematic_share: the same in shares of the values;
     common_factor: standard deviation of a factor on all values that the modulus takes up. signed: values

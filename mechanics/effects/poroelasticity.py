@@ -94,5 +94,6 @@ EFFECT = Effect(
     touch=_touch,
     law=LAW,
     apply=unchanged,
+    phenomenon="relaxation",
     systematic=(0.02, 0.1),
 )
