@@ -18,6 +18,8 @@ from mechanics.samples import runs
 _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
 _LEAST_PIECE = 2.0  # tip radii; less tells no plane
 _FLAT = 0.1  # tip radii off the plane
+_MOMENT_S = 0.05  # a contact that is shorter is no press
+_THINNED = 5  # samples
 
 
 @dataclass(frozen=True)
@@ -113,10 +115,7 @@ def find_interval(
         centre, normal, flatness = fit_plane(position[a:b])
         if flatness > _FLAT * tip_radius_m:
             continue
-        off = np.array([np.median(np.abs((position[c:d] - centre) @ normal)) for c, d in found])
-        outside = np.flatnonzero(off > _FLAT * tip_radius_m)
-        first = int(max(outside[outside < i], default=-1)) + 1
-        last = int(min(outside[outside > i], default=len(found))) - 1
+        first, last = _coplanar(t, position, found, i, _FLAT * tip_radius_m)
         if sum(_travel(position[c:d]) for c, d in found[first : last + 1]) > _LEAST_SLIDE * tip_radius_m:
             return found[first][0], found[last][1]
     raise NoBaseError(
@@ -124,6 +123,28 @@ def find_interval(
         "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
         "model whose base stands in"
     )
+
+
+def _coplanar(
+    t: np.ndarray, position: np.ndarray, found: list[tuple[int, int]], start: int, limit_m: float
+) -> tuple[int, int]:
+    """First and last of the contacts around `start` that lie in one plane with it, none left out between.
+
+    The plane is fitted anew with each contact that is tried: one straight side of a foot alone tells no
+    plane. A contact of a moment, as of a tip that bounces, ends nothing.
+    """
+    lasting = [k for k, (a, b) in enumerate(found) if k == start or t[b - 1] - t[a] > _MOMENT_S]
+    at = lasting.index(start)
+    low = high = at
+    for step in (1, -1):
+        while 0 <= (tried := (high if step > 0 else low) + step) < len(lasting):
+            chosen = [found[k] for k in lasting[min(low, tried) : max(high, tried) + 1]]
+            thinned = [position[a:b:_THINNED] for a, b in chosen]
+            centre, normal, _ = fit_plane(np.concatenate(thinned))
+            if max(float(np.median(np.abs((x - centre) @ normal))) for x in thinned) > limit_m:
+                break
+            low, high = min(low, tried), max(high, tried)
+    return lasting[low], lasting[high]
 
 
 def _travel(points: np.ndarray) -> float:

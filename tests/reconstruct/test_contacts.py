@@ -207,3 +207,27 @@ def test_a_soft_object_pressed_shallowly_keeps_its_presses():
     assert 0.05 < np.median(np.linalg.norm(exploration.force[at], axis=1)) < 0.25
     assert len(exploration.presses) == len(onsets)
     assert not exploration.rejected
+
+
+def test_a_foot_traced_in_straight_pieces_with_a_bounce_is_one_phase():
+    """One straight side alone tells no plane, and a bounce of 20 ms ends no tracing."""
+    from reconstruct.boundary import find_interval
+
+    rate, rng = 1000, np.random.default_rng(5)
+    corners = np.array([[0, 0], [0.06, 0], [0.06, 0.06], [0, 0.06], [0, 0]])
+    parts = []
+    for k, (a, b) in enumerate(zip(corners[:-1], corners[1:], strict=True)):
+        side = a + np.linspace(0, 1, 2 * rate)[:, None] * (b - a)
+        # the tip leans across its way, as a hand does: by itself such a side has a tilted plane
+        lean = 2e-4 * (k == 0) * np.linspace(-1, 1, len(side)) ** 2
+        parts.append(np.column_stack([side, 0.005 + lean + 1e-5 * rng.normal(size=len(side))]))
+        bounce = np.tile([*b, 0.0065], (20, 1))
+        parts += [np.tile([*b, 0.008], (30, 1)), bounce, np.tile([*b, 0.008], (30, 1))]
+    press = np.column_stack([np.tile([0.03, 0.03], (800, 1)), 0.05 - 4e-3 * np.hanning(800)])
+    position = np.vstack([*parts, np.tile([0.03, 0.03, 0.06], (500, 1)), press])
+    on_plane = np.abs(position[:, 2] - 0.005) < 4e-4
+    touching = on_plane | (position[:, 2] == 0.0065) | ((position[:, 2] > 0.04) & (position[:, 2] < 0.0495))
+    t = np.arange(len(position)) / rate
+    first, last = find_interval(t, position, touching, None, 0.005)
+    sides = np.flatnonzero(on_plane)
+    assert first == sides[0] and last == sides[-1] + 1
