@@ -17,6 +17,7 @@ from reconstruct.checks.sight import CHANNELS, Sight
 
 _WINDOW_S, _LEAST_WINDOW = 0.25, 10
 _STUCK_S = 1.5
+_MOST_STUCK = 0.25  # of touches or time: a wide play holds a reading still for some presses
 _MOVED, _FELT = 10.0, 30.0
 _COARSE = 0.05
 _SPIKE_S, _SPIKES, _AROUND_S, _LEAST_SPIKES = 0.006, 12.0, 0.04, 5
@@ -126,7 +127,7 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         "rest goes on" + (f"; {lost} of {len(sight.spans)} touches lie there" if lost else ""),
         p_words(decades),
         "cut that stretch out of the recording, or record anew",
-        np.inf if share > 0.1 else max(float(share), 0.02),
+        np.inf if share > _MOST_STUCK else max(float(share), 0.02),
         decades,
         (begin, end),
         names,
