@@ -24,6 +24,9 @@ OUT_OF_SET = 0.1
 RIVAL_CLOSES = 0.3
 """A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
 
+NEARLY = 0.6
+"""Of the greatest gain: what may be the cause in its place if it closes more of the held-out gap."""
+
 HIDDEN_LEAST = 10.0
 """What may hide finite strain gains this much alone before it is tried with it as well."""
 
@@ -107,7 +110,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
-        best = max(passing, key=lambda score: score.gain)
+        best = _first_of(passing)
         for effect in effects:
             if _of_one(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
@@ -144,6 +147,21 @@ def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
     return bool(effect.phenomenon) and any(
         o.phenomenon == effect.phenomenon and o.name != effect.name for o in others
     )
+
+
+def _first_of(passing: Sequence[Score]) -> Score:
+    """The score that gains most; or one of its scope that gains nearly as much and closes far more of the
+    held-out gap: a fit that does not carry over is not the cause."""
+    most = max(passing, key=lambda s: s.gain)
+    better = [
+        s
+        for s in passing
+        if s.effect.scope is most.effect.scope
+        and not s.effect.few_places
+        and s.gain > NEARLY * most.gain
+        and s.share > most.share + RIVAL_CLOSES
+    ]
+    return most if most.effect.few_places else max([most, *better], key=lambda s: s.share)
 
 
 def _best_law(scores: Sequence[Score], best: Score) -> Score:

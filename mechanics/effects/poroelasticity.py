@@ -94,6 +94,5 @@ EFFECT = Effect(
     touch=_touch,
     law=LAW,
     apply=unchanged,
-    phenomenon="relaxation",
     systematic=(0.02, 0.1),
 )

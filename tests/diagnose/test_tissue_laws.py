@@ -92,7 +92,5 @@ def test_laws_of_one_phenomenon_are_no_rivals():
     }  # fmt: skip
     assert pairs == {
         frozenset(("viscoelasticity", "power_law_relaxation")),
-        frozenset(("viscoelasticity", "poroelasticity")),
-        frozenset(("power_law_relaxation", "poroelasticity")),
         frozenset(("adhesion", "jkr_adhesion")),
     }  # fmt: skip
