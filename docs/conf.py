@@ -24,7 +24,8 @@ html_show_copyright = False
 html_favicon = None
 exclude_patterns = ["**/README.md"]
 # names of constants that are unpacked from a tuple are there all the same
-suppress_warnings = ["config.cache", "autoapi.python_import_resolution"]
+# annotations name local types by their last word, which others share
+suppress_warnings = ["config.cache", "autoapi.python_import_resolution", "ref.python"]
 
 myst_heading_anchors = 4
 myst_enable_extensions = ["dollarmath"]
@@ -45,7 +46,7 @@ sphinx_gallery_conf = {
     "examples_dirs": [str(ROOT / "examples")],
     "gallery_dirs": ["gallery"],
     "filename_pattern": r".*\.py",
-    "ignore_pattern": r"(__init__|conftest)\.py",
+    "ignore_pattern": r"(__init__|conftest|robot_client)\.py",
     "image_scrapers": ("matplotlib", "pyvista"),
     "within_subsection_order": "FileNameSortKey",
     "download_all_examples": False,
