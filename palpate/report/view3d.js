@@ -136,7 +136,7 @@ function start(root) {
     renderer.setPixelRatio(Math.min(window.devicePixelRatio, 2));
     renderer.setSize(w, h, false);
     camera.aspect = w / h;
-    redraw();
+    draw();  // a canvas of a new size is blank: a frame later would be seen
   }
 
   // ---- colours
