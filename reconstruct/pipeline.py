@@ -104,7 +104,7 @@ def reconstruct_fully(
     options = options or ReconstructOptions()
     paper = options.method == "paper"
     nu = _poisson_ratio(recording, options)
-    clock = _Clock()
+    clock = Clock()
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
     _check_points(recording, geometry, paper)
@@ -320,12 +320,15 @@ def _part(progress: Progress, low: float, high: float) -> Progress:
     return lambda stage, fraction: progress(stage, low + (high - low) * fraction)
 
 
-class _Clock:
+class Clock:
+    """Wall time of steps, s: `lap` books what passed since the last to a name."""
+
     def __init__(self) -> None:
         self.laps: dict[str, float] = {}
         self._last = time.perf_counter()
 
     def lap(self, name: str) -> None:
+        """The step `name` ends here."""
         now = time.perf_counter()
         self.laps[name] = self.laps.get(name, 0.0) + now - self._last
         self._last = now

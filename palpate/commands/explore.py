@@ -11,7 +11,6 @@ from __future__ import annotations
 
 import argparse
 import sys
-from pathlib import Path
 
 from mechanics.errors import OptionError
 from mechanics.recording import SAMPLES
@@ -103,7 +102,7 @@ def _robot(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOption
     def tell(line: str) -> None:
         print(line, flush=True)
 
-    serve(explorer, sys.stdin, tell, lambda e: _keep(e, arguments.output))
+    serve(explorer, sys.stdin, tell, lambda e: e.save(arguments.output))
     emit_json({"recording": arguments.output, **explorer.state.table()}, arguments.json)
     return 0
 
@@ -131,7 +130,7 @@ def _phantom(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOpti
         if suggestion.kind == "stop":
             break
         state = explorer.add(robot.carry_out(suggestion))
-        _keep(explorer, arguments.output)
+        explorer.save(arguments.output)
         steps.append({"suggest": suggestion.table(), "state": state.table()})
     state = explorer.state
     say(
@@ -143,10 +142,6 @@ def _phantom(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOpti
         summary["truth"] = dict(robot.last.truth)
     emit_json(summary, arguments.json)
     return 0
-
-
-def _keep(explorer: Explorer, path: str | Path) -> None:
-    explorer.save(path)
 
 
 def _line(suggestion: Suggestion, state: State) -> str:

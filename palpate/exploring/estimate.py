@@ -8,7 +8,6 @@ costs one solve.
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -22,6 +21,7 @@ from reconstruct.casting import cast
 from reconstruct.contacts import ContactOptions, Exploration, explore
 from reconstruct.meshing import MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.pipeline import Clock
 from reconstruct.shape_error import compliance_covariance
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 
@@ -72,7 +72,7 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
     Raises ContactError where too few presses can be found, SurfaceError or MeshError where they do not make
     a body yet.
     """
-    clock = _Clock()
+    clock = Clock()
     exploration = explore(recording, contact_options=ContactOptions(least_palpations=LEAST_PRESSES))
     clock.lap("presses")
     surface, chosen_at = _surface(exploration, before)
@@ -150,14 +150,3 @@ def _rows(sites: TouchSites, rows: slice) -> TouchSites:
         sites.points[rows], sites.normals[rows], sites.curvature[rows], sites.far[rows],
         sites.patch_width_m, sites.poisson_ratio,
     )  # fmt: skip
-
-
-class _Clock:
-    def __init__(self) -> None:
-        self.laps: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        now = time.perf_counter()
-        self.laps[name] = now - self._last
-        self._last = now

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -151,7 +150,6 @@ class Explorer:
         A press that cannot be used is kept in the recording and named in `state.trouble`.
         """
         self.segments.append(segment)
-        began = time.perf_counter()
         try:
             if self._base is None or self._made < LEAST_PRESSES:
                 self._trace_only()
@@ -160,7 +158,6 @@ class Explorer:
             self._trouble = ""
         except (ContactError, SurfaceError, MeshError) as error:
             self._trouble = str(error)
-        self._last_s = time.perf_counter() - began
         return self.state
 
     @property

@@ -50,7 +50,7 @@ def serve(
     explorer: Explorer,
     lines: Iterable[str],
     say: Callable[[str], None],
-    kept: Callable[[Explorer], None],
+    kept: Callable[[Explorer], object],
 ) -> None:
     """Talk until the robot ends, its lines do, or there is nothing left to suggest.
 
