@@ -24,6 +24,9 @@ OUT_OF_SET = 0.1
 RIVAL_CLOSES = 0.3
 """A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
 
+AS_LIKELY = np.log(10)
+"""Log odds by which one effect must be likelier than another, or the likelihood of all places decides."""
+
 HIDDEN_LEAST = 10.0
 """What may hide finite strain gains this much alone before it is tried with it as well."""
 
@@ -110,7 +113,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
-        best = max(passing, key=lambda s: s.log_odds)
+        best = _likeliest(passing)
         for effect in effects:
             if _of_one(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
@@ -147,6 +150,13 @@ def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
     return bool(effect.phenomenon) and any(
         o.phenomenon == effect.phenomenon and o.name != effect.name for o in others
     )
+
+
+def _likeliest(passing: Sequence[Score]) -> Score:
+    """The score that gains most of those as likely to be there as any; a fit that does not carry over is
+    not."""
+    best = max(s.log_odds for s in passing)
+    return max((s for s in passing if s.log_odds > best - AS_LIKELY), key=lambda s: s.gain)
 
 
 def _best_law(scores: Sequence[Score], best: Score) -> Score:
@@ -253,7 +263,7 @@ def _without_idle(
         if effect.slips and sideways_off(search.forward, without):
             continue
         score = search.score([effect], current, without)
-        if not search.passes(score, first=False):
+        if not score.may_be:
             chosen.remove(name)
             current = without
     return current, chosen

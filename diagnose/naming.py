@@ -29,7 +29,7 @@ class Weights:
         )
 
 
-WEIGHTS = Weights(offset=-17.0, evidence=5.0, closure=15.0)
+WEIGHTS = Weights(offset=-14.3, evidence=4.5, closure=13.6)
 """Fitted by `palpate bench diagnose-weights` to the development seeds of the blind benchmark."""
 
 
