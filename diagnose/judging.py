@@ -102,9 +102,15 @@ class Score:
         return self.gain if self.effect.few_places else self.gain - max(float(self.per_group.max()), 0.0)
 
     @property
+    def closure(self) -> float:
+        """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
+        places, as it is."""
+        return self.share if self.effect.few_places else self.closes
+
+    @property
     def log_odds(self) -> float:
         """That it is there, rather than an error of our own law."""
-        return WEIGHTS.log_odds(self.evidence, self.share if self.effect.few_places else self.closes)
+        return WEIGHTS.log_odds(self.evidence, self.closure)
 
     @property
     def probability(self) -> float:
