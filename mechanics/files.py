@@ -145,6 +145,16 @@ def writing(path: Path | str) -> Iterator[None]:
         raise FileError(told(refused, path, "written")) from refused
 
 
+def no_file(path: Path | str) -> str:
+    """In words, what `path` names that is no file: 'is a folder', or that it does not exist."""
+    path = Path(path)
+    if path.is_dir():
+        return "is a folder"
+    if path.is_symlink() and not path.exists():
+        return f"is a link to '{os.path.realpath(path)}', which does not exist"
+    return "is no ordinary file" if path.exists() else "does not exist"
+
+
 def read_text(path: Path | str, error: type[PalpateError] = FileError) -> str:
     """A UTF-8 file of at most 16 MB; raises `error` in one line for anything else."""
     with reading(path, error), open(path, "rb") as file:
@@ -221,11 +231,13 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
 
 
 def check_room(folder: Path, least_bytes: int, variable: str = "PALPATE_CACHE") -> None:
-    """Raises FileError where a folder, which a variable of the environment names, cannot be made or has less
-    room than that."""
+    """Make a folder, which a variable of the environment names; raises FileError where it cannot be made, or
+    its disk has less room than that: then nothing is made."""
     with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        free = shutil.disk_usage(folder).free
+        place = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+        free = shutil.disk_usage(place).free
+        if free >= least_bytes:
+            folder.mkdir(parents=True, exist_ok=True)
     if free < least_bytes:
         raise FileError(
             f"'{folder}' has {free / 1e6:.1f} MB free, about {least_bytes / 1e6:.0f} MB are needed: free "

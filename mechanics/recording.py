@@ -21,7 +21,16 @@ import numpy as np
 import tomli_w
 
 from mechanics.errors import RecordingError
-from mechanics.files import Kind, atomic_file, check_target, named_in, read_toml, reading, sha256_of_file
+from mechanics.files import (
+    Kind,
+    atomic_file,
+    check_target,
+    named_in,
+    no_file,
+    read_toml,
+    reading,
+    sha256_of_file,
+)
 from mechanics.schema import ANY, Key, Schema, check_table
 from mechanics.store import content_key
 from mechanics.surface_files import UNITS
@@ -233,7 +242,7 @@ def recording_files(path: Path | str) -> tuple[Path, Path]:
     for file in (samples, description):
         if not file.is_file():
             raise RecordingError(
-                f"'{file}' does not exist: a recording is NAME.csv (or NAME.csv.gz) "
+                f"'{file}' {no_file(file)}: a recording is NAME.csv (or NAME.csv.gz) "
                 "and NAME.toml side by side"
             )
     return samples, description

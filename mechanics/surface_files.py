@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.files import no_file
 
 if TYPE_CHECKING:
     import trimesh
@@ -68,7 +69,7 @@ def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
     if unit not in UNITS:
         raise SurfaceError(f"--unit is '{unit}'; allowed are {', '.join(UNITS)}")
     if not path.is_file():
-        raise SurfaceError(f"'{path}' does not exist: name a file that is there")
+        raise SurfaceError(f"'{path}' {no_file(path)}: name a file that is there")
     return _closed(_shell_of(path), path.name, unit)
 
 

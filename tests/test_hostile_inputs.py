@@ -23,6 +23,7 @@ from mechanics.files import (
     JSON,
     Kind,
     atomic_file,
+    check_room,
     check_target,
     named_in,
     sole_writer,
@@ -132,6 +133,25 @@ def test_hostile_samples_are_refused_in_one_line(record, name):
     with pytest.raises(RecordingError, match=words) as error:
         read_recording(path)
     one_line(error, path)
+
+
+def test_what_is_no_file_is_told_as_what_it_is(record, tmp_path):
+    path = record()
+    description = tmp_path / "rec.toml"
+    description.unlink()
+    for make, words in (
+        (lambda: None, "rec.toml' does not exist"),
+        (description.mkdir, "rec.toml' is a folder"),
+        (lambda: description.symlink_to("nowhere.toml"), "nowhere.toml', which does not exist"),
+        (lambda: os.mkfifo(description), "rec.toml' is no ordinary file"),
+    ):
+        make()
+        with pytest.raises(RecordingError, match=words) as error:
+            read_recording(path)
+        one_line(error)
+        if description.is_dir():
+            description.rmdir()
+        description.unlink(missing_ok=True)
 
 
 def test_text_of_another_encoding_beside_the_numbers_is_read(record):
@@ -691,11 +711,14 @@ def test_room_and_permission_are_seen_before_the_work(tmp_path):
         check_target(tmp_path / "a", MODEL)
 
 
-def test_a_full_scratch_disk_is_seen_before_the_work(monkeypatch):
+def test_a_full_disk_of_scratch_or_cache_is_seen_before_the_work(monkeypatch, tmp_path):
     import shutil
 
     full = shutil.disk_usage("/")._replace(free=1000)
     monkeypatch.setattr("mechanics.files.shutil.disk_usage", lambda _: full)
+    with pytest.raises(FileError, match="set PALPATE_CACHE to a folder on another disk"):
+        check_room(tmp_path / "deep" / "laboratory", 1 << 20)
+    assert not list(tmp_path.iterdir()), "an empty folder is left"
     with pytest.raises(FileError, match="set TMPDIR to a folder on another disk") as error:
         with temporary_folder("x-"):
             pytest.fail("nothing can be written there")

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import RecordingError
+from mechanics.files import no_file
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def read_tables(path: Path | str) -> list[Table]:
     """
     path = Path(path)
     if not path.exists():
-        raise RecordingError(f"'{path}' does not exist: name a file that is there")
+        raise RecordingError(f"'{path}' {no_file(path)}: name a file that is there")
     suffix = ".bag" if path.is_dir() else path.suffix.lower()
     if suffix not in _READERS:
         allowed = ", ".join(s.removeprefix(".") for s in SUFFIXES)
