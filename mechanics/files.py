@@ -33,6 +33,7 @@ _TEXT_BYTES = 16 << 20
 _DEEPEST = 32
 _PROBE_BYTES = 1 << 16
 _SCRATCH_BYTES = 1 << 24
+_MOST_MEMORY = 2 << 30
 
 _REMEDIES = {
     errno.ENOSPC: "free some space or write to another disk",
@@ -153,6 +154,40 @@ def no_file(path: Path | str) -> str:
     if path.is_symlink() and not path.exists():
         return f"is a link to '{os.path.realpath(path)}', which does not exist"
     return "is no ordinary file" if path.exists() else "does not exist"
+
+
+@contextmanager
+def bounded_memory(path: Path | str, error: type[PalpateError] = FileError) -> Iterator[None]:
+    """A stranger's file may unpack to anything: inside, this process gets at most 2 GB more than it has, and
+    `error` names the file. Where the system has no such limit (Windows, macOS) nothing is bounded."""
+    try:
+        with _limited_data(_MOST_MEMORY):
+            yield
+    except MemoryError as wrong:
+        raise error(
+            f"'{path}' takes more than {_MOST_MEMORY >> 30} GB of memory to read: cut it, or check where "
+            "it is from"
+        ) from wrong
+
+
+@contextmanager
+def _limited_data(most_bytes: int) -> Iterator[None]:
+    """RLIMIT_DATA counts what is written privately: neither maps of files nor what is reserved only."""
+    try:
+        import resource
+
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        held = 1024 * next(int(x.split()[1]) for x in status.splitlines() if x.startswith("VmData"))
+    except (ImportError, OSError, StopIteration):
+        yield
+        return
+    soft, hard = before = resource.getrlimit(resource.RLIMIT_DATA)
+    limits = [held + most_bytes, *(x for x in before if x != resource.RLIM_INFINITY)]
+    resource.setrlimit(resource.RLIMIT_DATA, (min(limits), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
 
 
 def read_text(path: Path | str, error: type[PalpateError] = FileError) -> str:
