@@ -3,6 +3,7 @@ told."""
 
 from __future__ import annotations
 
+import gzip
 import json
 import sys
 
@@ -233,6 +234,21 @@ def test_what_is_missing_is_one_line(tmp_path, content, said, words):
     with pytest.raises(RecordingError, match=words) as refused:
         pp.read_table(tmp_path / "log.csv", **said)
     assert len(str(refused.value).splitlines()) == 1
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a limit that only Linux has")
+@pytest.mark.parametrize("name", ["log.csv.gz", "log.npz"])
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch, name):
+    most = 16 << 20
+    monkeypatch.setattr("mechanics.files._MOST_MEMORY", most)
+    if name.endswith("gz"):
+        (tmp_path / name).write_bytes(gzip.compress(bytes(4 * most), 1))
+    else:
+        np.savez_compressed(tmp_path / name, t=np.zeros(most // 2))
+    with pytest.raises(RecordingError, match="takes more than .* of memory to read") as refused:
+        pp.read_table(tmp_path / name, tip_radius_m=TIP)
+    assert len(str(refused.value).splitlines()) == 1
+    assert np.zeros(4 * most).size, "the limit ends with the file"
 
 
 def test_a_missing_library_names_the_extra(tmp_path, monkeypatch):
