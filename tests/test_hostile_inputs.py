@@ -405,6 +405,16 @@ def test_hostile_scenes_are_refused_in_one_line(tmp_path, name):
     one_line(error, path)
 
 
+def test_an_inclusion_beside_the_object_is_refused():
+    from scenes.build import _check_inside
+
+    _check_inside(block())
+    far = dataclasses.replace(block().material, inclusions={"lump": Ball((9, 0, 0), 0.01, 6.0)})
+    with pytest.raises(SceneError, match="lies outside the object") as error:
+        _check_inside(dataclasses.replace(block(), material=far))
+    one_line(error)
+
+
 def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path):
     path = tmp_path / "x.bin"
     arrays = {"far": np.arange(600.0).reshape(-1, 3), "own": np.arange(50, dtype=np.float32)}
@@ -840,3 +850,20 @@ def test_atomic_writes_follow_links_and_leave_them(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert not [p for p in tmp_path.iterdir() if p.name.startswith(".palpate")]
+
+
+NAMED = re.compile(r"`([A-Z]+)\[((?:[^\]\\]|\\.)+)\]`|`(test_\w+)`")
+
+
+@pytest.mark.parametrize(("page", "least"), [("robustness.md", 120), ("safety.md", 15)])
+def test_every_row_of_the_docs_names_tests_that_exist(page, least):
+    from palpate.benchmarks._faults import FAULTS
+
+    root, defined = Path(__file__).resolve().parents[1], set()
+    for file in (root / "tests").rglob("test_*.py"):
+        defined |= set(re.findall(r"^def (test_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE))
+    named = NAMED.findall((root / "docs" / page).read_text(encoding="utf-8"))
+    assert len(named) >= least
+    for table, key, name in named:
+        rows = FAULTS if table == "FAULTS" else globals()[table] if table else defined
+        assert (name or key.replace("\\", "")) in rows, f"{table or page} has no '{name or key}'"
