@@ -160,11 +160,16 @@ def _base_type(hint: Any) -> type:
 
 
 def finite(text: str) -> float:
-    """argparse type: a finite float."""
+    """argparse type: a finite float, and one whose square is finite too."""
     value = float(text)
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    if abs(value) > _GREATEST:
+        raise argparse.ArgumentTypeError(f"'{text}' is beyond any quantity here (in SI units, {_GREATEST:g})")
     return value
+
+
+_GREATEST = 1e15
 
 
 def natural(text: str) -> int:

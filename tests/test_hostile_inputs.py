@@ -588,6 +588,16 @@ ABSURD = {
         "--depth",
         "inf",
     ),
+    "a place of 1e200": ("beyond any quantity", "press", "M", "--at", "1e200,0,0", "--direction", "0,0,-1"),
+    "a direction of 1e200": (
+        "beyond any quantity",
+        "press",
+        "M",
+        "--at",
+        "0,0,0",
+        "--direction",
+        "0,0,-1e200",
+    ),
     "nu of -0.99": ("from 0 to 0.4999", "reconstruct", "REC", "-o", "new", "--poisson-ratio", "-0.99"),
 }
 
