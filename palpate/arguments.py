@@ -226,7 +226,7 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
         flag = action.option_strings[-1] if action.option_strings else str(action.metavar or action.dest)
         kind = getattr(action, _WRITES, None)
         for each in given if isinstance(given, list) else [given]:
-            if each is None or str(each) == "-":
+            if each is None or str(each) in ("-", "none"):
                 continue
             if hasattr(action, _READS):
                 read |= {_identity(file): flag for file in _files_of(Path(each))}
