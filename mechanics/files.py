@@ -394,7 +394,7 @@ def temporary_folder(label: str = "") -> Iterator[Path]:
 
     Raises FileError where the disk has no room for any.
     """
-    sweep(Path(tempfile.gettempdir()))
+    sweep_scratch()
     check_room(Path(tempfile.gettempdir()), _SCRATCH_BYTES, "TMPDIR")
     with writing(tempfile.gettempdir()):
         with tempfile.TemporaryDirectory(prefix=temporary_prefix(label), ignore_cleanup_errors=True) as name:
@@ -408,6 +408,12 @@ def memory_folder() -> Path | None:
         return None
     sweep(shared)
     return shared
+
+
+def sweep_scratch() -> None:
+    """Sweep where scratch files and shared memory go."""
+    sweep(Path(tempfile.gettempdir()))
+    memory_folder()
 
 
 def sweep(folder: Path) -> None:

@@ -107,6 +107,7 @@ SAMPLES = {
     "too few values": (text_of(rows())[:-7], "not 7 decimal numbers"),
     "an infinite value": (text_of(changed(rows(), 7, 4, np.inf)), "data row 8"),
     "a value beyond a double": (text_of(rows()).replace("0.05", "1e400", 1), "not a finite number"),
+    "a force beyond any": (text_of(changed(rows(), 7, 4, 1e300)), "above 1e.09 N .first in data row 8"),
     "time standing": (text_of(changed(rows(), 7, 0, 0.006)), "t must increase strictly"),
     "time in ms": (text_of(rows(step=1.0)), "look like milliseconds"),
     "a clock ten times slow": (text_of(rows(step=0.01)), "state the true rate"),
@@ -227,6 +228,14 @@ def test_a_misspelt_key_is_told_and_a_key_of_ones_own_is_not(record):
     with pytest.warns(MisspeltKey, match="boundry_phase is no key: did you mean boundary_phase") as told:
         assert read_recording(path).boundary_phase is None
     assert len(told) == 1
+
+
+def test_a_slow_clock_is_taken_for_milliseconds_only_where_it_may_be_one(record):
+    unstated = described("sample_rate_hz = 1000.0", "")
+    for step, like in ((1.0, True), (0.02, False)):
+        with pytest.raises(RecordingError, match="from 60 to 100000 Hz") as error:
+            read_recording(record(text_of(rows(step=step)), unstated))
+        assert ("look like milliseconds" in str(error.value)) == like
 
 
 def test_a_path_in_a_description_stays_in_its_folder(record, tmp_path, monkeypatch):
@@ -777,7 +786,7 @@ def test_two_writers_of_one_folder_do_not_mix(tmp_path):
     assert not list((tmp_path / "demo").iterdir())
 
 
-def test_what_killed_processes_left_is_swept(tmp_path):
+def test_what_killed_processes_left_is_swept(tmp_path, monkeypatch):
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     ours = temporary_prefix().replace(str(os.getpid()), str(gone.pid))
@@ -790,6 +799,11 @@ def test_what_killed_processes_left_is_swept(tmp_path):
     sweep(tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([f"{temporary_prefix()}alive", "model"])
     assert (tmp_path / "model" / "kept").exists(), "what was being replaced goes back"
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("mechanics.files._swept", set())
+    (tmp_path / f"{ours}mesh-x").mkdir()
+    command("press", "nothing", "--at", "0,0,0", "--direction", "0,0,-1", "--depth", "0.001")
+    assert not list(tmp_path.glob("*mesh-x")), "whatever command is next sweeps the scratch files"
     with temporary_folder("x-") as scratch:
         (scratch / "a").touch()
     assert not scratch.exists()
