@@ -194,7 +194,7 @@ def _check_samples(recording: Recording) -> None:
             raise RecordingError(f"boundary_phase = [{start}, {end}]: the start must come before the end (s)")
 
 
-def _check_sane(recording: Recording) -> None:
+def check_sane(recording: Recording) -> None:
     """What no exploration of an object of 1 mm to 1 m by hand can be; raises RecordingError."""
     t, rate = recording.t, recording.sample_rate_hz
     block = min(100, len(t) - 1)
@@ -318,7 +318,7 @@ def read_recording(path: Path | str) -> Recording:
             sha256=sha256_of_file(samples),
             description=table,
         )
-        _check_sane(recording)
+        check_sane(recording)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
     if "calibration" in tool:

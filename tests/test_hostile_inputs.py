@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import gzip
+import json
 import os
 import re
 import signal
@@ -422,6 +423,40 @@ def test_an_inclusion_beside_the_object_is_refused():
     with pytest.raises(SceneError, match="lies outside the object") as error:
         _check_inside(dataclasses.replace(block(), material=far))
     one_line(error)
+
+
+def told(**changes):
+    """A robot's line of 0.6 s of rest."""
+    count = 600
+    said = {"segment": "trace", "t": [1e-3 * k for k in range(count)]}
+    return json.dumps(said | {"position": [[0.0] * 3] * count, "force": [[0.0] * 3] * count} | changes)
+
+
+ROBOT = {
+    "no JSON": ("[" * 100_000, "no JSON"),
+    "a list": ("[]", "holds a list"),
+    "a kind that is a list": (told(segment=["trace"]), "kind is"),
+    "a place of words": (told(position=[["a"] * 3] * 600), "no numbers"),
+    "a time of nan": (told(t=[float("nan")] * 600), "all finite"),
+    "two samples": (told(t=[0, 1e-3], position=[[0] * 3] * 2, force=[[0] * 3] * 2), "20 samples or more"),
+    "a place of 1e300": (told(position=[[0.0] * 3] * 599 + [[1e300, 0, 0]]), "1e.300 m across"),
+    "a force of 1e300": (told(force=[[1e300, 0, 0]] * 600), "above 1e.09 N"),
+    "a clock of 1e300": (told(t=[1e-3 * k for k in range(599)] + [1e300]), "the clock runs from"),
+    "another rate": (told(t=[1e-2 * k for k in range(600)]), "state the true rate"),
+    "an orientation of 0": (told(quaternion=[[0.0] * 4] * 600), "unit quaternions"),
+}
+
+
+@pytest.mark.parametrize("name", ROBOT)
+def test_a_robots_hostile_line_is_answered_in_one_and_nothing_of_it_kept(name):
+    from palpate.exploring.explorer import Explorer
+    from palpate.exploring.protocol import serve
+    from palpate.exploring.rows import Instrument
+
+    line, words = ROBOT[name]
+    explorer, said = Explorer(Instrument(0.005)), []
+    serve(explorer, [line], said.append, lambda _: pytest.fail("there is nothing to keep"))
+    assert re.search(words, json.loads(said[-1])["error"]) and not explorer.segments
 
 
 def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path):
