@@ -100,8 +100,12 @@ def interrupted(
     with tempfile.TemporaryDirectory(prefix="palpate-ends-") as folder:
         place = _Place(Path(folder))
         whole_s = {}
-        for name in tqdm(names, desc="whole", disable=None):
-            whole_s[name] = place.whole(name)
+        try:
+            for name in tqdm(names, desc="whole", disable=None):
+                whole_s[name] = place.whole(name)
+        except KeyboardInterrupt:
+            print("interrupted: the commands that ran whole until then", file=sys.stderr)
+            names, count = tuple(whole_s), 0
         weights = np.array([place.jobs[name].weight for name in names])
         for seed in tqdm(range(first, first + count), desc="ended", disable=None):
             if time.perf_counter() - began > 60 * minutes:
@@ -195,8 +199,8 @@ class _Place:
         return process, said
 
     def _next(self, name: str) -> None:
-        """The next command that writes to the same place."""
-        argv = ("press", str(self.model), *PRESS, "-o", str(self.out / "curve.csv"))
+        """The next command that writes to the same place: one that compiles nothing."""
+        argv = ("export", str(self.model), "--to", "stl", "-o", str(self.out / "next.stl"))
         subprocess.run(module_command("palpate", *argv), env=self._environment, capture_output=True)
 
     def _left(self, family: list[int]) -> list[str]:
