@@ -54,6 +54,7 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
     "min_reported_time": 0,
     "abort_on_example_error": True,
+    "parallel": 2,
     "show_signature": False,
     "reset_modules": (),
 }
