@@ -98,6 +98,7 @@ class TouchWindow:
         self._help = self._text("", (0.01, 0.98), "top", font="courier")
         self._help.prop.background_color, self._help.prop.background_opacity = "white", 0.9
         self._help.SetVisibility(False)
+        self.plotter.add_axes(interactive=False, color="black", line_width=2, viewport=(0.0, 0.0, 0.14, 0.2))
         points, triangles = self.pictures[0].rest_surface
         model = session.model
         radius = session.servo.tip_radius_m
