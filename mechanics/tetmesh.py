@@ -146,8 +146,8 @@ def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     corners = triangles[:, :3]
     p = points[corners]
     area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    normals = np.zeros_like(points)
-    for k in range(triangles.shape[1]):
-        np.add.at(normals, triangles[:, k], area)
+    nodes, each = triangles.ravel(), np.repeat(area, triangles.shape[1], axis=0)
+    # far faster than adding row by row, and the touch window does it at every picture
+    normals = np.stack([np.bincount(nodes, axis, len(points)) for axis in each.T], axis=1)
     length = np.linalg.norm(normals, axis=1, keepdims=True)
     return normals / np.where(length > 0, length, 1.0)

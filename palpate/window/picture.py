@@ -61,10 +61,11 @@ class ObjectPicture:
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
             color=TIP_COLOUR,
+            ambient=0.35,
             specular=0.4,
         )
         self._arrow = plotter.add_mesh(
-            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR
+            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
         )
         self._ball = plotter.add_mesh(
             pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20), color=INCLUSION_COLOUR

@@ -11,7 +11,7 @@ from mechanics.frames import tangents
 
 FLOOR_COLOUR = np.array([217, 222, 229], dtype=float)
 DARKEST = 0.5
-_DIRECTIONS, _ANGLES, _RINGS = 96, 96, 56
+_DIRECTIONS, _ANGLES, _NEAR_RINGS, _FAR_RINGS = 96, 72, 28, 12
 
 
 def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarray) -> pyvista.PolyData:
@@ -20,9 +20,9 @@ def floor(middle: np.ndarray, up: np.ndarray, radius_m: float, points: np.ndarra
     across, along = tangents(up)
     foot = float(np.linalg.norm((points - middle) @ np.column_stack([across, along]), axis=1).max())
     # close rings where the foot's shadow falls, ever wider ones outside
-    rings = np.concatenate(
-        [np.linspace(0.0, 1.6 * foot, 40), np.geomspace(1.6 * foot, radius_m, _RINGS - 39)[1:]]
-    )
+    near = 1.6 * foot
+    far = np.geomspace(near, max(radius_m, 1.1 * near), _FAR_RINGS)[1:]
+    rings = np.concatenate([np.linspace(0.0, near, _NEAR_RINGS), far])
     disc = _disc(middle, across, along, rings)
     shade = 1.0 - DARKEST * occlusion(disc.points, points, up)
     disc.point_data["shade"] = (shade[:, None] * FLOOR_COLOUR).astype(np.uint8)

@@ -150,19 +150,20 @@ class TouchWindow:
             pointa=(0.012, SLIDER_AT),
             pointb=(0.012 + 0.5 * PANEL_SHARE, SLIDER_AT),
             interaction_event="always",
-            title_height=0.016,
+            title_height=0.05,
             title_color="black",
             color="#1b4f9c",
             fmt="%.1f",
-            slider_width=0.012,
-            tube_width=0.004,
+            slider_width=0.035,
+            tube_width=0.008,
         )
         look = slider.GetSliderRepresentation()
-        look.SetEndCapLength(0.004)
         look.SetSliderLength(0.012)
-        look.SetLabelHeight(0.018)
-        look.GetLabelProperty().SetColor(0.0, 0.0, 0.0)
+        look.SetEndCapLength(0.0)
+        look.SetLabelHeight(0.05)
+        look.GetTubeProperty().SetColor(*pyvista.Color("#b8c0cc").float_rgb)
         for words in (look.GetLabelProperty(), look.GetTitleProperty()):
+            words.SetColor(0.0, 0.0, 0.0)
             words.SetBold(False)
             words.SetShadow(False)
         return slider
