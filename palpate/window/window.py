@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import wrap
+from typing import Any
 
 import numpy as np
 import pyvista
@@ -157,7 +158,7 @@ class TouchWindow:
             slider_width=0.035,
             tube_width=0.008,
         )
-        look = slider.GetSliderRepresentation()
+        look: Any = slider.GetSliderRepresentation()
         look.SetSliderLength(0.012)
         look.SetEndCapLength(0.0)
         look.SetLabelHeight(0.05)
