@@ -14,7 +14,7 @@ from palpate.exploring.candidates import Candidate, ReachOptions, first_places, 
 from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing, surface_error
 from palpate.exploring.orders import Order
-from palpate.exploring.rows import Instrument, Segment, together
+from palpate.exploring.rows import Instrument, Segment, check_joined, together
 from reconstruct.boundary import Boundary
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.modulus import ModulusOptions
@@ -149,6 +149,7 @@ class Explorer:
 
         A press that cannot be used is kept in the recording and named in `state.trouble`.
         """
+        check_joined(self.instrument, self.segments, segment)
         self.segments.append(segment)
         try:
             if self._base is None or self._made < LEAST_PRESSES:

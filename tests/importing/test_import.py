@@ -3,6 +3,7 @@ told."""
 
 from __future__ import annotations
 
+import gzip
 import json
 import sys
 
@@ -12,7 +13,7 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 import palpate as pp
-from mechanics.errors import RecordingError
+from mechanics.errors import FileError, RecordingError
 from palpate import cli
 from palpate.importing.convert import cross_correlated
 from palpate.importing.dates import seconds_of
@@ -234,6 +235,38 @@ def test_what_is_missing_is_one_line(tmp_path, content, said, words):
     with pytest.raises(RecordingError, match=words) as refused:
         pp.read_table(tmp_path / "log.csv", **said)
     assert len(str(refused.value).splitlines()) == 1
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a limit that only Linux has")
+@pytest.mark.parametrize("name", ["log.csv.gz", "log.npz"])
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch, name):
+    most = 16 << 20
+    monkeypatch.setattr("mechanics.files._MOST_MEMORY", most)
+    if name.endswith("gz"):
+        (tmp_path / name).write_bytes(gzip.compress(bytes(4 * most), 1))
+    else:
+        np.savez_compressed(tmp_path / name, t=np.zeros(most // 2))
+    with pytest.raises(RecordingError, match="takes more than .* of memory to read") as refused:
+        pp.read_table(tmp_path / name, tip_radius_m=TIP)
+    assert len(str(refused.value).splitlines()) == 1
+    assert np.zeros(4 * most).size, "the limit ends with the file"
+
+
+def test_a_picture_replaces_no_photograph_and_is_whole_or_not_there(tmp_path, world):
+    rows = np.column_stack([world["t"], world["p"], world["f"]])[::50]
+    np.savetxt(tmp_path / "log.csv", rows, "%.6g", ",", header="t,x,y,z,fx,fy,fz", comments="")
+    result = pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP)
+    photo = tmp_path / "rec.png"
+    photo.write_bytes(b"\x89PNG of a cat")
+    with pytest.raises(FileError, match="is no picture of palpate import"):
+        result.draw(photo)
+    assert photo.read_bytes() == b"\x89PNG of a cat"
+    words = ["import", str(tmp_path / "log.csv"), "--tip-radius", "0.005", "--dry-run", "--picture"]
+    assert (
+        cli.main([*words, str(tmp_path / "log.csv")]) == 2 and "t,x,y" in (tmp_path / "log.csv").read_text()
+    )
+    drawn = result.draw(tmp_path / "drawn.png").read_bytes()
+    assert drawn.endswith(b"IEND\xaeB`\x82") and result.draw(tmp_path / "drawn.png").stat().st_size > 1000
 
 
 def test_a_missing_library_names_the_extra(tmp_path, monkeypatch):
