@@ -10,7 +10,7 @@ import numpy as np
 from mechanics.press_sites import SITE_M, sites_of
 from mechanics.presses import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses, Segment
 from mechanics.recording import Recording
-from mechanics.robust import spread_about_zero
+from mechanics.robust import read_columns, spread_about_zero
 from mechanics.samples import runs
 
 AROUND_S = 0.3
@@ -77,9 +77,9 @@ def measured_noise(recording: Recording, free: np.ndarray, usual_n: float = USUA
         lasting = min(1.0, held / per_step)
         step = stated * np.sqrt(max(lasting, 1 / per_step))
         return Noise(stated, step, float(np.clip(held / per_step, 1.0, 10.0)))
-    if free.sum() < 200 * per_step:
+    force = read_columns(recording.force_on_tool)
+    if free.sum() < 200 * per_step or not force.size:
         return Noise(stated, stated / np.sqrt(per_step), 1.0)
-    force = recording.force_on_tool
     steps = np.diff(force, axis=0)[free[1:] & free[:-1]]
     white = max(_robust_std(steps) / np.sqrt(2), 1e-4)
     line = np.polyfit(recording.t[free], force[free], 1)
