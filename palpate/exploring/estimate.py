@@ -13,17 +13,20 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mechanics.nearest import distance
+from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.sites import TouchSites, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from reconstruct.casting import cast
-from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.contacts import ContactOptions, Exploration, explore, filtered_of
+from reconstruct.filtering import FilterOptions
 from reconstruct.meshing import MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.pipeline import Clock
-from reconstruct.shape_error import compliance_covariance
+from reconstruct.shape_error import compliance_covariance, shape_gradients
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
+from reconstruct.tool_weight import ToolWeight
 
 MESH_M, SURFACE_EDGE_M = 0.016, 0.010
 """Tetrahedra of the running estimate, and of its surface."""
@@ -36,25 +39,29 @@ _BOOTSTRAPS = 200
 
 @dataclass(frozen=True)
 class Solved:
-    """A mesh with its factorisation, the surface it fills, and the far fields solved on it by place."""
+    """A mesh with its factorisation, the surface it fills, and what was solved on it by place: far fields,
+    and how each answers to an error of the shape (reconstruct.shape_error.shape_gradients)."""
 
     surface: Surface
     mesh: TetMesh
     solver: Solver
-    far: dict[bytes, TouchSites] = field(default_factory=dict)
+    far: dict[bytes, tuple[TouchSites, np.ndarray]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Estimate:
     """What is known after the presses so far. surface, fit: None before LEAST_PRESSES were found.
 
+    weight: of the tool. presses_placed: the table on the surface, a row of `sites` each.
     presses_at_choice: how many there were when the shape's family was chosen last. seconds: wall time of
     each step of this update.
     """
 
     exploration: Exploration | None = None
+    weight: ToolWeight | None = None
     surface: Surface | None = None
     solved: Solved | None = None
+    presses_placed: Presses | None = None
     sites: TouchSites | None = None
     fit: ModulusFit | None = None
     presses_at_choice: int = 0
@@ -73,7 +80,9 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
     a body yet.
     """
     clock = Clock()
-    exploration = explore(recording, contact_options=ContactOptions(least_palpations=LEAST_PRESSES))
+    filtered = filtered_of(recording, FilterOptions().cutoff_hz, near=before.weight)
+    options = ContactOptions(least_palpations=LEAST_PRESSES)
+    exploration = explore(recording, contact_options=options, filtered=filtered)
     clock.lap("presses")
     surface, chosen_at = _surface(exploration, before)
     clock.lap("surface")
@@ -82,9 +91,10 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
     touched = exploration.presses
     where = cast(solved.surface.vertices, solved.surface.triangles, touched.point, touched.contact_normal)
     presses = touched.on_surface(where.points, where.normals)
-    sites = _sites(solved, where.points, where.normals, poisson_ratio)
+    sites, gradient = solved_sites(solved, where.points, where.normals, poisson_ratio)
     clock.lap("touch sites")
-    covariance = compliance_covariance(solved.solver, sites, uncertainty_at(solved.solver.mesh, surface))
+    deviation = uncertainty_at(solved.solver.mesh, surface)
+    covariance = compliance_covariance(solved.solver, sites, deviation, gradient=gradient)
     fit = fit_modulus(
         presses,
         sites,
@@ -94,7 +104,9 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
         seed=seed,
     )
     clock.lap("modulus")
-    return Estimate(exploration, surface, solved, sites, fit, chosen_at, clock.laps)
+    return Estimate(
+        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, clock.laps
+    )  # fmt: skip
 
 
 def _surface(exploration: Exploration, before: Estimate) -> tuple[Surface, int]:
@@ -118,8 +130,11 @@ def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:
     return Solved(surface, mesh, touch_solver(mesh, poisson_ratio, surface_edge_m=SURFACE_EDGE_M))
 
 
-def _sites(solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_ratio: float) -> TouchSites:
-    """The sites of all presses; those whose place was solved on this mesh before are read."""
+def solved_sites(
+    solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_ratio: float
+) -> tuple[TouchSites, np.ndarray]:
+    """(sites of surface points (k, 3) with outward normals (k, 3), their shape gradients (k, m)); what was
+    solved on this mesh before is read."""
     keys = [np.round(np.concatenate(pair), 9).tobytes() for pair in zip(points, normals, strict=True)]
     new = [i for i, key in enumerate(keys) if key not in solved.far]
     width = patch_width(solved.solver.mesh)
@@ -132,17 +147,19 @@ def _sites(solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_rati
             solver=solved.solver,
             patch_width_m=width,
         )
+        gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):
-            solved.far[keys[i]] = _rows(made, slice(row, row + 1))
+            solved.far[keys[i]] = _rows(made, slice(row, row + 1)), gradients[row]
     parts = [solved.far[key] for key in keys]
-    return TouchSites(
-        points=np.concatenate([p.points for p in parts]),
-        normals=np.concatenate([p.normals for p in parts]),
-        curvature=np.concatenate([p.curvature for p in parts]),
-        far=np.concatenate([p.far for p in parts]),
+    sites = TouchSites(
+        points=np.concatenate([p.points for p, _ in parts]),
+        normals=np.concatenate([p.normals for p, _ in parts]),
+        curvature=np.concatenate([p.curvature for p, _ in parts]),
+        far=np.concatenate([p.far for p, _ in parts]),
         patch_width_m=float(width),
         poisson_ratio=poisson_ratio,
     )
+    return sites, np.array([gradient for _, gradient in parts])
 
 
 def _rows(sites: TouchSites, rows: slice) -> TouchSites:

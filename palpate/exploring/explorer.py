@@ -8,16 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import ContactError, MeshError, OptionError, SurfaceError
+from mechanics.errors import ContactError, DiagnosisError, MeshError, OptionError, SurfaceError
 from mechanics.recording import Recording, write_recording
 from palpate.exploring.candidates import Candidate, ReachOptions, first_places, vertex_areas, weighed
+from palpate.exploring.causes import Causes, Weighing, causes_of, words
 from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing, surface_error
 from palpate.exploring.orders import Order
-from palpate.exploring.rows import Instrument, Segment, together
+from palpate.exploring.parting import Parting, missing, partings
+from palpate.exploring.rows import Instrument, Segment, apart, together
 from reconstruct.boundary import Boundary
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.modulus import ModulusOptions
+from reconstruct.pipeline import Clock
 
 
 @dataclass(frozen=True)
@@ -62,7 +65,8 @@ class State:
     """What is known. modulus_pa, interval: nan where nothing is known. standing: goal by goal.
 
     presses: found and used; made: segments of presses that were added. seconds: of exploring so far.
-    update_s: wall time of the last update by step. trouble: why the last update could not be made, or "".
+    update_s: wall time of the last update by step. causes: where they are asked for and can be told;
+    cause_at: how surely. trouble: why the last update could not be made, or "".
     """
 
     presses: int
@@ -75,6 +79,8 @@ class State:
     standing: tuple[Standing, ...]
     update_s: dict[str, float] = field(default_factory=dict)
     trouble: str = ""
+    causes: Causes | None = None
+    cause_at: float = 0.95
 
     @property
     def done(self) -> bool:
@@ -97,6 +103,7 @@ class State:
             "surface": self.surface,
             "goals": {s.name: {"now": known(s.now), "goal": s.goal, "met": s.met} for s in self.standing},
             "done": self.done,
+            "causes": None if self.causes is None else self.causes.table(self.cause_at),
             "update_s": self.update_s,
             "trouble": self.trouble,
         }
@@ -129,6 +136,28 @@ class Explorer:
         self._estimate = Estimate()
         self._base: Boundary | None = None
         self._trouble = ""
+        self._asked: list[np.ndarray] = []
+        self._causes: tuple[Causes, Weighing] | None = None
+
+    @classmethod
+    def going_on(
+        cls,
+        recording: Recording,
+        goals: GoalOptions | None = None,
+        reach: ReachOptions | None = None,
+        **given: Any,
+    ) -> Explorer:
+        """The explorer of an exploration that was interrupted, from what it recorded; `given` as above.
+
+        Any recording of an exploration will do. Raises RecordingError, ContactError where it cannot be cut
+        into segments.
+        """
+        instrument, segments = apart(recording)
+        nu = {} if recording.poisson_ratio is None else {"poisson_ratio": recording.poisson_ratio}
+        made = cls(instrument, goals, reach, **{**nu, **given})
+        made.segments = segments
+        made._brought_up_to_date()
+        return made
 
     @property
     def recording(self) -> Recording:
@@ -150,15 +179,27 @@ class Explorer:
         A press that cannot be used is kept in the recording and named in `state.trouble`.
         """
         self.segments.append(segment)
+        self._brought_up_to_date()
+        return self.state
+
+    def _brought_up_to_date(self) -> None:
         try:
             if self._base is None or self._made < LEAST_PRESSES:
                 self._trace_only()
             if self._made >= LEAST_PRESSES:
                 self._estimate = updated(self.recording, self._estimate, self._nu, self._seed)
+                self._weigh()
             self._trouble = ""
-        except (ContactError, SurfaceError, MeshError) as error:
+        except (ContactError, SurfaceError, MeshError, DiagnosisError) as error:
             self._trouble = str(error)
-        return self.state
+
+    def _weigh(self) -> None:
+        if self.goals.cause_at is None:
+            return
+        clock = Clock()
+        self._causes = causes_of(self._estimate)
+        clock.lap("causes")
+        self._estimate.seconds.update(clock.laps)
 
     @property
     def _made(self) -> int:
@@ -188,6 +229,9 @@ class Explorer:
         if self.goals.surface_within_m is not None:
             now = error if e.surface is not None else float("inf")
             standing.append(Standing("surface", now, self.goals.surface_within_m))
+        causes = self._causes[0] if self._causes else None
+        if self.goals.cause_at is not None:
+            standing.append(cause_standing(causes, self.goals.cause_at))
         return State(
             presses=e.presses,
             made=self._made,
@@ -199,6 +243,8 @@ class Explorer:
             standing=tuple(standing),
             update_s=dict(e.seconds),
             trouble=self._trouble,
+            causes=causes,
+            cause_at=self.goals.cause_at or 0.95,
         )
 
     def suggest(self) -> Suggestion:
@@ -222,7 +268,11 @@ class Explorer:
                 "stop",
                 "no touch in reach is expected to bring a goal nearer at this noise; " + self._words(state),
             )
-        return self._press(best.point, best.normal, best.depth_m, best.seconds, self._why(best, state))
+        self._asked.append(best.point)
+        return Suggestion(
+            "press", self._why(best, state), best.point, best.normal, float(best.depth_m),
+            best.speed_m_per_s, best.hold_s, self.reach.clearance_m, float(best.seconds),
+        )  # fmt: skip
 
     def _first(self) -> Suggestion:
         assert self._base is not None
@@ -262,14 +312,31 @@ class Explorer:
             e.fit.modulus_pa,
             self.instrument.tip_radius_m,
             self.reach,
+            self._partings(),
+            np.array(self._asked).reshape(-1, 3),
         )
         if self._order is None or not ranked:
             return ranked[0] if ranked else None
         places = np.array([c.point for c in ranked])
         return ranked[self._order(places, presses.point, presses.point[-1], self._rng)]
 
+    def _partings(self) -> list[Parting]:
+        if self._causes is None or self.goals.cause_at is None or self._order is not None:
+            return []
+        causes, weighing = self._causes
+        return partings(weighing, causes, self.goals.cause_at)
+
     def _why(self, best: Candidate, state: State) -> str:
         by_name = {s.name: s for s in state.standing}
+        if best.for_goal == "cause" and best.parting is not None:
+            p = best.parting
+            pace = (
+                "slow" if best.speed_m_per_s < 0.01 else "fast" if best.speed_m_per_s > 0.04 else "middling"
+            )
+            held = f", held {best.hold_s:.1f} s" if best.hold_s > 1 else ""
+            return (
+                f"{words(p.first)} and {words(p.rival)} both stand: a {pace} press here{held} parts them most"
+            )
         if best.for_goal == "modulus":
             now = by_name["modulus"]
             return (
@@ -286,7 +353,10 @@ class Explorer:
     def _words(state: State) -> str:
         parts = []
         for s in state.standing:
-            if not np.isfinite(s.now):
+            if s.name == "cause":
+                left = [] if state.causes is None else state.causes.standing(state.cause_at)
+                parts.append("cause: " + (" or ".join(map(words, left)) or "unknown"))
+            elif not np.isfinite(s.now):
                 parts.append(f"{s.name} unknown")
             elif s.name == "modulus":
                 parts.append(f"modulus {state.modulus_pa / 1e3:.1f} kPa within {100 * s.now:.1f} %")
@@ -295,7 +365,16 @@ class Explorer:
         return ", ".join(parts)
 
 
+def cause_standing(causes: Causes | None, at: float) -> Standing:
+    """How far it is to one cause alone: the greatest ratio beside the likeliest, of what rules it out."""
+    if causes is None:
+        return Standing("cause", float("inf"), 1 - at)
+    first = causes.standing(at)[0]
+    most = max(missing(causes, name, at) for name in causes.ratio if name != first)
+    return Standing("cause", (1 - at) * float(np.exp(most)), 1 - at)
+
+
 def check_goals(goals: GoalOptions) -> None:
     """Raises OptionError where nothing is asked for."""
-    if goals.modulus_within is None and goals.surface_within_m is None:
-        raise OptionError("no goal is given: ask for --modulus-within or --surface-within")
+    if goals.modulus_within is None and goals.surface_within_m is None and goals.cause_at is None:
+        raise OptionError("no goal is given: ask for --modulus-within, --surface-within or --cause-at")
