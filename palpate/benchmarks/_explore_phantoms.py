@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.errors import SceneError
 from palpate.exploring.causes import detectable_n, weigh
 from palpate.exploring.estimate import Estimate, updated
 from palpate.exploring.explorer import Suggestion
@@ -30,6 +31,8 @@ LEAST, MOST = 2.0, 4.0
 """Times the detectable limit."""
 DEPTH = 0.6
 """Of what a place allows, of the presses by which sizes and limits are told."""
+STRONGEST = 4.0
+"""Of strengths: a cause that would have to be stronger gives way to another."""
 REFERENCE = 12
 """Presses, evenly spread, of the exploration by which the limit is told."""
 
@@ -95,18 +98,23 @@ def strengthened(it: Sealed) -> Sealed:
     """The phantom with its cause as strong as its ratio says. Raises PalpateError where it cannot be told."""
     if not it.cause:
         return it
-    limit = limit_of(it)
-    strength = 1.0
-    for _ in range(2):
-        size = size_at(it, strength)
-        strength = float(np.clip(strength * it.ratio * limit / max(size, 1e-6), 1e-3, 16.0))
-    size = size_at(it, strength)
-    return replace(it, strength=strength, size_n=size, limit_n=limit, ratio=size / limit)
+    limits = limits_of(it)
+    causes = np.random.default_rng([31, it.seed]).permutation([c for c in CAUSES if c != it.cause])
+    for cause in (it.cause, *map(str, causes)):
+        limit, strength = limits.get(cause, np.inf), 1.0
+        for _ in range(2):
+            size = size_at(replace(it, cause=cause), strength)
+            strength = float(np.clip(strength * it.ratio * limit / max(size, 1e-6), 1e-3, 2 * STRONGEST))
+        if strength <= STRONGEST:
+            made = replace(it, cause=cause, strength=strength, limit_n=limit)
+            size = size_at(made, strength)
+            return replace(made, size_n=size, ratio=size / limit)
+    raise SceneError(f"no cause up to strength {STRONGEST:g} is {it.ratio:.1f} times what shows")
 
 
-def limit_of(it: Sealed) -> float:
-    """N rms: the smallest size of the cause that shows in REFERENCE evenly spread presses of the object
-    without it."""
+def limits_of(it: Sealed) -> dict[str, float]:
+    """{cause: N rms}, the smallest size that shows in REFERENCE evenly spread presses of the object without
+    it."""
     body = thing(it.number)
     robot = robot_of(it, {})
     segments = [robot.carry_out(Suggestion("trace", ""))]
@@ -116,7 +124,7 @@ def limit_of(it: Sealed) -> float:
         segments.append(robot.carry_out(to))
     recording = together(robot.instrument, segments)
     weighing = weigh(updated(recording, Estimate(), robot.phantom.poisson_ratio, it.seed))
-    return detectable_n(weighing)[it.cause] if weighing else float("nan")
+    return detectable_n(weighing) if weighing else {}
 
 
 def size_at(it: Sealed, strength: float) -> float:

@@ -193,7 +193,7 @@ def tables(made: list[dict[str, Any]], orders: list[str]) -> str:
         none = [m for m in own if not m["cause"]]
         alarms = sum(any(NONE not in s.get("standing", [NONE]) for s in m["steps"]) for m in none)
         lost = sum(any(m["cause"] not in s.get("standing", [m["cause"]]) for s in m["steps"]) for m in there)
-        low, high = wilson(alarms, len(none)) if none else (0.0, 1.0)
+        _, low, high = wilson(alarms, len(none)) if none else (0.0, 0.0, 1.0)
         cause.append([
             order, len(there), len(right), len(told) - len(right), lost,
             _median([s["made"] for s in right], len(there)),

@@ -12,9 +12,10 @@ import argparse
 import os
 import sys
 import time
+from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -47,6 +48,9 @@ from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from palpate.exploring.guide import Guide
 
 SUMMARY = "feel a model or scene at 1 kHz"
 DEFAULT_SCENE = "demo"
@@ -105,8 +109,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Open, touch, close; prints what the servo did."""
+def run(arguments: argparse.Namespace, guided: Callable[[TouchSession], Guide] | None = None) -> int:
+    """Open, touch, close; prints what the servo did. guided: makes an exploration's guide, for the window."""
     scene = given_scene(arguments, arguments.scene)
     name = arguments.device or ("simulated" if arguments.headless else "mouse")
     _check(arguments, name)
@@ -150,7 +154,8 @@ def run(arguments: argparse.Namespace) -> int:
         else:
             from palpate.window.window import TouchWindow
 
-            TouchWindow(session, scene, channel).run(seconds, screenshot=arguments.screenshot)
+            guide = None if guided is None else guided(session)
+            TouchWindow(session, scene, channel, guide=guide).run(seconds, screenshot=arguments.screenshot)
         report = session.report()
     say(arguments, f"{scene.title}: {session.renderer_name}, {name}", str(report))
     if arguments.record is not None:

@@ -16,7 +16,7 @@ import numpy as np
 
 from mechanics.options import option
 from mechanics.tetmesh import vertex_normals
-from palpate.exploring.goals import Standing, surface_error
+from palpate.exploring.goals import Standing, surface_error, vertex_areas
 from palpate.exploring.parting import Parting
 from reconstruct.boundary import Boundary, farthest_points
 from reconstruct.shape_error import CORRELATION_M
@@ -115,15 +115,16 @@ def weighed(
             now = surface_error(after[free], area[free])
             gain = missing["surface"].missing - Standing("", now, missing["surface"].goal).missing
         nearest = int(np.argmin(((touched - point) ** 2).sum(axis=1))) if len(touched) else 0
-        for way in _ways(deepest, "modulus" in missing or bool(partings), partings, reach):
+        for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), partings, reach):
             gains = {"surface": gain}
             if "modulus" in missing:
                 sd = modulus_after(touched, depths_m, point, way.depth_m, modulus_sd, modulus_bias)
                 gains["modulus"] = (
                     missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
                 )
-            if way.parting is not None and "cause" in missing:
-                gains["cause"] = float(way.parting.gain[min(nearest, len(way.parting.gain) - 1)])
+            if "cause" in missing:
+                told = UNTOLD if way.parting is None else way.parting.gain
+                gains["cause"] = float(np.atleast_1d(told)[min(nearest, np.size(told) - 1)])
             seconds = (
                 float(np.linalg.norm(point - here)) / reach.air_speed_m_per_s
                 + 2 * reach.clearance_m / reach.air_speed_m_per_s
@@ -139,6 +140,10 @@ def weighed(
                 )
             )  # fmt: skip
     return sorted(made, key=lambda c: -c.worth)
+
+
+UNTOLD = 1e-3
+"""Log evidence of a press whose worth for the cause is not known: any is better than none."""
 
 
 @dataclass(frozen=True)
@@ -213,13 +218,6 @@ def press_depth(
         stiff = 4 / 3 * modulus_pa / (1 - 0.49**2) * np.sqrt(tip_radius_m)
         depth = min(depth, (reach.strongest_n / stiff) ** (2 / 3))
     return float(depth)
-
-
-def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(n,) m^2: a third of the triangles around each vertex."""
-    corner = vertices[triangles]
-    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
-    return np.bincount(triangles.ravel(), np.repeat(size / 3, 3), minlength=len(vertices))
 
 
 def first_places(

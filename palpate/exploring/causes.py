@@ -45,8 +45,10 @@ NONE = "none"
 FALSE_ALARMS = 0.02
 """Probability of ruling 'none' out at any time where it is true."""
 LEAST_PRESSES = 6
-SIZES = np.geomspace(0.5, 12.0, 9)
+SIZES = np.geomspace(1.0, 100.0, 13)
 """Sizes of a cause that are weighed, times `least_n`."""
+LEAST = 0.1
+"""Of a reading's noise: the smallest size of a cause that is weighed."""
 SHARES = (0.3, 1.0, 3.0)
 """Steps from where an effect does nothing, of its starts, at which its form is taken."""
 SUPPORT_GIVES = 1.5e-5
@@ -74,7 +76,8 @@ class Causes:
     """What stands after the presses so far.
 
     log_evidence: of each cause and 'none', log M over the ideal model's. least_n: N rms over contact samples,
-    the size from which a cause matters. misfit: lack of fit (whitened mean square) that the best one leaves.
+    the smallest size of a cause that is weighed. misfit: lack of fit (whitened mean square) that the best one
+    leaves.
     """
 
     log_evidence: dict[str, float]
@@ -150,7 +153,7 @@ def causes_of(estimate: Estimate, least_n: float | None = None) -> tuple[Causes,
     weighing = weigh(estimate)
     if weighing is None:
         return None
-    least = least_n or 0.5 * weighing.forward.touches.noise.raw_n
+    least = least_n or LEAST * weighing.forward.touches.noise.raw_n
     return judge(weighing, least), weighing
 
 
@@ -301,10 +304,11 @@ def _field(points: np.ndarray) -> np.ndarray:
 
 
 def tried(presses: Presses) -> list[Effect]:
-    """Effects that may be the cause: those that a diagnosis searches for and such presses tell, but for what
-    can take the form of others, and Poisson's ratio, which is given."""
-    out = untold_effects(presses) | {"poisson_ratio"}
-    return [e for e in effects() if e.role is Role.SEARCHED and e.name not in out and not e.any_form]
+    """Effects that may be the cause: those that a quick diagnosis searches for and such presses tell, but for
+    what can take the form of others."""
+    untold = untold_effects(presses)
+    able = [e for e in effects() if e.role is Role.SEARCHED and not e.any_form and not e.costly]
+    return [e for e in able if e.name not in untold]
 
 
 def forms_of(forward: Forward) -> list[tuple[str, Act]]:

@@ -18,6 +18,7 @@ from mechanics.recording import Recording
 from mechanics.sites import TouchSites, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
+from palpate.exploring.goals import surface_error, vertex_areas
 from reconstruct.casting import cast
 from reconstruct.contacts import ContactOptions, Exploration, explore, filtered_of
 from reconstruct.filtering import FilterOptions
@@ -53,6 +54,7 @@ class Estimate:
     """What is known after the presses so far. surface, fit: None before LEAST_PRESSES were found.
 
     weight: of the tool. presses_placed: the table on the surface, a row of `sites` each.
+    confirmed: whether the surface was as sure as asked for when all families were tried last.
     presses_at_choice: how many there were when the shape's family was chosen last. seconds: wall time of
     each step of this update.
     """
@@ -65,6 +67,7 @@ class Estimate:
     sites: TouchSites | None = None
     fit: ModulusFit | None = None
     presses_at_choice: int = 0
+    confirmed: bool = False
     seconds: dict[str, float] = field(default_factory=dict)
 
     @property
@@ -73,8 +76,16 @@ class Estimate:
         return 0 if self.exploration is None else len(self.exploration.presses)
 
 
-def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: int = 0) -> Estimate:
-    """The estimate with all that `recording` holds; `before`: of a beginning of it.
+def updated(
+    recording: Recording,
+    before: Estimate,
+    poisson_ratio: float,
+    seed: int = 0,
+    *,
+    within_m: float | None = None,
+) -> Estimate:
+    """The estimate with all that `recording` holds; `before`: of a beginning of it. within_m: as sure as the
+    surface is asked for; one family of shapes may only seem that sure, so all are tried before it counts.
 
     Raises ContactError where too few presses can be found, SurfaceError or MeshError where they do not make
     a body yet.
@@ -84,7 +95,7 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
     options = ContactOptions(least_palpations=LEAST_PRESSES)
     exploration = explore(recording, contact_options=options, filtered=filtered)
     clock.lap("presses")
-    surface, chosen_at = _surface(exploration, before)
+    surface, chosen_at, confirmed = _surface(exploration, before, within_m)
     clock.lap("surface")
     solved = _solved(surface, before, poisson_ratio)
     clock.lap("mesh")
@@ -105,19 +116,30 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
     )
     clock.lap("modulus")
     return Estimate(
-        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, clock.laps
+        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, confirmed, clock.laps
     )  # fmt: skip
 
 
-def _surface(exploration: Exploration, before: Estimate) -> tuple[Surface, int]:
+def _surface(exploration: Exploration, before: Estimate, within_m: float | None) -> tuple[Surface, int, bool]:
+    """(surface, presses at the last choice of a family, whether that was as sure as asked for)."""
     count = len(exploration.presses)
     evidence = evidence_of(exploration)
     known = before.surface
     again = known is None or count >= before.presses_at_choice + min(_ALL_SHAPES_EVERY, count // 3 + 1)
     if known is not None and not again and known.method != "implicit":
-        same = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
-        return reconstruct_surface(evidence, same), before.presses_at_choice
-    return reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=0.004)), count
+        options = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
+        same = reconstruct_surface(evidence, options)
+        if before.confirmed or within_m is None or free_error(same) > within_m:
+            return same, before.presses_at_choice, before.confirmed
+    chosen = reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=0.004))
+    return chosen, count, within_m is not None and free_error(chosen) <= within_m
+
+
+def free_error(surface: Surface) -> float:
+    """m, within which 95 % of the surface off the support lies, by its own word."""
+    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
+    area = vertex_areas(surface.vertices, surface.triangles)
+    return surface_error(surface.uncertainty_m[free], area[free])
 
 
 def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:

@@ -7,25 +7,37 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mechanics.errors import ContactError, DiagnosisError, MeshError, OptionError, SurfaceError
+from mechanics.nearest import distance
 from mechanics.recording import Recording, write_recording
-from palpate.exploring.candidates import Candidate, ReachOptions, first_places, vertex_areas, weighed
+from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions, first_places, weighed
 from palpate.exploring.causes import Causes, Weighing, causes_of, words
-from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
-from palpate.exploring.goals import GoalOptions, Standing, surface_error
+from palpate.exploring.estimate import LEAST_PRESSES, Estimate, free_error, updated
+from palpate.exploring.goals import GoalOptions, Standing
 from palpate.exploring.orders import Order
-from palpate.exploring.parting import Parting, missing, partings
+from palpate.exploring.parting import RIGID_S, Parting, by_support, missing, partings
 from palpate.exploring.rows import Instrument, Segment, apart, together
 from reconstruct.boundary import Boundary
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.modulus import ModulusOptions
 from reconstruct.pipeline import Clock
 
+FAR_FROM = 3.0
+"""Times as much as all presses that are left are expected to tell."""
+RECENT = 6
+"""Touches that test the surface: older ones tested another."""
+NEW_S = 0.1
+"""A press that begins so much later than the last one known is new."""
+TRUSTED = 3.0
+"""Touches by which a surface's own word of its uncertainty counts beside those that tested it."""
+
 
 @dataclass(frozen=True)
 class Suggestion:
-    """The next touch. kind: 'trace', 'press', or 'stop'; the rest holds for a press; device frame, SI units.
+    """What to do next. kind: 'trace', 'press', 'rigid' (press the bare support three times), 'free' (wave and
+    turn the tool in the air) or 'stop'; the rest holds for a press; device frame, SI units.
 
     point: (3,) where the surface is expected; normal: (3,) outward there. Come from outside along -normal,
     begin clearance_m above, go on until the force rises, then depth_m deeper at speed_m_per_s, hold hold_s,
@@ -137,6 +149,7 @@ class Explorer:
         self._base: Boundary | None = None
         self._trouble = ""
         self._asked: list[np.ndarray] = []
+        self._tests: list[float] = []
         self._causes: tuple[Causes, Weighing] | None = None
 
     @classmethod
@@ -156,7 +169,7 @@ class Explorer:
         nu = {} if recording.poisson_ratio is None else {"poisson_ratio": recording.poisson_ratio}
         made = cls(instrument, goals, reach, **{**nu, **given})
         made.segments = segments
-        made._brought_up_to_date()
+        made.bring_up_to_date()
         return made
 
     @property
@@ -179,19 +192,44 @@ class Explorer:
         A press that cannot be used is kept in the recording and named in `state.trouble`.
         """
         self.segments.append(segment)
-        self._brought_up_to_date()
+        self.bring_up_to_date()
         return self.state
 
-    def _brought_up_to_date(self) -> None:
+    def bring_up_to_date(self) -> None:
+        """Update the estimate with all segments, where they were put down without `add`."""
         try:
             if self._base is None or self._made < LEAST_PRESSES:
                 self._trace_only()
             if self._made >= LEAST_PRESSES:
-                self._estimate = updated(self.recording, self._estimate, self._nu, self._seed)
+                before = self._estimate
+                self._estimate = updated(
+                    self.recording, self._estimate, self._nu, self._seed, within_m=self.goals.surface_within_m
+                )
+                self._tested(before)
                 self._weigh()
             self._trouble = ""
         except (ContactError, SurfaceError, MeshError, DiagnosisError) as error:
             self._trouble = str(error)
+
+    def _tested(self, before: Estimate) -> None:
+        """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""
+        if before.surface is None or before.exploration is None or self._estimate.exploration is None:
+            return
+        surface, presses = before.surface, self._estimate.exploration.presses
+        new = presses.onset_s > before.exploration.presses.onset_s[-1] + NEW_S
+        if not new.any():
+            return
+        point = presses.point[new]
+        off = distance(surface.vertices, surface.triangles, point)
+        nearest = cKDTree(surface.vertices).query(point)[1]
+        sd = np.hypot(surface.uncertainty_m[nearest], TOUCH_ERROR_M)
+        self._tests += (off / sd).tolist()
+
+    @property
+    def _doubt(self) -> float:
+        """Factor on the surface's uncertainty, from the touches that tested it; never below 1."""
+        squares = np.array(self._tests[-RECENT:]) ** 2
+        return float(np.sqrt(max(1.0, (TRUSTED + squares.sum()) / (TRUSTED + len(squares)))))
 
     def _weigh(self) -> None:
         if self.goals.cause_at is None:
@@ -219,9 +257,7 @@ class Explorer:
         modulus, interval = (nan, (nan, nan)) if e.fit is None else (e.fit.modulus_pa, e.fit.ci95_pa)
         error = nan
         if e.surface is not None:
-            s = e.surface
-            free = (s.vertices - s.support_point) @ s.support_normal > 1e-6
-            error = surface_error(s.uncertainty_m[free], vertex_areas(s.vertices, s.triangles)[free])
+            error = free_error(e.surface) * self._doubt
         standing = []
         if self.goals.modulus_within is not None:
             half = (interval[1] - interval[0]) / (2 * modulus) if e.fit is not None else float("inf")
@@ -260,10 +296,15 @@ class Explorer:
             return Suggestion(
                 "stop", f"{self._made} presses were made, as many as allowed; " + self._words(state)
             )
+        if "free" not in self._kinds and self._trouble.startswith("in free motion"):
+            return Suggestion("free", f"{self._trouble}: wave and turn the tool in the air for three seconds")
         if self._estimate.surface is None:
             return self._first()
         best = self._best(state)
-        if best is None or (best.worth <= 0 and self._order is None):
+        rigid = self._on_support(best.worth if best else 0.0)
+        if rigid is not None:
+            return rigid
+        if best is None or (best.worth <= 0 and self._order is None) or self._in_vain(best, state):
             return Suggestion(
                 "stop",
                 "no touch in reach is expected to bring a goal nearer at this noise; " + self._words(state),
@@ -319,6 +360,33 @@ class Explorer:
             return ranked[0] if ranked else None
         places = np.array([c.point for c in ranked])
         return ranked[self._order(places, presses.point, presses.point[-1], self._rng)]
+
+    def _in_vain(self, best: Candidate, state: State) -> bool:
+        """Whether only the cause is open, and all presses that are left would not tell it, by far."""
+        open_ = [s for s in state.standing if not s.met]
+        if best.parting is None or [s.name for s in open_] != ["cause"]:
+            return False
+        left = self.goals.most - self._made
+        return FAR_FROM * left * best.worth * best.seconds < open_[0].missing
+
+    @property
+    def _kinds(self) -> set[str]:
+        return {s.kind for s in self.segments}
+
+    def _on_support(self, worth: float) -> Suggestion | None:
+        """Presses on the bare support, where a yielding tool is in question and they tell more a second."""
+        if self._causes is None or self.goals.cause_at is None or self._order or "rigid" in self._kinds:
+            return None
+        causes, weighing = self._causes
+        gain, first, rival = by_support(weighing, causes, self.goals.cause_at)
+        if gain / RIGID_S <= worth:
+            return None
+        return Suggestion(
+            "rigid",
+            f"{words(first)} and {words(rival)} both stand: on the bare support only a yielding tool yields; "
+            "press it three times, with 3 to 5 N",
+            seconds=RIGID_S,
+        )
 
     def _partings(self) -> list[Parting]:
         if self._causes is None or self.goals.cause_at is None or self._order is not None:

@@ -67,3 +67,10 @@ def surface_error(deviation_m: np.ndarray, area: np.ndarray, share: float = 0.95
         return float(weight @ erf(x / (deviation * np.sqrt(2)))) - share
 
     return float(brentq(short, 0.0, 10 * float(deviation.max())))
+
+
+def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(n,) m^2: a third of the triangles around each vertex."""
+    corner = vertices[triangles]
+    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+    return np.bincount(triangles.ravel(), np.repeat(size / 3, 3), minlength=len(vertices))

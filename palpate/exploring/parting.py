@@ -15,7 +15,15 @@ import numpy as np
 from diagnose.next_touch import Plan, pressed
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.presses import Presses
-from palpate.exploring.causes import FALSE_ALARMS, NONE, Causes, Weighing, changed, likeliest
+from palpate.exploring.causes import (
+    FALSE_ALARMS,
+    NONE,
+    SUPPORT_GIVES,
+    Causes,
+    Weighing,
+    changed,
+    likeliest,
+)
 
 PLANS = (
     Plan(0.8, 0.02, 0.2, 0.0, 1),
@@ -26,6 +34,9 @@ PLANS = (
 )
 """Ways of pressing that are compared; depths as shares of the greatest so far, m/s, s."""
 RIVALS = 2
+RIGID_S = 6.0
+"""What three presses on the bare support take."""
+SPRING = "tool_compliance"
 
 
 @dataclass(frozen=True)
@@ -78,3 +89,17 @@ def partings(weighing: Weighing, causes: Causes, at: float) -> list[Parting]:
 def depth_of(touches: Presses, plan: Plan) -> float:
     """m, of a plan."""
     return plan.depth * float(touches.deepest.max())
+
+
+def by_support(weighing: Weighing, causes: Causes, at: float) -> tuple[float, str, str]:
+    """(expected log evidence, likeliest cause, rival) of three presses on the bare support; 0 where no
+    yielding tool is in question."""
+    first, *others = causes.standing(at)
+    pair = [n for n in (first, *others[:RIVALS]) if n != SPRING]
+    if len(pair) > RIVALS or not pair or not others:
+        return 0.0, first, first
+    act, size = likeliest(weighing, SPRING, causes.least_n) or (None, 0.0)
+    yields = size * weighing.springs[weighing.acts.index(act)] if act is not None else 0.0
+    gain = 0.5 * (yields / SUPPORT_GIVES) ** 2
+    out = min(missing(causes, name, at) for name in (pair if first == SPRING else [SPRING]))
+    return float(min(gain, out)), first, others[0] if first == SPRING else SPRING

@@ -14,16 +14,20 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from mechanics.errors import SceneError
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from palpate.exploring.explorer import Suggestion
 from palpate.exploring.rows import Instrument, Segment
-from scenes.laboratory.hand import HandOptions, minimum_jerk
+from scenes.laboratory.effects import Readings, effect
+from scenes.laboratory.frame import quaternions
+from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import Simulation, simulate
+from scenes.laboratory.tracing import RATE_HZ
 from scenes.phantoms import Phantom
 
 
@@ -37,6 +41,8 @@ class RobotOptions:
     speed_error: float = option(0.15, "of the speed, as a share of it")
 
 
+RIGID_N = 4.0
+"""Greatest force of a press on the bare support."""
 JOIN_S = 0.25
 """In free air, over which a touch's way is joined to where the last one ended."""
 FORGETFUL = frozenset(
@@ -52,7 +58,8 @@ class LaboratoryRobot:
     """A phantom, its effects, and a hand that follows suggestions. Device frame: the object's own.
 
     places: touches that may be made, lengths mm, object frame; a suggestion is carried out at the nearest of
-    them, as deep as it is solved. None: anywhere, which solves every touch anew.
+    them, as deep as it is solved. None: anywhere, which solves every touch anew. made: presses of an
+    exploration that is gone on with.
     """
 
     def __init__(
@@ -78,6 +85,7 @@ class LaboratoryRobot:
         self._touches: list[Touch] = []
         self._places = places
         self._left: np.ndarray | None = None
+        self.made = 0
         self.last: Simulation | None = None
 
     @property
@@ -98,10 +106,21 @@ class LaboratoryRobot:
             # with the way to a touch that is only laid down to have one: free air, which tells the noise
             end = int(np.argmax(made.motion.touch >= 0))
             return self._part(made, "trace", 0, end)
+        if suggestion.kind == "retrace":
+            made = self._simulated([self._aside()], self.seed + 1)
+            return self._part(made, "retrace", 0, int(np.argmax(made.motion.touch >= 0)))
+        if suggestion.kind in ("rigid", "free"):
+            return self._without_object(suggestion.kind)
         self._touches.append(self._touch(suggestion))
         forgets = self.effects.keys() <= FORGETFUL
+        if self.made and not forgets:
+            raise SceneError(
+                "an exploration of this phantom cannot be gone on with: its effects remember earlier touches"
+            )
         new = self._touches[-2:] if forgets else self._touches
-        made = self._simulated(new, self.seed + 7919 * len(self._touches) if forgets else self.seed)
+        made = self._simulated(
+            new, self.seed + 7919 * (self.made + len(self._touches)) if forgets else self.seed
+        )
         rows = np.flatnonzero(made.motion.touch == len(new) - 1)
         # after the touch before, or where the tracing's segment ended
         start = int((made.motion.phase[1] + 0.6) * 1000)
@@ -123,6 +142,26 @@ class LaboratoryRobot:
             progress=self._progress,
         )
         return self.last
+
+    def _without_object(self, kind: str) -> Segment:
+        """Three presses on the bare support, or waving and turning in the air, as they are read."""
+        rng, options = np.random.default_rng([self.seed, len(kind), len(self._touches)]), self.options
+        way, push, turn = _on_the_support(options.tip_radius_m) if kind == "rigid" else _waving(rng)
+        reach = float(np.linalg.norm(self._surface.vertices[:, :2], axis=1).max())
+        top = float(self._surface.vertices[:, 2].max())
+        way = way + ([1.4 * reach, 0.0, 0.0] if kind == "rigid" else [0.0, 0.0, top + 0.06])
+        force = np.column_stack([np.zeros((len(push), 2)), push])
+        readings = Readings(np.arange(len(way)) / RATE_HZ, way, force, turn, np.ones(len(way), dtype=bool))
+        known = {} if self.last is None else dict(self.last.truth["parameters"])
+        for name in self.effects:
+            read = effect(name).on_readings
+            if read is not None:
+                readings = read(readings, known[name])
+        noisy = readings.force + options.force_noise_std_n * rng.normal(size=force.shape)
+        step = options.position_resolution_m
+        position = np.round(readings.position / step) * step if step > 0 else readings.position
+        self._left = position[-1]
+        return Segment(kind, readings.t, position, noisy, quaternions(readings.axes))
 
     def _part(self, made: Simulation, kind: str, start: int, end: int) -> Segment:
         r = made.recording
@@ -188,6 +227,27 @@ class LaboratoryRobot:
             direction=way / np.linalg.norm(way),
             side=np.zeros(3),
         )
+
+
+def _on_the_support(tip_radius_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """((n, 3) m, (n,) N along the support's normal, (n, 3, 3)) of three presses, from the air to the air."""
+    above, still = 0.03, np.zeros(int(0.3 * RATE_HZ))
+    down = above * (1 - minimum_jerk(int(0.4 * RATE_HZ)))
+    held = 0.5 * RIGID_N * (1 - np.cos(2 * np.pi * np.arange(int(0.8 * RATE_HZ)) / (0.8 * RATE_HZ)))
+    height = np.concatenate([above + still, *[np.r_[down, 0 * held, down[::-1]]] * 3, above + still])
+    push = np.concatenate([still, *[np.r_[0 * down, held, 0 * down]] * 3, still])
+    way = np.column_stack([np.zeros((len(height), 2)), tip_radius_m + height])
+    return way, push, np.broadcast_to(np.eye(3), (len(way), 3, 3))
+
+
+def _waving(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same of three seconds in the air: to and fro by some centimetres, turning by some 20 degrees."""
+    count = int(3 * RATE_HZ)
+    fade = np.sin(np.pi * np.arange(count) / count)[:, None] ** 0.5
+    way = fade * 0.015 * np.column_stack([band_noise(count, RATE_HZ, 0.4, 2.5, rng) for _ in range(3)])
+    turn = np.column_stack([band_noise(count, RATE_HZ, 0.3, 1.5, rng) for _ in range(3)])
+    axes = Rotation.from_rotvec(fade * np.radians(20) * turn).as_matrix()
+    return way, np.zeros(count), axes
 
 
 def _first_hit(surface: trimesh.Trimesh, start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, int] | None:
