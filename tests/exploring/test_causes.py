@@ -1,4 +1,4 @@
-"""Causes after every press: error rates that hold however often one looks (simulated), and what parts them."""
+"""Causes after every press: error rates that hold however often one looks (simulated); what parts them."""
 
 from types import SimpleNamespace
 

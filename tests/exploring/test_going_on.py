@@ -1,4 +1,4 @@
-"""An exploration is whole at any time: its recording says what each segment was, and one can go on with it."""
+"""An exploration is whole at any time: its recording says what each segment was; one can go on with it."""
 
 import dataclasses
 

@@ -7,6 +7,7 @@ import pytest
 from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 from mechanics.errors import ContactError, OptionError
+from mechanics.segments import Segment
 from reconstruct import finding
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.filtering import low_pass
@@ -135,6 +136,16 @@ def test_a_press_on_the_support_is_rejected_and_named():
     exploration = explore(recording)
     assert len(exploration.presses) == len(onsets) - 1
     assert any("support" in reason for _, reason in exploration.rejected)
+
+
+def test_presses_that_are_stated_to_be_on_the_support_are_none_of_the_object(cylinder):
+    recording, _ = cylinder
+    plain = explore(recording).presses
+    stretch = Segment("rigid", plain.onset_s[3] - 0.1, plain.end_s[3] + 0.1)
+    found = explore(dataclasses.replace(recording, segments=(stretch,)))
+    np.testing.assert_allclose(found.presses.onset_s, np.delete(plain.onset_s, 3), atol=0.01)
+    assert any("stated to be rigid" in reason for _, reason in found.rejected)
+    assert stretch in found.presses.segments
 
 
 def test_the_papers_mode_names_presses_below_its_threshold():
