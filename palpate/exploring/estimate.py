@@ -126,7 +126,7 @@ def _surface(exploration: Exploration, before: Estimate, within_m: float | None)
     evidence = evidence_of(exploration)
     known = before.surface
     again = known is None or count >= before.presses_at_choice + min(_ALL_SHAPES_EVERY, count // 3 + 1)
-    if known is not None and not again and known.method != "implicit":
+    if known is not None and not again:
         options = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
         same = reconstruct_surface(evidence, options)
         if before.confirmed or within_m is None or free_error(same) > within_m:

@@ -1,4 +1,4 @@
-"""Guidance in the window: ticks become segments where the tip has left, and the ghost stands where it is told."""
+"""Guidance in the window: ticks become segments where the tip has left; the ghost stands where it is told."""
 
 from types import SimpleNamespace
 
