@@ -145,6 +145,7 @@ def _step(explorer: Explorer, state: State, it: Sealed, robot: Any, update_s: fl
         step["standing"] = state.causes.standing(state.cause_at)
         step["ratio"] = {k: v for k, v in state.causes.ratio.items() if v > 1e-4}
         step["misfit"] = state.causes.misfit
+        step["modulus_beside_cause_error"] = state.causes.modulus_pa / it.young_modulus_pa - 1
     return step
 
 

@@ -17,6 +17,7 @@ is not exact.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -77,12 +78,13 @@ class Causes:
 
     log_evidence: of each cause and 'none', log M over the ideal model's. least_n: N rms over contact samples,
     the smallest size of a cause that is weighed. misfit: lack of fit (whitened mean square) that the best one
-    leaves.
+    leaves. modulus_pa: with the likeliest hypothesis taken into account.
     """
 
     log_evidence: dict[str, float]
     least_n: float
     misfit: float
+    modulus_pa: float = float("nan")
 
     @property
     def ratio(self) -> dict[str, float]:
@@ -113,6 +115,7 @@ class Causes:
             "ratio": self.ratio,
             "least_n": self.least_n,
             "misfit": self.misfit,
+            "young_modulus_pa": self.modulus_pa if np.isfinite(self.modulus_pa) else None,
         }
 
 
@@ -154,7 +157,23 @@ def causes_of(estimate: Estimate, least_n: float | None = None) -> tuple[Causes,
     if weighing is None:
         return None
     least = least_n or LEAST * weighing.forward.touches.noise.raw_n
-    return judge(weighing, least), weighing
+    causes = judge(weighing, least)
+    modulus = modulus_beside(weighing, causes.standing(0.95)[0])
+    return dataclasses.replace(causes, modulus_pa=modulus), weighing
+
+
+def modulus_beside(w: Weighing, name: str) -> float:
+    """Pa, fitted together with the form of a cause that fits best; of 'none' beside our own errors alone."""
+    k = 2 + w.own
+    columns = list(range(1, k))
+    if name != NONE:
+        target, curve = with_support(w, *projected(w)[:2])
+        rows = [i for i, n in enumerate(w.names) if n == name]
+        gain = target[rows] ** 2 / np.maximum(curve[rows], 1e-300)
+        columns.append(k + rows[int(np.argmax(gain))])
+    prior = np.diag([1e-9, *np.ones(w.own), *[1e-9] * (len(columns) - 1 - w.own)])
+    solved = np.linalg.solve(w.gram[np.ix_(columns, columns)] + prior, w.gram[columns, 0])
+    return float(w.found.modulus * np.exp(np.clip(solved[0], -2.0, 2.0)))
 
 
 def weigh(estimate: Estimate) -> Weighing | None:
@@ -184,6 +203,13 @@ def weigh(estimate: Estimate) -> Weighing | None:
             acts.append(act)
             changes.append(change)
             springs.append(_spring(forward, found, act))
+    answer = changed(forward, found, _softer(np.ones(len(forward.touches)))) - before
+    for compliance in balls(forward):
+        # small against the whole: as much of one press's answer as there is more compliance
+        names.append("inclusion")
+        acts.append(_softer(compliance))
+        changes.append(answer * compliance[forward.touches.press][:, None])
+        springs.append(0.0)
     columns = np.stack([residual, before, *own, *changes], axis=2)
     gram = whitener.gram(columns).sum(axis=0)
     counted = forward.touches.counted
@@ -312,7 +338,7 @@ def tried(presses: Presses) -> list[Effect]:
 
 
 def forms_of(forward: Forward) -> list[tuple[str, Act]]:
-    """(name, act) pairs: every form of each cause."""
+    """(name, act) pairs: every form of each cause but the inclusion, whose places the object gives."""
     forms: list[tuple[str, Act]] = []
     laws: dict[str, str] = {}
     for each in tried(forward.touches):
@@ -320,7 +346,7 @@ def forms_of(forward: Forward) -> list[tuple[str, Act]]:
         name = laws.setdefault(each.phenomenon, each.name) if each.phenomenon else each.name
         if each.seek is None:
             forms += [(name, _acting(each, values)) for values in _values(each)]
-    return forms + [("inclusion", act) for act in balls(forward)]
+    return forms
 
 
 def _acting(each: Effect, values: np.ndarray) -> Act:
@@ -343,8 +369,9 @@ def _values(each: Effect) -> list[np.ndarray]:
     return list(made.values())
 
 
-def balls(forward: Forward) -> list[Act]:
-    """A softer ball on a grid inside the object, to first order in its energy."""
+def balls(forward: Forward) -> list[np.ndarray]:
+    """(p,) 1/m each: by how much more each place gives, unit modulus, over a softer ball on a grid inside the
+    object; to first order in its energy."""
     places = forward.places
     fields = energy_fields(places)
     low, high = fields.centroid.min(axis=0), fields.centroid.max(axis=0)
@@ -357,14 +384,14 @@ def balls(forward: Forward) -> list[Act]:
             continue
         for radius in BALL_RADII_M:
             share = np.clip((radius - away) / 0.004 + 0.5, 0.0, 1.0)
-            made.append(_softer((fields.energy[:, :, 0, 0] @ share)[places.place]))
+            made.append(BALL_SHARE * (fields.energy[:, :, 0, 0] @ share)[places.place])
     return made
 
 
 def _softer(compliance: np.ndarray) -> Act:
     def act(settings: Settings, scene: Forward) -> None:
         settings.far = settings.far.copy()
-        settings.far[:, 0, 0] += BALL_SHARE * compliance
+        settings.far[:, 0, 0] += compliance
 
     return act
 
