@@ -33,6 +33,8 @@ MESH_M, SURFACE_EDGE_M = 0.016, 0.010
 """Tetrahedra of the running estimate, and of its surface."""
 LEAST_PRESSES = 4
 _ALL_SHAPES_EVERY = 6
+_CONFIRMED_AFTER = 2
+"""Presses since all families were tried, after which a goal that one family meets has them tried again."""
 _MOVED_M = 0.0007
 """The mesh is made anew where the surface has left it by more than this (95 % of the vertices)."""
 _BOOTSTRAPS = 200
@@ -54,7 +56,7 @@ class Estimate:
     """What is known after the presses so far. surface, fit: None before LEAST_PRESSES were found.
 
     weight: of the tool. presses_placed: the table on the surface, a row of `sites` each.
-    confirmed: whether the surface was as sure as asked for when all families were tried last.
+    choice_error_m: within which 95 % of the surface lay when all families were tried last.
     presses_at_choice: how many there were when the shape's family was chosen last. seconds: wall time of
     each step of this update.
     """
@@ -67,8 +69,14 @@ class Estimate:
     sites: TouchSites | None = None
     fit: ModulusFit | None = None
     presses_at_choice: int = 0
-    confirmed: bool = False
+    choice_error_m: float = float("inf")
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def surface_error_m(self) -> float:
+        """Within which 95 % of the surface lies, by its own word and by that of all families of shapes."""
+        assert self.surface is not None
+        return max(free_error(self.surface), self.choice_error_m)
 
     @property
     def presses(self) -> int:
@@ -95,7 +103,7 @@ def updated(
     options = ContactOptions(least_palpations=LEAST_PRESSES)
     exploration = explore(recording, contact_options=options, filtered=filtered)
     clock.lap("presses")
-    surface, chosen_at, confirmed = _surface(exploration, before, within_m)
+    surface, chosen_at, choice_error = _surface(exploration, before, within_m)
     clock.lap("surface")
     solved = _solved(surface, before, poisson_ratio)
     clock.lap("mesh")
@@ -116,12 +124,14 @@ def updated(
     )
     clock.lap("modulus")
     return Estimate(
-        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, confirmed, clock.laps
+        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error, clock.laps
     )  # fmt: skip
 
 
-def _surface(exploration: Exploration, before: Estimate, within_m: float | None) -> tuple[Surface, int, bool]:
-    """(surface, presses at the last choice of a family, whether that was as sure as asked for)."""
+def _surface(
+    exploration: Exploration, before: Estimate, within_m: float | None
+) -> tuple[Surface, int, float]:
+    """(surface, presses at the last choice of a family, m within which 95 % of the surface lay by that)."""
     count = len(exploration.presses)
     evidence = evidence_of(exploration)
     known = before.surface
@@ -129,10 +139,11 @@ def _surface(exploration: Exploration, before: Estimate, within_m: float | None)
     if known is not None and not again:
         options = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
         same = reconstruct_surface(evidence, options)
-        if before.confirmed or within_m is None or free_error(same) > within_m:
-            return same, before.presses_at_choice, before.confirmed
+        seems = within_m is not None and free_error(same) <= within_m < before.choice_error_m
+        if not seems or count < before.presses_at_choice + _CONFIRMED_AFTER:
+            return same, before.presses_at_choice, before.choice_error_m
     chosen = reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=0.004))
-    return chosen, count, within_m is not None and free_error(chosen) <= within_m
+    return chosen, count, free_error(chosen)
 
 
 def free_error(surface: Surface) -> float:

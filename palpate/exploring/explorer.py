@@ -14,7 +14,7 @@ from mechanics.nearest import distance
 from mechanics.recording import Recording, write_recording
 from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions, first_places, weighed
 from palpate.exploring.causes import Causes, Weighing, causes_of, words
-from palpate.exploring.estimate import LEAST_PRESSES, Estimate, free_error, updated
+from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing
 from palpate.exploring.orders import Order
 from palpate.exploring.parting import RIGID_S, Parting, by_support, missing, partings
@@ -257,7 +257,7 @@ class Explorer:
         modulus, interval = (nan, (nan, nan)) if e.fit is None else (e.fit.modulus_pa, e.fit.ci95_pa)
         error = nan
         if e.surface is not None:
-            error = free_error(e.surface) * self._doubt
+            error = e.surface_error_m * self._doubt
         standing = []
         if self.goals.modulus_within is not None:
             half = (interval[1] - interval[0]) / (2 * modulus) if e.fit is not None else float("inf")
