@@ -105,6 +105,7 @@ def weighed(
     area = vertex_areas(surface.vertices, surface.triangles)
     free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
     missing = {s.name: s for s in standing if s.missing > 0}
+    own = surface_error(surface.uncertainty_m[free], area[free])
     made = []
     for row in rows:
         point, normal = surface.vertices[row], normals[row]
@@ -112,8 +113,7 @@ def weighed(
         gain = 0.0
         if "surface" in missing:
             after = after_touch(surface.vertices, surface.uncertainty_m, row)
-            now = surface_error(after[free], area[free])
-            gain = missing["surface"].missing - Standing("", now, missing["surface"].goal).missing
+            gain = float(np.log(own / surface_error(after[free], area[free])))
         nearest = int(np.argmin(((touched - point) ** 2).sum(axis=1))) if len(touched) else 0
         for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), partings, reach):
             gains = {"surface": gain}

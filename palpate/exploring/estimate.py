@@ -124,7 +124,8 @@ def updated(
     )
     clock.lap("modulus")
     return Estimate(
-        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error, clock.laps
+        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error,
+        clock.laps,
     )  # fmt: skip
 
 
