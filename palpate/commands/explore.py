@@ -1,11 +1,11 @@
 """Guided exploration: where to touch next and why, what is known so far, and when to stop.
 
 In the virtual laboratory (--phantom NAME) a simulated robot follows the suggestions with errors of place,
-way and depth. In the touch window (--device NAME, --scene) a ghost
-tip shows where and how to press. A robot of your own talks over standard input and output (--robot): one line
-of JSON a suggestion and a segment, as docs/exploring.md tells. The recording so far is written after every
-touch, so an exploration that was interrupted is whole, and --continue goes on with it.
-At the end `palpate reconstruct` makes a MODEL of it like any other.
+way and depth. In the touch window (--device NAME, --scene) a ghost tip shows where and how to press. A robot
+of your own talks over standard input and output (--robot): one line of JSON a suggestion and a segment, as
+docs/exploring.md tells. The recording so far is written after every touch, so an exploration that was
+interrupted is whole, and --continue goes on with it. At the end `palpate reconstruct` makes a MODEL of it
+like any other.
 """
 
 from __future__ import annotations
@@ -220,6 +220,9 @@ def _line(suggestion: Suggestion, state: State) -> str:
             f"({state.modulus_ci95_pa[0] / 1e3:.1f} to {state.modulus_ci95_pa[1] / 1e3:.1f}), "
             f"surface within {1e3 * state.surface_error_m:.1f} mm"
         )
+    if state.causes is not None:
+        likeliest, *others = state.causes.standing(state.cause_at)
+        known += f", cause: {likeliest}" + (f" or {len(others)} others" if others else "")
     if suggestion.point is None:
         return f"{known}; {suggestion.kind}: {suggestion.why}"
     x, y, z = (1e3 * float(v) for v in suggestion.point)
