@@ -36,7 +36,9 @@ _ALL_SHAPES_EVERY = 6
 _CONFIRMED_AFTER = 2
 """Presses since all families were tried, after which a goal that one family meets has them tried again."""
 _MOVED_M = 0.0007
-"""The mesh is made anew where the surface has left it by more than this (95 % of the vertices)."""
+"""The mesh is made anew where the surface has left it by more than this (95 % of the vertices) ..."""
+_MOVED_SHARE = 0.25
+"""... and more than this share of what the surface is uncertain by."""
 _BOOTSTRAPS = 200
 
 
@@ -158,7 +160,7 @@ def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:
     kept = before.solved
     if kept is not None:
         off = distance(kept.surface.vertices, kept.surface.triangles, surface.vertices)
-        if np.percentile(off, 95) < _MOVED_M:
+        if np.percentile(off, 95) < max(_MOVED_M, _MOVED_SHARE * free_error(surface)):
             return kept
     mesh = mesh_surface(surface, MeshingOptions(mesh_size_m=MESH_M)).mesh
     return Solved(surface, mesh, touch_solver(mesh, poisson_ratio, surface_edge_m=SURFACE_EDGE_M))
