@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.errors import ContactError, DiagnosisError, MeshError, OptionError, SurfaceError
+from mechanics.errors import ContactError, DiagnosisError, MeshError, ModelError, OptionError, SurfaceError
 from mechanics.nearest import distance
 from mechanics.recording import Recording, write_recording
 from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions, first_places, weighed
@@ -208,7 +208,7 @@ class Explorer:
                 self._tested(before)
                 self._weigh()
             self._trouble = ""
-        except (ContactError, SurfaceError, MeshError, DiagnosisError) as error:
+        except (ContactError, SurfaceError, MeshError, DiagnosisError, ModelError) as error:
             self._trouble = str(error)
 
     def _tested(self, before: Estimate) -> None:
