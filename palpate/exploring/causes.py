@@ -68,6 +68,8 @@ FIELD, FIELD_M = 0.03, 0.03
 """Share by which the stiffness of places may be off that neighbours share, and over which distance."""
 BALL_GRID_M, BALL_RADII_M, BALL_SHARE = 0.014, (0.008, 0.012), 0.5
 """Balls that are weighed: apart, radii, and the share by which a form is softer."""
+LITTLE = 0.1
+"""1/m, of compliance for unit modulus, small against a place's own (some 10)."""
 TWO_SIGNED = frozenset({"inclusion"})
 """A form of which may as well be the other way round."""
 
@@ -139,7 +141,6 @@ class Weighing:
 
     forward: Forward
     found: Fit
-    whitener: Whitener
     acts: tuple[Act, ...]
     names: tuple[str, ...]
     sizes: np.ndarray
@@ -194,8 +195,7 @@ def weigh(estimate: Estimate) -> Weighing | None:
     residual = forward.touches.local_force - before
     residual = residual + whitener.onset_column * found.onset[forward.touches.press][:, None]
     own = common_errors(forward, found, before)
-    names, acts, changes = [], [], []
-    springs = []
+    names, acts, changes, springs = [], [], [], []
     for name, act in forms_of(forward):
         change = changed(forward, found, act) - before
         if np.abs(change).max() > 0:
@@ -203,7 +203,8 @@ def weigh(estimate: Estimate) -> Weighing | None:
             acts.append(act)
             changes.append(change)
             springs.append(_spring(forward, found, act))
-    answer = changed(forward, found, _softer(np.ones(len(forward.touches)))) - before
+    little = np.full(len(forward.touches), LITTLE)
+    answer = (changed(forward, found, _softer(little)) - before) / LITTLE
     for compliance in balls(forward):
         # small against the whole: as much of one press's answer as there is more compliance
         names.append("inclusion")
@@ -217,7 +218,7 @@ def weigh(estimate: Estimate) -> Weighing | None:
     sizes = np.array([_size(c[counted], plain) for c in changes])
     dof = 3.0 * float(counted.sum())
     return Weighing(
-        forward, found, whitener, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
+        forward, found, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
         np.array(springs), _on_support(estimate),
     )  # fmt: skip
 
