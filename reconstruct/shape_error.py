@@ -12,12 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from mechanics.elasticity import barycentric_gradients, lame_parameters, shape_derivatives
 from mechanics.patch import PatchSampler
 from mechanics.sites import TouchSites
 from mechanics.solver import Solver
-from mechanics.tetmesh import FACES, TetMesh
+from mechanics.tetmesh import FACES, TetMesh, lone_faces
 
 CORRELATION_M = 0.025
 _BATCH = 16
@@ -53,7 +54,7 @@ def compliance_covariance(
     free = ~faces.base
     sd = np.asarray(uncertainty_m)[faces.triangles[free]].mean(axis=1)
     centres = faces.centres[free]
-    squared = ((centres[:, None] - centres[None]) ** 2).sum(axis=2)
+    squared = cdist(centres, centres, "sqeuclidean")
     kernel = np.exp(-squared / (2 * correlation_m**2)) * np.outer(sd, sd)
     local = gradient[:, free] @ kernel @ gradient[:, free].T
     if pose is None:
@@ -133,10 +134,8 @@ class _Faces:
 
 
 def _faces(mesh: TetMesh) -> _Faces:
-    faces = mesh.tetrahedra[:, FACES].reshape(-1, 3)
-    _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    boundary = first[counts == 1]
-    triangles = faces[boundary]
+    boundary = lone_faces(mesh.tetrahedra)
+    triangles = mesh.tetrahedra[:, FACES].reshape(-1, 3)[boundary]
     corners = mesh.points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(normal, axis=1)

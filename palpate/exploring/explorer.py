@@ -18,7 +18,7 @@ from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing
 from palpate.exploring.orders import Order
 from palpate.exploring.parting import RIGID_S, Parting, by_support, missing, partings
-from palpate.exploring.rows import Instrument, Segment, apart, together
+from palpate.exploring.rows import Instrument, Segment, apart, check_joined, together
 from reconstruct.boundary import Boundary
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.modulus import ModulusOptions
@@ -191,6 +191,7 @@ class Explorer:
 
         A press that cannot be used is kept in the recording and named in `state.trouble`.
         """
+        check_joined(self.instrument, self.segments, segment)
         self.segments.append(segment)
         self.bring_up_to_date()
         return self.state

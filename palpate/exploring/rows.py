@@ -42,9 +42,10 @@ class Segment:
                 continue
             value = np.asarray(getattr(self, name), dtype=float)
             wanted = (len(self.t),) if width is None else (len(self.t), width)
-            if value.shape != wanted or len(value) < 2 or not np.isfinite(value).all():
+            if value.shape != wanted or len(value) < LEAST_SAMPLES or not np.isfinite(value).all():
                 raise RecordingError(
-                    f"a segment's {name} has shape {value.shape}; it must be {wanted}, 2 samples or more, "
+                    f"a segment's {name} has shape {value.shape}; it must be {wanted}, "
+                    f"{LEAST_SAMPLES} samples or more, "
                     "all finite"
                 )
             object.__setattr__(self, name, value)
@@ -57,6 +58,10 @@ class Segment:
         return float(self.t[-1] - self.t[0])
 
 
+LEAST_SAMPLES = 20
+"""Of a segment: fewer pass no filter."""
+
+
 @dataclass(frozen=True)
 class Instrument:
     """What is known of the device before anything is touched, SI. about: further fields of Recording."""
@@ -64,6 +69,22 @@ class Instrument:
     tip_radius_m: float
     sample_rate_hz: float = 1000.0
     about: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Raises RecordingError for what no recording may state."""
+        from mechanics.recording import SCHEMA
+
+        for table, name in (("tool", "tip_radius_m"), ("recording", "sample_rate_hz")):
+            key, value = SCHEMA[table][name], getattr(self, name)  # type: ignore[index]
+            if not key.takes(value):  # type: ignore[union-attr]
+                raise RecordingError(f"{name} is {value}; it must be {key.words}")  # type: ignore[union-attr]
+
+
+def check_joined(instrument: Instrument, segments: list[Segment], segment: Segment) -> None:
+    """Raises RecordingError where a segment makes what no exploration can be (mechanics.recording)."""
+    from mechanics.recording import check_sane
+
+    check_sane(together(instrument, [*segments, segment]))
 
 
 def together(instrument: Instrument, segments: list[Segment]) -> Recording:
