@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from mechanics.press_sites import SITE_M, sites_of
-from mechanics.presses import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses, Segment
+from mechanics.presses import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from mechanics.recording import Recording
 from mechanics.robust import read_columns, spread_about_zero
 from mechanics.samples import runs
+from mechanics.segments import ON_SUPPORT, Segment
 
 AROUND_S = 0.3
 """Samples are kept this long before first and after last touch."""
@@ -164,6 +165,7 @@ def cut(
     air = free_segments(t, touches[:, 0], touches[:, 1], begin)
     segments = [] if trace_s is None else [Segment("trace", *map(float, trace_s))]
     segments += [Segment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
+    segments += [s for s in recording.segments if s.kind in ON_SUPPORT]
     point = centre - recording.tip_radius_m * normal
     table = Presses(
         starts=np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])]),

@@ -118,7 +118,8 @@ def _reconstructed(
     geometry = stated_geometry(recording, options.geometry)
     _check_points(recording, geometry, paper)
     checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
-    placed, meshes = None, list[Future[TetMesh]]()
+    placed: Placed | None = None
+    meshes: list[Future[TetMesh]] = []
 
     def begin_mesh(shape: Surface) -> None:
         meshes.append(beside.submit(fill, shape, _meshing_options(options)))

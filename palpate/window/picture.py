@@ -108,8 +108,8 @@ class ObjectPicture:
             cmap=colours,
             clim=limits,
             opacity=opacity,
-            ambient=0.35,
-            diffuse=0.75,
+            ambient=0.3,
+            diffuse=0.62,
             scalar_bar_args={
                 "title": self._bar,
                 "title_font_size": 12,
