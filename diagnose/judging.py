@@ -98,8 +98,10 @@ class Score:
     @property
     def evidence(self) -> float:
         """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
-        is wrong, speaks for whatever bends it; a lump lives in few places, so there all of it."""
-        return self.gain if self.effect.few_places else self.gain - max(float(self.per_group.max()), 0.0)
+        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
+        if self.effect.few_places:
+            return self.gain - float(np.log(len(self.per_group)))
+        return self.gain - max(float(self.per_group.max()), 0.0)
 
     @property
     def closure(self) -> float:

@@ -6,6 +6,7 @@ described in docs/recording-format.md. SI units; device frame; forces are kept a
 
 from __future__ import annotations
 
+import dataclasses
 import gzip
 import io
 import re
@@ -32,7 +33,8 @@ from mechanics.files import (
     reading,
     sha256_of_file,
 )
-from mechanics.schema import ANY, Key, Schema, check_table
+from mechanics.schema import ANY, Key, Listed, Schema, check_table
+from mechanics.segments import STATED, Segment
 from mechanics.store import content_key
 from mechanics.surface_files import UNITS
 
@@ -70,6 +72,13 @@ SCHEMA: Schema = {
         "slab_m": Key(low=1e-6, high=2.0, unit="m"),
         "half_space": Key(bool),
     },
+    "segment": Listed(
+        {
+            "kind": Key(str, choices=STATED, required=True),
+            "start_s": Key(unit="s", required=True),
+            "end_s": Key(unit="s", required=True),
+        }
+    ),
     "import": ANY,
     "truth": ANY,
 }
@@ -100,7 +109,8 @@ class Recording:
     t: (n,) s, strictly increasing. position: (n, 3) m, centre of the spherical tip, device frame.
     force_on_tool: (n, 3) N, the reaction that pushes the tool out, device frame.
     quaternion: (n, 4) unit (w, x, y, z), tool frame to device frame, or None.
-    boundary_phase: (start, end) s of phase I, or None where it is to be detected.
+    boundary_phase: (start, end) s of phase I, or None where it is to be detected. segments: what was done
+    when, as far as it is stated.
     """
 
     t: np.ndarray
@@ -120,6 +130,7 @@ class Recording:
     path: Path | None = None
     sha256: str = ""
     description: Mapping[str, Any] = field(default_factory=dict)
+    segments: tuple[Segment, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("t", "position", "force_on_tool", "quaternion"):
@@ -192,6 +203,12 @@ def _check_samples(recording: Recording) -> None:
         start, end = recording.boundary_phase
         if not start < end:
             raise RecordingError(f"boundary_phase = [{start}, {end}]: the start must come before the end (s)")
+    for each in recording.segments:
+        if each.kind not in STATED or not each.start_s < each.end_s:
+            raise RecordingError(
+                f"a segment is '{each.kind}' from {each.start_s} to {each.end_s} s: its kind must be one of "
+                f"{', '.join(STATED)}, and the start must come before the end"
+            )
 
 
 def check_sane(recording: Recording) -> None:
@@ -317,6 +334,9 @@ def read_recording(path: Path | str) -> Recording:
             path=samples,
             sha256=sha256_of_file(samples),
             description=table,
+            segments=tuple(
+                Segment(s["kind"], float(s["start_s"]), float(s["end_s"])) for s in table.get("segment", ())
+            ),
         )
         check_sane(recording)
     except RecordingError as error:
@@ -479,6 +499,8 @@ def description_table(recording: Recording) -> dict[str, Any]:
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
+    if recording.segments:
+        table["segment"] = [dataclasses.asdict(each) for each in recording.segments]
     if recording.truth is not None:
         table["truth"] = dict(recording.truth)
     return table

@@ -19,13 +19,14 @@ from mechanics.press_sites import SITE_M
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.samples import runs
+from mechanics.segments import ON_SUPPORT
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
 from reconstruct.delay import force_delay
 from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
-from reconstruct.tool_weight import tool_weight
+from reconstruct.tool_weight import ToolWeight, tool_weight
 from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
@@ -108,13 +109,15 @@ class Filtered:
     """A recording low-passed at `cutoff_hz`, and what it reads in free air.
 
     free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
-    free motion; more where inertia is left.
+    free motion; more where inertia is left. weight: the tool's share of free_air, None where forces were
+    taken as they are.
     """
 
     signals: Signals
     free_air: np.ndarray
     spread: np.ndarray
     cutoff_hz: float
+    weight: ToolWeight | None = None
 
     @cached_property
     def least(self) -> float:
@@ -306,7 +309,7 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     start = 0
     if boundary is None:
         radius = recording.tip_radius_m
-        interval = find_interval(recording.t, signals.position, touching, recording.boundary_phase, radius)
+        interval = find_interval(recording.t, signals.position, touching, _traced(recording), radius)
         boundary = find_boundary(signals.position, signals.force, touching, interval, radius, given.boundary)
         start = interval[1]
     touching[:start] = False
@@ -323,7 +326,9 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
                 cut_apart += pieces
                 cut_up.append((a, b))
                 continue
-        reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
+        reason = _on_support(recording, a, b) or _unusable(
+            signals, boundary, a, b, max(high, least_peak), options.least_duration_s
+        )
         contact = None
         if not reason:
             contact = (paper_contact if method == "paper" else fitted_contact)(signals, a, b)
@@ -353,10 +358,28 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
 
 
-def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) -> Filtered:
+def _traced(recording: Recording) -> tuple[float, float] | None:
+    """(start, end) s of phase I as it is stated: by itself, or as the first segment of that kind."""
+    stated = [(s.start_s, s.end_s) for s in recording.segments if s.kind == "trace"]
+    return recording.boundary_phase or (stated[0] if stated else None)
+
+
+def _on_support(recording: Recording, a: int, b: int) -> str:
+    """Why the contact of samples [a, b), stated to be with the support, is no palpation; '' elsewhere."""
+    middle = float(recording.t[(a + b - 1) // 2])
+    for each in recording.segments:
+        if each.kind in ON_SUPPORT and each.start_s <= middle <= each.end_s:
+            return f"is stated to be {each.kind}"
+    return ""
+
+
+def filtered_of(
+    recording: Recording, cutoff_hz: float, *, tared: bool = False, near: ToolWeight | None = None
+) -> Filtered:
     """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off.
 
-    tared: nothing is free air, and forces are taken as they are.
+    tared: nothing is free air, and forces are taken as they are. near: what the tool weighs by a beginning
+    of the recording.
     """
     rate = recording.sample_rate_hz
     filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
@@ -371,10 +394,10 @@ def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) 
         raw = recording.force_on_tool
         signals = Signals(recording, position, filtered, size, raw, noise)
         return Filtered(signals, nothing, np.full(len(size), white), cutoff_hz)
-    weight, inertia = tool_weight(recording, filtered, cutoff_hz)
-    left = np.linalg.norm(filtered - weight, axis=1)
-    drift, _ = free_air_force(recording.t, filtered - weight, max(white, crowd_scale(left)))
-    free_air = weight + drift
+    weight = tool_weight(recording, filtered, cutoff_hz, near=near)
+    left = np.linalg.norm(filtered - weight.force, axis=1)
+    drift, _ = free_air_force(recording.t, filtered - weight.force, max(white, crowd_scale(left)))
+    free_air = weight.force + drift
     force = filtered - free_air
     signals = Signals(
         recording=recording,
@@ -385,8 +408,8 @@ def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) 
         noise_n=noise,
     )
     still = max(white, crowd_scale(signals.magnitude))
-    spread = moving_spread(signals.magnitude, inertia, still, round(rate / cutoff_hz))
-    return Filtered(signals, free_air, spread, cutoff_hz)
+    spread = moving_spread(signals.magnitude, weight.inertia, still, round(rate / cutoff_hz))
+    return Filtered(signals, free_air, spread, cutoff_hz, weight)
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

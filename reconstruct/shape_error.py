@@ -40,15 +40,17 @@ def compliance_covariance(
     *,
     correlation_m: float = CORRELATION_M,
     pose: PoseError | None = None,
+    gradient: np.ndarray | None = None,
 ) -> np.ndarray:
     """(k, k) covariance, 1/m^2, of the sites' compliance along their normals for unit modulus.
 
     uncertainty_m: (n,) standard deviation of the surface along its normal at each node of the solver's mesh.
     Errors at two places correlate as exp(-r^2 / (2 L^2)). The patch itself, which the tip has touched, is
-    left out. pose: of an object of known shape, whose base moves along with it.
+    left out. pose: of an object of known shape, whose base moves along with it. gradient: (k, m),
+    `shape_gradients` where they are known already.
     """
     faces = _faces(solver.mesh)
-    gradient = _gradients(solver, sites, faces)
+    gradient = _gradients(solver, sites, faces) if gradient is None else gradient
     free = ~faces.base
     sd = np.asarray(uncertainty_m)[faces.triangles[free]].mean(axis=1)
     centres = faces.centres[free]
@@ -78,6 +80,11 @@ def _by_pose(gradient: np.ndarray, faces: _Faces, sites: TouchSites, pose: PoseE
     normal = np.einsum("kmi,ki->km", motion(sites.points), sites.normals)
     facing = sites.normals @ faces.normals.T
     return gradient @ everywhere - np.einsum("kf,kf->k", gradient, facing)[:, None] * normal
+
+
+def shape_gradients(solver: Solver, sites: TouchSites) -> np.ndarray:
+    """(k, m) 1/m^2: change of each site's compliance as each of the mesh's m boundary faces moves outward."""
+    return _gradients(solver, sites, _faces(solver.mesh))
 
 
 def _gradients(solver: Solver, sites: TouchSites, faces: _Faces) -> np.ndarray:

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -49,6 +49,9 @@ from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from palpate.exploring.guide import Guide
 
 SUMMARY = "feel a model or scene at 1 kHz"
 DEFAULT_SCENE = "demo"
@@ -107,8 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Open, touch, close; prints what the servo did."""
+def run(arguments: argparse.Namespace, guided: Callable[[TouchSession], Guide] | None = None) -> int:
+    """Open, touch, close; prints what the servo did. guided: makes an exploration's guide, for the window."""
     scene = given_scene(arguments, arguments.scene)
     name = arguments.device or ("simulated" if arguments.headless else "mouse")
     _check(arguments, name)
@@ -151,7 +154,7 @@ def run(arguments: argparse.Namespace) -> int:
             session.enable()
             _wait(session, until if arguments.seconds is None else arguments.seconds)
         else:
-            shown = _in_window(prepare, scene, channel, arguments)
+            shown = _in_window(prepare, scene, channel, arguments, guided)
             if shown is None:
                 return 0
             session = shown
@@ -170,6 +173,7 @@ def _in_window(
     scene: Scene,
     channel: PoseChannel | None,
     arguments: argparse.Namespace,
+    guided: Callable[[TouchSession], Guide] | None,
 ) -> TouchSession | None:
     """A window from the first moment on, which shows how the preparation comes along; then the touch. None
     where a person closes it before."""
@@ -180,7 +184,8 @@ def _in_window(
     try:
         session, until = waiting.run(prepare)
         session.enable()
-        window = TouchWindow(session, scene, channel)
+        guide = None if guided is None else guided(session)
+        window = TouchWindow(session, scene, channel, guide=guide)
         seconds = until if arguments.seconds is None else arguments.seconds
         window.run(seconds, screenshot=arguments.screenshot, shown=waiting.close)
     except ClosedError as error:

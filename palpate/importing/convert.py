@@ -149,8 +149,7 @@ def _slower(force: _Stream, rate_hz: float, notes: list[str]) -> tuple[float | N
     read_hz = float(1 / np.median(np.diff(force.t)))
     if read_hz > rate_hz / 1.5 or len(force.values) < 10:
         return None, None
-    moving = np.ptp(force.values, axis=0) > 0
-    noise = white_noise_std(force.values[:, moving]) if moving.any() else 0.0
+    noise = white_noise_std(force.values)
     notes.append(f"the force was read at {read_hz:.4g} Hz, with a noise of {noise:.2g} N a component")
     return read_hz, noise or None
 

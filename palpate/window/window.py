@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable
 from pathlib import Path
 from textwrap import wrap
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista
@@ -18,6 +18,7 @@ import vtk
 
 from devices.channel import PoseChannel
 from mechanics.files import PNG, atomic_file
+from palpate.exploring.ghost import GhostTip
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
 from palpate.window.frames import Frame
@@ -33,6 +34,9 @@ from render.base import Renderer
 from scenes.phantoms import Region
 from scenes.scene import Scene
 
+if TYPE_CHECKING:
+    from palpate.exploring.guide import Guide
+
 PERIOD_MS = 16
 SIZE = (1280, 800)
 CHARTS_SHARE = 0.28
@@ -46,7 +50,8 @@ LETTER = 0.62
 
 
 class TouchWindow:
-    """Draws a started session. channel: where the mouse's pose goes, None where another device moves."""
+    """Draws a started session. channel: where the mouse's pose goes, None where another device moves. guide:
+    of an exploration, whose suggestions are shown."""
 
     def __init__(
         self,
@@ -56,6 +61,7 @@ class TouchWindow:
         *,
         off_screen: bool = False,
         size: tuple[int, int] = SIZE,
+        guide: Guide | None = None,
     ) -> None:
         self.session = session
         self.scene = scene
@@ -70,6 +76,7 @@ class TouchWindow:
         nodules = tuple(session.model.material.inclusions.values())
         up = session.model.support.normal
         self.game = Game(nodules, up) if scene.find and nodules else None
+        self.guide = guide
         self._coloured = scene.colour == "stiffness"
         halves = [(0, slice(None)), (1, slice(None))]
         self.plotter = pyvista.Plotter(
@@ -91,6 +98,7 @@ class TouchWindow:
         self._texts: list[tuple[pyvista.Text, int]] = []
         self._scaled_for = (0, 0)
         self.pictures = [self._picture(side) for side in range(self.sides)]
+        self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
         self.plotter.subplot(1, 0)
         self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names, left=PANEL_SHARE)
         self._status = self._text("", (0.008, 0.95), "top", size=15)
@@ -276,6 +284,10 @@ class TouchWindow:
         lines = status(self.session, self.scene, self.pointer, frame, self.notice)
         if self.game is not None:
             lines += self.game.lines(time.perf_counter())
+        if self.guide is not None and self._ghost is not None:
+            self.guide.follow()
+            self._ghost.show(self.guide.ghost)
+            lines += self.guide.lines()
         if self._slider is not None:
             self._slider.GetSliderRepresentation().SetValue(1e3 * self.pointer.press_depth_m)
         self._scale_type()
