@@ -24,11 +24,14 @@ OUT_OF_SET = 0.1
 RIVAL_CLOSES = 0.3
 """A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
 
-NEARLY = 0.6
-"""Of the greatest gain: what may be the cause in its place if it closes more of the held-out gap."""
+AS_LIKELY = np.log(10)
+"""Log odds by which one effect must be likelier than another, or the likelihood of all places decides."""
 
 HIDDEN_LEAST = 10.0
 """What may hide finite strain gains this much alone before it is tried with it as well."""
+
+REFINED_WORSE = 35.0
+"""A law that is solved anew at its fit may fit worse than its linear answer by this log likelihood."""
 
 LINEAR_UNLESS = -8.0
 """Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
@@ -92,16 +95,16 @@ def attribute(
             break
         first = not chosen
         for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
-            if score.gain > search.options.plain_gain and not search.passes(score, first=first):
+            if score.may_be and not search.passes(score, first=first):
                 scores[score.name] = _reexamined(search, score, current)
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
         off = sideways_off(search.forward, current)
         if off:
-            passing = _not_blind_to_slip(search, passing, list(scores.values()), off)
+            passing = _not_blind_to_slip(search, passing, off)
         known = [scores[n] for n in sorted(seen) if n in scores]
-        passing = [s for s in known if s.size_n > search.options.size_n] or passing
+        passing = [s for s in known if s.size_n > search.smallest_n] or passing
         if not passing:
             pair = None if step + 2 > search.options.most else _paired(search, effects, current)
             if pair is None:
@@ -110,7 +113,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
-        best = _first_of(passing)
+        best = _likeliest(passing)
         for effect in effects:
             if _of_one(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
@@ -149,19 +152,11 @@ def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
     )
 
 
-def _first_of(passing: Sequence[Score]) -> Score:
-    """The score that gains most; or one of its scope that gains nearly as much and closes far more of the
-    held-out gap: a fit that does not carry over is not the cause."""
-    most = max(passing, key=lambda s: s.gain)
-    better = [
-        s
-        for s in passing
-        if s.effect.scope is most.effect.scope
-        and not s.effect.few_places
-        and s.gain > NEARLY * most.gain
-        and s.share > most.share + RIVAL_CLOSES
-    ]
-    return most if most.effect.few_places else max([most, *better], key=lambda s: s.share)
+def _likeliest(passing: Sequence[Score]) -> Score:
+    """The score that gains most of those as likely to be there as any; a fit that does not carry over is
+    not."""
+    best = max(s.log_odds for s in passing)
+    return max((s for s in passing if s.log_odds > best - AS_LIKELY), key=lambda s: s.gain)
 
 
 def _best_law(scores: Sequence[Score], best: Score) -> Score:
@@ -198,22 +193,19 @@ def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Ca
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
         score = search.score([one, two], candidate, current)
-        if candidate.chi < 0.5 * current.chi and score.gain > 2 * search.options.gain and score.share > 0:
+        if candidate.chi < 0.5 * current.chi and search.passes(score):
             found.append(candidate)
     return min(found, key=lambda c: c.found.loss, default=None)
 
 
-def _not_blind_to_slip(search: Search, passing: list[Score], scores: list[Score], off: float) -> list[Score]:
-    """What may be named while the sideways force is off by a share: slip where it helps; of effects that
-    differ from place to place only those that mend it, or a sliding tip is taken for a soft place."""
-    kept = [
+def _not_blind_to_slip(search: Search, passing: list[Score], off: float) -> list[Score]:
+    """What may be named while the sideways force is off by a share: of effects that differ from place to
+    place only those that mend it, or a sliding tip is taken for a soft place."""
+    return [
         s
         for s in passing
         if not s.effect.scope.between_places or sideways_off(search.forward, s.candidate) < 0.7 * off
     ]
-    o = search.options
-    slips = [s for s in scores if s.effect.slips and s.gain > o.plain_gain and s.share > o.further_share]
-    return kept + [s for s in slips if s not in kept]
 
 
 def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
@@ -226,7 +218,7 @@ def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
         effect.refine(search.forward, current.found.of(effect.name))
         search.renew(current.found)
         current = search.judge(current.found.effects, like=current)
-    if current.found.loss < first.found.loss + search.options.plain_gain:
+    if current.found.loss < first.found.loss + REFINED_WORSE:
         return current
     effect.forget(search.forward)
     search.renew(first.found)
@@ -242,7 +234,7 @@ def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
     old = there.judge(current.found.effects, like=current)
     new = there.judge(score.candidate.found.effects, like=score.candidate)
     again = there.score(score.added, new, old)
-    return dataclasses.replace(again, gain=score.gain, z=score.z, per_group=score.per_group)
+    return dataclasses.replace(again, gain=score.gain, per_group=score.per_group)
 
 
 def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float]:
@@ -271,7 +263,7 @@ def _without_idle(
         if effect.slips and sideways_off(search.forward, without):
             continue
         score = search.score([effect], current, without)
-        if score.gain < search.options.strong_gain * current.chi and not search.passes(score, first=False):
+        if not score.may_be:
             chosen.remove(name)
             current = without
     return current, chosen
@@ -299,7 +291,7 @@ def _rivals(
             continue
         first = scores[name]
         for score in scores.values():
-            if score.name in chosen or score.gain <= 0.6 * search.options.plain_gain:
+            if score.name in chosen or not search.passes(score):
                 continue
             if _of_one(score.effect, first.added):
                 continue

@@ -2,7 +2,8 @@
 
 On a rigid plate only the tool gives: force over travel is its stiffness, a loop of constant width its play,
 one that grows with the rate a delay. On an object of known modulus the same effects as in a diagnosis are
-fitted together, and kept where presses that were held out ask for them; what is left between known and found
+fitted together, none left out: presses that hardly tell a bending from a gain say so by both intervals,
+while a bending left out would be taken for a gain. What is left between known and found
 modulus is the sensor's gain, or the tip's radius where the sensor is trusted, which no press on one material
 can tell apart.
 """
@@ -14,12 +15,12 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.fit import Fit
+from diagnose.fit import Fit, bounds_of
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets
-from diagnose.intervals import covariance, parameter_intervals
-from diagnose.judging import AttributionOptions, Candidate, Search
+from diagnose.instrument_offsets import InstrumentOffsets, find_instrument_offsets
+from diagnose.intervals import covariance
+from diagnose.judging import AttributionOptions, Search
 from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of
@@ -45,10 +46,11 @@ from reconstruct.placing import presses_on
 TRUSTED = ("tip", "gain")
 FITTED = (SPRING, GAIN, DELAY, PLAY)
 """Effects that a press on a known object shows, fitted together."""
-LEAST_GAIN = 10.0
-"""Log likelihood on held-out presses for which one of them is kept."""
 MODULUS_SD = 0.02
 """Share by which law and mesh may miss a known modulus."""
+STIFFEST = 1e6
+"""N/m: a tool that bends less is rigid here."""
+_DRAWS = 400
 _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)
 _BRISK, _TAKES_UP, _PRESSED = 0.2, 0.3, 0.1
 _CORRELATED = 10.0
@@ -82,139 +84,139 @@ def calibrate_on_object(
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, set())
     nuisance = NuisanceOptions()
-    strain = FINITE
     search = Search(
         forward, modulus_pa, nuisance=nuisance, options=AttributionOptions(),
-        site_sd=site_stiffness_sd(touches, model, nuisance), finite_strain=strain,
+        site_sd=site_stiffness_sd(touches, model, nuisance), finite_strain=FINITE,
     )  # fmt: skip
-    base = [strain] if material.dent_law == "neo-hookean" else []
+    base = [FINITE] if material.dent_law == "neo-hookean" else []
     # a bending that a rigid support shows is settled there
-    tried = [e for e in FITTED if e.name not in offsets.names]
-    kept, found = _kept(search, base, tried, progress)
-    # what was dropped may still hide behind the modulus: the fit with all of it is as good
-    whole = search.judge([*base, *tried]).found
-    told = _told(recording, search, found.found, kept, offsets, modulus_pa, trust, seed)
-    return _widened(told, search, whole, modulus_pa, trust)
-
-
-def _kept(
-    search: Search, base: list[Effect], tried: list[Effect], progress: Progress
-) -> tuple[list[Effect], Candidate]:
-    """Those without which held-out presses are predicted worse: the least of them goes until all are
-    needed."""
-    kept = list(tried)
-    found = search.judge([*base, *kept])
-    while kept:
-        progress("instrument", 0.2 + 0.7 * (1 - len(kept) / len(tried)))
-        gains = []
-        for each in kept:
-            without = search.judge([*base, *(e for e in kept if e is not each)])
-            over = max(1.0, found.chi) * search.forward.touches.noise.variance_inflation
-            gains.append(float((without.held - found.held).sum()) / over)
-        least = int(np.argmin(gains))
-        if gains[least] > LEAST_GAIN:
-            break
-        kept.pop(least)
-        found = search.judge([*base, *kept])
-    return kept, found
+    fitted = [e for e in FITTED if e.name not in offsets.names]
+    progress("instrument", 0.3)
+    return _told(recording, search, search.judge([*base, *fitted]).found, offsets, modulus_pa, trust, seed)
 
 
 def _told(
     recording: Recording,
     search: Search,
     found: Fit,
-    kept: list[Effect],
-    offsets: Any,
+    offsets: InstrumentOffsets,
     modulus_pa: float,
     trust: str,
     seed: int,
 ) -> Calibration:
+    """What the fit says and, drawn from its covariance, within which limits."""
     forward, rng = search.forward, np.random.default_rng(seed)
-    names = {e.name for e in kept}
-    keys = {e.name: e.report(found.of(e.name), forward, found.modulus) for e in kept}
-    keys = {**offsets.parameters, **keys}
-    between = {e.name: parameter_intervals(found, e.name, forward, search.dof, rng) for e in kept}
-    between = {**offsets.intervals, **between}
-    names |= set(offsets.names)
     spread = covariance(found, forward.touches.noise.variance_inflation, search.dof)
-    scale_sd = float(np.hypot(np.sqrt(max(spread[0, 0], 0.0)), MODULUS_SD))
-    scale = found.modulus / modulus_pa
-    matrix = np.asarray(keys[GAIN.name]["matrix"]) if GAIN.name in names else np.eye(3)
-    level = float(np.trace(matrix)) / 3
-    matrix, scale = matrix / level, scale * level
-    interval: dict[str, Any] = {}
-    wide = np.exp(1.96 * scale_sd * np.array([-1, 1]))
-    radius = None
-    if trust == "gain":
-        radius = recording.tip_radius_m * scale**2
-        interval["tip_radius_m"] = (radius * wide**2).tolist()
-    else:
-        matrix = scale * matrix
-        interval["common_gain"] = (scale * wide).tolist()
-    stiffness = keys.get(SPRING.name, {}).get("stiffness_n_per_m")
-    play = float(found.of(PLAY.name)[0]) if PLAY.name in names else None
-    for name, key, label in (
-        (SPRING.name, "stiffness_n_per_m", "stiffness_n_per_m"),
-        (DELAY.name, "delay_s", "delay_s"),
-        (PLAY.name, "width_m", "play_m"),
-        (GAIN.name, "matrix", "cross_talk"),
-    ):
-        if key in between.get(name, {}):
-            interval[label] = between[name][key]
+    spread = spread + np.diag(_systematic(found) ** 2)
+    drawn = rng.multivariate_normal(found.values, spread, _DRAWS, check_valid="ignore")
+    drawn = np.clip(drawn, *bounds_of(found.effects)[:2])
+    rigid = _rigid_give(offsets)
+    known = modulus_pa * np.exp(MODULUS_SD * rng.standard_normal(_DRAWS))
+    give = rigid[0] + rigid[1] * rng.standard_normal(_DRAWS)
+    normal = forward.model.support.normal
+    here = instrument_of(found, found.values, modulus_pa, rigid[0], normal, trust)
+    each = [instrument_of(found, *numbers, normal, trust) for numbers in zip(drawn, known, give, strict=True)]
+    interval: dict[str, Any] = {
+        key: np.quantile([k[key] for k in each], [0.025, 0.975], axis=0) for key in here
+    }
+    radius = recording.tip_radius_m * here["radius"]
+    interval["tip_radius_m"] = recording.tip_radius_m * interval.pop("radius")
+    # a spring's give may be none, its stiffness not
+    interval["stiffness_n_per_m"] = 1 / np.maximum(interval.pop("give")[::-1], 1 / STIFFEST)
+    trusts_tip = trust == "tip"
+    interval.pop("tip_radius_m" if trusts_tip else "common_gain")
     bias = offsets.parameters.get(BIAS.name, {}).get("bias_n")
     if bias is not None:
         interval["bias_n"] = offsets.intervals[BIAS.name]["bias_n"]
-    mass = offsets.parameters.get(INERTIA.name, {}).get("mass_kg")
     about = {
         "on": f"an object of {modulus_pa:g} Pa",
         "recording": recording.name,
         "presses": len(forward.touches),
-        "trusted": {"tip": "the tip's radius", "gain": "the sensor's common gain"}[trust],
+        "trusted": "the tip's radius" if trusts_tip else "the sensor's common gain",
         "misfit": float(np.sqrt(found.gram[:, 0, 0].sum() / search.dof)),
-        "not_told": ["tip_radius_m" if trust == "tip" else "common gain", *_absent(names, bias)],
+        "not_told": [
+            "tip_radius_m" if trusts_tip else "common gain",
+            *_not_told(interval),
+            *([] if bias is not None else ["bias"]),
+        ],
     }
+    mass = offsets.parameters.get(INERTIA.name, {}).get("mass_kg")
     if mass is not None:
         about["mass_kg"] = mass
     return Calibration(
-        tip_radius_m=radius,
-        stiffness_n_per_m=stiffness,
-        play_m=play,
-        matrix=matrix,
+        tip_radius_m=None if trusts_tip else radius,
+        stiffness_n_per_m=1 / max(here["give"], 1 / STIFFEST),
+        play_m=here["play_m"],
+        matrix=here["matrix"],
         bias_n=None if bias is None else np.asarray(bias),
-        delay_s=keys.get(DELAY.name, {}).get("delay_s"),
-        interval=interval,
+        delay_s=here["delay_s"],
+        interval={key: np.asarray(ends).tolist() for key, ends in interval.items()},
         about=about,
     )
 
 
-def _widened(told: Calibration, search: Search, whole: Fit, modulus_pa: float, trust: str) -> Calibration:
-    """With an interval of the common factor that holds what the fit of all effects allows as well."""
-    spread = covariance(whole, search.forward.touches.noise.variance_inflation, search.dof)
-    level = 1.0
-    if GAIN.name in whole.names:
-        level = float(np.trace(whole.of(GAIN.name).reshape(3, 3))) / 3
-    scale, sd = (
-        level * whole.modulus / modulus_pa,
-        float(np.hypot(np.sqrt(max(spread[0, 0], 0.0)), MODULUS_SD)),
-    )
-    ends = scale * np.exp(1.96 * sd * np.array([-1, 1]))
-    key = "common_gain"
-    if trust == "gain":
-        key, ends = "tip_radius_m", search.forward.tip_radius * ends**2
-    low, high = told.interval[key]
-    wider = [float(min(low, ends[0])), float(max(high, ends[1]))]
-    return dataclasses.replace(told, interval={**told.interval, key: wider})
+def _systematic(found: Fit) -> np.ndarray:
+    """(k,) standard deviations of the fit's values that no noise tells, as the effects state them."""
+    parts = [np.zeros(1)]
+    for effect in found.effects:
+        none = np.zeros(len(effect.parameters))
+        share = np.asarray(effect.systematic_share or none) * found.of(effect.name)
+        parts.append(np.hypot(effect.systematic or none, share))
+    return np.concatenate(parts)
 
 
-def _absent(names: set[str], bias: Any) -> list[str]:
-    """What was not found: too small, or not asked for by these presses."""
-    words = {
-        SPRING.name: "tool's bending",
-        GAIN.name: "cross-talk",
-        DELAY.name: "delay",
-        PLAY.name: "play",
+def _rigid_give(offsets: InstrumentOffsets) -> tuple[float, float]:
+    """(m/N of the force as read, standard error) of a tool that the support shows to bend, else 0."""
+    if SPRING.name not in offsets.names:
+        return 0.0, 0.0
+    stiffness = offsets.parameters[SPRING.name]["stiffness_n_per_m"]
+    low, high = offsets.intervals[SPRING.name]["stiffness_n_per_m"]
+    return 1 / stiffness, (1 / low - 1 / high) / (2 * 1.96)
+
+
+def instrument_of(
+    found: Fit, values: np.ndarray, modulus_pa: float, rigid: float, normal: np.ndarray, trust: str
+) -> dict[str, Any]:
+    """One draw as numbers of the instrument: matrix (3, 3), common_gain, radius over the stated one, give
+    (m/N of true force), play_m, delay_s. rigid: m/N of read force, on a support of that normal (3,).
+
+    A fit's spring gives by the fit's force, which is the true one times what the modulus took up.
+    """
+
+    def of(effect: Effect) -> np.ndarray:
+        return values[found.place_of(effect.name)]
+
+    matrix = of(GAIN).reshape(3, 3)
+    level, taken = float(np.trace(matrix)) / 3, float(np.exp(values[0])) / modulus_pa
+    if trust == "tip":
+        matrix, fitted_over_true, radius = taken * matrix, taken, 1.0
+    else:
+        matrix, fitted_over_true, radius = matrix / level, 1 / level, (taken * level) ** 2
+    give = rigid * float(normal @ matrix @ normal)
+    if SPRING.name in found.names:
+        give = float(of(SPRING)[0]) * fitted_over_true
+    return {
+        "matrix": matrix,
+        "common_gain": float(np.trace(matrix)) / 3,
+        "radius": radius,
+        "give": give,
+        "play_m": float(of(PLAY)[0]),
+        "delay_s": float(of(DELAY)[0]),
     }
-    return [w for n, w in words.items() if n not in names] + (["bias"] if bias is None else [])
+
+
+def _not_told(interval: dict[str, Any]) -> list[str]:
+    """What may as well not be there, by its interval; it is in the file all the same, as the rest was found
+    beside it."""
+    found = []
+    if interval["stiffness_n_per_m"][1] >= STIFFEST:
+        found.append("tool's bending")
+    low, high = interval["matrix"]
+    apart = ~np.eye(3, dtype=bool)
+    if ((low < 0) & (high > 0))[apart].all():
+        found.append("cross-talk")
+    words = {"delay_s": "delay", "play_m": "play"}
+    return found + [w for key, w in words.items() if interval[key][0] <= 0 <= interval[key][1]]
 
 
 def calibrate_on_plate(recording: Recording, exploration: Exploration) -> Calibration:

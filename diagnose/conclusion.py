@@ -137,7 +137,6 @@ def _entries(
     forward, search, found = evidence.forward, evidence.search, evidence.found
     offsets = evidence.instrument_offsets
     noise, added = evidence.noise_n, evidence.forward.touches.thinned_away
-    best = max((max(s.gain, 0.0) for s in found.scores.values()), default=0.0)
     draws = max(100, evidence.bootstrap // 4)
     limits = detectable(search, found.base, [s.effect for s in found.scores.values()])
     entries = []
@@ -149,7 +148,7 @@ def _entries(
             EffectEntry(
                 name,
                 own.domain,
-                sure if name in found.chosen else odds(score, search, best),
+                sure if name in found.chosen else odds(score),
                 gap(score.candidate.plain, counts, added),
                 closed,
                 interval,

@@ -286,6 +286,8 @@ class Descent:
             gradient = total[1:, 0] - self.prior * (values - self.centre)
             for _ in range(5):
                 tried = self._moved(values, hessian, gradient, damping)
+                if not np.isfinite(tried).all():
+                    break  # the model gave no number here, so no slope either
                 new_residual = self.residual(tried, onset)
                 new_loss = self.loss(tried, new_residual, onset)
                 if new_loss < loss:

@@ -7,29 +7,16 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.special import expit
 
 from diagnose.first_touch import first_touches
 from diagnose.fit import Descent, Fit, fit, settings_of
 from diagnose.forward import Forward
 from diagnose.leave_one_out import held_out, levelled
-from diagnose.shape import repeat_scatter
+from diagnose.naming import WEIGHTS, lower_closure
 from diagnose.whiten import NuisanceOptions, Whitener
-from mechanics.effects.base import Effect, Scope
+from mechanics.effects.base import Effect
 from mechanics.options import option
-
-STEADY_Z = 2.0
-"""What every site feels, and any further effect that differs from place to place, gains by this many standard
-errors across sites: one site alone that a wrong surface bends cannot speak for them."""
-
-SURE_Z = 3.0
-"""What every site feels is named on a small gain only if so many standard errors of the sites agree ..."""
-
-CLOSING_GAIN, CLOSING_SHARE = 50.0, 0.5
-"""... or if the gain is not that small and half of the gap closes on held-out sites."""
-
-FELT, PLENTY = 0.7, 150.0
-"""What every site feels must change the force by this share of the noise (of the 3-vector), unless the
-evidence is plenty: a surface that is off everywhere by the same little bends all presses alike, by little."""
 
 ANEW = 0.8
 """A fit from unmoved first touches replaces the usual one where its loss is this much less."""
@@ -37,25 +24,12 @@ ANEW = 0.8
 
 @dataclass(frozen=True)
 class AttributionOptions:
-    """When an effect is named. Calibrated on recordings without any effect; see docs/diagnosis.md."""
+    """When an effect is named; see docs/diagnosis.md."""
 
-    gain: float = option(120.0, "least gain in log likelihood over held-out sites that names an effect")
-    spatial_gain: float = option(
-        75.0, "the same for effects that differ from site to site, penalised in sample"
+    sure: float = option(0.5, "probability from which an effect is named")
+    smallest: float = option(
+        0.5, "smallest gap that matters, rms over contact samples, of the noise of a force 3-vector"
     )
-    lump_gain: float = option(120.0, "the same for an inclusion, which lives in a few places")
-    plain_gain: float = option(35.0, "a lower gain that is enough where the gap closes plainly ...")
-    plain_share: float = option(0.35, "... by at least this share on held-out sites")
-    strong_gain: float = option(
-        300.0, "gain, times the lack of fit, that names the first effect whatever plain gap shapes leave"
-    )
-    z: float = option(2.5, "least gain over its own standard error across sites")
-    size_n: float = option(0.009, "least size of an effect: rms change of force after the refit", unit="N")
-    toward: float = option(
-        0.2, "least share of an effect's own size by which it lowers the plain gap in sample"
-    )
-    first_share: float = option(0.10, "least share of the held-out gap that the first effect closes")
-    further_share: float = option(0.25, "the same for each further effect, of what is left")
     least_of_first: float = option(
         0.25,
         "least size of a further effect, of the first's: no law is exact, what it leaves is no effect",
@@ -98,23 +72,18 @@ class Candidate:
 class Score:
     """How much better a candidate is than what it was added to.
 
-    added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit. z: gain
-    over its standard error across sites.
-    per_group: (g,) the gain of each site, deflated likewise.
-    size_n: rms change of the predicted force, N. share: of the old held-out excess over the noise.
-    toward: plain mean square taken away in sample over size squared: 1 where the change meets the gap.
-    scatter_n: N rms by which repeats at one place still differ.
+    added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
+    per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
+    share: of the old held-out excess over the noise. closes: the same, at least, over resampled sites.
     """
 
     added: tuple[Effect, ...]
     gain: float
-    z: float
     size_n: float
     share: float
-    toward: float
+    closes: float
     per_group: np.ndarray
     candidate: Candidate
-    scatter_n: float = 0.0
 
     @property
     def effect(self) -> Effect:
@@ -129,8 +98,31 @@ class Score:
     @property
     def evidence(self) -> float:
         """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
-        is wrong, speaks for whatever bends it; a lump lives in few places, so there all of it."""
-        return self.gain if self.effect.few_places else self.gain - max(float(self.per_group.max()), 0.0)
+        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
+        if self.effect.few_places:
+            return self.gain - float(np.log(len(self.per_group)))
+        return self.gain - max(float(self.per_group.max()), 0.0)
+
+    @property
+    def closure(self) -> float:
+        """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
+        places, as it is."""
+        return self.share if self.effect.few_places else self.closes
+
+    @property
+    def log_odds(self) -> float:
+        """That it is there, rather than an error of our own law."""
+        return WEIGHTS.log_odds(self.evidence, self.closure)
+
+    @property
+    def probability(self) -> float:
+        """The same as a probability."""
+        return float(expit(self.log_odds))
+
+    @property
+    def may_be(self) -> bool:
+        """Whether it would be as likely as not if it closed the whole gap."""
+        return WEIGHTS.log_odds(self.evidence, 1.0) > 0
 
 
 class Search:
@@ -155,8 +147,12 @@ class Search:
         rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
         self.finite_strain = finite_strain
         self.starts: dict[str, list[np.ndarray]] = {}
-        self.felt_n = FELT * forward.touches.vector_noise_n
         self.renew(rough)
+
+    @property
+    def smallest_n(self) -> float:
+        """N rms of a 3-vector: the smallest gap that matters."""
+        return self.options.smallest * self.forward.touches.vector_noise_n
 
     def renew(self, found: Fit) -> None:
         """Weigh from now on with the nuisances as they are at a fit; earlier judgements are forgotten."""
@@ -215,51 +211,22 @@ class Search:
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
             gain = old.found.loss - new.found.loss - 4.0 * extra
-        z = per_group.sum() / (per_group.std() * np.sqrt(len(per_group)) + 1e-9)
-        counted = self.forward.touches.counted
-        before, after = old.residual[counted], new.residual[counted]
+        t = self.forward.touches
+        before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
-        squares = [(r**2).sum(axis=1).mean() for r in (before, after)]
-        toward = float((squares[0] - squares[1]) / max(size**2, 1e-12))
-        noise = 3 * self.forward.touches.noise_n**2
-        excess = max(float(old.plain.sum() / counted.sum()) - noise, 0.02 * noise)
-        share = float((old.plain.sum() - new.plain.sum()) / counted.sum()) / excess
-        scatter = np.nan_to_num(repeat_scatter(new.residual, self.forward.touches))
-        return Score(
-            tuple(added), float(gain / over), float(z), size, share, toward, per_group / over, new,
-            scatter,
-        )  # fmt: skip
+        noise = 3 * t.noise_n**2
+        least = self.smallest_n**2
+        samples = self.whitener.counts()
+        excess = max(float(old.plain.sum() / samples.sum()) - noise, least)
+        share = float((old.plain.sum() - new.plain.sum()) / samples.sum()) / excess
+        closes = lower_closure(old.plain, new.plain, samples, noise, least)
+        return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
-        """Whether a score names its effect; one beside another must close a fair share of what is left."""
-        o, effect = self.options, score.effect
-        everywhere, between = effect.scope is Scope.EVERYWHERE, effect.scope.between_places
-        if score.size_n < o.size_n:
+        """Whether a score names its effect. first: nothing else is named yet."""
+        if score.effect.only_first and not first:
             return False
-        if effect.only_first and not first:
-            return False
-        if effect.few_places:
-            return score.evidence > o.lump_gain and score.share > -0.3 and score.toward > o.toward
-        if everywhere:
-            unfelt = score.size_n < self.felt_n and score.evidence < PLENTY
-            if score.z < STEADY_Z or unfelt:
-                return False
-        if not first and between and score.z < STEADY_Z:
-            # one place that a law misses by far must not name a second effect
-            return False
-        if first and score.evidence > o.strong_gain * max(1.0, score.candidate.chi) and score.z > o.z:
-            return True
-        if score.share < (o.first_share if first else o.further_share) or score.toward < o.toward:
-            return False
-        closing = score.evidence > CLOSING_GAIN and score.share > CLOSING_SHARE
-        steady = SURE_Z if everywhere and not closing else STEADY_Z
-        if score.evidence > o.plain_gain and score.share > o.plain_share and score.z > steady:
-            # repeats of one place that differ by more than the effect changes may be all that it fits
-            if not between or score.size_n > score.scatter_n:
-                return True
-        if between:
-            return score.evidence > o.spatial_gain
-        return score.evidence > o.gain and score.z > o.z
+        return score.probability > self.options.sure
 
 
 SIDEWAYS_SHARE = 0.3

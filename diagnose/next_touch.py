@@ -54,7 +54,7 @@ def next_touch(
     """The best press to tell `first` from `second` (name, fitted candidate)."""
     best: tuple[float, float, Plan, int] | None = None
     for plan in plans():
-        virtual = dataclasses.replace(forward, touches=_pressed(forward, plan))
+        virtual = dataclasses.replace(forward, touches=pressed(forward, plan))
         predicted = [
             virtual.predict(settings_of(virtual, c.found.effects, c.found.values)) for _, c in (first, second)
         ]
@@ -115,7 +115,7 @@ def _sideways(forward: Forward, press: int) -> np.ndarray:
     return forward.touches.frame[press][1]
 
 
-def _pressed(forward: Forward, plan: Plan) -> Presses:
+def pressed(forward: Forward, plan: Plan) -> Presses:
     """Every known press done over by a plan, each a site of its own."""
     t = forward.touches
     into, along = _path(_depth(t, plan), plan)

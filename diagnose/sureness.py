@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.judging import Score, Search
+from diagnose.judging import Score
 
 NAMED = 0.97
 """Share of names that were right where nothing unknown remained and no rival was left ..."""
@@ -24,9 +24,6 @@ def sureness(remainder: bool, closed: float | None, rivalled: bool) -> float:
     return min(sure, RIVALLED) if rivalled else sure
 
 
-def odds(score: Score, search: Search, best: float) -> float:
-    """Rough odds of what is not named: its share of the best gain, and how near the threshold it comes."""
-    need = search.options.lump_gain if score.effect.few_places else search.options.gain
-    over = 1 / (1 + np.exp(np.clip(-(score.gain - need) / max(0.25 * need, 1.0), -50, 50)))
-    rank = np.exp(min(0.0, (score.gain - best) / max(0.1 * best, 20.0)))
-    return float(np.clip(over * rank, 0.0, 0.25))
+def odds(score: Score) -> float:
+    """Probability of what is not named: something else explained the gap better, or it closes too little."""
+    return min(score.probability, 0.25)

@@ -4,6 +4,7 @@ The pages of this folder are the guide, `examples` is a gallery that runs while 
 is read from the docstrings without importing anything. A warning is an error.
 """
 
+import os
 import re
 import sys
 from importlib.metadata import version as installed
@@ -40,8 +41,9 @@ autoapi_python_class_content = "class"
 autoapi_add_toctree_entry = False
 autoapi_keep_files = False
 
-pyvista.OFF_SCREEN = True
-pyvista.BUILDING_GALLERY = True
+pyvista.OFF_SCREEN = pyvista.BUILDING_GALLERY = True
+# for the processes that run essays side by side
+os.environ |= {"PYVISTA_OFF_SCREEN": "true", "PYVISTA_BUILDING_GALLERY": "true", "MPLBACKEND": "Agg"}
 sphinx_gallery_conf = {
     "examples_dirs": [str(ROOT / "examples")],
     "gallery_dirs": ["gallery"],
@@ -54,6 +56,7 @@ sphinx_gallery_conf = {
     "remove_config_comments": True,
     "min_reported_time": 0,
     "abort_on_example_error": True,
+    "parallel": 2,
     "show_signature": False,
     "reset_modules": (),
 }

@@ -14,7 +14,7 @@ recording.plot()
 
 # %%
 # One call turns it into geometry, tetrahedra, a fixed base, Young's modulus with an interval, and the 1D
-# models of every press. The block's true modulus is 29 kPa; nothing of that is in the recording.
+# models of every press. A test of the silicone by itself gave 29 kPa; the recording does not say so.
 
 made = pp.reconstruct(recording)
 print(made)

@@ -58,7 +58,7 @@ for n in cells:
 figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
 axes.plot(sizes, points, "o-", label="point load, linear tetrahedra (the paper)")
 axes.plot(sizes, tips, "s-", label="tip of 5 mm")
-axes.set(xlabel="edge of an element, mm", ylabel="force of a press of 5 mm, N", ylim=(0, None))
+axes.set(xlabel="edge of an element [mm]", ylabel="force of a press of 5 mm [N]", ylim=(0, None))
 axes.invert_xaxis()
 axes.legend()
 

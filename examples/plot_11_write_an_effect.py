@@ -49,7 +49,7 @@ registry.NAMES = (*registry.NAMES, "saturation")
 
 recording = pp.read_recording("silicone-1-cylinder")
 clipped = dataclasses.replace(recording, force_on_tool=saturate(recording.force_on_tool, 1.2))
-model = pp.load("silicone-1")
+model = pp.load("demo")
 found = pp.diagnose(clipped, model, fast=True)
 print(found)
 assert "saturation" in found.effects

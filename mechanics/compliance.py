@@ -179,8 +179,8 @@ def load_or_condense(
 
     The cache is keyed by everything that the numbers depend on and guarded by a checksum: a changed model,
     a damaged or a truncated file is rebuilt. Of the model's effects those of the base count
-    (mechanics.support). A model that was never written, or a folder that cannot be written, is computed in
-    memory. A large surface is compressed (ComplianceOptions).
+    (mechanics.support). That of a model that was never written stays in memory until the next one's. A
+    folder that cannot be written keeps nothing. A large surface is compressed (ComplianceOptions).
     """
     material = model.material
     hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)
@@ -215,5 +215,16 @@ def load_or_condense(
         )
         return made.arrays()
 
-    path = None if model.path is None else model.path / f"compliance-{key[:16]}.bin"
-    return SurfaceCompliance.from_arrays(load_or_build(path, key, build))
+    if model.path is not None:
+        arrays = load_or_build(model.path / f"compliance-{key[:16]}.bin", key, build)
+        return SurfaceCompliance.from_arrays(arrays)
+    if key not in _unwritten:
+        arrays = load_or_build(None, key, build)
+        _unwritten.clear()
+        _unwritten[key] = arrays
+    return SurfaceCompliance.from_arrays(_unwritten[key])
+
+
+_unwritten: dict[str, dict[str, np.ndarray]] = {}
+"""The last one that has no folder to be kept in: who presses a model that was never written, and then replays
+with it, waits once."""

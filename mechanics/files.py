@@ -33,6 +33,7 @@ _TEXT_BYTES = 16 << 20
 _DEEPEST = 32
 _PROBE_BYTES = 1 << 16
 _SCRATCH_BYTES = 1 << 24
+_MOST_MEMORY = 2 << 30
 
 _REMEDIES = {
     errno.ENOSPC: "free some space or write to another disk",
@@ -145,6 +146,50 @@ def writing(path: Path | str) -> Iterator[None]:
         raise FileError(told(refused, path, "written")) from refused
 
 
+def no_file(path: Path | str) -> str:
+    """In words, what `path` names that is no file: 'is a folder', or that it does not exist."""
+    path = Path(path)
+    if path.is_dir():
+        return "is a folder"
+    if path.is_symlink() and not path.exists():
+        return f"is a link to '{os.path.realpath(path)}', which does not exist"
+    return "is no ordinary file" if path.exists() else "does not exist"
+
+
+@contextmanager
+def bounded_memory(path: Path | str, error: type[PalpateError] = FileError) -> Iterator[None]:
+    """A stranger's file may unpack to anything: inside, this process gets at most 2 GB more than it has, and
+    `error` names the file. Where the system has no such limit (Windows, macOS) nothing is bounded."""
+    try:
+        with _limited_data(_MOST_MEMORY):
+            yield
+    except MemoryError as wrong:
+        raise error(
+            f"'{path}' takes more than {_MOST_MEMORY >> 30} GB of memory to read: cut it, or check where "
+            "it is from"
+        ) from wrong
+
+
+@contextmanager
+def _limited_data(most_bytes: int) -> Iterator[None]:
+    """RLIMIT_DATA counts what is written privately: neither maps of files nor what is reserved only."""
+    try:
+        import resource
+
+        status = Path("/proc/self/status").read_text(encoding="ascii", errors="replace")
+        held = 1024 * next(int(x.split()[1]) for x in status.splitlines() if x.startswith("VmData"))
+    except (ImportError, OSError, StopIteration):
+        yield
+        return
+    soft, hard = before = resource.getrlimit(resource.RLIMIT_DATA)
+    limits = [held + most_bytes, *(x for x in before if x != resource.RLIM_INFINITY)]
+    resource.setrlimit(resource.RLIMIT_DATA, (min(limits), hard))
+    try:
+        yield
+    finally:
+        resource.setrlimit(resource.RLIMIT_DATA, (soft, hard))
+
+
 def read_text(path: Path | str, error: type[PalpateError] = FileError) -> str:
     """A UTF-8 file of at most 16 MB; raises `error` in one line for anything else."""
     with reading(path, error), open(path, "rb") as file:
@@ -221,11 +266,13 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
 
 
 def check_room(folder: Path, least_bytes: int, variable: str = "PALPATE_CACHE") -> None:
-    """Raises FileError where a folder, which a variable of the environment names, cannot be made or has less
-    room than that."""
+    """Make a folder, which a variable of the environment names; raises FileError where it cannot be made, or
+    its disk has less room than that: then nothing is made."""
     with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        free = shutil.disk_usage(folder).free
+        place = next(p for p in (folder, *folder.absolute().parents) if p.exists())
+        free = shutil.disk_usage(place).free
+        if free >= least_bytes:
+            folder.mkdir(parents=True, exist_ok=True)
     if free < least_bytes:
         raise FileError(
             f"'{folder}' has {free / 1e6:.1f} MB free, about {least_bytes / 1e6:.0f} MB are needed: free "
@@ -347,7 +394,7 @@ def temporary_folder(label: str = "") -> Iterator[Path]:
 
     Raises FileError where the disk has no room for any.
     """
-    sweep(Path(tempfile.gettempdir()))
+    sweep_scratch()
     check_room(Path(tempfile.gettempdir()), _SCRATCH_BYTES, "TMPDIR")
     with writing(tempfile.gettempdir()):
         with tempfile.TemporaryDirectory(prefix=temporary_prefix(label), ignore_cleanup_errors=True) as name:
@@ -361,6 +408,12 @@ def memory_folder() -> Path | None:
         return None
     sweep(shared)
     return shared
+
+
+def sweep_scratch() -> None:
+    """Sweep where scratch files and shared memory go."""
+    sweep(Path(tempfile.gettempdir()))
+    memory_folder()
 
 
 def sweep(folder: Path) -> None:

@@ -8,10 +8,11 @@ from collections.abc import Iterable, Mapping, Sequence
 import numpy as np
 
 from mechanics.press_sites import SITE_M, sites_of
-from mechanics.presses import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses, Segment
+from mechanics.presses import LEAD_S, STEP_S, USUAL_NOISE_N, Noise, Presses
 from mechanics.recording import Recording
-from mechanics.robust import spread_about_zero
+from mechanics.robust import read_columns, spread_about_zero
 from mechanics.samples import runs
+from mechanics.segments import ON_SUPPORT, Segment
 
 AROUND_S = 0.3
 """Samples are kept this long before first and after last touch."""
@@ -77,9 +78,9 @@ def measured_noise(recording: Recording, free: np.ndarray, usual_n: float = USUA
         lasting = min(1.0, held / per_step)
         step = stated * np.sqrt(max(lasting, 1 / per_step))
         return Noise(stated, step, float(np.clip(held / per_step, 1.0, 10.0)))
-    if free.sum() < 200 * per_step:
+    force = read_columns(recording.force_on_tool)
+    if free.sum() < 200 * per_step or not force.size:
         return Noise(stated, stated / np.sqrt(per_step), 1.0)
-    force = recording.force_on_tool
     steps = np.diff(force, axis=0)[free[1:] & free[:-1]]
     white = max(_robust_std(steps) / np.sqrt(2), 1e-4)
     line = np.polyfit(recording.t[free], force[free], 1)
@@ -164,6 +165,7 @@ def cut(
     air = free_segments(t, touches[:, 0], touches[:, 1], begin)
     segments = [] if trace_s is None else [Segment("trace", *map(float, trace_s))]
     segments += [Segment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
+    segments += [s for s in recording.segments if s.kind in ON_SUPPORT]
     point = centre - recording.tip_radius_m * normal
     table = Presses(
         starts=np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])]),

@@ -13,7 +13,8 @@ import numpy as np
 from mechanics.errors import CacheError, ModelError
 from mechanics.files import atomic_file, read_text
 from mechanics.press_making import of_places
-from mechanics.presses import FITS, KINDS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses, Segment
+from mechanics.presses import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
+from mechanics.segments import KINDS, Segment
 from mechanics.store import read_arrays, write_arrays
 
 _FORMAT = "presses 1"

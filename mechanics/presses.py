@@ -21,11 +21,8 @@ import numpy as np
 from mechanics.errors import ModelError
 from mechanics.frames import tangents
 from mechanics.samples import delayed
+from mechanics.segments import Segment
 
-KINDS = ("trace", "press", "free", "rigid", "retrace", "slide", "cycle", "points")
-"""Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
-more, sliding over a surface, a press cut out of a contact that never breaks, quasi-static points of one
-place."""
 CANNOT_TELL = {
     "slide": ("modulus", "1D law", "first touch"),
     "cycle": ("force in free air", "adhesion", "own first touch: it follows from the law of the others"),
@@ -44,15 +41,6 @@ STEP_S = 0.01
 """The averaging for which the noise is measured."""
 USUAL_NOISE_N = 0.012
 LOADING, HOLDING, UNLOADING, OUTSIDE = 0, 1, 2, 3
-
-
-@dataclass(frozen=True)
-class Segment:
-    """A stretch of the recording: its kind, one of KINDS, and when it lasts, s."""
-
-    kind: str
-    start_s: float
-    end_s: float
 
 
 @dataclass(frozen=True)

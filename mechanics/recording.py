@@ -6,6 +6,7 @@ described in docs/recording-format.md. SI units; device frame; forces are kept a
 
 from __future__ import annotations
 
+import dataclasses
 import gzip
 import io
 import re
@@ -20,9 +21,20 @@ from typing import Any
 import numpy as np
 import tomli_w
 
+from mechanics.bounds import LARGEST_N
 from mechanics.errors import RecordingError
-from mechanics.files import Kind, atomic_file, check_target, named_in, read_toml, reading, sha256_of_file
-from mechanics.schema import ANY, Key, Schema, check_table
+from mechanics.files import (
+    Kind,
+    atomic_file,
+    check_target,
+    named_in,
+    no_file,
+    read_toml,
+    reading,
+    sha256_of_file,
+)
+from mechanics.schema import ANY, Key, Listed, Schema, check_table
+from mechanics.segments import STATED, Segment
 from mechanics.store import content_key
 from mechanics.surface_files import UNITS
 
@@ -60,6 +72,13 @@ SCHEMA: Schema = {
         "slab_m": Key(low=1e-6, high=2.0, unit="m"),
         "half_space": Key(bool),
     },
+    "segment": Listed(
+        {
+            "kind": Key(str, choices=STATED, required=True),
+            "start_s": Key(unit="s", required=True),
+            "end_s": Key(unit="s", required=True),
+        }
+    ),
     "import": ANY,
     "truth": ANY,
 }
@@ -72,6 +91,8 @@ MOST_SAMPLES = 10_000_000
 _UNITS = {"micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
 _HAND_M = (0.02, 0.6)
 """Extent of a path that a hand makes round an object, to guess a wrong unit by."""
+_QUICKEST_HZ = 2e4
+"""No hand's exploration is sampled faster: a slower clock is then no clock in milliseconds."""
 _RATE_FACTOR = 1.5
 _MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
 """Bytes of samples, and of unpacked ones a packed byte (numbers pack to a fifth)."""
@@ -88,7 +109,8 @@ class Recording:
     t: (n,) s, strictly increasing. position: (n, 3) m, centre of the spherical tip, device frame.
     force_on_tool: (n, 3) N, the reaction that pushes the tool out, device frame.
     quaternion: (n, 4) unit (w, x, y, z), tool frame to device frame, or None.
-    boundary_phase: (start, end) s of phase I, or None where it is to be detected.
+    boundary_phase: (start, end) s of phase I, or None where it is to be detected. segments: what was done
+    when, as far as it is stated.
     """
 
     t: np.ndarray
@@ -108,6 +130,7 @@ class Recording:
     path: Path | None = None
     sha256: str = ""
     description: Mapping[str, Any] = field(default_factory=dict)
+    segments: tuple[Segment, ...] = ()
 
     def __post_init__(self) -> None:
         for name in ("t", "position", "force_on_tool", "quaternion"):
@@ -180,9 +203,15 @@ def _check_samples(recording: Recording) -> None:
         start, end = recording.boundary_phase
         if not start < end:
             raise RecordingError(f"boundary_phase = [{start}, {end}]: the start must come before the end (s)")
+    for each in recording.segments:
+        if each.kind not in STATED or not each.start_s < each.end_s:
+            raise RecordingError(
+                f"a segment is '{each.kind}' from {each.start_s} to {each.end_s} s: its kind must be one of "
+                f"{', '.join(STATED)}, and the start must come before the end"
+            )
 
 
-def _check_sane(recording: Recording) -> None:
+def check_sane(recording: Recording) -> None:
     """What no exploration of an object of 1 mm to 1 m by hand can be; raises RecordingError."""
     t, rate = recording.t, recording.sample_rate_hz
     block = min(100, len(t) - 1)
@@ -209,6 +238,12 @@ def _check_sane(recording: Recording) -> None:
             f"the tip's path is {extent:.4g} m across: {like}x, y, z must be metres, at most "
             f"{WIDEST_PATH_M:g} m across"
         )
+    loud = np.flatnonzero((np.abs(recording.force_on_tool) > LARGEST_N).any(axis=1))
+    if len(loud):
+        raise RecordingError(
+            f"{len(loud)} samples have a force above {LARGEST_N:g} N (first in data row {loud[0] + 1}): no "
+            "sensor reads that; remove or repair those rows"
+        )
 
 
 def _near(value: float, other: float) -> bool:
@@ -233,7 +268,7 @@ def recording_files(path: Path | str) -> tuple[Path, Path]:
     for file in (samples, description):
         if not file.is_file():
             raise RecordingError(
-                f"'{file}' does not exist: a recording is NAME.csv (or NAME.csv.gz) "
+                f"'{file}' {no_file(file)}: a recording is NAME.csv (or NAME.csv.gz) "
                 "and NAME.toml side by side"
             )
     return samples, description
@@ -272,7 +307,11 @@ def read_recording(path: Path | str) -> Recording:
             raise RecordingError(
                 f"'{samples}': t steps by {1 / rate:.4g} s, which is {rate:.4g} Hz; it must be "
                 f"{limits.words}"  # type: ignore[union-attr]
-                + (": these look like milliseconds; write t in seconds" if rate < 60 <= rate * 1e3 else "")
+                + (
+                    ": these look like milliseconds; write t in seconds"
+                    if rate < 60 <= rate * 1e3 <= _QUICKEST_HZ
+                    else ""
+                )
             )
     phase = about.get("boundary_phase")
     base = thing.get("model")
@@ -295,8 +334,11 @@ def read_recording(path: Path | str) -> Recording:
             path=samples,
             sha256=sha256_of_file(samples),
             description=table,
+            segments=tuple(
+                Segment(s["kind"], float(s["start_s"]), float(s["end_s"])) for s in table.get("segment", ())
+            ),
         )
-        _check_sane(recording)
+        check_sane(recording)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
     if "calibration" in tool:
@@ -457,6 +499,8 @@ def description_table(recording: Recording) -> dict[str, Any]:
         table["object"]["poisson_ratio"] = recording.poisson_ratio
     if recording.base_model is not None:
         table["object"]["model"] = str(recording.base_model)
+    if recording.segments:
+        table["segment"] = [dataclasses.asdict(each) for each in recording.segments]
     if recording.truth is not None:
         table["truth"] = dict(recording.truth)
     return table

@@ -48,7 +48,8 @@ def _halved(mesh: TetMesh, chosen: np.ndarray, edge_m: float) -> tuple[TetMesh, 
     """
     n = len(mesh.points)
     tets = mesh.tetrahedra
-    pairs = np.unique(np.sort(tets[:, EDGES].reshape(-1, 2), axis=1), axis=0)
+    ends = np.sort(tets[:, EDGES].reshape(-1, 2), axis=1)
+    pairs = np.column_stack(np.divmod(np.unique(ends[:, 0] * np.int64(n) + ends[:, 1]), n))
     length = np.linalg.norm(mesh.points[pairs[:, 0]] - mesh.points[pairs[:, 1]], axis=1)
     marked = pairs[chosen[pairs].any(axis=1) & (length > edge_m)]
     if not len(marked):

@@ -29,6 +29,12 @@ class Robust(Generic[Fitted]):
     scale: float
 
 
+def read_columns(values: np.ndarray) -> np.ndarray:
+    """Of (n, k) readings the columns that ever change: the others are none that is read, as of a machine of
+    one axis, and say nothing of the noise."""
+    return values[:, np.ptp(values, axis=0) > 0]
+
+
 def spread(values: np.ndarray, axis: int | None = None) -> np.ndarray | float:
     """Standard deviation of Gaussian values (n, ...) from their median deviation from their median."""
     return median_abs_deviation(values, axis=axis, scale="normal")

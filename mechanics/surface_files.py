@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.files import bounded_memory, no_file
+from mechanics.vtk_files import read_vtk
 
 if TYPE_CHECKING:
     import trimesh
@@ -68,7 +70,7 @@ def read_surface(path: Path | str, unit: str = "m") -> ClosedSurface:
     if unit not in UNITS:
         raise SurfaceError(f"--unit is '{unit}'; allowed are {', '.join(UNITS)}")
     if not path.is_file():
-        raise SurfaceError(f"'{path}' does not exist: name a file that is there")
+        raise SurfaceError(f"'{path}' {no_file(path)}: name a file that is there")
     return _closed(_shell_of(path), path.name, unit)
 
 
@@ -113,19 +115,19 @@ def _shell_of(path: Path) -> trimesh.Trimesh:
 
     suffix = path.suffix.lower()
     try:
-        if suffix in BY_TRIMESH:
-            loaded: Any = trimesh.load(path, force="mesh")
-            if not isinstance(loaded, trimesh.Trimesh):
-                raise SurfaceError(f"'{path}' holds no surface: one of triangles is needed")
-            return loaded
-        import pyvista
-
-        with _silent():
+        with bounded_memory(path, SurfaceError):
+            if suffix in BY_TRIMESH:
+                loaded: Any = trimesh.load(path, force="mesh")
+                if not isinstance(loaded, trimesh.Trimesh):
+                    raise SurfaceError(f"'{path}' holds no surface: one of triangles is needed")
+                return loaded
             if suffix in BY_VTK:
-                return _boundary(pyvista.read(path))
+                return _boundary(read_vtk(path, SurfaceError))
             import meshio
+            import pyvista
 
-            return _boundary(pyvista.from_meshio(meshio.read(path)))
+            with _silent():
+                return _boundary(pyvista.from_meshio(meshio.read(path)))
     except SurfaceError:
         raise
     except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
@@ -138,14 +140,11 @@ def _silent() -> Iterator[None]:
     """What readers say of a damaged file goes into one line of ours."""
     import logging
 
-    import pyvista
-
     level = logging.root.manager.disable
     logging.disable(logging.CRITICAL)
     try:
         with (
             warnings.catch_warnings(action="ignore"),
-            pyvista.vtk_verbosity("off"),
             contextlib.redirect_stdout(io.StringIO()),
             contextlib.redirect_stderr(io.StringIO()),
         ):

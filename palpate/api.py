@@ -443,13 +443,13 @@ def changes(
 
     taken("changes", options)
     sides = []
+    both = read_recording(before), read_recording(after)  # a name that is wrong is told at once
     with _told("changes", progress) as tell:
-        for k, source in enumerate((before, after)):
+        for k, measured in enumerate(both):
 
             def step(words: str, share: float, k: int = k) -> None:
                 tell(words, 0.5 * k + 0.5 * share)
 
-            measured = read_recording(source)
             made = reconstruct(measured, seed=seed, progress=lambda s, x: step(s, 0.4 * x), **options)
             found = None
             if diagnosed:

@@ -160,11 +160,16 @@ def _base_type(hint: Any) -> type:
 
 
 def finite(text: str) -> float:
-    """argparse type: a finite float."""
+    """argparse type: a finite float, and one whose square is finite too."""
     value = float(text)
     if not math.isfinite(value):
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
+    if abs(value) > _GREATEST:
+        raise argparse.ArgumentTypeError(f"'{text}' is beyond any quantity here (in SI units, {_GREATEST:g})")
     return value
+
+
+_GREATEST = 1e15
 
 
 def natural(text: str) -> int:
@@ -221,7 +226,7 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
         flag = action.option_strings[-1] if action.option_strings else str(action.metavar or action.dest)
         kind = getattr(action, _WRITES, None)
         for each in given if isinstance(given, list) else [given]:
-            if each is None or str(each) == "-":
+            if each is None or str(each) in ("-", "none"):
                 continue
             if hasattr(action, _READS):
                 read |= {_identity(file): flag for file in _files_of(Path(each))}

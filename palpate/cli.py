@@ -114,7 +114,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
     import warnings
 
     from mechanics.errors import PalpateError
-    from mechanics.files import told
+    from mechanics.files import sweep_scratch, told
     from mechanics.recording import MisspeltKey
     from palpate.arguments import check_paths
 
@@ -135,6 +135,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
         try:
             arguments = command.parse_args(words)
             check_paths(command, arguments)
+            sweep_scratch()
             return int(module.run(arguments) or 0)
         except PalpateError as error:
             return refused(str(error))

@@ -87,7 +87,7 @@ def run_demo(
         done = replace(done, model=done.model.replaced(path=path))
         model = done.model
         progress("compiling", 0.99)
-        compiling.wait()
+        compiling()
     with stage("precompute") as progress:
         load_or_condense(model, progress=progress)
         renderer = render.create(options.renderer, model, progress=progress)

@@ -1,26 +1,33 @@
 """Compile what the demo needs on a small block, in a process beside the reconstruction.
 
 A fresh installation has no compiled kernels on disk; compiling them takes some tens of seconds of one core,
-which the second core can do while the first reconstructs. Run as `python -m palpate.warm_up`; a failure costs
-only time.
+which the second core can do while the first reconstructs. It leaves a mark beside the kernels, so that it is
+done once. Run as `python -m palpate.warm_up`; a failure costs only time.
 """
 
 from __future__ import annotations
 
 import subprocess
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from importlib.metadata import version
 from pathlib import Path
 
 import numpy as np
 
+from mechanics.kernel_cache import choose_folder
 from palpate.child import end_with_parent, module_command, module_environment
 
 
 @contextmanager
-def warming_up() -> Iterator[subprocess.Popen]:
-    """The compiling process, started at once; ended with the block where it is still running then."""
+def warming_up() -> Iterator[Callable[[], object]]:
+    """What waits for the compiling process, which is started at once and ended with the block where it still
+    runs then; nothing is started where these kernels are compiled."""
+    mark = _mark()
+    if mark is not None and mark.is_file():
+        yield lambda: None
+        return
     process = subprocess.Popen(
         module_command("palpate.warm_up"),
         stdin=subprocess.PIPE,
@@ -29,7 +36,7 @@ def warming_up() -> Iterator[subprocess.Popen]:
         env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
     )
     try:
-        yield process
+        yield process.wait
     finally:
         if process.poll() is None:
             process.terminate()
@@ -58,6 +65,14 @@ def warm_up() -> None:
         t.setflags(write=False)  # as a recording's
         replay(renderer, t, path, tip_radius_m=block.tool.tip_radius_m)
         run_headless(block, "fem", seconds=0.2)
+    mark = _mark()
+    if mark is not None:
+        mark.touch()
+
+
+def _mark() -> Path | None:
+    folder = choose_folder()
+    return None if folder is None else folder / f"compiled-for-the-demo-by-{version('numba')}"
 
 
 if __name__ == "__main__":

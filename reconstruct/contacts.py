@@ -20,6 +20,7 @@ from mechanics.press_sites import SITE_M
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.samples import runs
+from mechanics.segments import ON_SUPPORT
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
 from reconstruct.delay import force_delay
@@ -27,7 +28,7 @@ from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
 from reconstruct.passing import between, crowd_median, missed, passing, slowly
-from reconstruct.tool_weight import tool_weight
+from reconstruct.tool_weight import ToolWeight, tool_weight
 from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
@@ -110,13 +111,15 @@ class Filtered:
     """A recording low-passed at `cutoff_hz`, and what it reads in free air.
 
     free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
-    free motion; more where inertia is left.
+    free motion; more where inertia is left. weight: the tool's share of free_air, None where forces were
+    taken as they are.
     """
 
     signals: Signals
     free_air: np.ndarray
     spread: np.ndarray
     cutoff_hz: float
+    weight: ToolWeight | None = None
 
     @cached_property
     def least(self) -> float:
@@ -296,7 +299,7 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     start = 0
     if boundary is None:
         radius = recording.tip_radius_m
-        interval = find_interval(recording.t, signals.position, touching, recording.boundary_phase, radius)
+        interval = find_interval(recording.t, signals.position, touching, _traced(recording), radius)
         boundary = find_boundary(signals.position, signals.force, touching, interval, radius, given.boundary)
         start = interval[1]
     touching[:start] = False
@@ -313,7 +316,9 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
                 cut_apart += pieces
                 cut_up.append((a, b))
                 continue
-        reason = _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
+        reason = _on_support(recording, a, b) or _unusable(
+            signals, boundary, a, b, max(high, least_peak), options.least_duration_s
+        )
         contact = None
         if not reason:
             contact = (paper_contact if method == "paper" else fitted_contact)(signals, a, b)
@@ -343,11 +348,29 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
 
 
-def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) -> Filtered:
+def _traced(recording: Recording) -> tuple[float, float] | None:
+    """(start, end) s of phase I as it is stated: by itself, or as the first segment of that kind."""
+    stated = [(s.start_s, s.end_s) for s in recording.segments if s.kind == "trace"]
+    return recording.boundary_phase or (stated[0] if stated else None)
+
+
+def _on_support(recording: Recording, a: int, b: int) -> str:
+    """Why the contact of samples [a, b), stated to be with the support, is no palpation; '' elsewhere."""
+    middle = float(recording.t[(a + b - 1) // 2])
+    for each in recording.segments:
+        if each.kind in ON_SUPPORT and each.start_s <= middle <= each.end_s:
+            return f"is stated to be {each.kind}"
+    return ""
+
+
+def filtered_of(
+    recording: Recording, cutoff_hz: float, *, tared: bool = False, near: ToolWeight | None = None
+) -> Filtered:
     """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off. Where the
     force in free air changes faster (a tool that turns unseen), it is followed from where the tip passes.
 
-    tared: nothing is free air, and forces are taken as they are.
+    tared: nothing is free air, and forces are taken as they are. near: what the tool weighs by a beginning
+    of the recording.
     """
     t, rate = recording.t, recording.sample_rate_hz
     filtered = low_pass_at(t, recording.force_on_tool, rate, cutoff_hz)
@@ -357,33 +380,36 @@ def filtered_of(recording: Recording, cutoff_hz: float, *, tared: bool = False) 
     noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
     white = noise * noise_gain(rate, cutoff_hz)
 
-    def less(free_air: np.ndarray, inertia: np.ndarray, still: Callable[[np.ndarray], float]) -> Filtered:
-        """With a force (n, 3) taken off; `still` tells the spread of a still tip by what is left."""
-        force = filtered - free_air
+    def less(weight: ToolWeight | None, drift: np.ndarray, still: Callable[[np.ndarray], float]) -> Filtered:
+        """With weight and drift (n, 3) taken off; `still` tells the spread of a still tip by what is left."""
+        free_air = drift if weight is None else drift + weight.force
+        force, raw = filtered - free_air, recording.force_on_tool - free_air
         size = np.linalg.norm(force, axis=1)
-        signals = Signals(recording, position, force, size, recording.force_on_tool - free_air, noise)
-        spread = moving_spread(size, inertia, max(white, still(size)), round(rate / cutoff_hz))
-        return Filtered(signals, free_air, spread, cutoff_hz)
+        spread = np.full(len(size), max(white, still(size)))
+        if weight is not None:
+            spread = moving_spread(size, weight.inertia, float(spread[0]), round(rate / cutoff_hz))
+        signals = Signals(recording, position, force, size, raw, noise)
+        return Filtered(signals, free_air, spread, cutoff_hz, weight)
 
-    nothing = np.zeros_like(filtered)
     if tared:
-        return less(nothing, nothing, lambda size: white)
-    weight, inertia = tool_weight(recording, filtered, cutoff_hz)
-    left = np.linalg.norm(filtered - weight, axis=1)
-    drift, _ = free_air_force(t, filtered - weight, max(white, crowd_scale(left)))
-    steady = less(weight + drift, inertia, crowd_scale)
-    air = passing(t, position, steady.signals.force, recording.tip_radius_m, recording.boundary_phase)
-    slow = slowly(t, recording.force_on_tool - weight, air)
-    if slow is None or missed(t, filtered - weight, air) > crowd_median(steady.signals.magnitude[air]):
+        return less(None, np.zeros_like(filtered), lambda size: white)
+    weight = tool_weight(recording, filtered, cutoff_hz, near=near)
+    left = filtered - weight.force
+    drift, _ = free_air_force(t, left, max(white, crowd_scale(np.linalg.norm(left, axis=1))))
+    steady = less(weight, drift, crowd_scale)
+    air = passing(t, position, steady.signals.force, recording.tip_radius_m, _traced(recording))
+    slow = slowly(t, recording.force_on_tool - weight.force, air)
+    if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
         return steady
     # mass and lateness were read from a force that turned
-    weight, inertia = tool_weight(recording, filtered - slow, cutoff_hz)
-    off = missed(t, filtered - weight, air)
+    again = tool_weight(recording, filtered - slow, cutoff_hz)
+    off = missed(t, filtered - again.force, air)
 
     def followed(drift: np.ndarray) -> Filtered:
-        return less(weight + drift, inertia, lambda size: max(off, crowd_scale(size[~air])))
+        return less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
 
-    return followed(between(t, recording.force_on_tool - weight, air, lambda x: followed(x).touching()))
+    raw = recording.force_on_tool - again.force
+    return followed(between(t, raw, air, lambda drift: followed(drift).touching()))
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

@@ -9,7 +9,7 @@ from scipy.signal import butter, savgol_filter, sosfiltfilt
 
 from mechanics.errors import OptionError
 from mechanics.options import option
-from mechanics.robust import spread
+from mechanics.robust import read_columns, spread
 
 _EVEN = 1e-3
 """Of a step: less is rounding of the clock."""
@@ -76,6 +76,9 @@ def noise_gain(sample_rate_hz: float, cutoff_hz: float) -> float:
 
 def white_noise_std(values: np.ndarray) -> float:
     """Standard deviation of white noise an axis in (n, k) samples, from second differences (robust to
-    presses)."""
-    second = np.diff(np.atleast_2d(values.T).T, n=2, axis=0)
+    presses); of the axes that are read."""
+    columns = read_columns(np.atleast_2d(values.T).T)
+    if not columns.size:
+        return 0.0
+    second = np.diff(columns, n=2, axis=0)
     return float(np.median(spread(second, axis=0) / np.sqrt(6.0)))

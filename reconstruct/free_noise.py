@@ -48,9 +48,7 @@ def moving_spread(size: np.ndarray, inertia: np.ndarray, spread: float, samples:
     the inertia that is left is told where most was taken off. samples: it may lie so far aside.
     """
     taken = maximum_filter1d(np.linalg.norm(inertia, axis=1), 2 * samples + 1)
-    most = taken > np.quantile(taken, _BRISK)
-    if not most.any():
-        return np.full(len(size), spread)
+    most = taken >= np.quantile(taken, _BRISK)  # the greatest may be one value for long
     left = max(crowd_scale(size[most]) ** 2 - spread**2, 0.0) / max(float(np.mean(taken[most] ** 2)), 1e-300)
     return np.sqrt(spread**2 + min(left, 1.0) * taken**2)
 

@@ -11,7 +11,7 @@ from mechanics.errors import MeshError
 from mechanics.nearest import closest, distance, sample
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from mechanics.tetmesh import FACES, TetMesh
+from mechanics.tetmesh import FACES, TetMesh, lone_faces
 from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.voxels import voxel_surface
 from reconstruct.surface import Surface
@@ -65,10 +65,15 @@ class Meshing:
 def mesh_surface(
     surface: Surface, options: MeshingOptions | None = None, progress: Progress = silent
 ) -> Meshing:
-    """Fill the surface with linear tetrahedra (`mesh.quadratic()` adds mid-edge nodes).
+    """Fill the surface with linear tetrahedra (`mesh.quadratic()` adds mid-edge nodes), and judge them.
 
     Raises MeshError where the mesher fails or the mesh does not stand on the support.
     """
+    return as_meshed(fill(surface, options, progress), surface)
+
+
+def fill(surface: Surface, options: MeshingOptions | None = None, progress: Progress = silent) -> TetMesh:
+    """The mesh of `mesh_surface` alone, which needs the surface's shape and not its uncertainty."""
     options = options or MeshingOptions()
     if not options.mesh_size_m > 0:
         raise MeshError(f"--mesh-size is {options.mesh_size_m} m; it must be greater than 0")
@@ -95,7 +100,7 @@ def mesh_surface(
             if not rest:
                 raise
     progress("meshing", 1.0)
-    return as_meshed(mesh, surface)
+    return mesh
 
 
 def as_meshed(mesh: TetMesh, surface: Surface) -> Meshing:
@@ -129,9 +134,7 @@ def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.nd
 
 
 def _boundary(cells: np.ndarray) -> np.ndarray:
-    faces = cells[:, FACES].reshape(-1, 3)
-    _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    return faces[first[counts == 1]]
+    return cells[:, FACES].reshape(-1, 3)[lone_faces(cells)]
 
 
 def _stand(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import time
+from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any
@@ -18,6 +19,7 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
+from mechanics.tetmesh import TetMesh
 from reconstruct.boundary import Boundary, BoundaryOptions
 from reconstruct.casting import CastPoints, cast
 from reconstruct.checks.base import Finding
@@ -27,7 +29,7 @@ from reconstruct.contacts import ContactOptions, Exploration, Filtered, explore
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
-from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, mesh_surface, uncertainty_at
+from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, fill, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.modulus_field import FieldOptions, with_fitted_field
 from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
@@ -101,7 +103,14 @@ def reconstruct_fully(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Reconstruction:
     """As `reconstruct`, with the intermediate results."""
-    options = options or ReconstructOptions()
+    # the mesher is a process of its own: what needs no mesh is done meanwhile
+    with ThreadPoolExecutor(1) as beside:
+        return _reconstructed(recording, options or ReconstructOptions(), progress, beside)
+
+
+def _reconstructed(
+    recording: Recording, options: ReconstructOptions, progress: Progress, beside: Executor
+) -> Reconstruction:
     paper = options.method == "paper"
     nu = _poisson_ratio(recording, options)
     clock = Clock()
@@ -109,7 +118,12 @@ def reconstruct_fully(
     geometry = stated_geometry(recording, options.geometry)
     _check_points(recording, geometry, paper)
     checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
-    placed = None
+    placed: Placed | None = None
+    meshes: list[Future[TetMesh]] = []
+
+    def begin_mesh(shape: Surface) -> None:
+        meshes.append(beside.submit(fill, shape, _meshing_options(options)))
+
     if geometry.known:
         exploration, placed = _on_known(
             recording, options, geometry, checkup.filtered, _part(progress, 0.02, 0.3)
@@ -122,26 +136,31 @@ def reconstruct_fully(
         checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
-            evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3)
+            evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3), shaped=begin_mesh
         )
         clock.lap("surface")
-    if placed is not None and placed.mesh is not None:
-        meshing = as_meshed(placed.mesh, surface)
-    else:
-        meshing = mesh_surface(surface, _meshing_options(options), _part(progress, 0.3, 0.5))
-    clock.lap("mesh")
+    known_mesh = None if placed is None else placed.mesh
+    if known_mesh is None and not meshes:
+        begin_mesh(surface)
+    progress("meshing", 0.3)
     touched = exploration.presses
     where = cast(surface.vertices, surface.triangles, touched.point, touched.contact_normal)
     presses = touched.on_surface(where.points, where.normals)
     curves = profiles(presses, options.filter.cutoff_hz)
-    mesh = meshing.mesh if paper else meshing.mesh.quadratic()
+    one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
+    clock.lap("1D models")
+    coarse = meshes[0].result() if known_mesh is None else known_mesh
+    judged = beside.submit(as_meshed, coarse, surface)
+    clock.lap("mesh")
+    progress("factorise", 0.5)
+    mesh = coarse if paper else coarse.quadratic()
     sites, fit, paper_fit = None, None, None
     if paper:
         progress("modulus", 0.6)
         paper_fit = fit_paper_modulus(curves, mesh, nu, options.paper, seed=options.seed)
         modulus, interval, each = paper_fit.modulus_pa, paper_fit.ci95_pa, paper_fit.press_modulus_pa
     else:
-        solver = touch_solver(meshing.mesh, nu)
+        solver = touch_solver(coarse, nu)
         clock.lap("factorise")
         sites = touch_sites(
             mesh, where.points, where.normals, nu, solver=solver, progress=_part(progress, 0.5, 0.8)
@@ -164,9 +183,8 @@ def reconstruct_fully(
         modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
     interval = checkup.interval(result_of(presses, modulus, interval, fit))
     clock.lap("modulus")
-    progress("1D models", 0.95)
-    one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
-    clock.lap("1D models")
+    progress("model", 0.95)
+    meshing = judged.result()
     tables = {"shape": shape_table(surface)}
     if placed is not None:
         tables["geometry"] = placed.about

@@ -12,12 +12,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from mechanics.elasticity import barycentric_gradients, lame_parameters, shape_derivatives
 from mechanics.patch import PatchSampler
 from mechanics.sites import TouchSites
 from mechanics.solver import Solver
-from mechanics.tetmesh import FACES, TetMesh
+from mechanics.tetmesh import FACES, TetMesh, lone_faces
 
 CORRELATION_M = 0.025
 _BATCH = 16
@@ -39,19 +40,21 @@ def compliance_covariance(
     *,
     correlation_m: float = CORRELATION_M,
     pose: PoseError | None = None,
+    gradient: np.ndarray | None = None,
 ) -> np.ndarray:
     """(k, k) covariance, 1/m^2, of the sites' compliance along their normals for unit modulus.
 
     uncertainty_m: (n,) standard deviation of the surface along its normal at each node of the solver's mesh.
     Errors at two places correlate as exp(-r^2 / (2 L^2)). The patch itself, which the tip has touched, is
-    left out. pose: of an object of known shape, whose base moves along with it.
+    left out. pose: of an object of known shape, whose base moves along with it. gradient: (k, m),
+    `shape_gradients` where they are known already.
     """
     faces = _faces(solver.mesh)
-    gradient = _gradients(solver, sites, faces)
+    gradient = _gradients(solver, sites, faces) if gradient is None else gradient
     free = ~faces.base
     sd = np.asarray(uncertainty_m)[faces.triangles[free]].mean(axis=1)
     centres = faces.centres[free]
-    squared = ((centres[:, None] - centres[None]) ** 2).sum(axis=2)
+    squared = cdist(centres, centres, "sqeuclidean")
     kernel = np.exp(-squared / (2 * correlation_m**2)) * np.outer(sd, sd)
     local = gradient[:, free] @ kernel @ gradient[:, free].T
     if pose is None:
@@ -77,6 +80,11 @@ def _by_pose(gradient: np.ndarray, faces: _Faces, sites: TouchSites, pose: PoseE
     normal = np.einsum("kmi,ki->km", motion(sites.points), sites.normals)
     facing = sites.normals @ faces.normals.T
     return gradient @ everywhere - np.einsum("kf,kf->k", gradient, facing)[:, None] * normal
+
+
+def shape_gradients(solver: Solver, sites: TouchSites) -> np.ndarray:
+    """(k, m) 1/m^2: change of each site's compliance as each of the mesh's m boundary faces moves outward."""
+    return _gradients(solver, sites, _faces(solver.mesh))
 
 
 def _gradients(solver: Solver, sites: TouchSites, faces: _Faces) -> np.ndarray:
@@ -126,10 +134,8 @@ class _Faces:
 
 
 def _faces(mesh: TetMesh) -> _Faces:
-    faces = mesh.tetrahedra[:, FACES].reshape(-1, 3)
-    _, first, counts = np.unique(np.sort(faces, axis=1), axis=0, return_index=True, return_counts=True)
-    boundary = first[counts == 1]
-    triangles = faces[boundary]
+    boundary = lone_faces(mesh.tetrahedra)
+    triangles = mesh.tetrahedra[:, FACES].reshape(-1, 3)[boundary]
     corners = mesh.points[triangles]
     normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     double = np.linalg.norm(normal, axis=1)

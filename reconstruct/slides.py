@@ -11,7 +11,8 @@ import dataclasses
 import numpy as np
 
 from mechanics.errors import ContactError
-from mechanics.presses import Presses, Segment
+from mechanics.presses import Presses
+from mechanics.segments import Segment
 from reconstruct.contacts import Exploration
 
 SLIDE_RADII = 8.0

@@ -127,13 +127,25 @@ def evidence_of(exploration: Exploration) -> Evidence:
 
 
 def reconstruct_surface(
-    evidence: Evidence, options: SurfaceOptions | None = None, progress: Progress = silent
+    evidence: Evidence,
+    options: SurfaceOptions | None = None,
+    progress: Progress = silent,
+    *,
+    shaped: Callable[[Surface], object] | None = None,
 ) -> Surface:
     """The surface that the touches and the base outline speak for.
 
+    shaped: called once its shape is there and its uncertainty and bounds are not, so that a mesher can begin.
     Raises SurfaceError where no closed surface can be made.
     """
-    options = options or SurfaceOptions()
+    found = _found(evidence, options or SurfaceOptions(), progress, shaped or (lambda surface: None))
+    progress("surface", 1.0)
+    return found
+
+
+def _found(
+    evidence: Evidence, options: SurfaceOptions, progress: Progress, shaped: Callable[[Surface], object]
+) -> Surface:
     if options.surface in ("hull", "tangent"):
         shells = {"hull": hull_surface, "tangent": tangent_surface}
         # finer than the facets need, so that the gap between the bounds is told inside them as well
@@ -161,16 +173,12 @@ def reconstruct_surface(
         if implicit.held_out_m["implicit"] < 0.8 * error:
             return implicit
     vertices, triangles, deviation = draw(best, options.surface_spacing_m)
-    deviation = np.hypot(deviation, _spread(vertices, best, tried))
-    facing = best.feet[1][: len(evidence.centres)] @ evidence.axes
-    bracket = bounds(replace(evidence, normals=facing))
-    progress("surface", 1.0)
 
     def redraw(spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
         coarse = draw(best, spacing_m)[:2]
         return evidence.to_device(balanced(coarse, (vertices, triangles))), coarse[1]
 
-    return _surface(
+    surface = _surface(
         evidence,
         vertices,
         triangles,
@@ -179,8 +187,14 @@ def reconstruct_surface(
         "asked for" if options.surface != "auto" else reason(best, tried),
         {p.label: p.value for p in best.shape.parameters},
         {e.name: held_out_error(e) for e in sorted(tried, key=score)},
-        bracket,
-        redraw,
+        redraw=redraw,
+    )
+    shaped(surface)
+    facing = best.feet[1][: len(evidence.centres)] @ evidence.axes
+    return replace(
+        surface,
+        uncertainty_m=np.hypot(deviation, _spread(vertices, best, tried)),
+        bracket_m3=bounds(replace(evidence, normals=facing)),
     )
 
 

@@ -9,6 +9,8 @@ the presses do. Without quaternions the tool is taken to keep its orientation.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.spatial.transform import Rotation
@@ -30,12 +32,25 @@ _COARSE = slice(0, None, 3)
 _RIDGE = 1e-4
 
 
-def tool_weight(
-    recording: Recording, filtered: np.ndarray, cutoff_hz: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """(n, 3) N on the tool that bias, weight and inertia make in `filtered` force (n, 3), and of that the
-    inertia's part.
+@dataclass(frozen=True)
+class ToolWeight:
+    """force: (n, 3) N on the tool that bias, weight and inertia make; inertia: (n, 3) N, its part of that.
+
+    found: (p,) constant, tool frame, inertia, drift over the recording; late_s: by how much the force reads
+    late.
     """
+
+    force: np.ndarray
+    inertia: np.ndarray
+    found: np.ndarray
+    late_s: float
+
+
+def tool_weight(
+    recording: Recording, filtered: np.ndarray, cutoff_hz: float, *, near: ToolWeight | None = None
+) -> ToolWeight:
+    """What the tool makes in `filtered` force (n, 3) N. near: of a beginning of the recording: the search
+    starts there."""
     t = recording.t
     hand = low_pass_at(t, recording.position, recording.sample_rate_hz, cutoff_hz, derivative=2)
     rows = _moving(hand, round(_LATE_S[-1] * recording.sample_rate_hz))
@@ -59,12 +74,15 @@ def tool_weight(
         found = _refined(model, force, found)
         return _near(np.linalg.norm(model @ found - force, axis=1)), found, late_s
 
-    rough = min((fitted(s, None) for s in _LATE_S[_COARSE]), key=lambda entry: entry[0])
-    near = _LATE_S[np.abs(_LATE_S - rough[2]) < 0.011]
-    _, found, late_s = min((fitted(s, rough[1]) for s in near), key=lambda entry: entry[0])
+    if near is None:
+        _, start, about = min((fitted(s, None) for s in _LATE_S[_COARSE]), key=lambda entry: entry[0])
+    else:
+        start, about = near.found, near.late_s
+    close = _LATE_S[np.abs(_LATE_S - about) < 0.011]
+    _, found, late_s = min((fitted(s, start) for s in close), key=lambda entry: entry[0])
     mass = len(found) - 4
     whole = columns(late_s, np.arange(len(t)))
-    return whole @ found, whole[:, :, mass] * found[mass]
+    return ToolWeight(whole @ found, whole[:, :, mass] * found[mass], found, late_s)
 
 
 def _moving(hand: np.ndarray, aside: int) -> np.ndarray:

@@ -76,7 +76,8 @@ def keep(scene: Scene, model: Path, *, cache: Path | None = None) -> None:
 
 
 def _folder(scene: Scene, cache: Path | None) -> Path:
-    return (cache or cache_folder()) / "scenes" / f"{scene.name}-{_key(scene)}"
+    """Scenes of one object share a folder: its name is the object's, not the scene's."""
+    return (cache or cache_folder()) / "scenes" / f"{Path(scene.source).name.split('.')[0]}-{_key(scene)}"
 
 
 def _own(scene: Scene) -> bool:
@@ -87,10 +88,13 @@ def _own(scene: Scene) -> bool:
 def _key(scene: Scene) -> str:
     """A hash of what the model depends on: the description, and the content of the files that it names."""
     content = asdict(scene)
-    for name in ("name", "title", "about", "mapper", "renderer", "beside", "colour", "friction"):
+    for name in ("name", "title", "about", "mapper", "renderer", "beside", "colour", "friction", "find"):
         content.pop(name)
+    files = _files(scene)
+    if files:  # what is in them counts, not where they lie
+        content.pop("source")
     digest = hashlib.sha256(json.dumps([VERSION, content], sort_keys=True).encode())
-    for file in _files(scene):
+    for file in files:
         with reading(file, SceneError):
             digest.update(file.read_bytes())
     return digest.hexdigest()[:12]

@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import SceneError
+from mechanics.files import no_file
 from mechanics.standing import standing
 from mechanics.surface_files import SUFFIXES, is_surface_file, read_surface
 
@@ -256,7 +257,7 @@ def phantom(name: str | Path) -> Phantom:
         )
     if not path.is_file():
         raise SceneError(
-            f"'{path}' does not exist: name a phantom ({', '.join(PHANTOMS)}) or a file that is there"
+            f"'{path}' {no_file(path)}: name a phantom ({', '.join(PHANTOMS)}) or a file that is there"
         )
     import trimesh
 

@@ -116,10 +116,10 @@ def load_scene(name: str | Path) -> Scene:
 
     Raises SceneError that lists what is allowed.
     """
-    path = Path(name)
-    if path.is_dir():
+    path, embedded = Path(name), FOLDER / f"{name}.toml"
+    # a MODEL goes before a scene of its name; any other folder does not
+    if path.is_dir() and ((path / "model.toml").is_file() or not embedded.is_file()):
         return Scene(path.name, "model", str(path.resolve()), title=path.name)
-    embedded = FOLDER / f"{name}.toml"
     if embedded.is_file():
         return read_scene(embedded)
     if path.name.endswith((".csv", ".csv.gz")) and path.is_file():

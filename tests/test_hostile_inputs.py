@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import dataclasses
 import gzip
+import json
 import os
 import re
 import signal
@@ -23,6 +24,7 @@ from mechanics.files import (
     JSON,
     Kind,
     atomic_file,
+    check_room,
     check_target,
     named_in,
     sole_writer,
@@ -106,6 +108,7 @@ SAMPLES = {
     "too few values": (text_of(rows())[:-7], "not 7 decimal numbers"),
     "an infinite value": (text_of(changed(rows(), 7, 4, np.inf)), "data row 8"),
     "a value beyond a double": (text_of(rows()).replace("0.05", "1e400", 1), "not a finite number"),
+    "a force beyond any": (text_of(changed(rows(), 7, 4, 1e300)), "above 1e.09 N .first in data row 8"),
     "time standing": (text_of(changed(rows(), 7, 0, 0.006)), "t must increase strictly"),
     "time in ms": (text_of(rows(step=1.0)), "look like milliseconds"),
     "a clock ten times slow": (text_of(rows(step=0.01)), "state the true rate"),
@@ -132,6 +135,25 @@ def test_hostile_samples_are_refused_in_one_line(record, name):
     with pytest.raises(RecordingError, match=words) as error:
         read_recording(path)
     one_line(error, path)
+
+
+def test_what_is_no_file_is_told_as_what_it_is(record, tmp_path):
+    path = record()
+    description = tmp_path / "rec.toml"
+    description.unlink()
+    for make, words in (
+        (lambda: None, "rec.toml' does not exist"),
+        (description.mkdir, "rec.toml' is a folder"),
+        (lambda: description.symlink_to("nowhere.toml"), "nowhere.toml', which does not exist"),
+        (lambda: os.mkfifo(description), "rec.toml' is no ordinary file"),
+    ):
+        make()
+        with pytest.raises(RecordingError, match=words) as error:
+            read_recording(path)
+        one_line(error)
+        if description.is_dir():
+            description.rmdir()
+        description.unlink(missing_ok=True)
 
 
 def test_text_of_another_encoding_beside_the_numbers_is_read(record):
@@ -207,6 +229,14 @@ def test_a_misspelt_key_is_told_and_a_key_of_ones_own_is_not(record):
     with pytest.warns(MisspeltKey, match="boundry_phase is no key: did you mean boundary_phase") as told:
         assert read_recording(path).boundary_phase is None
     assert len(told) == 1
+
+
+def test_a_slow_clock_is_taken_for_milliseconds_only_where_it_may_be_one(record):
+    unstated = described("sample_rate_hz = 1000.0", "")
+    for step, like in ((1.0, True), (0.02, False)):
+        with pytest.raises(RecordingError, match="from 60 to 100000 Hz") as error:
+            read_recording(record(text_of(rows(step=step)), unstated))
+        assert ("look like milliseconds" in str(error.value)) == like
 
 
 def test_a_path_in_a_description_stays_in_its_folder(record, tmp_path, monkeypatch):
@@ -385,6 +415,50 @@ def test_hostile_scenes_are_refused_in_one_line(tmp_path, name):
     one_line(error, path)
 
 
+def test_an_inclusion_beside_the_object_is_refused():
+    from scenes.build import _check_inside
+
+    _check_inside(block())
+    far = dataclasses.replace(block().material, inclusions={"lump": Ball((9, 0, 0), 0.01, 6.0)})
+    with pytest.raises(SceneError, match="lies outside the object") as error:
+        _check_inside(dataclasses.replace(block(), material=far))
+    one_line(error)
+
+
+def told(**changes):
+    """A robot's line of 0.6 s of rest."""
+    count = 600
+    said = {"segment": "trace", "t": [1e-3 * k for k in range(count)]}
+    return json.dumps(said | {"position": [[0.0] * 3] * count, "force": [[0.0] * 3] * count} | changes)
+
+
+ROBOT = {
+    "no JSON": ("[" * 100_000, "no JSON"),
+    "a list": ("[]", "holds a list"),
+    "a kind that is a list": (told(segment=["trace"]), "kind is"),
+    "a place of words": (told(position=[["a"] * 3] * 600), "no numbers"),
+    "a time of nan": (told(t=[float("nan")] * 600), "all finite"),
+    "two samples": (told(t=[0, 1e-3], position=[[0] * 3] * 2, force=[[0] * 3] * 2), "20 samples or more"),
+    "a place of 1e300": (told(position=[[0.0] * 3] * 599 + [[1e300, 0, 0]]), "1e.300 m across"),
+    "a force of 1e300": (told(force=[[1e300, 0, 0]] * 600), "above 1e.09 N"),
+    "a clock of 1e300": (told(t=[1e-3 * k for k in range(599)] + [1e300]), "the clock runs from"),
+    "another rate": (told(t=[1e-2 * k for k in range(600)]), "state the true rate"),
+    "an orientation of 0": (told(quaternion=[[0.0] * 4] * 600), "unit quaternions"),
+}
+
+
+@pytest.mark.parametrize("name", ROBOT)
+def test_a_robots_hostile_line_is_answered_in_one_and_nothing_of_it_kept(name):
+    from palpate.exploring.explorer import Explorer
+    from palpate.exploring.protocol import serve
+    from palpate.exploring.rows import Instrument
+
+    line, words = ROBOT[name]
+    explorer, said = Explorer(Instrument(0.005)), []
+    serve(explorer, [line], said.append, lambda _: pytest.fail("there is nothing to keep"))
+    assert re.search(words, json.loads(said[-1])["error"]) and not explorer.segments
+
+
 def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path):
     path = tmp_path / "x.bin"
     arrays = {"far": np.arange(600.0).reshape(-1, 3), "own": np.arange(50, dtype=np.float32)}
@@ -558,6 +632,16 @@ ABSURD = {
         "--depth",
         "inf",
     ),
+    "a place of 1e200": ("beyond any quantity", "press", "M", "--at", "1e200,0,0", "--direction", "0,0,-1"),
+    "a direction of 1e200": (
+        "beyond any quantity",
+        "press",
+        "M",
+        "--at",
+        "0,0,0",
+        "--direction",
+        "0,0,-1e200",
+    ),
     "nu of -0.99": ("from 0 to 0.4999", "reconstruct", "REC", "-o", "new", "--poisson-ratio", "-0.99"),
 }
 
@@ -691,11 +775,14 @@ def test_room_and_permission_are_seen_before_the_work(tmp_path):
         check_target(tmp_path / "a", MODEL)
 
 
-def test_a_full_scratch_disk_is_seen_before_the_work(monkeypatch):
+def test_a_full_disk_of_scratch_or_cache_is_seen_before_the_work(monkeypatch, tmp_path):
     import shutil
 
     full = shutil.disk_usage("/")._replace(free=1000)
     monkeypatch.setattr("mechanics.files.shutil.disk_usage", lambda _: full)
+    with pytest.raises(FileError, match="set PALPATE_CACHE to a folder on another disk"):
+        check_room(tmp_path / "deep" / "laboratory", 1 << 20)
+    assert not list(tmp_path.iterdir()), "an empty folder is left"
     with pytest.raises(FileError, match="set TMPDIR to a folder on another disk") as error:
         with temporary_folder("x-"):
             pytest.fail("nothing can be written there")
@@ -734,7 +821,7 @@ def test_two_writers_of_one_folder_do_not_mix(tmp_path):
     assert not list((tmp_path / "demo").iterdir())
 
 
-def test_what_killed_processes_left_is_swept(tmp_path):
+def test_what_killed_processes_left_is_swept(tmp_path, monkeypatch):
     gone = subprocess.Popen([sys.executable, "-c", ""])
     gone.wait()
     ours = temporary_prefix().replace(str(os.getpid()), str(gone.pid))
@@ -747,6 +834,11 @@ def test_what_killed_processes_left_is_swept(tmp_path):
     sweep(tmp_path)
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([f"{temporary_prefix()}alive", "model"])
     assert (tmp_path / "model" / "kept").exists(), "what was being replaced goes back"
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("mechanics.files._swept", set())
+    (tmp_path / f"{ours}mesh-x").mkdir()
+    command("press", "nothing", "--at", "0,0,0", "--direction", "0,0,-1", "--depth", "0.001")
+    assert not list(tmp_path.glob("*mesh-x")), "whatever command is next sweeps the scratch files"
     with temporary_folder("x-") as scratch:
         (scratch / "a").touch()
     assert not scratch.exists()
@@ -817,3 +909,20 @@ def test_atomic_writes_follow_links_and_leave_them(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert not [p for p in tmp_path.iterdir() if p.name.startswith(".palpate")]
+
+
+NAMED = re.compile(r"`([A-Z]+)\[((?:[^\]\\]|\\.)+)\]`|`(test_\w+)`")
+
+
+@pytest.mark.parametrize(("page", "least"), [("robustness.md", 120), ("safety.md", 15)])
+def test_every_row_of_the_docs_names_tests_that_exist(page, least):
+    from palpate.benchmarks._faults import FAULTS
+
+    root, defined = Path(__file__).resolve().parents[1], set()
+    for file in (root / "tests").rglob("test_*.py"):
+        defined |= set(re.findall(r"^def (test_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE))
+    named = NAMED.findall((root / "docs" / page).read_text(encoding="utf-8"))
+    assert len(named) >= least
+    for table, key, name in named:
+        rows = FAULTS if table == "FAULTS" else globals()[table] if table else defined
+        assert (name or key.replace("\\", "")) in rows, f"{table or page} has no '{name or key}'"

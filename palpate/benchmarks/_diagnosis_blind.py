@@ -186,6 +186,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
             "closed_by": {e["name"]: e["gap_closed"] for e in data["effects"]},
             "probability": {e["name"]: e["probability"] for e in data["effects"]},
             "detectable_n": {e["name"]: e["detectable_n"] for e in data["effects"]},
+            "scores": {n: [s.evidence, s.closure] for n, s in result.attribution.scores.items()},
             "bic": best_by_bic(result.attribution),
             "regression_gap_n": regressed_gap(result.forward, result.residual_before),
             "seconds": sum(data["seconds"].values()),

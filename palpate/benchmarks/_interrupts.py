@@ -31,7 +31,7 @@ import numpy as np
 from mechanics.errors import OptionError, PalpateError
 from mechanics.files import temporary_prefix
 from mechanics.model import read_model, write_model
-from mechanics.recording import read_recording
+from mechanics.recording import read_recording, recording_files
 from palpate.benchmarks._fuzz_cases import PRESS, cube
 from palpate.benchmarks.timing import table
 from palpate.child import module_command, module_environment
@@ -58,14 +58,14 @@ class Job:
 
 
 def _jobs(model: Path, out: Path) -> dict[str, Job]:
-    name = embedded_recording(embedded_names()[0])
-    recording, folder, file = str(name), str(model), lambda end: str(out / end)
+    samples, description = recording_files(embedded_recording(embedded_names()[0]))
+    recording, folder, file = str(description), str(model), lambda end: str(out / end)
     return {
         "press": Job(("press", folder, *PRESS, "-o", file("curve.csv"), "--json", file("press.json"))),
         "replay": Job(("replay", folder, recording, "-o", file("forces.csv"))),
         "touch": Job(("touch", folder, "--headless", "--seconds", "3", "--record", file("session.csv.gz"))),
         "check": Job(("check", recording, "--report", file("check.html"), "--json", file("check.json"))),
-        "import": Job(("import", recording, "-o", file("imported.csv"), "--tip-radius", "0.005")),
+        "import": Job(("import", str(samples), "-o", file("imported.csv"), "--tip-radius", "0.005")),
         "export": Job(("export", folder, "--to", "stl", "-o", file("block.stl"))),
         "reconstruct": Job(("reconstruct", recording, "-o", file("model"), "--mesh-size", "0.012",
                             "--report", file("figures.html")), 2.0),
@@ -100,8 +100,12 @@ def interrupted(
     with tempfile.TemporaryDirectory(prefix="palpate-ends-") as folder:
         place = _Place(Path(folder))
         whole_s = {}
-        for name in tqdm(names, desc="whole", disable=None):
-            whole_s[name] = place.whole(name)
+        try:
+            for name in tqdm(names, desc="whole", disable=None):
+                whole_s[name] = place.whole(name)
+        except KeyboardInterrupt:
+            print("interrupted: the commands that ran whole until then", file=sys.stderr)
+            names, count = tuple(whole_s), 0
         weights = np.array([place.jobs[name].weight for name in names])
         for seed in tqdm(range(first, first + count), desc="ended", disable=None):
             if time.perf_counter() - began > 60 * minutes:
@@ -195,8 +199,8 @@ class _Place:
         return process, said
 
     def _next(self, name: str) -> None:
-        """The next command that writes to the same place."""
-        argv = ("press", str(self.model), *PRESS, "-o", str(self.out / "curve.csv"))
+        """The next command that writes to the same place: one that compiles nothing."""
+        argv = ("export", str(self.model), "--to", "stl", "-o", str(self.out / "next.stl"))
         subprocess.run(module_command("palpate", *argv), env=self._environment, capture_output=True)
 
     def _left(self, family: list[int]) -> list[str]:

@@ -24,7 +24,9 @@ from reconstruct.modulus_paper import nearest_nodes
 
 NEAR_M = 0.009
 """Around a place: where a tip may touch, for a solver that is told of nodes."""
-SETTLE_S, TIMESTEP_S = 0.15, 0.001
+SETTLE_S, TIMESTEP_S = 0.1, 0.001
+FLEX_POISSON = 0.45
+"""At 0.49 its linear tetrahedra lock, and its solver of the elastic forces does not converge."""
 
 
 class Peer(ABC):
@@ -157,7 +159,8 @@ class Flex(Peer):
         import mujoco
 
         self.mujoco, self.radius_m = mujoco, radius_m
-        xml = flex_xml(mesh, TIMESTEP_S, young_pa=young_pa, poisson=poisson, radius_m=radius_m)
+        nu = min(poisson, FLEX_POISSON)
+        xml = flex_xml(mesh, TIMESTEP_S, young_pa=young_pa, poisson=nu, radius_m=radius_m)
         self.model = mujoco.MjModel.from_xml_string(xml)
 
     def force(self, point: np.ndarray, normal: np.ndarray, depths_m: np.ndarray) -> np.ndarray:

@@ -20,6 +20,7 @@ from mechanics.presses import Presses
 from mechanics.sites import TouchSites, touch_sites
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import forces_at
+from reconstruct.modulus_field import FieldSites
 
 NU, RATE_HZ, UP = 0.49, 200.0, np.array([0.0, 0.0, 1.0])
 FINE_M, COARSE_M = 0.0045, 0.010
@@ -29,13 +30,21 @@ _DENT_POINTS = 400
 @dataclass(frozen=True)
 class Tissue:
     """presses: their first touches as read. model: of one modulus, the slab alone. log_ratio: points (k, 3) m
-    to ln of the true modulus over `modulus_pa`. about: what was drawn."""
+    to ln of the true modulus over `modulus_pa`. true, law: sites and dent law that made the forces. about:
+    what was drawn."""
 
     presses: Presses
     model: Model
     log_ratio: Callable[[np.ndarray], np.ndarray]
     modulus_pa: float
+    true: FieldSites
+    law: str
     about: dict[str, float]
+
+    def forces(self, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) N that the slab itself gives to the presses from their first touches as read, or moved (p,)
+        m earlier."""
+        return self.modulus_pa * self.true.unit_forces(presses, self.law, moved_m)
 
 
 def tissue(
@@ -75,7 +84,8 @@ def tissue(
         presses=presses,
     )  # fmt: skip
     drawn = {"spacing_m": spacing, "height_m": height, "length_m": length, "tip_m": tip, "noise_n": noise}
-    return Tissue(presses, model, log_ratio, float(modulus), {k: float(v) for k, v in drawn.items()})
+    about = {k: float(v) for k, v in drawn.items()}
+    return Tissue(presses, model, log_ratio, float(modulus), FieldSites(sites, dent), law, about)
 
 
 def _slab(size: tuple[float, float, float], edge_m: float) -> TetMesh:

@@ -1,117 +1,222 @@
 """Guided exploration against other orders of touching: presses and seconds until the goals are met.
 
-Each phantom of the pool of varied objects (scenes.variety) is explored by the laboratory's robot, with a
-modulus, noise and errors of its own drawn by its seed, by every order with the same stop rule. Told are
-presses and seconds of exploring, and what was true when it stopped: error of the modulus, whether the
-interval covers it, and how far 95 % of the surface really is from the phantom's. Touches that were solved
-before are read.
+Sealed phantoms: objects of the pool of varied ones, modulus and noise drawn by seed, a third without any
+effect, the others with one cause at 2 to 4 times the size from which it shows. The laboratory's robot
+explores each in every order, with errors of place, depth and speed, the same goals and the same stop rule.
+Told are presses and seconds until shape and modulus, and until the cause, were as sure as asked for, and what
+was true then. Each exploration is kept in the work folder by its content: a run that was interrupted goes on.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mechanics.errors import PalpateError
+from mechanics.files import atomic_file, cache_folder
 from mechanics.nearest import distance, sample
+from mechanics.store import content_key
 from palpate.arguments import progress_bar
+from palpate.benchmarks._explore_phantoms import Sealed, robot_of, sealed, strengthened
+from palpate.benchmarks._rates import wilson
 from palpate.benchmarks.timing import table
-from palpate.exploring.explorer import Explorer
+from palpate.exploring.causes import NONE
+from palpate.exploring.explorer import Explorer, State
 from palpate.exploring.goals import GoalOptions
 from palpate.exploring.orders import ORDERS
-from palpate.exploring.robot import LaboratoryRobot
-from scenes.laboratory.session import SimulateOptions
-from scenes.variety.draws import draw
-from scenes.variety.objects import thing
+from scenes.laboratory.specimen import VERSION as LABORATORY
 
 SUMMARY = "guided exploration against other orders: presses and seconds until the goals are met"
+VERSION = 1
+"""Of what an exploration does: raised when kept ones say nothing of the program any more."""
+NAMES = ("guided", *ORDERS)
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """How many phantoms, which orders, how many presses at most."""
     parser.add_argument("--count", type=int, default=60, help="phantoms (default: 60)")
     parser.add_argument("--first", type=int, default=0, help="first seed (default: 0)")
-    parser.add_argument(
-        "--orders", nargs="+", choices=("guided", *ORDERS), default=["guided", *ORDERS], help="(default: all)"
-    )
-    parser.add_argument("--most", type=int, default=30, help="presses at most (default: 30)")
+    parser.add_argument("--orders", nargs="+", choices=NAMES, default=list(NAMES), help="(default: all)")
+    parser.add_argument("--most", type=int, default=20, help="presses at most (default: 20)")
+    parser.add_argument("--work", type=Path, help="folder of explorations that were made")
+    parser.add_argument("--only-read", action="store_true", help="tell what is there, make nothing")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Explore every phantom in every order; print medians."""
+    work = arguments.work or cache_folder() / "bench-explore"
+    goals = GoalOptions(most=arguments.most, cause_at=0.95)
+    seeds = range(arguments.first, arguments.first + arguments.count)
+    jobs = [(order, seed) for order in arguments.orders for seed in seeds]
     made: list[dict[str, Any]] = []
-    jobs = [
-        (s, o) for s in range(arguments.first, arguments.first + arguments.count) for o in arguments.orders
-    ]
     with progress_bar("explorations") as bar:
-        for done, (seed, order) in enumerate(jobs):
-            made.append(explored(seed, order, arguments.most))
+        for done, (order, seed) in enumerate(jobs):
+            row = kept(work, seed, order, goals, only_read=arguments.only_read)
+            made += [row] if row else []
             bar("explorations", (done + 1) / len(jobs))
-    rows = []
-    for order in arguments.orders:
-        own = [m for m in made if m["order"] == order and not m["trouble"]]
-        if not own:
-            rows.append([order, 0, *[""] * 8])
-            continue
-        met = [m for m in own if m["met"]]
-        presses, seconds = ([m[k] for m in own] for k in ("presses", "seconds"))
-        rows.append([
-            order, len(own), f"{len(met)}", float(np.median(presses)), f"{min(presses)} to {max(presses)}",
-            float(np.median(seconds)), 100 * float(np.median([abs(m["modulus_error"]) for m in own])),
-            f"{sum(m['covered'] for m in own)}", 1e3 * float(np.median([m["surface_m"] for m in own])),
-            float(np.median([m["update_s"] for m in own])),
-        ])  # fmt: skip
-    heads = ["order", "explorations", "goals met", "presses, median", "least to most", "seconds of exploring",
-             "modulus error [%]", "covered", "95 % of surface within [mm]", "update, median [s]"]  # fmt: skip
-    print(table(heads, rows))
-    for m in made:
-        if m["trouble"]:
-            print(f"seed {m['seed']}, {m['order']}: {m['trouble']}")
+    print(tables(made, arguments.orders))
     return {"explorations": made}
 
 
-def explored(seed: int, order: str, most: int) -> dict[str, Any]:
-    """One exploration. A phantom that cannot be explored is told with its trouble."""
-    drawn = draw(seed)
-    object_ = thing(drawn.number)
-    phantom = object_.phantom
-    options = SimulateOptions(
-        young_modulus_pa=drawn.young_modulus_pa,
-        tip_radius_m=object_.tip_radius_m,
-        force_noise_std_n=drawn.noise_n,
-    )
-    robot = LaboratoryRobot(phantom, seed=seed, options=options)
+def kept(work: Path, seed: int, order: str, goals: GoalOptions, *, only_read: bool) -> dict[str, Any] | None:
+    """One exploration, read where it was made before."""
+    about = {"goals": dataclasses.asdict(goals), "version": VERSION, "laboratory": LABORATORY}
+    phantom = _stored(work / "phantoms", {"seed": seed, **about}, lambda: _phantom(seed), only_read)
+    if phantom is None:
+        return None
+    if phantom["trouble"]:
+        return {"seed": seed, "order": order, "trouble": phantom["trouble"]}
+    it = Sealed(**phantom["sealed"])
+    content = {"seed": seed, "order": order, **about}
+    return _stored(work / "explorations", content, lambda: explored(it, order, goals), only_read)
+
+
+def _phantom(seed: int) -> dict[str, Any]:
+    try:
+        return {"sealed": dataclasses.asdict(strengthened(sealed(seed))), "trouble": ""}
+    except PalpateError as error:
+        return {"sealed": dataclasses.asdict(sealed(seed)), "trouble": str(error)}
+
+
+def _stored(
+    folder: Path, content: dict[str, Any], make: Callable[[], dict[str, Any]], only_read: bool
+) -> dict[str, Any] | None:
+    name = "-".join(str(content[k]) for k in ("seed", "order") if k in content)
+    path = folder / f"{name}-{content_key(json.dumps(content, sort_keys=True))[:12]}.json"
+    if path.exists():
+        return json.loads(path.read_text(encoding="utf-8"))
+    if only_read:
+        return None
+    made = make()
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(path) as temporary:
+        temporary.write_text(json.dumps(made), encoding="utf-8")
+    return made
+
+
+def explored(it: Sealed, order: str, goals: GoalOptions) -> dict[str, Any]:
+    """One exploration, step by step. A phantom that cannot be explored is told with its trouble."""
+    robot = robot_of(it)
     explorer = Explorer(
         robot.instrument,
-        GoalOptions(most=most),
-        poisson_ratio=phantom.poisson_ratio,
-        seed=seed,
+        goals,
+        poisson_ratio=robot.phantom.poisson_ratio,
+        seed=it.seed,
         order=None if order == "guided" else ORDERS[order],
     )
-    updates: list[float] = []
-    row: dict[str, Any] = {"seed": seed, "object": phantom.name, "order": order, "trouble": ""}
+    row: dict[str, Any] = {**dataclasses.asdict(it), "object": robot.phantom.name, "order": order}
+    steps: list[dict[str, Any]] = []
+    trouble, begin = "", time.process_time()
     try:
         while (suggestion := explorer.suggest()).kind != "stop":
-            state = explorer.add(robot.carry_out(suggestion))
-            updates.append(sum(state.update_s.values()))
+            segment = robot.carry_out(suggestion)
+            clock = time.process_time()
+            state = explorer.add(segment)
+            steps.append(_step(explorer, state, it, robot, time.process_time() - clock))
     except PalpateError as error:
-        return row | {"trouble": str(error)}
-    state, surface = explorer.state, explorer.estimate.surface
-    if surface is None:
-        return row | {"trouble": state.trouble or "no surface"}
-    true = (phantom.vertices, phantom.faces)
-    points = sample(surface.vertices, surface.triangles, 3000)
-    points = points[points[:, 2] > 1e-3]
-    off = distance(*true, points)
-    low, high = state.modulus_ci95_pa
-    return row | {
-        "met": state.done,
-        "presses": state.made,
+        trouble = str(error)
+    return row | {"steps": steps, "trouble": trouble, "cpu_s": time.process_time() - begin}
+
+
+def _step(explorer: Explorer, state: State, it: Sealed, robot: Any, update_s: float) -> dict[str, Any]:
+    """What was known after a touch, and what was true."""
+    step: dict[str, Any] = {
+        "made": state.made,
+        "presses": state.presses,
         "seconds": state.seconds,
-        "modulus_error": state.modulus_pa / drawn.young_modulus_pa - 1,
-        "covered": bool(low <= drawn.young_modulus_pa <= high),
-        "surface_m": float(np.percentile(off, 95)),
-        "update_s": float(np.median([u for u in updates if u > 0] or [0.0])),
+        "update_s": update_s,
+        "met": [s.name for s in state.standing if s.met],
+        "trouble": state.trouble,
     }
+    surface = explorer.estimate.surface
+    if surface is not None:
+        low, high = state.modulus_ci95_pa
+        step["modulus_error"] = state.modulus_pa / it.young_modulus_pa - 1
+        step["covered"] = bool(low <= it.young_modulus_pa <= high)
+        step["surface_m"] = _off(surface, robot) if {"surface"} <= set(step["met"]) else None
+    if state.causes is not None:
+        step["standing"] = state.causes.standing(state.cause_at)
+        step["ratio"] = {k: v for k, v in state.causes.ratio.items() if v > 1e-4}
+        step["misfit"] = state.causes.misfit
+        step["modulus_beside_cause_error"] = state.causes.modulus_pa / it.young_modulus_pa - 1
+    return step
+
+
+def _off(surface: Any, robot: Any) -> float:
+    """m, within which 95 % of the surface lies of the phantom's."""
+    points = sample(surface.vertices, surface.triangles, 1500)
+    points = points[points[:, 2] > 1e-3]
+    return float(np.percentile(distance(robot.phantom.vertices, robot.phantom.faces, points), 95))
+
+
+def first_at(row: dict[str, Any], good: Callable[[dict[str, Any]], bool]) -> dict[str, Any] | None:
+    """The first step at which `good` holds."""
+    return next((s for s in row["steps"] if good(s)), None)
+
+
+def shape_and_modulus(step: dict[str, Any]) -> bool:
+    """Both goals met, by the explorer's own word."""
+    return {"modulus", "surface"} <= set(step["met"])
+
+
+def alone(step: dict[str, Any]) -> bool:
+    """One cause, or none, left by itself."""
+    return len(step.get("standing", [])) == 1
+
+
+def tables(made: list[dict[str, Any]], orders: list[str]) -> str:
+    """Both tables: shape and modulus; causes."""
+    shape, cause, heads = [], [], []
+    for order in orders:
+        own = [m for m in made if m["order"] == order and m.get("steps")]
+        if not own:
+            continue
+        met = [(m, s) for m in own if (s := first_at(m, shape_and_modulus))]
+        calm = [s for m, s in met if not m["cause"]]
+        shape.append([
+            order, len(own), len(met), _median([s["made"] for _, s in met], len(own)),
+            _median([s["seconds"] for _, s in met], len(own)),
+            _middle([100 * abs(s["modulus_error"]) for s in calm]),
+            f"{sum(s['covered'] for s in calm)}/{len(calm)}",
+            _middle([1e3 * s["surface_m"] for _, s in met if s["surface_m"] is not None]),
+            _middle([s["update_s"] for m in own for s in m["steps"] if s["presses"] >= 5]),
+        ])  # fmt: skip
+        there = [m for m in own if m["cause"]]
+        told = [(m, s) for m in there if (s := first_at(m, alone))]
+        right = [s for m, s in told if s["standing"] == [m["cause"]]]
+        none = [m for m in own if not m["cause"]]
+        alarms = sum(any(NONE not in s.get("standing", [NONE]) for s in m["steps"]) for m in none)
+        lost = sum(any(m["cause"] not in s.get("standing", [m["cause"]]) for s in m["steps"]) for m in there)
+        _, low, high = wilson(alarms, len(none)) if none else (0.0, 0.0, 1.0)
+        cause.append([
+            order, len(there), len(right), len(told) - len(right), lost,
+            _median([s["made"] for s in right], len(there)),
+            _median([s["seconds"] for s in right], len(there)),
+            f"{alarms}/{len(none)} ({100 * low:.0f} to {100 * high:.0f} %)",
+        ])  # fmt: skip
+    heads = ["order", "phantoms", "goals met", "presses, median", "seconds", "modulus error, no effect [%]",
+             "covered", "95 % of surface within [mm]", "update, median [CPU s]"]  # fmt: skip
+    more = ["order", "with a cause", "right one alone", "wrong one alone", "true one ever out",
+            "presses, median", "seconds", "'none' ever out where it is true"]  # fmt: skip
+    troubles = [f"seed {m['seed']}, {m['order']}: {m['trouble']}" for m in made if m["trouble"]]
+    return "\n".join([table(heads, shape), "", table(more, cause), *troubles])
+
+
+def _median(values: list[float], of: int) -> str:
+    """Median over all `of` explorations, those that did not get there counting as worst."""
+    ranked = sorted(values) + [np.inf] * (of - len(values))
+    if not ranked:
+        return "-"
+    middle = 0.5 * (ranked[(of - 1) // 2] + ranked[of // 2])
+    return f"{middle:.0f}" if np.isfinite(middle) else "not reached"
+
+
+def _middle(values: list[float]) -> float:
+    return float(np.median(values)) if values else float("nan")

@@ -67,13 +67,14 @@ def _run(arguments: argparse.Namespace, folder: Path) -> None:
     from palpate.report.demo import write_report
     from scenes.build import keep
     from scenes.embedded import embedded_recording
-    from scenes.scene import load_scene
+    from scenes.scene import FOLDER, read_scene
 
     source = arguments.recording or embedded_recording()
     result = run_demo(source, folder, options_from(arguments, DemoOptions), progress_bar, arguments.seed)
     report = write_report(result, folder)
     if not arguments.recording:
-        keep(load_scene("demo"), folder / "model")  # 'palpate touch' opens at once
+        # 'palpate touch' opens at once; by its file, as a folder of that name would go before it
+        keep(read_scene(FOLDER / "demo.toml"), folder / "model")
     model = result.model
     say(
         arguments,

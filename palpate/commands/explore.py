@@ -1,10 +1,11 @@
 """Guided exploration: where to touch next and why, what is known so far, and when to stop.
 
 In the virtual laboratory (--phantom NAME) a simulated robot follows the suggestions with errors of place,
-way and depth. A robot of your own talks over standard input and output (--robot): one line of JSON a
-suggestion and a segment, as docs/exploring.md tells. The recording so far is written after every touch, so an
-exploration that was interrupted is whole.
-At the end `palpate reconstruct` makes a MODEL of it like any other.
+way and depth. In the touch window (--device NAME, --scene) a ghost tip shows where and how to press. A robot
+of your own talks over standard input and output (--robot): one line of JSON a suggestion and a segment, as
+docs/exploring.md tells. The recording so far is written after every touch, so an exploration that was
+interrupted is whole, and --continue goes on with it. At the end `palpate reconstruct` makes a MODEL of it
+like any other.
 """
 
 from __future__ import annotations
@@ -12,9 +13,12 @@ from __future__ import annotations
 import argparse
 import sys
 
+import numpy as np
+
 from mechanics.errors import OptionError
-from mechanics.recording import SAMPLES
+from mechanics.recording import SAMPLES, read_recording
 from palpate.arguments import (
+    add_input,
     add_json,
     add_options,
     add_output,
@@ -28,6 +32,7 @@ from palpate.exploring.candidates import ReachOptions
 from palpate.exploring.explorer import Explorer, State, Suggestion, check_goals
 from palpate.exploring.goals import GoalOptions
 from palpate.exploring.robot import RobotOptions
+from palpate.exploring.rows import Instrument
 
 SUMMARY = "where to touch next, and when to stop"
 
@@ -39,6 +44,24 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--phantom", metavar="NAME", help="explore this phantom of the laboratory, or a surface file"
     )
     who.add_argument("--robot", action="store_true", help="talk with a robot: lines of JSON, in and out")
+    who.add_argument("--device", metavar="NAME", help="explore in the touch window: mouse, or another")
+    parser.add_argument(
+        "--scene",
+        default="nodule",
+        metavar="MODEL_OR_SCENE",
+        help="with --device: what is felt (default: nodule)",
+    )
+    parser.add_argument("--screenshot", metavar="PNG", help="with --device: save the window at its end")
+    parser.add_argument(
+        "--seconds", type=float, metavar="NUMBER", help="with --device: stop after this time [s]"
+    )
+    add_input(
+        parser,
+        "--continue",
+        dest="going_on",
+        metavar="REC",
+        help="go on with what was explored so far",
+    )
     add_output(
         parser, "-o", "--output", kind=SAMPLES, required=True, metavar="REC",
         help="recording to write (.csv.gz, .csv), after every touch",
@@ -86,18 +109,63 @@ def run(arguments: argparse.Namespace) -> int:
     reach = options_from(arguments, ReachOptions)
     if arguments.robot:
         return _robot(arguments, goals, reach)
+    if arguments.device:
+        return _window(arguments, goals, reach)
     return _phantom(arguments, goals, reach)
+
+
+def _explorer(
+    arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions, instrument: Instrument, nu: float
+) -> Explorer:
+    """A new one, or one that goes on with what --continue names."""
+    if arguments.going_on is None:
+        return Explorer(instrument, goals, reach, poisson_ratio=nu, seed=arguments.seed)
+    recording = read_recording(arguments.going_on)
+    made = Explorer.going_on(recording, goals, reach, poisson_ratio=nu, seed=arguments.seed)
+    if not np.isclose(made.instrument.tip_radius_m, instrument.tip_radius_m, rtol=0.01):
+        raise OptionError(
+            f"{arguments.going_on} was explored with a tip of {1e3 * made.instrument.tip_radius_m:.2f} mm, "
+            f"this one has {1e3 * instrument.tip_radius_m:.2f} mm: go on with the same tip"
+        )
+    return made
+
+
+def _window(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
+    from palpate.commands import touch
+    from palpate.exploring.guide import Guide
+    from palpate.window.session import TouchSession
+
+    parser = argparse.ArgumentParser()
+    touch.add_arguments(parser)
+    words = [arguments.scene, "--device", arguments.device, "--seed", str(arguments.seed)]
+    for name in ("screenshot", "seconds"):
+        if getattr(arguments, name) is not None:
+            words += [f"--{name}", str(getattr(arguments, name))]
+    kept: list[Explorer] = []
+
+    def guided(session: TouchSession) -> Guide:
+        servo, nu = session.servo, session.model.material.poisson_ratio
+        instrument = Instrument(
+            servo.tip_radius_m, servo.options.rate_hz, {"object_name": session.title, "poisson_ratio": nu}
+        )
+        kept.append(_explorer(arguments, goals, reach, instrument, nu))
+        return Guide(kept[-1], servo, session.model, session.worker, arguments.output)
+
+    touch.run(parser.parse_args(words), guided)
+    state = kept[-1].state
+    say(arguments, _line(kept[-1].suggest(), state))
+    emit_json({"recording": arguments.output, **state.table()}, arguments.json)
+    return 0
 
 
 def _robot(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
     from palpate.exploring.protocol import serve
-    from palpate.exploring.rows import Instrument
 
     if not (arguments.rate > 0 and arguments.tip_radius > 0):
         raise OptionError("--rate and --tip-radius must be greater than 0")
     about = {"poisson_ratio": arguments.poisson_ratio}
     instrument = Instrument(arguments.tip_radius, arguments.rate, about)
-    explorer = Explorer(instrument, goals, reach, poisson_ratio=arguments.poisson_ratio, seed=arguments.seed)
+    explorer = _explorer(arguments, goals, reach, instrument, arguments.poisson_ratio)
 
     def tell(line: str) -> None:
         print(line, flush=True)
@@ -120,9 +188,8 @@ def _phantom(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOpti
         options=SimulateOptions(young_modulus_pa=arguments.modulus, tip_radius_m=arguments.tip_radius),
         robot=options_from(arguments, RobotOptions),
     )
-    explorer = Explorer(
-        robot.instrument, goals, reach, poisson_ratio=thing.poisson_ratio, seed=arguments.seed
-    )
+    explorer = _explorer(arguments, goals, reach, robot.instrument, thing.poisson_ratio)
+    robot.made = sum(s.kind == "press" for s in explorer.segments)
     steps: list[dict] = []
     while True:
         suggestion = explorer.suggest()
@@ -153,6 +220,9 @@ def _line(suggestion: Suggestion, state: State) -> str:
             f"({state.modulus_ci95_pa[0] / 1e3:.1f} to {state.modulus_ci95_pa[1] / 1e3:.1f}), "
             f"surface within {1e3 * state.surface_error_m:.1f} mm"
         )
+    if state.causes is not None:
+        likeliest, *others = state.causes.standing(state.cause_at)
+        known += f", cause: {likeliest}" + (f" or {len(others)} others" if others else "")
     if suggestion.point is None:
         return f"{known}; {suggestion.kind}: {suggestion.why}"
     x, y, z = (1e3 * float(v) for v in suggestion.point)

@@ -18,6 +18,7 @@ from mechanics.errors import OptionError
 from mechanics.recording import SAMPLES
 from palpate import api
 from palpate.arguments import add_input, add_json, add_output, emit_json, finite, say, vector
+from palpate.importing.written import PICTURE
 
 SUMMARY = "other programs' files become a recording"
 
@@ -48,7 +49,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--name", help="of the object")
     parser.add_argument("--slab", type=finite, metavar="NUMBER", help="the object is a slab so thick [m]")
     parser.add_argument("--half-space", action="store_true", help="the object is deep and wide")
-    parser.add_argument("--picture", metavar="PNG", help="what was understood (default: beside REC; 'none')")
+    add_output(
+        parser, "--picture", kind=PICTURE, metavar="PNG",
+        help="what was understood (default: beside REC; 'none')",
+    )  # fmt: skip
     parser.add_argument("--dry-run", action="store_true", help="picture and summary only: write no recording")
     add_json(parser)
 

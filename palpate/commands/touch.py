@@ -12,9 +12,10 @@ import argparse
 import os
 import sys
 import time
-from contextlib import ExitStack
+from collections.abc import Callable
+from contextlib import ExitStack, closing
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,6 +26,7 @@ from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
 from mechanics.errors import DeviceError, OptionError
 from mechanics.files import PNG
 from mechanics.model import Model
+from mechanics.progress import Progress
 from mechanics.recording import SAMPLES
 from palpate.arguments import (
     add_input,
@@ -47,6 +49,9 @@ from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene
+
+if TYPE_CHECKING:
+    from palpate.exploring.guide import Guide
 
 SUMMARY = "feel a model or scene at 1 kHz"
 DEFAULT_SCENE = "demo"
@@ -105,8 +110,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Open, touch, close; prints what the servo did."""
+def run(arguments: argparse.Namespace, guided: Callable[[TouchSession], Guide] | None = None) -> int:
+    """Open, touch, close; prints what the servo did. guided: makes an exploration's guide, for the window."""
     scene = given_scene(arguments, arguments.scene)
     name = arguments.device or ("simulated" if arguments.headless else "mouse")
     _check(arguments, name)
@@ -119,38 +124,40 @@ def run(arguments: argparse.Namespace) -> int:
     for word in servo_options.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
     with ExitStack() as stack:
-        bar = stack.enter_context(progress_bar("touch"))
-        model = model_of(scene, lambda stage, share: bar(stage, 0.5 * share))
-        channel = None
-        if name == "mouse":
-            channel = PoseChannel.create()
-            stack.callback(channel.close)
-            channel.write(time.perf_counter(), tuple(_above(model)))
-        device, until = device_choice(arguments, name, model, channel)
-        session = stack.enter_context(
-            TouchSession(
-                model,
-                title=scene.title,
-                device=device,
-                renderer=arguments.renderer or scene.renderer,
-                beside=_beside(arguments, scene),
-                render_options=with_friction(options_from(arguments, RenderOptions), scene),
-                mapping=_mapping(arguments, name, scene, model),
-                options=servo_options,
-                recording=arguments.record,
-                pictures=not arguments.headless,
-            )
-        )
-        session.start(lambda stage, share: bar(stage, 0.5 + 0.5 * share))
-        bar.close()
-        session.enable()
-        seconds = arguments.seconds if arguments.seconds is not None else until
-        if arguments.headless:
-            _wait(session, seconds)
-        else:
-            from palpate.window.window import TouchWindow
+        channel = stack.enter_context(closing(PoseChannel.create())) if name == "mouse" else None
 
-            TouchWindow(session, scene, channel).run(seconds, screenshot=arguments.screenshot)
+        def prepare(tell: Progress) -> tuple[TouchSession, float | None]:
+            model = model_of(scene, lambda stage, share: tell(stage, 0.5 * share))
+            if channel is not None:
+                channel.write(time.perf_counter(), tuple(_above(model)))
+            device, until = device_choice(arguments, name, model, channel)
+            session = stack.enter_context(
+                TouchSession(
+                    model,
+                    title=scene.title,
+                    device=device,
+                    renderer=arguments.renderer or scene.renderer,
+                    beside=_beside(arguments, scene),
+                    render_options=with_friction(options_from(arguments, RenderOptions), scene),
+                    mapping=_mapping(arguments, name, scene, model),
+                    options=servo_options,
+                    recording=arguments.record,
+                    pictures=not arguments.headless,
+                )
+            )
+            session.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
+            return session, until
+
+        if arguments.headless:
+            with progress_bar("touch") as bar:
+                session, until = prepare(bar)
+            session.enable()
+            _wait(session, until if arguments.seconds is None else arguments.seconds)
+        else:
+            shown = _in_window(prepare, scene, channel, arguments, guided)
+            if shown is None:
+                return 0
+            session = shown
         report = session.report()
     say(arguments, f"{scene.title}: {session.renderer_name}, {name}", str(report))
     if arguments.record is not None:
@@ -159,6 +166,34 @@ def run(arguments: argparse.Namespace) -> int:
     if session.servo.failure:
         raise DeviceError(session.servo.failure)
     return 0
+
+
+def _in_window(
+    prepare: Callable[[Progress], tuple[TouchSession, float | None]],
+    scene: Scene,
+    channel: PoseChannel | None,
+    arguments: argparse.Namespace,
+    guided: Callable[[TouchSession], Guide] | None,
+) -> TouchSession | None:
+    """A window from the first moment on, which shows how the preparation comes along; then the touch. None
+    where a person closes it before."""
+    from palpate.window.waiting import ClosedError, WaitingWindow
+    from palpate.window.window import SIZE, TouchWindow
+
+    waiting = WaitingWindow(f"Palpate: {scene.title}", SIZE)
+    try:
+        session, until = waiting.run(prepare)
+        session.enable()
+        guide = None if guided is None else guided(session)
+        window = TouchWindow(session, scene, channel, guide=guide)
+        seconds = until if arguments.seconds is None else arguments.seconds
+        window.run(seconds, screenshot=arguments.screenshot, shown=waiting.close)
+    except ClosedError as error:
+        print(f"palpate touch: {error}", file=sys.stderr)
+        return None
+    finally:
+        waiting.close()
+    return session
 
 
 def _check(arguments: argparse.Namespace, name: str) -> None:

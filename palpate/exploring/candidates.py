@@ -9,13 +9,15 @@ error of first touch is a greater share of its depth.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from mechanics.options import option
 from mechanics.tetmesh import vertex_normals
-from palpate.exploring.goals import Standing, surface_error
+from palpate.exploring.goals import Standing, surface_error, vertex_areas
+from palpate.exploring.parting import Parting
 from reconstruct.boundary import Boundary, farthest_points
 from reconstruct.shape_error import CORRELATION_M
 from reconstruct.surface import Surface
@@ -43,12 +45,13 @@ class ReachOptions:
     air_speed_m_per_s: float = option(0.12, "speed through the air", unit="m/s")
     hold_s: float = option(0.2, "how long a press is held", unit="s")
     clearance_m: float = option(0.012, "height above the surface where a press begins", unit="m")
+    between_s: float = option(0.5, "what it takes to begin another touch", unit="s")
 
 
 @dataclass(frozen=True)
 class Candidate:
     """A touch that could be made: surface point (3,), outward unit normal (3,), depth m, seconds it takes,
-    worth a second, and which goal gains most."""
+    worth a second, and which goal gains most; how it is pressed, and what causes that would part."""
 
     point: np.ndarray
     normal: np.ndarray
@@ -56,6 +59,9 @@ class Candidate:
     seconds: float
     worth: float
     for_goal: str
+    speed_m_per_s: float = 0.02
+    hold_s: float = 0.2
+    parting: Parting | None = None
 
 
 def places(surface: Surface, tip_radius_m: float) -> np.ndarray:
@@ -84,43 +90,91 @@ def weighed(
     modulus_pa: float,
     tip_radius_m: float,
     reach: ReachOptions,
+    partings: Sequence[Parting] = (),
+    asked: np.ndarray | None = None,
 ) -> list[Candidate]:
     """All touches, the best first. touched: (k, 3) m, places pressed so far, depths_m (k,); here: (3,) m,
-    where the tip is.
+    where the tip is. asked: (a, 3) m, places that were suggested: where one was not reached, so as not to ask
+    in vain again, no place nearby counts as new.
 
     modulus_sd: of its logarithm, of which modulus_bias no touch takes away. modulus_pa: nan where unknown.
+    partings: what each way of pressing would tell of causes, at the places pressed so far.
     """
-    rows = places(surface, tip_radius_m)
+    rows = _not_in_vain(surface.vertices, places(surface, tip_radius_m), touched, asked)
     normals = vertex_normals(surface.vertices, surface.triangles)
     area = vertex_areas(surface.vertices, surface.triangles)
     free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
-    missing = {s.name: s for s in standing}
+    missing = {s.name: s for s in standing if s.missing > 0}
+    own = surface_error(surface.uncertainty_m[free], area[free])
     made = []
     for row in rows:
         point, normal = surface.vertices[row], normals[row]
-        depth = press_depth(surface, point, modulus_pa, tip_radius_m, reach)
-        gains = {}
-        if "surface" in missing and missing["surface"].missing > 0:
+        deepest = press_depth(surface, point, modulus_pa, tip_radius_m, reach)
+        gain = 0.0
+        if "surface" in missing:
             after = after_touch(surface.vertices, surface.uncertainty_m, row)
-            now = surface_error(after[free], area[free])
-            gains["surface"] = missing["surface"].missing - Standing("", now, missing["surface"].goal).missing
-        if "modulus" in missing and missing["modulus"].missing > 0:
-            sd = modulus_after(touched, depths_m, point, depth, modulus_sd, modulus_bias)
-            gains["modulus"] = (
-                missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
+            gain = float(np.log(own / surface_error(after[free], area[free])))
+        nearest = int(np.argmin(((touched - point) ** 2).sum(axis=1))) if len(touched) else 0
+        for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), partings, reach):
+            gains = {"surface": gain}
+            if "modulus" in missing:
+                sd = modulus_after(touched, depths_m, point, way.depth_m, modulus_sd, modulus_bias)
+                gains["modulus"] = (
+                    missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
+                )
+            if "cause" in missing:
+                told = UNTOLD if way.parting is None else way.parting.gain
+                gains["cause"] = float(np.atleast_1d(told)[min(nearest, np.size(told) - 1)])
+            seconds = (
+                float(np.linalg.norm(point - here)) / reach.air_speed_m_per_s
+                + 2 * reach.clearance_m / reach.air_speed_m_per_s
+                + 2 * way.depth_m / way.speed_m_per_s
+                + way.hold_s
+                + reach.between_s
             )
-        else:
-            depth = min(depth, LIGHT_M)
-        seconds = (
-            float(np.linalg.norm(point - here)) / reach.air_speed_m_per_s
-            + 2 * reach.clearance_m / reach.air_speed_m_per_s
-            + 2 * depth / reach.press_speed_m_per_s
-            + reach.hold_s
-        )
-        total = sum(gains.values())
-        best = max(gains, key=lambda g: gains[g], default="surface")
-        made.append(Candidate(point, normal, depth, seconds, total / seconds, best))
+            best = max(gains, key=lambda g: gains[g])
+            made.append(
+                Candidate(
+                    point, normal, way.depth_m, seconds, sum(gains.values()) / seconds, best,
+                    way.speed_m_per_s, way.hold_s, way.parting,
+                )
+            )  # fmt: skip
     return sorted(made, key=lambda c: -c.worth)
+
+
+UNTOLD = 1e-3
+"""Log evidence of a press whose worth for the cause is not known: any is better than none."""
+
+
+@dataclass(frozen=True)
+class _Way:
+    depth_m: float
+    speed_m_per_s: float
+    hold_s: float
+    parting: Parting | None = None
+
+
+def _ways(deepest: float, deep: bool, partings: Sequence[Parting], reach: ReachOptions) -> list[_Way]:
+    """How a place may be pressed: as usual, or by a plan that parts causes."""
+    usual = _Way(deepest if deep else min(deepest, LIGHT_M), reach.press_speed_m_per_s, reach.hold_s)
+    return [
+        usual,
+        *(_Way(min(p.depth_m, deepest), p.plan.speed, p.plan.hold, p) for p in partings),
+    ]
+
+
+def _not_in_vain(
+    vertices: np.ndarray, rows: np.ndarray, touched: np.ndarray, asked: np.ndarray | None
+) -> np.ndarray:
+    """Those of `rows` that do not lie where a suggestion was made and nothing near it was touched."""
+    if asked is None or not len(asked) or not len(touched):
+        return rows
+    away = np.linalg.norm(asked[:, None] - touched[None], axis=2).min(axis=1)
+    vain = asked[away > SPACING_M]
+    if not len(vain):
+        return rows
+    near = np.linalg.norm(vertices[rows][:, None] - vain[None], axis=2).min(axis=1) < SPACING_M
+    return rows[~near] if not near.all() else rows
 
 
 def after_touch(vertices: np.ndarray, deviation_m: np.ndarray, row: int) -> np.ndarray:
@@ -164,13 +218,6 @@ def press_depth(
         stiff = 4 / 3 * modulus_pa / (1 - 0.49**2) * np.sqrt(tip_radius_m)
         depth = min(depth, (reach.strongest_n / stiff) ** (2 / 3))
     return float(depth)
-
-
-def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """(n,) m^2: a third of the triangles around each vertex."""
-    corner = vertices[triangles]
-    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
-    return np.bincount(triangles.ravel(), np.repeat(size / 3, 3), minlength=len(vertices))
 
 
 def first_places(

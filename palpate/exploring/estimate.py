@@ -13,52 +13,72 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from mechanics.nearest import distance
+from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.sites import TouchSites, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
+from palpate.exploring.goals import surface_error, vertex_areas
 from reconstruct.casting import cast
-from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.contacts import ContactOptions, Exploration, explore, filtered_of
+from reconstruct.filtering import FilterOptions
 from reconstruct.meshing import MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.pipeline import Clock
-from reconstruct.shape_error import compliance_covariance
+from reconstruct.shape_error import compliance_covariance, shape_gradients
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
+from reconstruct.tool_weight import ToolWeight
 
 MESH_M, SURFACE_EDGE_M = 0.016, 0.010
 """Tetrahedra of the running estimate, and of its surface."""
 LEAST_PRESSES = 4
 _ALL_SHAPES_EVERY = 6
+_CONFIRMED_AFTER = 2
+"""Presses since all families were tried, after which a goal that one family meets has them tried again."""
 _MOVED_M = 0.0007
-"""The mesh is made anew where the surface has left it by more than this (95 % of the vertices)."""
+"""The mesh is made anew where the surface has left it by more than this (95 % of the vertices) ..."""
+_MOVED_SHARE = 0.25
+"""... and more than this share of what the surface is uncertain by."""
 _BOOTSTRAPS = 200
 
 
 @dataclass(frozen=True)
 class Solved:
-    """A mesh with its factorisation, the surface it fills, and the far fields solved on it by place."""
+    """A mesh with its factorisation, the surface it fills, and what was solved on it by place: far fields,
+    and how each answers to an error of the shape (reconstruct.shape_error.shape_gradients)."""
 
     surface: Surface
     mesh: TetMesh
     solver: Solver
-    far: dict[bytes, TouchSites] = field(default_factory=dict)
+    far: dict[bytes, tuple[TouchSites, np.ndarray]] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
 class Estimate:
     """What is known after the presses so far. surface, fit: None before LEAST_PRESSES were found.
 
+    weight: of the tool. presses_placed: the table on the surface, a row of `sites` each.
+    choice_error_m: within which 95 % of the surface lay when all families were tried last.
     presses_at_choice: how many there were when the shape's family was chosen last. seconds: wall time of
     each step of this update.
     """
 
     exploration: Exploration | None = None
+    weight: ToolWeight | None = None
     surface: Surface | None = None
     solved: Solved | None = None
+    presses_placed: Presses | None = None
     sites: TouchSites | None = None
     fit: ModulusFit | None = None
     presses_at_choice: int = 0
+    choice_error_m: float = float("inf")
     seconds: dict[str, float] = field(default_factory=dict)
+
+    @property
+    def surface_error_m(self) -> float:
+        """Within which 95 % of the surface lies, by its own word and by that of all families of shapes."""
+        assert self.surface is not None
+        return max(free_error(self.surface), self.choice_error_m)
 
     @property
     def presses(self) -> int:
@@ -66,25 +86,36 @@ class Estimate:
         return 0 if self.exploration is None else len(self.exploration.presses)
 
 
-def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: int = 0) -> Estimate:
-    """The estimate with all that `recording` holds; `before`: of a beginning of it.
+def updated(
+    recording: Recording,
+    before: Estimate,
+    poisson_ratio: float,
+    seed: int = 0,
+    *,
+    within_m: float | None = None,
+) -> Estimate:
+    """The estimate with all that `recording` holds; `before`: of a beginning of it. within_m: as sure as the
+    surface is asked for; one family of shapes may only seem that sure, so all are tried before it counts.
 
     Raises ContactError where too few presses can be found, SurfaceError or MeshError where they do not make
     a body yet.
     """
     clock = Clock()
-    exploration = explore(recording, contact_options=ContactOptions(least_palpations=LEAST_PRESSES))
+    filtered = filtered_of(recording, FilterOptions().cutoff_hz, near=before.weight)
+    options = ContactOptions(least_palpations=LEAST_PRESSES)
+    exploration = explore(recording, contact_options=options, filtered=filtered)
     clock.lap("presses")
-    surface, chosen_at = _surface(exploration, before)
+    surface, chosen_at, choice_error = _surface(exploration, before, within_m)
     clock.lap("surface")
     solved = _solved(surface, before, poisson_ratio)
     clock.lap("mesh")
     touched = exploration.presses
     where = cast(solved.surface.vertices, solved.surface.triangles, touched.point, touched.contact_normal)
     presses = touched.on_surface(where.points, where.normals)
-    sites = _sites(solved, where.points, where.normals, poisson_ratio)
+    sites, gradient = solved_sites(solved, where.points, where.normals, poisson_ratio)
     clock.lap("touch sites")
-    covariance = compliance_covariance(solved.solver, sites, uncertainty_at(solved.solver.mesh, surface))
+    deviation = uncertainty_at(solved.solver.mesh, surface)
+    covariance = compliance_covariance(solved.solver, sites, deviation, gradient=gradient)
     fit = fit_modulus(
         presses,
         sites,
@@ -94,32 +125,52 @@ def updated(recording: Recording, before: Estimate, poisson_ratio: float, seed: 
         seed=seed,
     )
     clock.lap("modulus")
-    return Estimate(exploration, surface, solved, sites, fit, chosen_at, clock.laps)
+    return Estimate(
+        exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error,
+        clock.laps,
+    )  # fmt: skip
 
 
-def _surface(exploration: Exploration, before: Estimate) -> tuple[Surface, int]:
+def _surface(
+    exploration: Exploration, before: Estimate, within_m: float | None
+) -> tuple[Surface, int, float]:
+    """(surface, presses at the last choice of a family, m within which 95 % of the surface lay by that)."""
     count = len(exploration.presses)
     evidence = evidence_of(exploration)
     known = before.surface
     again = known is None or count >= before.presses_at_choice + min(_ALL_SHAPES_EVERY, count // 3 + 1)
-    if known is not None and not again and known.method != "implicit":
-        same = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
-        return reconstruct_surface(evidence, same), before.presses_at_choice
-    return reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=0.004)), count
+    if known is not None and not again:
+        options = SurfaceOptions(surface=known.method.removesuffix("+"), surface_spacing_m=0.004)
+        same = reconstruct_surface(evidence, options)
+        seems = within_m is not None and free_error(same) <= within_m < before.choice_error_m
+        if not seems or count < before.presses_at_choice + _CONFIRMED_AFTER:
+            return same, before.presses_at_choice, before.choice_error_m
+    chosen = reconstruct_surface(evidence, SurfaceOptions(surface_spacing_m=0.004))
+    return chosen, count, free_error(chosen)
+
+
+def free_error(surface: Surface) -> float:
+    """m, within which 95 % of the surface off the support lies, by its own word."""
+    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
+    area = vertex_areas(surface.vertices, surface.triangles)
+    return surface_error(surface.uncertainty_m[free], area[free])
 
 
 def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:
     kept = before.solved
     if kept is not None:
         off = distance(kept.surface.vertices, kept.surface.triangles, surface.vertices)
-        if np.percentile(off, 95) < _MOVED_M:
+        if np.percentile(off, 95) < max(_MOVED_M, _MOVED_SHARE * free_error(surface)):
             return kept
     mesh = mesh_surface(surface, MeshingOptions(mesh_size_m=MESH_M)).mesh
     return Solved(surface, mesh, touch_solver(mesh, poisson_ratio, surface_edge_m=SURFACE_EDGE_M))
 
 
-def _sites(solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_ratio: float) -> TouchSites:
-    """The sites of all presses; those whose place was solved on this mesh before are read."""
+def solved_sites(
+    solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_ratio: float
+) -> tuple[TouchSites, np.ndarray]:
+    """(sites of surface points (k, 3) with outward normals (k, 3), their shape gradients (k, m)); what was
+    solved on this mesh before is read."""
     keys = [np.round(np.concatenate(pair), 9).tobytes() for pair in zip(points, normals, strict=True)]
     new = [i for i, key in enumerate(keys) if key not in solved.far]
     width = patch_width(solved.solver.mesh)
@@ -132,17 +183,19 @@ def _sites(solved: Solved, points: np.ndarray, normals: np.ndarray, poisson_rati
             solver=solved.solver,
             patch_width_m=width,
         )
+        gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):
-            solved.far[keys[i]] = _rows(made, slice(row, row + 1))
+            solved.far[keys[i]] = _rows(made, slice(row, row + 1)), gradients[row]
     parts = [solved.far[key] for key in keys]
-    return TouchSites(
-        points=np.concatenate([p.points for p in parts]),
-        normals=np.concatenate([p.normals for p in parts]),
-        curvature=np.concatenate([p.curvature for p in parts]),
-        far=np.concatenate([p.far for p in parts]),
+    sites = TouchSites(
+        points=np.concatenate([p.points for p, _ in parts]),
+        normals=np.concatenate([p.normals for p, _ in parts]),
+        curvature=np.concatenate([p.curvature for p, _ in parts]),
+        far=np.concatenate([p.far for p, _ in parts]),
         patch_width_m=float(width),
         poisson_ratio=poisson_ratio,
     )
+    return sites, np.array([gradient for _, gradient in parts])
 
 
 def _rows(sites: TouchSites, rows: slice) -> TouchSites:

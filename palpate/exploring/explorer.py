@@ -7,22 +7,37 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
-from mechanics.errors import ContactError, MeshError, OptionError, SurfaceError
+from mechanics.errors import ContactError, DiagnosisError, MeshError, ModelError, OptionError, SurfaceError
+from mechanics.nearest import distance
 from mechanics.recording import Recording, write_recording
-from palpate.exploring.candidates import Candidate, ReachOptions, first_places, vertex_areas, weighed
+from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions, first_places, weighed
+from palpate.exploring.causes import Causes, Weighing, causes_of, words
 from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
-from palpate.exploring.goals import GoalOptions, Standing, surface_error
+from palpate.exploring.goals import GoalOptions, Standing
 from palpate.exploring.orders import Order
-from palpate.exploring.rows import Instrument, Segment, together
+from palpate.exploring.parting import RIGID_S, Parting, by_support, missing, partings
+from palpate.exploring.rows import Instrument, Segment, apart, check_joined, together
 from reconstruct.boundary import Boundary
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.modulus import ModulusOptions
+from reconstruct.pipeline import Clock
+
+FAR_FROM = 3.0
+"""Times as much as all presses that are left are expected to tell."""
+RECENT = 6
+"""Touches that test the surface: older ones tested another."""
+NEW_S = 0.1
+"""A press that begins so much later than the last one known is new."""
+TRUSTED = 3.0
+"""Touches by which a surface's own word of its uncertainty counts beside those that tested it."""
 
 
 @dataclass(frozen=True)
 class Suggestion:
-    """The next touch. kind: 'trace', 'press', or 'stop'; the rest holds for a press; device frame, SI units.
+    """What to do next. kind: 'trace', 'press', 'rigid' (press the bare support three times), 'free' (wave and
+    turn the tool in the air) or 'stop'; the rest holds for a press; device frame, SI units.
 
     point: (3,) where the surface is expected; normal: (3,) outward there. Come from outside along -normal,
     begin clearance_m above, go on until the force rises, then depth_m deeper at speed_m_per_s, hold hold_s,
@@ -62,7 +77,8 @@ class State:
     """What is known. modulus_pa, interval: nan where nothing is known. standing: goal by goal.
 
     presses: found and used; made: segments of presses that were added. seconds: of exploring so far.
-    update_s: wall time of the last update by step. trouble: why the last update could not be made, or "".
+    update_s: wall time of the last update by step. causes: where they are asked for and can be told;
+    cause_at: how surely. trouble: why the last update could not be made, or "".
     """
 
     presses: int
@@ -75,6 +91,8 @@ class State:
     standing: tuple[Standing, ...]
     update_s: dict[str, float] = field(default_factory=dict)
     trouble: str = ""
+    causes: Causes | None = None
+    cause_at: float = 0.95
 
     @property
     def done(self) -> bool:
@@ -97,6 +115,7 @@ class State:
             "surface": self.surface,
             "goals": {s.name: {"now": known(s.now), "goal": s.goal, "met": s.met} for s in self.standing},
             "done": self.done,
+            "causes": None if self.causes is None else self.causes.table(self.cause_at),
             "update_s": self.update_s,
             "trouble": self.trouble,
         }
@@ -129,6 +148,29 @@ class Explorer:
         self._estimate = Estimate()
         self._base: Boundary | None = None
         self._trouble = ""
+        self._asked: list[np.ndarray] = []
+        self._tests: list[float] = []
+        self._causes: tuple[Causes, Weighing] | None = None
+
+    @classmethod
+    def going_on(
+        cls,
+        recording: Recording,
+        goals: GoalOptions | None = None,
+        reach: ReachOptions | None = None,
+        **given: Any,
+    ) -> Explorer:
+        """The explorer of an exploration that was interrupted, from what it recorded; `given` as above.
+
+        Any recording of an exploration will do. Raises RecordingError, ContactError where it cannot be cut
+        into segments.
+        """
+        instrument, segments = apart(recording)
+        nu = {} if recording.poisson_ratio is None else {"poisson_ratio": recording.poisson_ratio}
+        made = cls(instrument, goals, reach, **{**nu, **given})
+        made.segments = segments
+        made.bring_up_to_date()
+        return made
 
     @property
     def recording(self) -> Recording:
@@ -149,16 +191,54 @@ class Explorer:
 
         A press that cannot be used is kept in the recording and named in `state.trouble`.
         """
+        check_joined(self.instrument, self.segments, segment)
         self.segments.append(segment)
+        self.bring_up_to_date()
+        return self.state
+
+    def bring_up_to_date(self) -> None:
+        """Update the estimate with all segments, where they were put down without `add`."""
         try:
             if self._base is None or self._made < LEAST_PRESSES:
                 self._trace_only()
             if self._made >= LEAST_PRESSES:
-                self._estimate = updated(self.recording, self._estimate, self._nu, self._seed)
+                before = self._estimate
+                self._estimate = updated(
+                    self.recording, self._estimate, self._nu, self._seed, within_m=self.goals.surface_within_m
+                )
+                self._tested(before)
+                self._weigh()
             self._trouble = ""
-        except (ContactError, SurfaceError, MeshError) as error:
+        except (ContactError, SurfaceError, MeshError, DiagnosisError, ModelError) as error:
             self._trouble = str(error)
-        return self.state
+
+    def _tested(self, before: Estimate) -> None:
+        """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""
+        if before.surface is None or before.exploration is None or self._estimate.exploration is None:
+            return
+        surface, presses = before.surface, self._estimate.exploration.presses
+        new = presses.onset_s > before.exploration.presses.onset_s[-1] + NEW_S
+        if not new.any():
+            return
+        point = presses.point[new]
+        off = distance(surface.vertices, surface.triangles, point)
+        nearest = cKDTree(surface.vertices).query(point)[1]
+        sd = np.hypot(surface.uncertainty_m[nearest], TOUCH_ERROR_M)
+        self._tests += (off / sd).tolist()
+
+    @property
+    def _doubt(self) -> float:
+        """Factor on the surface's uncertainty, from the touches that tested it; never below 1."""
+        squares = np.array(self._tests[-RECENT:]) ** 2
+        return float(np.sqrt(max(1.0, (TRUSTED + squares.sum()) / (TRUSTED + len(squares)))))
+
+    def _weigh(self) -> None:
+        if self.goals.cause_at is None:
+            return
+        clock = Clock()
+        self._causes = causes_of(self._estimate)
+        clock.lap("causes")
+        self._estimate.seconds.update(clock.laps)
 
     @property
     def _made(self) -> int:
@@ -178,9 +258,7 @@ class Explorer:
         modulus, interval = (nan, (nan, nan)) if e.fit is None else (e.fit.modulus_pa, e.fit.ci95_pa)
         error = nan
         if e.surface is not None:
-            s = e.surface
-            free = (s.vertices - s.support_point) @ s.support_normal > 1e-6
-            error = surface_error(s.uncertainty_m[free], vertex_areas(s.vertices, s.triangles)[free])
+            error = e.surface_error_m * self._doubt
         standing = []
         if self.goals.modulus_within is not None:
             half = (interval[1] - interval[0]) / (2 * modulus) if e.fit is not None else float("inf")
@@ -188,6 +266,9 @@ class Explorer:
         if self.goals.surface_within_m is not None:
             now = error if e.surface is not None else float("inf")
             standing.append(Standing("surface", now, self.goals.surface_within_m))
+        causes = self._causes[0] if self._causes else None
+        if self.goals.cause_at is not None:
+            standing.append(cause_standing(causes, self.goals.cause_at))
         return State(
             presses=e.presses,
             made=self._made,
@@ -199,6 +280,8 @@ class Explorer:
             standing=tuple(standing),
             update_s=dict(e.seconds),
             trouble=self._trouble,
+            causes=causes,
+            cause_at=self.goals.cause_at or 0.95,
         )
 
     def suggest(self) -> Suggestion:
@@ -214,15 +297,24 @@ class Explorer:
             return Suggestion(
                 "stop", f"{self._made} presses were made, as many as allowed; " + self._words(state)
             )
+        if "free" not in self._kinds and self._trouble.startswith("in free motion"):
+            return Suggestion("free", f"{self._trouble}: wave and turn the tool in the air for three seconds")
         if self._estimate.surface is None:
             return self._first()
         best = self._best(state)
-        if best is None or (best.worth <= 0 and self._order is None):
+        rigid = self._on_support(best.worth if best else 0.0)
+        if rigid is not None:
+            return rigid
+        if best is None or (best.worth <= 0 and self._order is None) or self._in_vain(best, state):
             return Suggestion(
                 "stop",
                 "no touch in reach is expected to bring a goal nearer at this noise; " + self._words(state),
             )
-        return self._press(best.point, best.normal, best.depth_m, best.seconds, self._why(best, state))
+        self._asked.append(best.point)
+        return Suggestion(
+            "press", self._why(best, state), best.point, best.normal, float(best.depth_m),
+            best.speed_m_per_s, best.hold_s, self.reach.clearance_m, float(best.seconds),
+        )  # fmt: skip
 
     def _first(self) -> Suggestion:
         assert self._base is not None
@@ -262,14 +354,58 @@ class Explorer:
             e.fit.modulus_pa,
             self.instrument.tip_radius_m,
             self.reach,
+            self._partings(),
+            np.array(self._asked).reshape(-1, 3),
         )
         if self._order is None or not ranked:
             return ranked[0] if ranked else None
         places = np.array([c.point for c in ranked])
         return ranked[self._order(places, presses.point, presses.point[-1], self._rng)]
 
+    def _in_vain(self, best: Candidate, state: State) -> bool:
+        """Whether only the cause is open, and all presses that are left would not tell it, by far."""
+        open_ = [s for s in state.standing if not s.met]
+        if best.parting is None or [s.name for s in open_] != ["cause"]:
+            return False
+        left = self.goals.most - self._made
+        return FAR_FROM * left * best.worth * best.seconds < open_[0].missing
+
+    @property
+    def _kinds(self) -> set[str]:
+        return {s.kind for s in self.segments}
+
+    def _on_support(self, worth: float) -> Suggestion | None:
+        """Presses on the bare support, where a yielding tool is in question and they tell more a second."""
+        if self._causes is None or self.goals.cause_at is None or self._order or "rigid" in self._kinds:
+            return None
+        causes, weighing = self._causes
+        gain, first, rival = by_support(weighing, causes, self.goals.cause_at)
+        if gain / RIGID_S <= worth:
+            return None
+        return Suggestion(
+            "rigid",
+            f"{words(first)} and {words(rival)} both stand: on the bare support only a yielding tool yields; "
+            "press it three times, with 3 to 5 N",
+            seconds=RIGID_S,
+        )
+
+    def _partings(self) -> list[Parting]:
+        if self._causes is None or self.goals.cause_at is None or self._order is not None:
+            return []
+        causes, weighing = self._causes
+        return partings(weighing, causes, self.goals.cause_at)
+
     def _why(self, best: Candidate, state: State) -> str:
         by_name = {s.name: s for s in state.standing}
+        if best.for_goal == "cause" and best.parting is not None:
+            p = best.parting
+            pace = (
+                "slow" if best.speed_m_per_s < 0.01 else "fast" if best.speed_m_per_s > 0.04 else "middling"
+            )
+            held = f", held {best.hold_s:.1f} s" if best.hold_s > 1 else ""
+            return (
+                f"{words(p.first)} and {words(p.rival)} both stand: a {pace} press here{held} parts them most"
+            )
         if best.for_goal == "modulus":
             now = by_name["modulus"]
             return (
@@ -286,7 +422,10 @@ class Explorer:
     def _words(state: State) -> str:
         parts = []
         for s in state.standing:
-            if not np.isfinite(s.now):
+            if s.name == "cause":
+                left = [] if state.causes is None else state.causes.standing(state.cause_at)
+                parts.append("cause: " + (" or ".join(map(words, left)) or "unknown"))
+            elif not np.isfinite(s.now):
                 parts.append(f"{s.name} unknown")
             elif s.name == "modulus":
                 parts.append(f"modulus {state.modulus_pa / 1e3:.1f} kPa within {100 * s.now:.1f} %")
@@ -295,7 +434,16 @@ class Explorer:
         return ", ".join(parts)
 
 
+def cause_standing(causes: Causes | None, at: float) -> Standing:
+    """How far it is to one cause alone: the greatest ratio beside the likeliest, of what rules it out."""
+    if causes is None:
+        return Standing("cause", float("inf"), 1 - at)
+    first = causes.standing(at)[0]
+    most = max(missing(causes, name, at) for name in causes.ratio if name != first)
+    return Standing("cause", (1 - at) * float(np.exp(most)), 1 - at)
+
+
 def check_goals(goals: GoalOptions) -> None:
     """Raises OptionError where nothing is asked for."""
-    if goals.modulus_within is None and goals.surface_within_m is None:
-        raise OptionError("no goal is given: ask for --modulus-within or --surface-within")
+    if goals.modulus_within is None and goals.surface_within_m is None and goals.cause_at is None:
+        raise OptionError("no goal is given: ask for --modulus-within, --surface-within or --cause-at")

@@ -22,6 +22,9 @@ class GoalOptions:
     surface_within_m: float | None = option(
         0.002, "where 95 % of the surface must lie within", unit="m", flag="--surface-within"
     )
+    cause_at: float | None = option(
+        None, "how surely one cause alone must be left, or none (0.95)", flag="--cause-at"
+    )
     most: int = option(40, "never more presses than these", flag="--most")
 
     def __post_init__(self) -> None:
@@ -30,6 +33,8 @@ class GoalOptions:
             raise OptionError(f"--modulus-within is {self.modulus_within}; it must lie between 0 and 1")
         if self.surface_within_m is not None and not self.surface_within_m > 0:
             raise OptionError(f"--surface-within is {self.surface_within_m} m; it must be greater than 0")
+        if self.cause_at is not None and not 0.5 <= self.cause_at < 1:
+            raise OptionError(f"--cause-at is {self.cause_at}; it must lie between 0.5 and 1 (0.95)")
         if self.most < 4:
             raise OptionError(f"--most is {self.most}; a reconstruction needs 4 presses or more")
 
@@ -62,3 +67,10 @@ def surface_error(deviation_m: np.ndarray, area: np.ndarray, share: float = 0.95
         return float(weight @ erf(x / (deviation * np.sqrt(2)))) - share
 
     return float(brentq(short, 0.0, 10 * float(deviation.max())))
+
+
+def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(n,) m^2: a third of the triangles around each vertex."""
+    corner = vertices[triangles]
+    size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
+    return np.bincount(triangles.ravel(), np.repeat(size / 3, 3), minlength=len(vertices))

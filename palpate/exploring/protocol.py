@@ -12,7 +12,7 @@ import json
 from collections.abc import Callable, Iterable
 from typing import Any
 
-from mechanics.errors import PalpateError, RecordingError
+from mechanics.errors import RecordingError
 from palpate.exploring.explorer import Explorer
 from palpate.exploring.rows import Segment
 
@@ -63,12 +63,12 @@ def serve(
             continue
         try:
             segment = segment_of(line)
-        except PalpateError as error:
+            if segment is None:
+                return
+            explorer.add(segment)
+        except RecordingError as error:
             say(json.dumps({"error": str(error)}))
             continue
-        if segment is None:
-            return
-        explorer.add(segment)
         kept(explorer)
         told = answer(explorer)
         say(json.dumps(told))

@@ -1,28 +1,33 @@
 """A robot in the virtual laboratory: carries suggestions out on a phantom, with errors of place, way and
 depth.
 
-The same exploration is simulated with one touch more each time; a hand of the same seed goes the same way up
-to there, so what is new is the part after it.
+What is new is simulated after the touch before it, and joined to where the tip was left in the air. Where
+the object remembers earlier touches, or an effect depends on all of them, the whole exploration is simulated
+with one touch more: a hand of the same seed goes the same way up to there.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import trimesh
+from scipy.spatial.transform import Rotation
 
 from mechanics.errors import SceneError
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from palpate.exploring.explorer import Suggestion
 from palpate.exploring.rows import Instrument, Segment
-from scenes.laboratory.hand import HandOptions
+from scenes.laboratory.effects import Readings, effect
+from scenes.laboratory.frame import quaternions
+from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import Simulation, simulate
+from scenes.laboratory.tracing import RATE_HZ
 from scenes.phantoms import Phantom
 
 
@@ -33,10 +38,29 @@ class RobotOptions:
     place_error_m: float = option(0.001, "sideways, of where it presses", unit="m")
     way_error_deg: float = option(4.0, "of the direction in which it comes", unit="deg")
     depth_error: float = option(0.08, "of the depth, as a share of it")
+    speed_error: float = option(0.15, "of the speed, as a share of it")
+
+
+RIGID_N = 4.0
+"""Greatest force of a press on the bare support."""
+JOIN_S = 0.25
+"""In free air, over which a touch's way is joined to where the last one ended."""
+FORGETFUL = frozenset(
+    {
+        "viscoelasticity", "power_law_relaxation", "poroelasticity", "adhesion", "jkr_adhesion",
+        "tool_compliance", "force_gain", "force_bias", "time_delay", "backlash",
+    }
+)  # fmt: skip
+"""Effects that a touch feels alike whatever was touched long before it."""
 
 
 class LaboratoryRobot:
-    """A phantom, its effects, and a hand that follows suggestions. Device frame: the object's own."""
+    """A phantom, its effects, and a hand that follows suggestions. Device frame: the object's own.
+
+    places: touches that may be made, lengths mm, object frame; a suggestion is carried out at the nearest of
+    them, as deep as it is solved. None: anywhere, which solves every touch anew. made: presses of an
+    exploration that is gone on with.
+    """
 
     def __init__(
         self,
@@ -49,6 +73,7 @@ class LaboratoryRobot:
         workers: int | None = 1,
         cache: Path | None = None,
         progress: Progress = silent,
+        places: Sequence[Touch] | None = None,
     ) -> None:
         self.phantom, self.effects, self.seed = phantom, dict(effects or {}), seed
         self.options = options or SimulateOptions()
@@ -58,7 +83,9 @@ class LaboratoryRobot:
         self._surface = trimesh.Trimesh(phantom.vertices, phantom.faces, process=False)
         self._rng = np.random.default_rng([seed, 16])
         self._touches: list[Touch] = []
-        self._emitted = 0
+        self._places = places
+        self._left: np.ndarray | None = None
+        self.made = 0
         self.last: Simulation | None = None
 
     @property
@@ -75,26 +102,39 @@ class LaboratoryRobot:
     def carry_out(self, suggestion: Suggestion) -> Segment:
         """What the device reads while the suggestion is followed. Raises SceneError where it misses."""
         if suggestion.kind == "trace":
-            made = self._simulated([self._aside()])
+            made = self._simulated([self._aside()], self.seed)
             # with the way to a touch that is only laid down to have one: free air, which tells the noise
             end = int(np.argmax(made.motion.touch >= 0))
             return self._part(made, "trace", 0, end)
+        if suggestion.kind == "retrace":
+            made = self._simulated([self._aside()], self.seed + 1)
+            return self._part(made, "retrace", 0, int(np.argmax(made.motion.touch >= 0)))
+        if suggestion.kind in ("rigid", "free"):
+            return self._without_object(suggestion.kind)
         self._touches.append(self._touch(suggestion))
-        made = self._simulated(self._touches)
-        rows = np.flatnonzero(made.motion.touch == len(self._touches) - 1)
+        forgets = self.effects.keys() <= FORGETFUL
+        if self.made and not forgets:
+            raise SceneError(
+                "an exploration of this phantom cannot be gone on with: its effects remember earlier touches"
+            )
+        new = self._touches[-2:] if forgets else self._touches
+        made = self._simulated(
+            new, self.seed + 7919 * (self.made + len(self._touches)) if forgets else self.seed
+        )
+        rows = np.flatnonzero(made.motion.touch == len(new) - 1)
         # after the touch before, or where the tracing's segment ended
         start = int((made.motion.phase[1] + 0.6) * 1000)
-        if len(self._touches) > 1:
-            start = int(np.flatnonzero(made.motion.touch == len(self._touches) - 2)[-1]) + 1
+        if len(new) > 1:
+            start = int(np.flatnonzero(made.motion.touch == len(new) - 2)[-1]) + 1
         return self._part(made, "press", start, int(rows[-1]) + 1)
 
-    def _simulated(self, touches: list[Touch]) -> Simulation:
+    def _simulated(self, touches: list[Touch], seed: int) -> Simulation:
         self.last = simulate(
             self.phantom,
             self.effects,
             self.options,
             hand=self.hand,
-            seed=self.seed,
+            seed=seed,
             sizes=False,
             staging=Staging(touches=tuple(touches)),
             workers=self._workers,
@@ -103,12 +143,39 @@ class LaboratoryRobot:
         )
         return self.last
 
+    def _without_object(self, kind: str) -> Segment:
+        """Three presses on the bare support, or waving and turning in the air, as they are read."""
+        rng, options = np.random.default_rng([self.seed, len(kind), len(self._touches)]), self.options
+        way, push, turn = _on_the_support(options.tip_radius_m) if kind == "rigid" else _waving(rng)
+        reach = float(np.linalg.norm(self._surface.vertices[:, :2], axis=1).max())
+        top = float(self._surface.vertices[:, 2].max())
+        way = way + ([1.4 * reach, 0.0, 0.0] if kind == "rigid" else [0.0, 0.0, top + 0.06])
+        force = np.column_stack([np.zeros((len(push), 2)), push])
+        readings = Readings(np.arange(len(way)) / RATE_HZ, way, force, turn, np.ones(len(way), dtype=bool))
+        known = {} if self.last is None else dict(self.last.truth["parameters"])
+        for name in self.effects:
+            read = effect(name).on_readings
+            if read is not None:
+                readings = read(readings, known[name])
+        noisy = readings.force + options.force_noise_std_n * rng.normal(size=force.shape)
+        step = options.position_resolution_m
+        position = np.round(readings.position / step) * step if step > 0 else readings.position
+        self._left = position[-1]
+        return Segment(kind, readings.t, position, noisy, quaternions(readings.axes))
+
     def _part(self, made: Simulation, kind: str, start: int, end: int) -> Segment:
         r = made.recording
         turned = None if r.quaternion is None else r.quaternion[start:end]
-        return Segment(kind, r.t[start:end], r.position[start:end], r.force_on_tool[start:end], turned)
+        position = r.position[start:end].copy()
+        if self._left is not None:
+            fade = 1 - minimum_jerk(int(JOIN_S * r.sample_rate_hz))[: len(position), None]
+            position[: len(fade)] += fade * (self._left - position[0])
+        self._left = position[-1]
+        return Segment(kind, r.t[start:end], position, r.force_on_tool[start:end], turned)
 
     def _aside(self) -> Touch:
+        if self._places is not None:
+            return replace(self._places[0], depth=1.0)
         top = self._surface.vertices[np.argmax(self._surface.vertices[:, 2])]
         return self._landed(top + [0, 0, 0.02], np.array([0.0, 0.0, -1.0]), 0.001)
 
@@ -119,9 +186,20 @@ class LaboratoryRobot:
         way = -suggestion.normal + np.cross(turn, suggestion.normal)
         way /= np.linalg.norm(way)
         off = error.place_error_m * rng.normal(size=3)
-        start = suggestion.point + off + 0.05 * suggestion.normal
         depth = suggestion.depth_m * float(np.exp(error.depth_error * rng.normal()))
-        return self._landed(start, way, depth)
+        speed = 1e3 * suggestion.speed_m_per_s * float(np.exp(error.speed_error * rng.normal()))
+        if self._places is not None:
+            touch = self._nearest(1e3 * (suggestion.point + off), 1e3 * depth)
+        else:
+            touch = self._landed(suggestion.point + off + 0.05 * suggestion.normal, way, depth)
+        return replace(touch, speed=speed, hold=suggestion.hold_s)
+
+    def _nearest(self, point_mm: np.ndarray, depth_mm: float) -> Touch:
+        assert self._places is not None
+        touch = min(self._places, key=lambda p: float(np.linalg.norm(p.point - point_mm)))
+        visits = sum(t.site == touch.site for t in self._touches)
+        depth = float(np.clip(depth_mm, 0.5, max(touch.reach, touch.depth)))
+        return replace(touch, depth=depth, repeat=visits)
 
     def _landed(self, start: np.ndarray, way: np.ndarray, depth: float) -> Touch:
         """The touch of a tip that comes from `start` along `way` until it feels something, then `depth` m."""
@@ -149,6 +227,27 @@ class LaboratoryRobot:
             direction=way / np.linalg.norm(way),
             side=np.zeros(3),
         )
+
+
+def _on_the_support(tip_radius_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """((n, 3) m, (n,) N along the support's normal, (n, 3, 3)) of three presses, from the air to the air."""
+    above, still = 0.03, np.zeros(int(0.3 * RATE_HZ))
+    down = above * (1 - minimum_jerk(int(0.4 * RATE_HZ)))
+    held = 0.5 * RIGID_N * (1 - np.cos(2 * np.pi * np.arange(int(0.8 * RATE_HZ)) / (0.8 * RATE_HZ)))
+    height = np.concatenate([above + still, *[np.r_[down, 0 * held, down[::-1]]] * 3, above + still])
+    push = np.concatenate([still, *[np.r_[0 * down, held, 0 * down]] * 3, still])
+    way = np.column_stack([np.zeros((len(height), 2)), tip_radius_m + height])
+    return way, push, np.broadcast_to(np.eye(3), (len(way), 3, 3))
+
+
+def _waving(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """The same of three seconds in the air: to and fro by some centimetres, turning by some 20 degrees."""
+    count = int(3 * RATE_HZ)
+    fade = np.sin(np.pi * np.arange(count) / count)[:, None] ** 0.5
+    way = fade * 0.015 * np.column_stack([band_noise(count, RATE_HZ, 0.4, 2.5, rng) for _ in range(3)])
+    turn = np.column_stack([band_noise(count, RATE_HZ, 0.3, 1.5, rng) for _ in range(3)])
+    axes = Rotation.from_rotvec(fade * np.radians(20) * turn).as_matrix()
+    return way, np.zeros(count), axes
 
 
 def _first_hit(surface: trimesh.Trimesh, start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, int] | None:

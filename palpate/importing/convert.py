@@ -19,11 +19,14 @@ from mechanics.errors import RecordingError
 from mechanics.recording import Recording
 from palpate.importing.mapping import ROLES, Column, Said, find_columns, time_of
 from palpate.importing.tables import Table
+from palpate.importing.units import SI
 from reconstruct.filtering import white_noise_std
 
 GRAVITY_M_PER_S2 = 9.80665
 _SEARCH_S, _SURE = 3.0, 0.5
 _MOST_HZ = 2000.0
+_WIDEST_M, _HARDEST_N, _SLOWEST_S = 3.0, 100.0, 0.5
+"""A unit that was only assumed is doubted beyond an arm's reach, a hand's push, a reading's interval."""
 POINTS_HZ = 100.0
 """Rows without a time are numbered by this clock, and slower readings put on it; a recording needs one."""
 LEAST_HZ = 60.0
@@ -48,7 +51,7 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     if said.tip_radius_m is None:
         raise RecordingError("the tip's radius is in no table: give --tip-radius M (or [tool] tip_radius_m)")
     columns = find_columns(tables, said)
-    notes: list[str] = []
+    notes = _sizes(columns)
     streams = {
         part: _stream(part, [columns[r] for r in roles if r in columns], columns, tables, said, notes)
         for part, roles in _PARTS.items()
@@ -96,6 +99,41 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     return Understood(recording, columns, tuple(notes), not timed, read_hz)
 
 
+def _sizes(columns: dict[str, Column]) -> list[str]:
+    """Warnings of sizes that no palpation has in the unit that nobody said; raises RecordingError for a path
+    that no arm reaches."""
+    found = []
+    for kind, roles, most, units in (
+        ("position", ("x", "y", "z"), _WIDEST_M, ("mm", "um", "nm")),
+        ("force", ("fx", "fy", "fz"), _HARDEST_N, ("mN", "uN", "nN")),
+        ("time", ("t",), _SLOWEST_S, ("ms", "us", "ns")),
+    ):
+        held = [columns[r] for r in roles if r in columns and columns[r].assumed]
+        size = max((_size(kind, np.asarray(c.values)) for c in held), default=0.0)
+        if size <= most:
+            continue
+        seen = {
+            "position": f"the path is {size:.3g} m wide",
+            "force": f"the force goes up to {size:.3g} N",
+            "time": f"a row comes every {size:.3g} s",
+        }[kind]
+        likely = next((u for u in units if size * SI[kind][u] <= most), units[-1])
+        hint = f"{seen} in the unit assumed: is it {likely}? say --units {kind}={likely}"
+        if kind == "position":
+            raise RecordingError(hint)
+        found.append(f"WARNING: {hint}")
+    return found
+
+
+def _size(kind: str, values: np.ndarray) -> float:
+    values = values[np.isfinite(values)]
+    if len(values) < 2:
+        return 0.0
+    if kind == "time":
+        return float(np.median(np.abs(np.diff(values))))
+    return float(np.ptp(values) if kind == "position" else np.abs(values).max())
+
+
 def _description(said: Said, quasi_static: bool, read_hz: float | None) -> dict[str, Any]:
     """What the recording's TOML will say of how it is to be read, for those who use it at once."""
     about: dict[str, Any] = {"quasi_static": True} if quasi_static else {}
@@ -111,8 +149,7 @@ def _slower(force: _Stream, rate_hz: float, notes: list[str]) -> tuple[float | N
     read_hz = float(1 / np.median(np.diff(force.t)))
     if read_hz > rate_hz / 1.5 or len(force.values) < 10:
         return None, None
-    moving = np.ptp(force.values, axis=0) > 0
-    noise = white_noise_std(force.values[:, moving]) if moving.any() else 0.0
+    noise = white_noise_std(force.values)
     notes.append(f"the force was read at {read_hz:.4g} Hz, with a noise of {noise:.2g} N a component")
     return read_hz, noise or None
 

@@ -107,7 +107,7 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
 @dataclass(frozen=True)
 class Column:
     """One column found: its table, its name there, factor to SI (with its sign), and the unit it was taken
-    in."""
+    in; assumed: nobody said the unit."""
 
     role: str
     table: Table | None
@@ -115,6 +115,7 @@ class Column:
     factor: float
     unit: str
     guessed: bool
+    assumed: bool = False
 
     @property
     def values(self) -> np.ndarray | float:
@@ -134,20 +135,28 @@ _AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
 _BEFORE = {
     "position": "pos position p tcp tip tippos tipposition tcppose tcpposition toolposition actualtcppose"
     " pose poseposition poseposeposition translation transformtranslation ee eepos probe probepos"
-    " loc location",
-    "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque",
+    " loc location flange flangeposition flangepos weg",
+    "force": "f force forces wrenchforce ft tcpforce actualtcpforce wrench load sensorforce forcetorque"
+    " kraft",
     "quaternion": "q quat quaternion orientation poseorientation poseposeorientation rotation"
-    " transformrotation rot",
+    " transformrotation rot flangeorientation",
 }
-_TIME = "t time times timestamp timestamps stamp ts sec secs seconds elapsed elapsedtime clock"
+_TIME = (
+    "t time times timestamp timestamps stamp ts sec secs seconds elapsed elapsedtime clock datetime date zeit"
+)
+_ORDERED = re.compile(r"(.*?)_?(xyzw|wxyz)\W*(\d)\W*$", re.IGNORECASE)
+"""An array of quaternions whose name tells the order of its columns."""
 _ALONG = (
     "depth displacement travel indentation indent extension compression crosshead stroke position z piezo"
-    " height gap"
+    " height gap weg"
 )
-_PUSH = "force load fn normalforce f reaction reactionforce fz push"
+_PUSH = "force load fn normalforce f reaction reactionforce fz push kraft"
 
 
 def _key(name: str) -> str:
+    ordered = _ORDERED.match(name)
+    if ordered and int(ordered[3]) < 4:
+        name = ordered[1] + "_q" + ordered[2][int(ordered[3])]
     return re.sub(r"[^a-z0-9]", "", without_unit(name).lower())
 
 
@@ -182,8 +191,8 @@ def time_of(table: Table, said: Said) -> Column | None:
 
 
 def _listed(tables: Sequence[Table]) -> str:
-    many = len(tables) > 1
-    names = [f"{t.name}:{n}" if many else n for t in tables for n in t.columns]
+    each = [n for t in tables for n in t.columns]
+    names = [f"{t.name}:{n}" if each.count(n) > 1 else n for t in tables for n in t.columns]
     return ", ".join(names[:40]) + (f" and {len(names) - 40} more" if len(names) > 40 else "")
 
 
@@ -219,8 +228,9 @@ def _column(
     if kind is None:
         return Column(role, table, name, sign, "1", guessed)
     unit = plain(said.units[kind]) if kind in said.units else unit_in(name, kind)
+    assumed = unit is None
     unit = unit or next(iter(SI[kind]))
-    return Column(role, table, name, sign * SI[kind][unit], unit, guessed)
+    return Column(role, table, name, sign * SI[kind][unit], unit, guessed, assumed)
 
 
 def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
@@ -229,7 +239,7 @@ def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
         wanted = set(_TIME.split())
     elif role.startswith("q"):
         before = _BEFORE["quaternion"].split()
-        wanted = {b + role[1] for b in before}
+        wanted = {b + end for b in before for end in (role, role[1])} | {role}
     else:
         kind = KIND[role]
         wanted = {b + end for b in _BEFORE[kind].split() for end in _AXIS[role[-1]]}

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import RecordingError
+from mechanics.files import bounded_memory, no_file
 
 
 @dataclass(frozen=True)
@@ -50,7 +51,7 @@ def read_tables(path: Path | str) -> list[Table]:
     """
     path = Path(path)
     if not path.exists():
-        raise RecordingError(f"'{path}' does not exist: name a file that is there")
+        raise RecordingError(f"'{path}' {no_file(path)}: name a file that is there")
     suffix = ".bag" if path.is_dir() else path.suffix.lower()
     if suffix not in _READERS:
         allowed = ", ".join(s.removeprefix(".") for s in SUFFIXES)
@@ -61,7 +62,8 @@ def read_tables(path: Path | str) -> list[Table]:
     module, _, function = home.partition(":")
     reader: Callable[[Path], list[Table]] = getattr(import_module(module), function or "read")
     try:
-        tables = reader(path)
+        with bounded_memory(path, RecordingError):
+            tables = [t for t in map(_numbers, reader(path)) if t.columns and t.rows > 1]
     except RecordingError:
         raise
     except ModuleNotFoundError as error:
@@ -71,7 +73,6 @@ def read_tables(path: Path | str) -> list[Table]:
     except Exception as error:  # each library has errors of its own for a damaged file
         reason = " ".join(str(error).split())[:200] or type(error).__name__
         raise RecordingError(f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason})") from error
-    tables = [t for t in map(_numbers, tables) if t.columns and t.rows > 1]
     if not tables:
         raise RecordingError(f"'{path}' holds no columns of numbers with two rows or more")
     return tables

@@ -10,12 +10,15 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import RecordingError
+from palpate.importing.dates import seconds_of
 from palpate.importing.tables import Table
 from palpate.importing.units import is_unit
 
 _SEPARATORS = ("\t", ";", ",", "|", None)
 _LOOK = 400
 """Lines that are looked at to find separator, decimal sign and first row."""
+_MISSING = ("", "-", "--", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf")
+"""What stands in a cell that holds nothing."""
 
 
 def read(path: Path) -> list[Table]:
@@ -37,11 +40,9 @@ def read(path: Path) -> list[Table]:
     rows = []
     for line in lines[start:]:
         parts = _split(line, separator)
-        if len(parts) != width:
-            if line.strip():
-                parts = (parts + [""] * width)[:width]
-            else:
-                continue
+        if not any(parts):
+            continue
+        parts = (parts + [""] * width)[:width]
         rows.append([_number(part, comma) for part in parts])
     values = np.array(rows)
     names = _names(lines, start, separator, width)
@@ -65,15 +66,17 @@ def _number(text: str, comma: bool) -> float:
     try:
         return float(text.replace(".", "").replace(",", ".") if comma and "," in text else text)
     except ValueError:
-        return np.nan
+        return np.nan if text.lower() in _MISSING else seconds_of(text)
 
 
 def _run(lines: list[str], separator: str | None, comma: bool) -> tuple[int, int]:
     """First line and number of cells of the longest run of lines of numbers among the first ones."""
     best, start, width, length = (0, 0), 0, 0, 0
     for i, line in enumerate([*lines[:_LOOK], ""]):
-        parts = _split(line, separator) if line.strip() else []
-        known = [part for part in parts if part]
+        parts = _split(line, separator)
+        known = [part for part in parts if part.lower() not in _MISSING]
+        if len(parts) == width > 1 and not known:
+            continue  # a row of empty cells
         fits = len(known) > 1 and all(np.isfinite(_number(part, comma)) for part in known)
         if fits and length and len(parts) == width:
             length += 1

@@ -11,9 +11,15 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from mechanics.errors import RecordingError
-from mechanics.files import atomic_file
+from mechanics.files import Kind, atomic_file
 from mechanics.recording import DESCRIPTION, QUATERNION_COLUMNS, REQUIRED_COLUMNS, SAMPLES, dump_toml
 from palpate.importing.convert import Understood
+
+PICTURE = Kind(
+    "a picture of palpate import", (b"\x89PNG", b"<?xml", b"%PDF"), holds=b"Read by palpate import",
+    likely_bytes=1 << 22,
+)  # fmt: skip
+"""Other pictures, which may lie beside what is imported, are left alone."""
 
 
 def write_imported(

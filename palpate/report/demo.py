@@ -112,7 +112,8 @@ def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
         counts, _ = np.histogram(lower_us[:-1].clip(least), edges, weights=histogram.counts)
         ax.stairs(counts, edges, fill=True, color="#457b9d")
         ax.set(xlabel=name, ylabel="ticks", yscale="log", xscale="log", xlim=(edges[0], edges[-1]))
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        wide = edges[-1] > 300 * edges[0]
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
         ax.xaxis.set_major_formatter("{x:g}")
         ax.xaxis.set_minor_formatter(NullFormatter())
     return axes

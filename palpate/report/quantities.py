@@ -35,7 +35,7 @@ class Quantity:
 
 ORDER = Quantity("first touches, in order", "", 1.0, "plasma")
 DEPTH = Quantity("greatest depth", "mm", 1e3, "YlGnBu")
-ERROR = Quantity("force error", "mN", 1e3, "magma")
+ERROR = Quantity("force error", "mN", 1e3, "magma_r")
 STIFFNESS = Quantity("own stiffness", "N/m", 1.0, "viridis")
 KELVIN_VOIGT = Quantity("stiffness k_V of a press", "N/m", 1.0, "viridis")
 MODULUS = Quantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)

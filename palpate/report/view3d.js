@@ -337,9 +337,9 @@ function start(root) {
   renderer.domElement.addEventListener("webglcontextlost", () => { root.dataset.state = "still"; });
 
   root.dataset.state = "live";
+  colour();  // before anything is drawn: three.js compiles what draws the dots once, with colours or without
   new ResizeObserver(resize).observe(stage);
   resize();
-  colour();
   if (curves) part("what").value = data.force;
   select(data.selected, false);
 }

@@ -84,9 +84,10 @@ class Comparison(Result, room.Comparison):
         return view_of(self)
 
     def _place(self, plotter: Plotter) -> None:
+        from palpate.report.quantities import ERROR
         from palpate.results.scenery import add_dots, add_object
 
         add_object(plotter, self.model)
         error = self.press_rmse_n["fem"] * 1e3
         label = "rms error of FEM, press held out [mN]"
-        add_dots(plotter, self.presses.point, error, label=label, colour_map="magma")
+        add_dots(plotter, self.presses.point, error, label=label, colour_map=ERROR.colour_map)

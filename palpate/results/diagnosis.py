@@ -69,10 +69,11 @@ class Diagnosis(Result, room.Diagnosis):
 
     def _place(self, plotter: Plotter) -> None:
         from palpate.report.diagnosis_figures import gap_at, sites_of
+        from palpate.report.quantities import ERROR
         from palpate.results.scenery import add_arrow, add_dots, add_object, surface_of
 
         gap = gap_at(self, surface_of(self.model)[0]) * 1e3
-        add_object(plotter, self.model, gap, label="gap [mN]", colour_map="magma")
+        add_object(plotter, self.model, gap, label="gap [mN]", colour_map=ERROR.colour_map)
         add_dots(plotter, sites_of(self), colour="#2a9d8f")
         touch = self.next_touch
         if touch is not None and self.candidates:

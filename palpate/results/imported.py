@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mechanics.files import atomic_file
 from palpate.importing.convert import Understood
-from palpate.importing.written import picture, write_imported
+from palpate.importing.written import PICTURE, picture, write_imported
 from palpate.results.base import Result
 from palpate.results.recording import Recording, recording_of
 
@@ -37,13 +38,13 @@ class Imported(Result):
         return recording_of(self.understood.recording)
 
     def draw(self, path: Path | str) -> Path:
-        """Write the picture of what was understood; returns its path."""
+        """Write the picture of what was understood; returns its path. No other picture is replaced."""
         from matplotlib import pyplot as plt
 
         path = Path(path)
-        path.parent.mkdir(parents=True, exist_ok=True)
         figure = picture(self.understood)
-        figure.savefig(path, dpi=110)
+        with atomic_file(path, PICTURE) as temporary:
+            figure.savefig(temporary, dpi=110, metadata={"Title": PICTURE.holds.decode()})
         plt.close(figure)
         return path
 

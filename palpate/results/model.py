@@ -24,7 +24,7 @@ class Model(Result, room.Model):
 
     Every field is that of `mechanics.model.Model`: `material.young_modulus_pa`, `support.normal`,
     `tool.tip_radius_m`, mesh, effects. `plot`: the object with the places touched. `show`: the
-    same in 3D on its support, the touches coloured by their own stiffness k_v, N/m.
+    same in 3D on its support, the touches coloured by their own modulus, kPa.
     """
 
     def save(self, path: Path | str) -> Model:
@@ -69,16 +69,23 @@ class Model(Result, room.Model):
         return View(thing_of(self), self.presses.point, usual_colourings(self))
 
     def _place(self, plotter: Plotter) -> None:
-        from palpate.report.modulus_figures import column
+        from palpate.report.quantities import KELVIN_VOIGT, MODULUS
         from palpate.results.scenery import add_dots, add_object
 
         add_object(plotter, self)
-        if len(self.presses):
-            stiffness = column(self, "k_v")
-            known = np.isfinite(stiffness)
-            add_dots(
-                plotter, self.presses.point[known], stiffness[known], label="k_v of single presses [N/m]"
-            )
+        for name, quantity_of in (("e_pa", MODULUS), ("k_v", KELVIN_VOIGT)):
+            values = quantity_of.scale * self.presses.fits[name]
+            known = np.isfinite(values)
+            if known.any():
+                add_dots(
+                    plotter,
+                    self.presses.point[known],
+                    values[known],
+                    label=quantity_of.label,
+                    limits=quantity_of.limits(float(values[known].min()), float(values[known].max())),
+                    colour_map=quantity_of.colour_map,
+                )
+                break
 
 
 def modulus_words(model: room.Model) -> str:

@@ -107,8 +107,9 @@ class ReplayResult(Result):
         ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)
 
     def _place(self, plotter: Plotter) -> None:
+        from palpate.report.quantities import ERROR
         from palpate.results.scenery import add_dots, add_object
 
         add_object(plotter, self.model)
         places, errors = self.touches()
-        add_dots(plotter, places, errors * 1e3, label="rms force error of a touch [mN]", colour_map="magma")
+        add_dots(plotter, places, errors * 1e3, label=ERROR.label, colour_map=ERROR.colour_map)

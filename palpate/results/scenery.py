@@ -11,6 +11,7 @@ import pyvista
 
 from mechanics.errors import OptionError
 from mechanics.model import Model
+from mechanics.tetmesh import vertex_normals
 from palpate.report.object3d import view_axes
 from render.base import Renderer
 from render.felt import felt_surface
@@ -50,15 +51,17 @@ def add_object(
     colour_map: str = "viridis",
 ) -> None:
     """The touchable surface on its support plane. values (n,): one a point of `surface_of`, named `label`."""
-    _add_surface(plotter, model, *surface_of(model), values, label, colour_map)
+    _add_surface(plotter, model, *surface_of(model), felt_surface(model).normals, values, label, colour_map)
 
 
 def add_deformed(plotter: pyvista.Plotter, renderer: Renderer, displacement: np.ndarray) -> None:
     """The renderer's surface, displaced by (n, 3) m and coloured by how far, on its support plane."""
     rest, triangles = renderer.surface
+    turned = vertex_normals(rest + displacement, triangles) - vertex_normals(rest, triangles)
+    normals = renderer.contact.arrays.normals + turned
     moved = 1e3 * np.linalg.norm(displacement, axis=1)
     _add_surface(
-        plotter, renderer.model, rest + displacement, triangles, moved, "displacement [mm]", "YlOrRd"
+        plotter, renderer.model, rest + displacement, triangles, normals, moved, "displacement [mm]", "YlOrRd"
     )
 
 
@@ -67,11 +70,15 @@ def _add_surface(
     model: Model,
     points: np.ndarray,
     triangles: np.ndarray,
+    normals: np.ndarray,
     values: np.ndarray | None,
     label: str,
     colour_map: str,
 ) -> None:
     surface = pyvista.PolyData.from_regular_faces(np.array(points), triangles)
+    # shaded as a tip feels it, not by its triangles
+    surface.point_data["normals"] = normals
+    surface.point_data.active_normals_name = "normals"
     look: dict[str, Any] = {"color": OBJECT_COLOUR}
     used = np.unique(triangles)
     if values is not None:
@@ -79,7 +86,8 @@ def _add_surface(
         limits = float(np.nanmin(surface[label][used])), float(np.nanmax(surface[label][used]))
         look = {"scalars": label, "cmap": colour_map, "clim": limits}
         look["scalar_bar_args"] = {"title": label, **_BAR}
-    plotter.add_mesh(surface, ambient=0.3, diffuse=0.75, **look)
+    actor = plotter.add_mesh(surface, ambient=0.3, diffuse=0.75, **look)
+    actor.prop.interpolation = "Gouraud"
     size = 1.5 * float(np.linalg.norm(np.ptp(points[used], axis=0)))
     middle, up = points[used].mean(axis=0), model.support.normal
     foot = middle - model.support.height(middle) * up
@@ -90,7 +98,7 @@ def _add_surface(
 
 def _look_from(plotter: pyvista.Plotter, middle: np.ndarray, up: np.ndarray, size: float) -> None:
     eye = view_axes(up, 25.0, 35.0)[2]
-    plotter.camera_position = [middle + 1.9 * size * eye, middle, up]
+    plotter.camera_position = [middle + 1.6 * size * eye, middle, up]
     plotter.camera.view_angle = 25.0
 
 
@@ -100,11 +108,13 @@ def add_dots(
     values: np.ndarray | None = None,
     *,
     label: str = "",
+    limits: tuple[float, float] | None = None,
     colour: str = "#c1121f",
     colour_map: str = "viridis",
     size_m: float = 2e-3,
 ) -> None:
-    """Small balls at points (k, 3) m, in one colour or by values (k,) named `label`."""
+    """Small balls at points (k, 3) m, in one colour or by values (k,) named `label`; limits: of the
+    colours."""
     if not len(points):
         return
     cloud = pyvista.PolyData(np.asarray(points, dtype=float))
@@ -112,6 +122,7 @@ def add_dots(
     if values is not None:
         cloud[label] = np.asarray(values, dtype=float)
         look = {"scalars": label, "cmap": colour_map, "scalar_bar_args": {"title": label, **_BAR}}
+        look["clim"] = limits
     ball = pyvista.Sphere(radius=size_m, theta_resolution=16, phi_resolution=16)
     balls: Any = cloud.glyph(geom=ball, scale=False, orient=False)
     plotter.add_mesh(balls, **look)

@@ -7,9 +7,12 @@ from typing import Literal
 import numpy as np
 import pyvista
 
+from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
+from palpate.window import shadow
 from palpate.window.frames import Frame, View
+from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
 from render.base import Renderer
 from render.press import BESIDE
@@ -18,6 +21,7 @@ from scenes.phantoms import Region
 
 ARROW_M_PER_N = 0.03
 LEAST_ARROW_N = 0.02
+SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 STIFFNESS = f"secant stiffness at {1000 * DEPTH_M:.0f} mm (N/m)"
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
@@ -57,16 +61,22 @@ class ObjectPicture:
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
             color=TIP_COLOUR,
+            ambient=0.35,
             specular=0.4,
         )
         self._arrow = plotter.add_mesh(
-            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR
+            pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
         )
         self._ball = plotter.add_mesh(
             pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20), color=INCLUSION_COLOUR
         )
         self._ball.SetVisibility(False)
         self._arrow.SetVisibility(False)
+        blot = shadow.blot(SHADOW_IN_RADII * tip_radius_m)
+        self._shadow = plotter.add_mesh(
+            blot, scalars="shade", rgba=True, lighting=False, show_scalar_bar=False
+        )
+        self._shadow.SetVisibility(False)
         self.colour_by_displacement()
 
     @property
@@ -98,8 +108,8 @@ class ObjectPicture:
             cmap=colours,
             clim=limits,
             opacity=opacity,
-            ambient=0.35,
-            diffuse=0.75,
+            ambient=0.3,
+            diffuse=0.62,
             scalar_bar_args={
                 "title": self._bar,
                 "title_font_size": 12,
@@ -135,8 +145,8 @@ class ObjectPicture:
             self._ball.SetPosition(*region.centre_m)
             self._ball.SetScale(region.radius_m)
 
-    def update(self, frame: Frame, view: View) -> None:
-        """Move surface, tip and arrow to a frame."""
+    def update(self, frame: Frame, view: View, below: Target | None = None) -> None:
+        """Move surface, tip and arrow to a frame; below: what the tip's shadow falls on."""
         moved = view.displacement_m
         if len(moved) == len(self._rest) and (self._bent or moved.any()):
             self._bent = bool(moved.any())
@@ -144,12 +154,25 @@ class ObjectPicture:
             self._shade()
             self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)
         self._tip.SetPosition(*frame.tip_m)
+        self._shadow.SetVisibility(below is not None)
+        if below is not None:
+            height = float(np.linalg.norm(frame.tip_m - below.point))
+            self._shadow.prop.opacity = float(np.clip(1.0 - height / SHADOW_FADES_M, 0.2, 1.0))
+            self._shadow.SetUserMatrix(_placed(below.point + SHADOW_OFF_M * below.normal, below.normal))
         force = view.force_n
         size = float(np.linalg.norm(force))
         self._arrow.SetVisibility(size > LEAST_ARROW_N)
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
             self._arrow.SetUserMatrix(_arrow_matrix(start, force, ARROW_M_PER_N * size))
+
+
+def _placed(point: np.ndarray, normal: np.ndarray) -> object:
+    """A matrix that takes the plane z = 0 to a point, across a unit normal."""
+    matrix = np.eye(4)
+    matrix[:3, :3] = np.column_stack([*tangents(normal), normal])
+    matrix[:3, 3] = point
+    return pyvista.vtkmatrix_from_array(matrix)
 
 
 def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> object:
@@ -164,10 +187,12 @@ def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> ob
 
 
 def _add_support(plotter: pyvista.Plotter, model: Model, points: np.ndarray) -> None:
-    size = 2 * BESIDE * float(np.linalg.norm(np.ptp(points, axis=0)))
+    size = 1.2 * BESIDE * float(np.linalg.norm(np.ptp(points, axis=0)))
     support = support_plane(model)
     middle = model.mesh.points[model.mesh.fixed].mean(axis=0)
     middle = middle - ((middle - support.point) @ support.normal) * support.normal
-    plane = pyvista.Plane(center=middle, direction=support.normal, i_size=size, j_size=size)
+    disc = shadow.floor(middle, support.normal, size, points)
     # never seen from below: the eye stays over it
-    plotter.add_mesh(plane, color="#d9dee5", lighting=False, culling="back")
+    plotter.add_mesh(
+        disc, scalars="shade", rgb=True, lighting=False, culling="back", interpolate_before_map=False
+    )

@@ -80,9 +80,17 @@ class Pointer:
             self.target = found
         return found
 
+    def below(self, place_m: np.ndarray) -> Target | None:
+        """What lies straight under a place (3,) m; None where nothing does."""
+        return self._hit(place_m, place_m - 2.0 * self._safe * self._up)
+
     def deeper(self, steps: float) -> None:
         """The wheel: how deep a press goes, 0.5 mm a step."""
-        self.press_depth_m = float(np.clip(self.press_depth_m + 0.0005 * steps, LEAST_PRESS_M, MOST_PRESS_M))
+        self.go_deep(1e3 * self.press_depth_m + 0.5 * steps)
+
+    def go_deep(self, depth_mm: float) -> None:
+        """The slider: how deep a press goes."""
+        self.press_depth_m = float(np.clip(1e-3 * depth_mm, LEAST_PRESS_M, MOST_PRESS_M))
 
     def place(self, duration_s: float) -> np.ndarray:
         """(3,) m, where the hand means the tip's centre to be after another frame."""

@@ -7,8 +7,10 @@ moves what is drawn. The servo never waits for a picture.
 from __future__ import annotations
 
 import time
+from collections.abc import Callable
 from pathlib import Path
 from textwrap import wrap
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pyvista
@@ -16,6 +18,7 @@ import vtk
 
 from devices.channel import PoseChannel
 from mechanics.files import PNG, atomic_file
+from palpate.exploring.ghost import GhostTip
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
 from palpate.window.frames import Frame
@@ -23,7 +26,7 @@ from palpate.window.game import Game
 from palpate.window.keys import help_text
 from palpate.window.orbit import Orbit
 from palpate.window.picture import ObjectPicture
-from palpate.window.pointer import Pointer
+from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M, Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
 from palpate.window.words import heading, hint, status
@@ -31,9 +34,14 @@ from render.base import Renderer
 from scenes.phantoms import Region
 from scenes.scene import Scene
 
+if TYPE_CHECKING:
+    from palpate.exploring.guide import Guide
+
 PERIOD_MS = 16
 SIZE = (1280, 800)
 CHARTS_SHARE = 0.28
+SLIDER_AT = 0.36
+"""Of the panel's height."""
 PANEL_SHARE = 0.42
 """Of the charts' row: the panel of words, which covers nothing."""
 LEAST_TYPE = 9
@@ -42,7 +50,8 @@ LETTER = 0.62
 
 
 class TouchWindow:
-    """Draws a started session. channel: where the mouse's pose goes, None where another device moves."""
+    """Draws a started session. channel: where the mouse's pose goes, None where another device moves. guide:
+    of an exploration, whose suggestions are shown."""
 
     def __init__(
         self,
@@ -52,6 +61,7 @@ class TouchWindow:
         *,
         off_screen: bool = False,
         size: tuple[int, int] = SIZE,
+        guide: Guide | None = None,
     ) -> None:
         self.session = session
         self.scene = scene
@@ -66,6 +76,7 @@ class TouchWindow:
         nodules = tuple(session.model.material.inclusions.values())
         up = session.model.support.normal
         self.game = Game(nodules, up) if scene.find and nodules else None
+        self.guide = guide
         self._coloured = scene.colour == "stiffness"
         halves = [(0, slice(None)), (1, slice(None))]
         self.plotter = pyvista.Plotter(
@@ -87,6 +98,7 @@ class TouchWindow:
         self._texts: list[tuple[pyvista.Text, int]] = []
         self._scaled_for = (0, 0)
         self.pictures = [self._picture(side) for side in range(self.sides)]
+        self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
         self.plotter.subplot(1, 0)
         self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names, left=PANEL_SHARE)
         self._status = self._text("", (0.008, 0.95), "top", size=15)
@@ -95,10 +107,12 @@ class TouchWindow:
         self._help = self._text("", (0.01, 0.98), "top", font="courier")
         self._help.prop.background_color, self._help.prop.background_opacity = "white", 0.9
         self._help.SetVisibility(False)
+        self.plotter.add_axes(interactive=False, color="black", line_width=2, viewport=(0.0, 0.0, 0.14, 0.2))
         points, triangles = self.pictures[0].rest_surface
         model = session.model
         radius = session.servo.tip_radius_m
         self.pointer = Pointer(points, triangles, radius, model.support.point, model.support.normal)
+        self._slider = None if channel is None else self._depth_slider()
         self.orbit = self._look()
         self.controls = Controls(self)
 
@@ -132,6 +146,36 @@ class TouchWindow:
         self._texts.append((actor, size))
         self.plotter.add_actor(actor, reset_camera=False)
         return actor
+
+    def _depth_slider(self) -> vtk.vtkSliderWidget:
+        """How deep a press goes, in the panel; a drag on it is none on the object."""
+        self.plotter.subplot(1, 0)
+        pointer = self.pointer
+        slider = self.plotter.add_slider_widget(
+            pointer.go_deep,
+            (1e3 * LEAST_PRESS_M, 1e3 * MOST_PRESS_M),
+            value=1e3 * pointer.press_depth_m,
+            title="press depth [mm]",
+            pointa=(0.012, SLIDER_AT),
+            pointb=(0.012 + 0.5 * PANEL_SHARE, SLIDER_AT),
+            interaction_event="always",
+            title_height=0.05,
+            title_color="black",
+            color="#1b4f9c",
+            fmt="%.1f",
+            slider_width=0.035,
+            tube_width=0.008,
+        )
+        look: Any = slider.GetSliderRepresentation()
+        look.SetSliderLength(0.012)
+        look.SetEndCapLength(0.0)
+        look.SetLabelHeight(0.05)
+        look.GetTubeProperty().SetColor(*pyvista.Color("#b8c0cc").float_rgb)
+        for words in (look.GetLabelProperty(), look.GetTitleProperty()):
+            words.SetColor(0.0, 0.0, 0.0)
+            words.SetBold(False)
+            words.SetShadow(False)
+        return slider
 
     def _picture(self, side: int) -> ObjectPicture:
         self.plotter.subplot(0, side)
@@ -225,8 +269,9 @@ class TouchWindow:
         return frame
 
     def _draw(self, frame: Frame) -> None:
+        below = self.pointer.below(frame.tip_m)
         for picture, view in zip(self.pictures, frame.views, strict=False):
-            picture.update(frame, view)
+            picture.update(frame, view, below)
         self._play(frame)
         if self._coloured and self.session.inclusion_felt and (self.game is None or self.game.answered):
             maps = self._map.of(self._drawing())
@@ -237,6 +282,12 @@ class TouchWindow:
         lines = status(self.session, self.scene, self.pointer, frame, self.notice)
         if self.game is not None:
             lines += self.game.lines(time.perf_counter())
+        if self.guide is not None and self._ghost is not None:
+            self.guide.follow()
+            self._ghost.show(self.guide.ghost)
+            lines += self.guide.lines()
+        if self._slider is not None:
+            self._slider.GetSliderRepresentation().SetValue(1e3 * self.pointer.press_depth_m)
         self._scale_type()
         width, _ = self.plotter.window_size
         letters = int(PANEL_SHARE * width / (LETTER * self._status.prop.font_size))
@@ -254,11 +305,18 @@ class TouchWindow:
             for text, points in self._texts:
                 text.prop.font_size = max(LEAST_TYPE, round(points * share))
 
-    def run(self, seconds: float | None = None, *, screenshot: Path | None = None) -> None:
-        """Show until closed or the time is up."""
+    def run(
+        self,
+        seconds: float | None = None,
+        *,
+        screenshot: Path | None = None,
+        shown: Callable[[], object] = lambda: None,
+    ) -> None:
+        """Show until closed or the time is up; shown: called once it is to be seen."""
         self._end_s = time.perf_counter() + seconds if seconds else float("inf")
         interactor = self.controls.interactor
         self.plotter.show(interactive_update=True, auto_close=False)
+        shown()
         interactor.AddObserver("TimerEvent", lambda *_: self._timed(screenshot))
         interactor.CreateRepeatingTimer(PERIOD_MS)
         interactor.AddObserver("ExitEvent", lambda *_: self.close())

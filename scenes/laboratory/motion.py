@@ -103,7 +103,8 @@ def _one_touch(
     offset = rng.normal(0, 1e3 * hand.scatter_m, 3) if touch.repeat else np.zeros(3)
     offset -= (offset @ touch.normal) * touch.normal
     foot = surface.nearest((touch.point + offset)[None])[0][0]
-    speed = 1e3 * np.exp(rng.uniform(np.log(hand.slowest_m_per_s), np.log(hand.fastest_m_per_s)))
+    own = 1e3 * np.exp(rng.uniform(np.log(hand.slowest_m_per_s), np.log(hand.fastest_m_per_s)))
+    speed = touch.speed or own
     height = rng.uniform(11.0, 16.0)
     legs: list[np.ndarray] = []
     s: list[np.ndarray] = []
@@ -117,6 +118,7 @@ def _one_touch(
     add(WAY_IN, near + (touch.depth - near) * minimum_jerk(_samples(touch.depth - near, speed)))
     held = rng.random() < hand.hold_share or touch.kind == "drag"
     pause = rng.uniform(0.15, 1e3 * hand.longest_hold_s / 1e3) if held else rng.uniform(0.005, 0.03)
+    pause = pause if touch.hold is None else touch.hold
     add(WAY_IN, _hold(touch.depth, pause, hand, rng, back=touch.kind == "drag"))
     distance = float(np.linalg.norm(touch.side))
     if distance > 0:

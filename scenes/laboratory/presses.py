@@ -54,7 +54,8 @@ class Touch:
     depth: greatest travel of the way in, mm. direction: unit vector of the way in. side: (3,) mm, sideways
     travel of a drag. slow: the person holds or presses slowly here. repeat: how often this site was
     touched before. reach: mm, as deep as its path is solved where that is deeper than `depth`, so that
-    presses of unlike depths share a solved path.
+    presses of unlike depths share a solved path. speed: mm/s, mean, of the way in; hold: s, at depth; None
+    is left to the hand.
     """
 
     site: int
@@ -66,6 +67,8 @@ class Touch:
     side: np.ndarray
     repeat: int = 0
     reach: float = 0.0
+    speed: float | None = None
+    hold: float | None = None
 
 
 def sites(phantom: Phantom, count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

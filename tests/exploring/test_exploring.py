@@ -122,3 +122,53 @@ def test_the_robots_example_runs_against_the_laboratory(tmp_path):
     state = module.main(str(tmp_path / "rec.csv.gz"), most=6)
     assert state["presses"] >= 4 and np.isfinite(state["young_modulus_pa"])
     assert (tmp_path / "rec.csv.gz").exists()
+
+
+def test_a_place_that_was_asked_for_and_not_reached_is_not_asked_for_again():
+    from palpate.exploring.candidates import _not_in_vain
+
+    vertices = np.column_stack([np.linspace(0, 0.1, 11), np.zeros(11), np.zeros(11)])
+    rows = np.arange(11)
+    asked = np.array([[0.05, 0.0, 0.0]])
+    reached = _not_in_vain(vertices, rows, np.array([[0.052, 0.0, 0.0]]), asked)
+    np.testing.assert_array_equal(reached, rows)
+    left = _not_in_vain(vertices, rows, np.array([[0.09, 0.0, 0.0]]), asked)
+    assert 5 not in left and len(left) == 10
+
+
+def test_touches_that_were_off_widen_what_a_surface_says_of_itself():
+    explorer = Explorer(Instrument(0.005))
+    assert explorer._doubt == 1.0
+    explorer._tests = [0.3, 0.5]
+    assert explorer._doubt == 1.0
+    explorer._tests = [8.0]
+    assert explorer._doubt > 3
+
+
+def test_a_robot_in_the_laboratory_presses_as_fast_and_as_long_as_it_is_told():
+    from scenes.laboratory.hand import HandOptions
+    from scenes.laboratory.motion import _one_touch
+    from scenes.laboratory.paths import WAY_IN
+    from scenes.laboratory.presses import Touch
+    from scenes.laboratory.surface import Surface
+    from scenes.phantoms import phantom
+
+    block = phantom("block")
+    surface = Surface(1e3 * block.vertices, block.faces)
+    top = np.array([0.0, 0.0, 1e3 * block.height_m])
+
+    def made(**given):
+        touch = Touch(
+            0, top, np.array([0.0, 0, 1]), "press", 5.0, np.array([0.0, 0, -1]), np.zeros(3), **given
+        )
+        return _one_touch(0, touch, surface, HandOptions(), 5.0, np.random.default_rng(3))[0]
+
+    def seconds(samples, low, high):
+        inside = (samples["leg"] == WAY_IN) & (samples["s"] > low) & (samples["s"] < high)
+        return inside.sum() / 1000
+
+    slow, fast = made(speed=5.0, hold=0.1), made(speed=80.0, hold=0.1)
+    assert seconds(slow, 0.0, 4.0) > 8 * seconds(fast, 0.0, 4.0)
+    assert seconds(made(speed=80.0, hold=1.5), 4.5, 5.1) - seconds(fast, 4.5, 5.1) == pytest.approx(
+        1.4, abs=0.05
+    )

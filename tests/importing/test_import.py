@@ -3,6 +3,7 @@ told."""
 
 from __future__ import annotations
 
+import gzip
 import json
 import sys
 
@@ -12,9 +13,10 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 import palpate as pp
-from mechanics.errors import RecordingError
+from mechanics.errors import FileError, RecordingError
 from palpate import cli
 from palpate.importing.convert import cross_correlated
+from palpate.importing.dates import seconds_of
 
 RATE, TIP = 500.0, 0.004
 
@@ -235,6 +237,38 @@ def test_what_is_missing_is_one_line(tmp_path, content, said, words):
     assert len(str(refused.value).splitlines()) == 1
 
 
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a limit that only Linux has")
+@pytest.mark.parametrize("name", ["log.csv.gz", "log.npz"])
+def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch, name):
+    most = 16 << 20
+    monkeypatch.setattr("mechanics.files._MOST_MEMORY", most)
+    if name.endswith("gz"):
+        (tmp_path / name).write_bytes(gzip.compress(bytes(4 * most), 1))
+    else:
+        np.savez_compressed(tmp_path / name, t=np.zeros(most // 2))
+    with pytest.raises(RecordingError, match="takes more than .* of memory to read") as refused:
+        pp.read_table(tmp_path / name, tip_radius_m=TIP)
+    assert len(str(refused.value).splitlines()) == 1
+    assert np.zeros(4 * most).size, "the limit ends with the file"
+
+
+def test_a_picture_replaces_no_photograph_and_is_whole_or_not_there(tmp_path, world):
+    rows = np.column_stack([world["t"], world["p"], world["f"]])[::50]
+    np.savetxt(tmp_path / "log.csv", rows, "%.6g", ",", header="t,x,y,z,fx,fy,fz", comments="")
+    result = pp.import_table(tmp_path / "log.csv", tip_radius_m=TIP)
+    photo = tmp_path / "rec.png"
+    photo.write_bytes(b"\x89PNG of a cat")
+    with pytest.raises(FileError, match="is no picture of palpate import"):
+        result.draw(photo)
+    assert photo.read_bytes() == b"\x89PNG of a cat"
+    words = ["import", str(tmp_path / "log.csv"), "--tip-radius", "0.005", "--dry-run", "--picture"]
+    assert (
+        cli.main([*words, str(tmp_path / "log.csv")]) == 2 and "t,x,y" in (tmp_path / "log.csv").read_text()
+    )
+    drawn = result.draw(tmp_path / "drawn.png").read_bytes()
+    assert drawn.endswith(b"IEND\xaeB`\x82") and result.draw(tmp_path / "drawn.png").stat().st_size > 1000
+
+
 def test_a_missing_library_names_the_extra(tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "h5py", None)
     (tmp_path / "log.h5").write_bytes(b"x")
@@ -257,3 +291,54 @@ def test_instruments_of_others_are_understood(measured_data):
     )
     assert meat.recording.force_on_tool[:, 2].max() == pytest.approx(1.062, abs=1e-3)
     assert 0.003 < np.ptp(meat.recording.position[:, 2]) < 0.006
+
+
+def test_dates_gaps_and_empty_rows_do_not_hide_the_header(tmp_path, world):
+    rows = []
+    for k, (t, p, f) in enumerate(zip(world["t"], world["p"], world["f"], strict=True)):
+        cells = [f"22.11.2026 13:05:{6 + t:09.6f}", *(f"{1e3 * v:.6f}" for v in p), *(f"{v:.6f}" for v in f)]
+        if k == 3:
+            cells = ["", "n/a", *[""] * 5]
+        rows.append(";".join(cells).replace(".", ",").replace("22,11,2026", "22.11.2026"))
+    header = "Zeit;Weg X [mm];Weg Y [mm];Weg Z [mm];Kraft X [N];Kraft Y [N];Kraft Z [N]"
+    (tmp_path / "log.txt").write_text("\n".join([header, ";;;;;;", *rows]), encoding="utf-16")
+    made = pp.import_table(tmp_path / "log.txt", tip_radius_m=TIP)
+    kept = np.arange(len(world["t"])) != 3
+    check(made.recording, {key: value[kept] for key, value in world.items()})
+
+
+@pytest.mark.parametrize(
+    ("text", "seconds"),
+    [
+        ("1970-01-01T00:01:02.5", 62.5),
+        ("1970-01-01 01:00:00+01:00", 0.0),
+        ("02.01.1970 00:00:01,25", 86401.25),
+        ("13:05:01.25", 47101.25),
+        ("yesterday", np.nan),
+    ],
+)
+def test_a_date_is_seconds(text, seconds):
+    assert seconds_of(text) == pytest.approx(seconds, nan_ok=True)
+
+
+def test_a_flange_and_its_orientation_in_any_order_are_known_by_name(tmp_path, world):
+    turn = Rotation.from_euler("xyz", np.column_stack([0.3 * np.sin(world["t"] + k) for k in range(3)]))
+    arm = np.array([0.01, -0.02, 0.12])
+    np.savez(
+        tmp_path / "log.npz", stamp=world["t"], flange_position=world["p"] - turn.apply(arm),
+        flange_orientation_xyzw=turn.as_quat(), force=turn.inv().apply(world["f"]),
+    )  # fmt: skip
+    made = pp.read_table(tmp_path / "log.npz", tip_radius_m=TIP, frame="tool", flange_to_tip_m=arm.tolist())
+    check(made, world)
+
+
+def test_a_unit_that_nobody_said_is_doubted(tmp_path, world):
+    held = {"t": world["t"], "x": 1e6 * world["p"][:, 0], "y": world["p"][:, 1], "z": world["p"][:, 2]}
+    np.savez(tmp_path / "far.npz", **held, fz=world["f"][:, 2])
+    with pytest.raises(RecordingError, match=r"5e\+04 m wide.* is it um\? say --units position=um"):
+        pp.read_table(tmp_path / "far.npz", tip_radius_m=TIP)
+    np.savez(tmp_path / "hard.npz", t=world["t"], z=world["p"][:, 2], fz=1e3 * world["f"][:, 2])
+    made = pp.import_table(tmp_path / "hard.npz", tip_radius_m=TIP)
+    assert "say --units force=mN" in str(made)
+    said = pp.import_table(tmp_path / "hard.npz", tip_radius_m=TIP, units={"force": "mN"})
+    assert "WARNING" not in str(said)

@@ -99,15 +99,25 @@ def test_units_that_make_no_object_for_a_hand_are_named(tmp_path, unit, words):
         read_surface(written(tmp_path, "block.stl"), unit)
 
 
+def _declaring(kind: str, cells: str) -> bytes:
+    """A file of 100 bytes that asks VTK for room for 10^11 points."""
+    many = "9" * 11
+    return (
+        f'<VTKFile type="{kind}"><{kind}><Piece NumberOfPoints="{many}" {cells}="{many}"/></{kind}></VTKFile>'
+    ).encode()
+
+
 @pytest.mark.parametrize(
     ("name", "content", "words"),
     [
         ("bad.stl", b"hello", "no triangles"),
         ("bad.msh", b"foo", "cannot be read as msh"),
         ("bad.inp", b"\x00\xff", "cannot be read as inp"),
-        ("bad.vtu", b"<a/>", "no triangles"),
+        ("bad.vtu", b"<a/>", "is damaged: VTK cannot read it"),
         ("thing.step", b"", "allowed are stl, obj"),
         ("gone.stl", None, "does not exist"),
+        ("huge.vtu", _declaring("UnstructuredGrid", "NumberOfCells"), "NumberOfPoints of 9+ in a file"),
+        ("huge.vtp", _declaring("PolyData", "NumberOfPolys"), "NumberOfPoints of 9+ in a file"),
     ],
 )
 def test_bad_files_are_one_line(tmp_path, capfd, name, content, words):

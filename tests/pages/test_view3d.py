@@ -121,6 +121,13 @@ def test_a_page_is_small_and_holds_its_script_with_the_licence(written):
 
 
 @needs_browser
+def test_dots_have_their_colours_from_the_first_picture_on(tab):
+    picture = pixels(tab, *stage(tab))
+    vivid = np.ptp(picture, axis=2) > 110  # the object is beige, the floor grey
+    assert vivid.sum() > 30
+
+
+@needs_browser
 def test_the_view_turns_zooms_and_comes_back(tab):
     x, y, w, h = stage(tab)
     azimuth, elevation, distance = (look(tab, k) for k in ("azimuth", "elevation", "distance"))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -10,7 +11,7 @@ from flat_contact import recorded
 from flat_ground import MODULUS_PA, TIP_M, raster
 
 import palpate as pp
-from diagnose.calibrate import calibrate_on_plate
+from diagnose.calibrate import STIFFEST, calibrate_on_plate, instrument_of
 from mechanics.calibration import Calibration, read_calibration, write_calibration
 from mechanics.errors import OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording
@@ -92,11 +93,42 @@ def test_what_was_pressed_must_be_said():
         pp.calibrate(raster((2, 2)), rigid=True, modulus_pa=MODULUS_PA, progress=False)
 
 
+@pytest.mark.parametrize(("trust", "gain", "radius"), [("tip", 0.8, 1.0), ("gain", 1.0, 0.64)])
+def test_a_tools_give_is_of_the_true_force(trust, gain, radius):
+    """A support shows what the tool gives by the force as read; a fit, by the force that the fit has."""
+    own = {"time_delay": 0.01, "backlash": 1e-4, "force_gain": np.eye(3).ravel(), "tool_compliance": 1e-3}
+    names, values, places = [], [np.log(0.8 * MODULUS_PA)], {}
+    for name, value in own.items():
+        places[name] = slice(len(values), len(values) + np.size(value))
+        values += np.ravel(value).tolist()
+        names.append(name)
+    up = np.array([0.0, 0.0, 1.0])
+
+    def keys(names, rigid):
+        found = SimpleNamespace(names=tuple(names), place_of=places.get)
+        return instrument_of(found, np.array(values), MODULUS_PA, rigid, up, trust)
+
+    fitted, shown = keys(names, 0.0), keys(names[:-1], 1e-3)
+    assert fitted["give"] == pytest.approx(1e-3 * gain)
+    # a sensor that reads 0.8 N of 1 N shows a tool that gives 1 mm a newton read
+    assert shown["give"] == pytest.approx(1e-3 * gain)
+    assert shown["common_gain"] == pytest.approx(gain) and shown["radius"] == pytest.approx(radius)
+    assert shown["delay_s"] == 0.01 and shown["play_m"] == 1e-4
+
+
 @pytest.mark.slow
-def test_ground_of_known_modulus_tells_the_sensors_gain():
+@pytest.mark.parametrize(("gain", "stiffness"), [(1.25, np.inf), (1.12, 900.0)])
+def test_ground_of_known_modulus_tells_gain_and_bending_together(gain, stiffness):
+    """Nine straight presses cannot part them: what is said of one must leave room for the other."""
     clean = raster((3, 3), 0.012, depth_m=0.0025, press_s=0.8)
-    spoilt = dataclasses.replace(clean, force_on_tool=1.25 * clean.force_on_tool)
+    spoilt = dataclasses.replace(
+        clean,
+        force_on_tool=gain * clean.force_on_tool,
+        position=clean.position - clean.force_on_tool / stiffness,
+    )
     found = pp.calibrate(spoilt, modulus_pa=MODULUS_PA, half_space=True, progress=False)
-    assert np.trace(found.matrix) / 3 == pytest.approx(1.25, rel=0.08)
     low, high = found.interval["common_gain"]
-    assert low < 1.25 < high
+    assert low < gain < high and high - low < 0.6
+    soft, stiff = found.interval["stiffness_n_per_m"]
+    assert soft < min(stiffness, STIFFEST) <= stiff
+    assert ("tool's bending" in found.about["not_told"]) == (stiffness > STIFFEST)

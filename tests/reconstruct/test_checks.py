@@ -46,6 +46,15 @@ def test_a_base_that_does_not_fit_the_presses_is_found(cylinder, fault):
     assert found and found[0].name in it.names and found[0].grave
 
 
+@pytest.mark.parametrize("scale", [0.0, 1e-300])
+def test_a_recording_of_nothing_is_found_without_a_warning_of_numpy(cylinder, scale):
+    recording = dataclasses.replace(cylinder[0], force_on_tool=scale * cylinder[0].force_on_tool)
+    still = dataclasses.replace(recording, position=np.zeros_like(recording.position))
+    with np.errstate(all="raise", under="ignore"):
+        assert any(f.grave for f in check(recording))
+        assert any(f.grave for f in check(still))
+
+
 def test_what_is_found_says_where_and_how_sure(cylinder):
     recording = cylinder[0]
     position = np.array(recording.position)

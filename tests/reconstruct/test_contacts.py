@@ -7,6 +7,7 @@ import pytest
 from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 from mechanics.errors import ContactError, OptionError
+from mechanics.segments import Segment
 from reconstruct import finding
 from reconstruct.contacts import ContactOptions, explore
 from reconstruct.filtering import low_pass
@@ -135,6 +136,16 @@ def test_a_press_on_the_support_is_rejected_and_named():
     assert any("support" in reason for _, reason in exploration.rejected)
 
 
+def test_presses_that_are_stated_to_be_on_the_support_are_none_of_the_object(cylinder):
+    recording, _ = cylinder
+    plain = explore(recording).presses
+    stretch = Segment("rigid", plain.onset_s[3] - 0.1, plain.end_s[3] + 0.1)
+    found = explore(dataclasses.replace(recording, segments=(stretch,)))
+    np.testing.assert_allclose(found.presses.onset_s, np.delete(plain.onset_s, 3), atol=0.01)
+    assert any("stated to be rigid" in reason for _, reason in found.rejected)
+    assert stretch in found.presses.segments
+
+
 def test_the_papers_mode_names_presses_below_its_threshold():
     recording, onsets = explore_cylinder(modulus=29e3, compliance=5e-4)
     exploration = explore(recording, method="paper", contact_options=ContactOptions(least_palpations=1))
@@ -175,7 +186,7 @@ def test_weight_and_inertia_of_the_tool_are_found_to_a_fiftieth():
     heavy, plain = (explore_cylinder(tool_mass_kg=mass)[0] for mass in (0.05, 0.0))
     rate, cutoff_hz = heavy.sample_rate_hz, 25.0
     true = low_pass(heavy.force_on_tool - plain.force_on_tool, rate, cutoff_hz)
-    found, _ = tool_weight(heavy, low_pass(heavy.force_on_tool, rate, cutoff_hz), cutoff_hz)
+    found = tool_weight(heavy, low_pass(heavy.force_on_tool, rate, cutoff_hz), cutoff_hz).force
     rms = np.sqrt(np.mean(true**2))
     assert np.sqrt(np.mean((found - true) ** 2)) < 0.02 * rms  # 1.1 %; two gradients in turn missed by 3.3 %
 
@@ -190,7 +201,8 @@ def test_the_tools_inertia_is_found_where_the_force_reads_late_and_nothing_tells
     assert np.array_equal(heavy.force_on_tool, force)
     rate, cutoff_hz = heavy.sample_rate_hz, 25.0
     true = low_pass(heavy.force_on_tool - plain.force_on_tool, rate, cutoff_hz)
-    found, inertia = tool_weight(heavy, low_pass(heavy.force_on_tool, rate, cutoff_hz), cutoff_hz)
+    weight = tool_weight(heavy, low_pass(heavy.force_on_tool, rate, cutoff_hz), cutoff_hz)
+    found, inertia = weight.force, weight.inertia
     inside = slice(200, -200)
     rms = np.sqrt(np.mean(true[inside] ** 2))
     assert np.sqrt(np.mean((found - true)[inside] ** 2)) < 0.05 * rms

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 from flat_contact import cyclic, points, pushed, recorded
@@ -51,6 +53,18 @@ def test_cycles_are_cut_at_minima_and_say_what_they_cannot_tell():
     assert "force in free air" in CANNOT_TELL["cycle"] and not found.within("free", recording.t).any()
     # nothing is taken off as free air
     assert not found.free_air.any()
+
+
+def test_a_load_cell_of_one_axis_cuts_the_presses_that_three_axes_cut():
+    """The axes that nobody reads are no silence: taken for one, 4 mN of noise were cut into contacts."""
+    full = raster((3, 2), tilt=False)
+    force = np.where([False, False, True], full.force_on_tool, 0.0)
+    alone = dataclasses.replace(full, force_on_tool=force)
+    found, whole = (explore(r, boundary=nowhere(r), unbroken=True).presses for r in (alone, full))
+    assert found.kinds == whole.kinds == ("press",) * 6
+    assert found.noise.raw_n == pytest.approx(NOISE_N, rel=0.15)
+    assert np.abs(found.onset_s - whole.onset_s).max() < 0.02
+    assert (found.contact_normal[:, 2] > 0.999).all()
 
 
 def test_a_hold_that_relaxes_is_one_press():

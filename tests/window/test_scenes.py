@@ -40,6 +40,23 @@ def test_what_the_demo_made_is_what_is_touched(block: Model, tmp_path: Path) -> 
     assert {f.name for f in touched.path.iterdir()} == {f.name for f in block.path.iterdir()}
 
 
+def test_only_a_model_goes_before_a_scene_of_its_name(
+    block: Model, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "demo").mkdir()
+    assert load_scene("demo").kind == "recording"
+    (tmp_path / "bean").symlink_to(block.path)
+    assert load_scene("bean").kind == "model"
+
+
+def test_scenes_of_one_recording_share_its_model(block: Model, tmp_path: Path) -> None:
+    keep(load_scene("demo"), block.path, cache=tmp_path)
+    kept = model_of(load_scene("demo"), cache=tmp_path).path
+    for name in ("your-recording", "silicone-1-cylinder"):
+        assert model_of(load_scene(name), cache=tmp_path).path == kept
+
+
 def test_anything_that_can_be_touched_is_a_scene(block: Model, tmp_path: Path) -> None:
     assert load_scene(block.path).kind == "model"
     assert load_scene("bowl").kind == "phantom"

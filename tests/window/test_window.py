@@ -96,6 +96,26 @@ def test_wheel_presses_deeper(driven: Driven) -> None:
     release(driven)
 
 
+def test_the_slider_sets_the_depth_and_presses_nothing(driven: Driven) -> None:
+    window, pointer = driven.window, driven.window.pointer
+    look, panel = window._slider.GetSliderRepresentation(), window._slider.GetCurrentRenderer()
+    ends = [look.GetPoint1Coordinate(), look.GetPoint2Coordinate()]
+    left, right = (np.array(end.GetComputedDisplayValue(panel), dtype=float) for end in ends)
+    driven.wait(0.05)
+    before = pointer.press_depth_m
+    share = (1e3 * before - look.GetMinimumValue()) / (look.GetMaximumValue() - look.GetMinimumValue())
+    driven.pixel(*(left + share * (right - left)))
+    driven.button(True)
+    driven.pixel(*(left + 0.8 * (right - left)))
+    assert not pointer.pressing
+    driven.button(False)
+    assert pointer.press_depth_m > before + 0.002
+    pointer.go_deep(1e3 * before)
+    driven.wait(0.05)
+    assert look.GetValue() == pytest.approx(1e3 * before), "the slider follows the wheel and the keys"
+    driven.mouse(0.5, 0.55)
+
+
 def test_keys_change_modulus_and_friction(driven: Driven) -> None:
     soft = press(driven)
     driven.key("plus")

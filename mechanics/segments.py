@@ -1,0 +1,23 @@
+"""Stretches of a recording and their kinds: what was done when."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+KINDS = ("trace", "press", "free", "rigid", "retrace", "slide", "cycle", "points")
+"""Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
+more, sliding over a surface, a press cut out of a contact that never breaks, quasi-static points of one
+place."""
+STATED = KINDS[:5]
+"""What a recording's TOML may say of a stretch ([[segment]])."""
+ON_SUPPORT = ("rigid", "retrace")
+"""Kinds of which every contact is with the support, not with the object."""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of the recording: its kind, one of KINDS, and when it lasts, s."""
+
+    kind: str
+    start_s: float
+    end_s: float

@@ -1,0 +1,53 @@
+"""An exploration is whole at any time: its recording says what each segment was; one can go on with it."""
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mechanics.errors import RecordingError
+from mechanics.recording import read_recording, write_recording
+from mechanics.segments import Segment as Stretch
+from palpate.exploring.rows import Instrument, Segment, apart, together
+
+
+def _rows(kind, n=400, at=0.0):
+    t = np.arange(n) / 1000
+    position = np.column_stack([np.full(n, at), np.zeros(n), 0.05 + 0.01 * np.cos(20 * t)])
+    return Segment(kind, t, position, np.zeros((n, 3)) + [0, 0, at])
+
+
+@pytest.fixture
+def explored():
+    about = {"force_noise_std_n": 0.01, "poisson_ratio": 0.45, "object_name": "thing"}
+    segments = [
+        _rows("trace", 700),
+        _rows("press", 400, 0.1),
+        _rows("rigid", 300, 0.2),
+        _rows("press", 500, 0.3),
+    ]
+    return together(Instrument(0.004, 1000.0, about), segments), segments
+
+
+def test_what_was_joined_comes_apart_again_also_from_its_file(explored, tmp_path):
+    recording, segments = explored
+    again = read_recording(write_recording(tmp_path / "so-far.csv.gz", recording))
+    assert [s.kind for s in again.segments] == ["trace", "press", "rigid", "press"]
+    for source in (recording, again):
+        instrument, parts = apart(source)
+        assert instrument.tip_radius_m == 0.004 and instrument.about["poisson_ratio"] == 0.45
+        assert [s.kind for s in parts] == [s.kind for s in segments]
+        for made, given in zip(parts, segments, strict=True):
+            np.testing.assert_allclose(made.position, given.position, atol=1e-9)
+    # and joined once more, it is the same recording
+    np.testing.assert_allclose(together(instrument, parts).t, recording.t, atol=1e-3)
+
+
+def test_a_recording_says_what_is_wrong_with_its_segments(explored):
+    recording, _ = explored
+    with pytest.raises(RecordingError, match="must be one of"):
+        dataclasses.replace(recording, segments=(Stretch("poke", 0.0, 1.0),))
+    with pytest.raises(RecordingError, match="start must come before"):
+        dataclasses.replace(recording, segments=(Stretch("press", 2.0, 1.0),))
+    with pytest.raises(RecordingError, match="order of time"):
+        apart(dataclasses.replace(recording, segments=recording.segments[::-1]))

@@ -1,0 +1,41 @@
+"""What an exploration knows in the end is what reconstruction says of its recording, and the labelled cause
+stands alone."""
+
+import numpy as np
+import pytest
+
+from mechanics.recording import read_recording
+from palpate.exploring.explorer import Explorer
+from palpate.exploring.goals import GoalOptions
+
+
+@pytest.mark.slow
+def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recordings):
+    from reconstruct.pipeline import reconstruct
+
+    recording = read_recording(shared_recordings / "silicone-1-cylinder.toml")
+    state = Explorer.going_on(recording, GoalOptions(most=60)).state
+    model = reconstruct(recording)
+    low, high = state.modulus_ci95_pa
+    other = model.material.young_modulus_ci95_pa
+    assert low < model.material.young_modulus_pa < high and other[0] < state.modulus_pa < other[1]
+    assert state.modulus_pa == pytest.approx(model.material.young_modulus_pa, rel=0.03)
+    assert state.surface.removesuffix("+") == model.about["shape"]["surface"].removesuffix("+")
+    assert state.done
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["time-delay", "viscoelasticity"])
+def test_the_labelled_cause_stands_alone(shared_recordings, name):
+    recording = read_recording(shared_recordings / f"example-{name}.toml")
+    state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
+    assert state.causes.standing(0.95) == [name.replace("-", "_")]
+    assert np.isfinite(state.modulus_pa)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["silicone-1-cylinder", "silicone-3-halfsphere"])
+def test_nothing_but_finite_strain_rules_none_out(shared_recordings, name):
+    recording = read_recording(shared_recordings / f"{name}.toml")
+    state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
+    assert "none" in state.causes.standing(0.95), state.causes.ratio

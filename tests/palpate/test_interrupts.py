@@ -1,0 +1,20 @@
+"""The commands that the benchmark of interrupts runs are commands."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from palpate.benchmarks import _interrupts
+from palpate.cli import parser_of
+from palpate.importing.tables import SUFFIXES
+
+
+@pytest.mark.parametrize("name", _interrupts.COMMANDS)
+def test_every_command_that_is_interrupted_is_one_that_works_on_files_that_are_there(name, tmp_path):
+    argv = _interrupts._jobs(tmp_path, tmp_path)[name].argv
+    parser_of(argv[0]).parse_args(argv[1:])
+    inputs = [Path(word) for word in argv[1:] if "recordings" in word]
+    assert all(file.is_file() for file in inputs)
+    assert argv[0] != "import" or inputs[0].suffix in SUFFIXES
