@@ -151,7 +151,7 @@ def cut(
             continue
         near = slice(*np.searchsorted(t, [onset[i] - 0.2, max(limits[i], peak_s[i]) + 0.2]))
         end[i] = loss_of_touch(
-            t[near], (recording.force_on_tool[near] - free[near]) @ normal[i], recording.sample_rate_hz,
+            t[near], recording.force_on_tool[near] @ normal[i], recording.sample_rate_hz,
             onset_s=onset[i], peak_s=peak_s[i], limit_s=limits[i], noise_n=noise,
         )  # fmt: skip
     pieces = []

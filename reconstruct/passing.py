@@ -29,27 +29,21 @@ _FLAT = 0.1
 _SLIDE = 8.0
 """Tip radii that are traced at least."""
 _FACETS = 40
+_ENOUGH = 4000
+"""Points of the way that tell the support."""
 _MARGIN_S = 0.1
 """A force may read so late."""
 _BLOCK_S = 0.02
 _LAG_S = 0.1
+"""Changes over so long tell how fast the force walks."""
 _SLOW_S = 0.15
+"""A mass that is moved makes what changes faster."""
 _LEAST_S = 4.0
 """Of such air, at least."""
 _CLEAR_S = 0.03
-_BLOCK_S = 0.02
-_LAG_S = 0.1
-_SLOW_S = 0.15
-_LEAST_S = 4.0
-"""Of such air, at least."""
-_CLEAR_S = 0.03
-_AROUND = 2
-"""Steps of the way, before and after."""
-_STILL = 0.6
-"""Tip radii a second: slower is standing."""
-_USUAL = 1.5
 _ROUNDS = 3
 _TOUCH_S = 0.3
+"""Touches last so long, about."""
 _MAXWELL = 1.538
 """Median length of a 3-vector of unit variance an axis."""
 
@@ -116,7 +110,9 @@ def _on_support(position: np.ndarray, force: np.ndarray, knots: np.ndarray, radi
 
     Of the planes that the way's hull touches, the one with most of the way on it, a push inwards counted.
     """
-    way, read = position[knots], force[knots]
+    position = position - position.mean(axis=0)  # the planes are rounded
+    thin = 1 + len(knots) // _ENOUGH
+    way, read = position[knots][::thin], force[knots][::thin]
     nowhere = np.zeros(len(position), dtype=bool)
     try:
         hull = ConvexHull(way)
@@ -128,7 +124,7 @@ def _on_support(position: np.ndarray, force: np.ndarray, knots: np.ndarray, radi
     best, found = 0.0, None
     for k in np.argsort(-on.sum(axis=0))[:_FACETS]:
         inside = on[:, k]
-        if inside.sum() * _STEP < _SLIDE or inside.all():
+        if inside.sum() * thin * _STEP < _SLIDE or inside.all():
             continue
         near = ~inside & (height[:, k] < 4 * radius_m)
         if near.sum() < 5:
