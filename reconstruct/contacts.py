@@ -7,6 +7,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -26,6 +27,7 @@ from reconstruct.delay import force_delay
 from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
+from reconstruct.passing import between, crowd_median, missed, passing, slowly
 from reconstruct.tool_weight import ToolWeight, tool_weight
 from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
@@ -257,26 +259,14 @@ def _speed(signals: Signals, contact: Found) -> float:
 
 
 def _searched(filtered: Filtered, given: _Given) -> _Found:
-    signals, spread = filtered.signals, filtered.spread
-    wanders = signals.recording.quaternion is None and spread.min() > signals.noise_n
-    hint = (
-        f"in free motion the force wanders by {spread.min():.2g} N an axis, louder than its noise "
-        f"({signals.noise_n:.2g} N): a tool whose weight turns with it; record its orientation (qw, qx, qy, "
-        "qz), or hold it one way"
-    )
-    try:
-        found = _found(filtered, given)
-    except ContactError as error:
-        if not wanders:
-            raise
-        # what the error itself advises would not help: its cause is the tool
-        raise type(error)(f"{hint} ({str(error).rsplit(': ', 1)[0]})") from error
+    signals = filtered.signals
+    found = _found(filtered, given)
     peaks = signals.magnitude[[c.peak for c in found.contacts]]
     automatic = given.method == "noise" and given.contact.contact_threshold_n is None
     if automatic and len(peaks) and np.median(peaks) < _CLEAR * found.threshold_n:
         raise ContactError(
             f"the presses reach {np.median(peaks):.2g} N in the middle, where free motion alone reaches "
-            f"{found.threshold_n:.2g} N: weaker ones are lost; {hint if wanders else 'press deeper'}"
+            f"{found.threshold_n:.2g} N: weaker ones are lost; press deeper"
         )
     return found
 
@@ -376,40 +366,50 @@ def _on_support(recording: Recording, a: int, b: int) -> str:
 def filtered_of(
     recording: Recording, cutoff_hz: float, *, tared: bool = False, near: ToolWeight | None = None
 ) -> Filtered:
-    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off.
+    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off. Where the
+    force in free air changes faster (a tool that turns unseen), it is followed from where the tip passes.
 
     tared: nothing is free air, and forces are taken as they are. near: what the tool weighs by a beginning
     of the recording.
     """
-    rate = recording.sample_rate_hz
-    filtered = low_pass_at(recording.t, recording.force_on_tool, rate, cutoff_hz)
+    t, rate = recording.t, recording.sample_rate_hz
+    filtered = low_pass_at(t, recording.force_on_tool, rate, cutoff_hz)
+    position = low_pass_at(t, recording.position, rate, cutoff_hz)
     ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
     stated = 0.5 * (recording.force_noise_std_n or 0.0)
     noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
     white = noise * noise_gain(rate, cutoff_hz)
+
+    def less(weight: ToolWeight | None, drift: np.ndarray, still: Callable[[np.ndarray], float]) -> Filtered:
+        """With weight and drift (n, 3) taken off; `still` tells the spread of a still tip by what is left."""
+        free_air = drift if weight is None else drift + weight.force
+        force, raw = filtered - free_air, recording.force_on_tool - free_air
+        size = np.linalg.norm(force, axis=1)
+        spread = np.full(len(size), max(white, still(size)))
+        if weight is not None:
+            spread = moving_spread(size, weight.inertia, float(spread[0]), round(rate / cutoff_hz))
+        signals = Signals(recording, position, force, size, raw, noise)
+        return Filtered(signals, free_air, spread, cutoff_hz, weight)
+
     if tared:
-        nothing = np.zeros_like(filtered)
-        position = low_pass_at(recording.t, recording.position, rate, cutoff_hz)
-        size = np.linalg.norm(filtered, axis=1)
-        raw = recording.force_on_tool
-        signals = Signals(recording, position, filtered, size, raw, noise)
-        return Filtered(signals, nothing, np.full(len(size), white), cutoff_hz)
+        return less(None, np.zeros_like(filtered), lambda size: white)
     weight = tool_weight(recording, filtered, cutoff_hz, near=near)
-    left = np.linalg.norm(filtered - weight.force, axis=1)
-    drift, _ = free_air_force(recording.t, filtered - weight.force, max(white, crowd_scale(left)))
-    free_air = weight.force + drift
-    force = filtered - free_air
-    signals = Signals(
-        recording=recording,
-        position=low_pass_at(recording.t, recording.position, rate, cutoff_hz),
-        force=force,
-        magnitude=np.linalg.norm(force, axis=1),
-        raw_force=recording.force_on_tool - free_air,
-        noise_n=noise,
-    )
-    still = max(white, crowd_scale(signals.magnitude))
-    spread = moving_spread(signals.magnitude, weight.inertia, still, round(rate / cutoff_hz))
-    return Filtered(signals, free_air, spread, cutoff_hz, weight)
+    left = filtered - weight.force
+    drift, _ = free_air_force(t, left, max(white, crowd_scale(np.linalg.norm(left, axis=1))))
+    steady = less(weight, drift, crowd_scale)
+    air = passing(t, position, steady.signals.force, recording.tip_radius_m, _traced(recording))
+    slow = slowly(t, recording.force_on_tool - weight.force, air)
+    if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
+        return steady
+    # mass and lateness were read from a force that turned
+    again = tool_weight(recording, filtered - slow, cutoff_hz)
+    off = missed(t, filtered - again.force, air)
+
+    def followed(drift: np.ndarray) -> Filtered:
+        return less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
+
+    raw = recording.force_on_tool - again.force
+    return followed(between(t, raw, air, lambda drift: followed(drift).touching()))
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:
