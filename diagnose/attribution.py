@@ -21,11 +21,8 @@ REEXAMINED = 4
 OUT_OF_SET = 0.1
 """An effect with a smaller p value is not in the model confidence set of 90 %."""
 
-RIVAL_CLOSES = 0.3
-"""A rival closes at least this share of what the one that was picked closes of the plain held-out gap."""
-
 AS_LIKELY = np.log(10)
-"""Log odds by which one effect must be likelier than another, or the likelihood of all places decides."""
+"""Log odds by which one effect must be likelier than another, or the two are not told apart by them."""
 
 HIDDEN_LEAST = 10.0
 """What may hide finite strain gains this much alone before it is tried with it as well."""
@@ -283,30 +280,21 @@ def _rivals(
     sets: list[dict[str, float]],
     chosen: list[str],
 ) -> tuple[str, ...]:
-    """Effects whose gain comes so close to that of the one picked in the same step that the sites do not tell
-    them apart."""
+    """Effects as likely to be there as the one picked in the same step, or that would be named themselves and
+    that the sites do not tell from it; the likeliest first."""
     found: dict[str, float] = {}
     for (scores, name), p in zip(picked, sets, strict=False):
         if name not in chosen:
             continue
         first = scores[name]
         for score in scores.values():
-            if score.name in chosen or not search.passes(score):
+            if score.name in chosen or _of_one(score.effect, first.added):
                 continue
-            if _of_one(score.effect, first.added):
+            if score.effect.any_form and first.effect.scope.between_places and score.gain < first.gain:
                 continue
-            if score.share < RIVAL_CLOSES * max(first.share, 0.0) and not score.effect.few_places:
-                continue
-            behind = first.gain - score.gain
-            if score.effect.any_form and first.effect.scope.between_places and behind > 0:
-                continue
-            difference = first.per_group - score.per_group
-            spread = difference.std() * np.sqrt(len(difference))
-            near = behind < max(search.options.rival_share * first.gain, 2.0 * spread, 25.0)
-            as_good = score.share > first.share - 0.05 and score.gain > 0.3 * first.gain
-            standing_beside = p[score.name] > OUT_OF_SET and score.gain > 0.6 * first.gain
-            if (near and behind < 0.6 * first.gain) or as_good or standing_beside:
-                found.setdefault(score.name, behind)
+            as_likely = score.log_odds > first.log_odds - AS_LIKELY
+            if as_likely or (p[score.name] > OUT_OF_SET and search.passes(score)):
+                found.setdefault(score.name, first.log_odds - score.log_odds)
     return tuple(sorted(found, key=lambda n: found[n]))
 
 

@@ -34,9 +34,6 @@ class AttributionOptions:
         0.25,
         "least size of a further effect, of the first's: no law is exact, what it leaves is no effect",
     )
-    rival_share: float = option(
-        0.12, "a rival within this share of the winner's gain counts as not told apart"
-    )
     most: int = option(3, "effects in one answer, at most")
     unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
 

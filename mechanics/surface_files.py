@@ -119,7 +119,7 @@ def _shell_of(path: Path) -> trimesh.Trimesh:
             if suffix in BY_TRIMESH:
                 loaded: Any = trimesh.load(path, force="mesh")
                 if not isinstance(loaded, trimesh.Trimesh):
-                    raise SurfaceError(f"'{path}' holds no surface: one of triangles is needed")
+                    raise SurfaceError(f"'{path}' holds no triangles: export the object as a surface")
                 return loaded
             if suffix in BY_VTK:
                 return _boundary(read_vtk(path, SurfaceError))

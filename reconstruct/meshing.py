@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
 
 from mechanics.errors import MeshError
 from mechanics.nearest import closest, distance, sample
@@ -19,6 +21,7 @@ from reconstruct.tetwild import tetrahedralize
 
 _SAMPLES = 4000
 _TRIES = 3
+_LOST = 0.02  # of the volume, what may be left out because nothing holds it
 _PITCH = 0.8  # of sigma, a voxel: corners are cut by as much, and the mesh keeps to it within 0.4
 
 
@@ -157,11 +160,37 @@ def _stand(
     fixed[faces[base]] = True
     points = points.copy()
     points[fixed] -= height[fixed, None] * up
-    cells = cells[~fixed[cells].all(axis=1)]
+    cells = _held(points, cells[~fixed[cells].all(axis=1)], fixed)
     used = np.unique(cells)
     index = np.full(len(points), -1)
     index[used] = np.arange(len(used))
     return points[used], index[cells], fixed[used]
+
+
+def _held(points: np.ndarray, cells: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """The tetrahedra (m, 4) of the largest piece and of those that stand on the base themselves.
+
+    Pieces hang together by faces. One that nothing holds (a drop of the drawing beside it, what hung on
+    flattened tetrahedra) would leave the stiffness singular. Raises MeshError where that is more than
+    _LOST of the volume.
+    """
+    faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
+    owner = np.repeat(np.arange(len(cells)), 4)
+    order = np.lexsort(faces.T)
+    same = (np.diff(faces[order], axis=0) == 0).all(axis=1)
+    pair = owner[order][:-1][same], owner[order][1:][same]
+    graph = coo_matrix((np.ones(len(pair[0])), pair), shape=(len(cells), len(cells)))
+    pieces, piece = connected_components(graph, directed=False)
+    if pieces == 1:
+        return cells
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    volume = np.bincount(piece, np.abs(np.linalg.det(edges)) / 6)
+    standing = [len(np.unique(cells[piece == k][fixed[cells[piece == k]]])) >= 3 for k in range(pieces)]
+    kept = np.array(standing) | (np.arange(pieces) == np.argmax(volume))
+    lost = float(volume[~kept].sum() / volume.sum())
+    if lost > _LOST:
+        raise MeshError(f"the surface is in pieces: {100 * lost:.0f} % of it does not stand on the support")
+    return cells[kept[piece]]
 
 
 def quality(mesh: TetMesh, surface: Surface) -> MeshReport:

@@ -246,11 +246,22 @@ def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
         wanted |= {role} | {end + b for b in ("pos", "position") for end in role if kind == "position"}
     matches = []
     for table in tables:
-        own = [name for name in table.columns if _key(name) in wanted or _ends(name, role, wanted)]
+        named = [name for name in table.columns if _key(name) in wanted or _ends(name, role, wanted)]
+        # X (N) is a force, whatever X is else
+        named += [name for name in table.columns if role[0] == "f" and _key(name) == role[1]]
+        own = [name for name in dict.fromkeys(named) if _may_be(name, role)]
         matches += [(table, name) for name in own[:1] if len(own) == 1 or role == "t"]
     if role == "t":
         return matches[0] if len(matches) >= 1 else None
     return matches[0] if len(matches) == 1 else None
+
+
+def _may_be(name: str, role: str) -> bool:
+    """Whether the unit in a column's name is of the role's kind, or tells no kind."""
+    kinds = [kind for kind in SI if unit_in(name, kind) is not None]
+    if role[0] == "f" and _key(name) == role[1]:
+        return "force" in kinds
+    return not kinds or KIND.get(role) in kinds
 
 
 def _ends(name: str, role: str, wanted: set[str]) -> bool:
@@ -265,7 +276,8 @@ def _ends(name: str, role: str, wanted: set[str]) -> bool:
 
 def _complete(tables: Sequence[Table], said: Said, found: dict[str, Column]) -> None:
     """A machine with one axis: its travel is downward z, its push fz; what is missing is 0."""
-    if not any(role in found for role in "xyz"):
+    sideways = any(_key(name) in ("x", "y") for table in tables for name in table.columns)
+    if not sideways and not any(role in found for role in "xyz"):
         along = _first(tables, _ALONG)
         if along is not None:
             # travel counts into the sample, z out of it

@@ -3,6 +3,7 @@ units."""
 
 from __future__ import annotations
 
+import csv
 import gzip
 import re
 from pathlib import Path
@@ -12,13 +13,15 @@ import numpy as np
 from mechanics.errors import RecordingError
 from palpate.importing.dates import seconds_of
 from palpate.importing.tables import Table
-from palpate.importing.units import is_unit
+from palpate.importing.units import is_unit, without_unit
 
 _SEPARATORS = ("\t", ";", ",", "|", None)
 _LOOK = 400
 """Lines that are looked at to find separator, decimal sign and first row."""
 _MISSING = ("", "-", "--", "nan", "na", "n/a", "#n/a", "null", "none", "inf", "-inf")
 """What stands in a cell that holds nothing."""
+_THOUSANDS = re.compile(r"[-+]?\d{1,3}(,\d{3})+(\.\d*)?")
+_FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d+")
 
 
 def read(path: Path) -> list[Table]:
@@ -40,7 +43,7 @@ def read(path: Path) -> list[Table]:
     rows = []
     for line in lines[start:]:
         parts = _split(line, separator)
-        if not any(parts):
+        if not any(parts) or _remark(line):
             continue
         parts = (parts + [""] * width)[:width]
         rows.append([_number(part, comma) for part in parts])
@@ -59,12 +62,26 @@ def _decoded(raw: bytes) -> str:
 
 
 def _split(line: str, separator: str | None) -> list[str]:
-    return [part.strip().strip('"').strip() for part in line.strip("\r\n").split(separator)]
+    line = line.strip("\r\n")
+    if separator is not None and '"' in line:
+        return [part.strip() for part in next(csv.reader([line], delimiter=separator), [])]
+    return [part.strip().strip('"').strip() for part in line.split(separator)]
+
+
+def _remark(line: str) -> bool:
+    return line.lstrip().startswith(("#", "%"))
 
 
 def _number(text: str, comma: bool) -> float:
+    number = text
+    if comma and "," in text:
+        number = text.replace(".", "").replace(",", ".")
+    elif _THOUSANDS.fullmatch(text):
+        number = text.replace(",", "")
+    elif _FORTRAN.fullmatch(text):
+        number = text.lower().replace("d", "e")
     try:
-        return float(text.replace(".", "").replace(",", ".") if comma and "," in text else text)
+        return float(number)
     except ValueError:
         return np.nan if text.lower() in _MISSING else seconds_of(text)
 
@@ -72,11 +89,11 @@ def _number(text: str, comma: bool) -> float:
 def _run(lines: list[str], separator: str | None, comma: bool) -> tuple[int, int]:
     """First line and number of cells of the longest run of lines of numbers among the first ones."""
     best, start, width, length = (0, 0), 0, 0, 0
-    for i, line in enumerate([*lines[:_LOOK], ""]):
+    for i, line in enumerate(lines[:_LOOK]):
         parts = _split(line, separator)
         known = [part for part in parts if part.lower() not in _MISSING]
-        if len(parts) == width > 1 and not known:
-            continue  # a row of empty cells
+        if length and (_remark(line) or not any(parts) or (not known and len(parts) == width)):
+            continue
         fits = len(known) > 1 and all(np.isfinite(_number(part, comma)) for part in known)
         if fits and length and len(parts) == width:
             length += 1
@@ -90,12 +107,14 @@ def _run(lines: list[str], separator: str | None, comma: bool) -> tuple[int, int
 def _names(lines: list[str], start: int, separator: str | None, width: int) -> list[str]:
     """The columns' names, with their units in brackets where a line of units follows them; else their
     numbers."""
-    above = [line for line in lines[:start] if line.strip()]
+    above = [line for line in lines[:start] if any(_split(line, separator))]
     header = _split(above[-1].lstrip("#%"), separator) if above else []
     if len(header) == width and len(above) > 1 and all(not h or is_unit(h.strip("[]()")) for h in header):
         named = _split(above[-2].lstrip("#%"), separator)
         if len(named) == width:
             header = [f"{n} ({u.strip('[]()')})" if u else n for n, u in zip(named, header, strict=True)]
+    if len(header) == width and len(above) > 1 and len({without_unit(h).lower() for h in header}) < width:
+        header = _grouped(_split(above[-2].lstrip("#%"), separator), header)
     if len(header) != width or all(re.fullmatch(r"[-+.\d,eE]*", name) for name in header):
         header = [""] * width
     names: list[str] = []
@@ -103,3 +122,14 @@ def _names(lines: list[str], start: int, separator: str | None, width: int) -> l
         name = name or f"#{k + 1}"
         names.append(name if name not in names else f"{name} #{k + 1}")
     return names
+
+
+def _grouped(groups: list[str], header: list[str]) -> list[str]:
+    """Names that repeat under a line of groups, each behind its group; as they are where there is none."""
+    if len(groups) != len(header) or sum(map(bool, groups)) < 2:
+        return header
+    found, group = [], ""
+    for own, name in zip(groups, header, strict=True):
+        group = own or group
+        found.append(f"{group} ({name})" if is_unit(name) else f"{group} {name}".strip())
+    return found

@@ -3,6 +3,8 @@ disc."""
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pyvista
 from scipy.spatial import ConvexHull, QhullError
@@ -72,4 +74,5 @@ def _disc(middle: np.ndarray, across: np.ndarray, along: np.ndarray, rings: np.n
     for ring in range(len(rings) - 1):
         a, b = ring * _ANGLES, (ring + 1) * _ANGLES
         faces += [np.column_stack([a + i, b + i, b + j]), np.column_stack([a + i, b + j, a + j])]
-    return pyvista.PolyData.from_regular_faces(points.reshape(-1, 3), np.vstack(faces))
+    triangles: Any = np.vstack(faces)
+    return pyvista.PolyData.from_regular_faces(points.reshape(-1, 3), triangles)

@@ -52,7 +52,7 @@ class WaitingWindow:
     def __init__(self, title: str, size: tuple[int, int], *, off_screen: bool = False) -> None:
         self._closed = False
         self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), title=title)
-        self.plotter.set_background(BACKGROUND)
+        self.plotter.renderer.set_background(BACKGROUND)
         self._text(title, 0.56, 16)
         self._stage = self._text("", 0.38, 12)
         self._bar(EMPTY, RIGHT)

@@ -107,7 +107,8 @@ class TouchWindow:
         self._help = self._text("", (0.01, 0.98), "top", font="courier")
         self._help.prop.background_color, self._help.prop.background_opacity = "white", 0.9
         self._help.SetVisibility(False)
-        self.plotter.add_axes(interactive=False, color="black", line_width=2, viewport=(0.0, 0.0, 0.14, 0.2))
+        plotter: Any = self.plotter  # its widgets' types are lost in PyVista's wrappers
+        plotter.add_axes(interactive=False, color="black", line_width=2, viewport=(0.0, 0.0, 0.14, 0.2))
         points, triangles = self.pictures[0].rest_surface
         model = session.model
         radius = session.servo.tip_radius_m
@@ -150,8 +151,9 @@ class TouchWindow:
     def _depth_slider(self) -> vtk.vtkSliderWidget:
         """How deep a press goes, in the panel; a drag on it is none on the object."""
         self.plotter.subplot(1, 0)
+        plotter: Any = self.plotter
         pointer = self.pointer
-        slider = self.plotter.add_slider_widget(
+        slider: vtk.vtkSliderWidget = plotter.add_slider_widget(
             pointer.go_deep,
             (1e3 * LEAST_PRESS_M, 1e3 * MOST_PRESS_M),
             value=1e3 * pointer.press_depth_m,

@@ -321,6 +321,33 @@ def test_a_date_is_seconds(text, seconds):
     assert seconds_of(text) == pytest.approx(seconds, nan_ok=True)
 
 
+def _comma(number):
+    return f'"{number:,.5f}"'
+
+
+def _fortran(number):
+    return f"{number:.9E}".replace("E", "D")
+
+
+@pytest.mark.parametrize(
+    ("head", "separator", "write", "remark"),
+    [
+        (["t [us],x [um],y [um],z [um],fx [mN],fy [mN],fz [mN]"], ",", _comma, ""),
+        (["# t [us] x [um] y [um] z [um] fx [mN] fy [mN] fz [mN]"], None, _fortran, "# the press begins"),
+        (["Time,Position,,,Force,,", "us,X (um),Y (um),Z (um),X (mN),Y (mN),Z (mN)"], ",", repr, "% turned"),
+        (["Time (us);X (um);Y (um);Z (um);X (mN);Y (mN);Z (mN)"], ";", repr, ""),
+    ],
+)
+def test_numbers_headers_and_remarks_as_others_write_them(tmp_path, world, head, separator, write, remark):
+    rows = np.column_stack([1e6 * world["t"], 1e6 * world["p"], 1e3 * world["f"]])
+    lines = [(separator or "  ").join(write(float(v)) for v in row) for row in rows]
+    lines.insert(70, remark)
+    if separator is None:
+        head = [head[0].replace(" [", "_").replace("]", "")]
+    (tmp_path / "log.csv").write_text("\n".join([*head, *lines]))
+    check(pp.read_table(tmp_path / "log.csv", tip_radius_m=TIP), world, atol_n=1e-5)
+
+
 def test_a_flange_and_its_orientation_in_any_order_are_known_by_name(tmp_path, world):
     turn = Rotation.from_euler("xyz", np.column_stack([0.3 * np.sin(world["t"] + k) for k in range(3)]))
     arm = np.array([0.01, -0.02, 0.12])

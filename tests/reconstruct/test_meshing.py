@@ -12,7 +12,7 @@ from scipy.spatial import Delaunay
 import reconstruct.meshing as meshing_module
 from mechanics.errors import MeshError, SurfaceError
 from palpate.benchmarks._surface_truth import phantom_truth, touch
-from reconstruct.meshing import MeshingOptions, mesh_surface
+from reconstruct.meshing import MeshingOptions, _held, mesh_surface
 from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.voxels import labels, voxel_surface
@@ -216,3 +216,22 @@ def test_a_mesh_that_the_support_flattens_is_made_again(surface, monkeypatch):
     monkeypatch.setattr(meshing_module, "relaxed", flattened_at_first)
     assert (mesh_surface(surface, MeshingOptions(mesh_size_m=0.015)).mesh.volumes > 0).all()
     assert len(made) == 2
+
+
+def test_a_drop_beside_the_object_is_left_out_and_half_of_it_refused():
+    """What nothing holds would leave the stiffness singular."""
+    points = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [0, 0, 1.0]])
+    fixed = np.array([True, True, True, False])
+    cell = np.arange(4)
+
+    def beside(size):
+        drop = points * size + 3.0
+        return _held(
+            np.vstack([points, drop]), np.vstack([cell, cell + 4]), np.concatenate([fixed, np.zeros(4, bool)])
+        )
+
+    np.testing.assert_array_equal(beside(0.1), [cell])
+    with pytest.raises(MeshError, match="in pieces: 50 %"):
+        beside(1.0)
+    both = _held(np.vstack([points, points + 3]), np.vstack([cell, cell + 4]), np.tile(fixed, 2))
+    assert len(both) == 2
