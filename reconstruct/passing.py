@@ -87,12 +87,13 @@ def _turns_back(way: np.ndarray, reach_m: float) -> np.ndarray:
     """(k,) bool: points (k, 3) of a way which it reaches from the side to which it leaves, `reach_m` off."""
     before, after = _away(way[::-1], reach_m)[::-1], _away(way, reach_m)
     back = np.einsum("ij,ij->i", before, after)
-    return ~(back < _BACK * reach_m**2)  # nan where the way begins, ends or stays near
+    # where the way begins, ends or stays near it may turn back
+    return ~(before.any(axis=1) & after.any(axis=1)) | (back >= _BACK * reach_m**2)
 
 
 def _away(way: np.ndarray, reach_m: float) -> np.ndarray:
-    """(k, 3) m: from each point to the first later one that is so far away; nan where none is."""
-    out = np.full(way.shape, np.nan)
+    """(k, 3) m: from each point to the first later one that is so far away; zero where none is."""
+    out = np.zeros(way.shape)
     left = np.arange(len(way))
     for lag in range(1, min(_FARTHEST, len(way))):
         left = left[left + lag < len(way)]
