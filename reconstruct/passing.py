@@ -188,8 +188,8 @@ def _followed(t: np.ndarray, force: np.ndarray, free: np.ndarray) -> np.ndarray:
     block = ((t - t[0]) / _BLOCK_S).astype(int)
     count = np.bincount(block, weights=free, minlength=block[-1] + 1)
     used = np.flatnonzero(count > 0)
-    level = np.column_stack([np.bincount(block, weights=free * force[:, k])[used] for k in range(3)])
-    level /= count[used][:, None]
+    total = np.column_stack([np.bincount(block, weights=free * force[:, k])[used] for k in range(3)])
+    level = total / count[used][:, None]
     centre = t[0] + (used + 0.5) * _BLOCK_S
     lag = max(2, round(_LAG_S / _BLOCK_S))
     noise, walk = _walk(used, level, lag)
