@@ -34,6 +34,10 @@ def test_the_labelled_cause_stands_alone(shared_recordings, name):
 
 
 @pytest.mark.slow
+@pytest.mark.xfail(
+    strict=True,
+    reason="with 38 presses our own errors at all places alike are larger than stated (docs/exploring.md)",
+)
 @pytest.mark.parametrize("name", ["silicone-1-cylinder", "silicone-3-halfsphere"])
 def test_nothing_but_finite_strain_rules_none_out(shared_recordings, name):
     recording = read_recording(shared_recordings / f"{name}.toml")
