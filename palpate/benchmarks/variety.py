@@ -67,8 +67,7 @@ NUISANCES: dict[str, Callable[[Draw], str]] = {
 """Nuisance: the group that a draw belongs to."""
 
 REMEDIES: dict[str, Callable[[Draw], Draw]] = {
-    "record its orientation": lambda d: replace(d, orientation="given"),
-    "hold it one way": lambda d: replace(d, orientation="constant"),
+    "log the tool's orientation": lambda d: replace(d, orientation="given"),
     "press deeper": lambda d: replace(
         d, least_depth_m=min(2 * d.least_depth_m, 0.01), most_depth_m=min(2 * d.most_depth_m, 0.01)
     ),
