@@ -397,6 +397,8 @@ def filtered_of(
     left = filtered - weight.force
     drift, _ = free_air_force(t, left, max(white, crowd_scale(np.linalg.norm(left, axis=1))))
     steady = less(weight, drift, crowd_scale)
+    if steady.spread.min() <= noise:
+        return steady  # free air is as quiet as its sensor: there is nothing to follow
     air = passing(t, position, steady.signals.force, recording.tip_radius_m, _traced(recording))
     slow = slowly(t, recording.force_on_tool - weight.force, air)
     if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):

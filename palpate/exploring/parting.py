@@ -14,6 +14,7 @@ import numpy as np
 
 from diagnose.next_touch import Plan, pressed
 from diagnose.whiten import NuisanceOptions, Whitener
+from mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
 from mechanics.presses import Presses
 from palpate.exploring.causes import (
     FALSE_ALARMS,
@@ -36,7 +37,7 @@ PLANS = (
 RIVALS = 2
 RIGID_S = 6.0
 """What three presses on the bare support take."""
-SPRING = "tool_compliance"
+SPRING = TOOL_COMPLIANCE.name
 
 
 @dataclass(frozen=True)

@@ -45,13 +45,6 @@ RIGID_N = 4.0
 """Greatest force of a press on the bare support."""
 JOIN_S = 0.25
 """In free air, over which a touch's way is joined to where the last one ended."""
-FORGETFUL = frozenset(
-    {
-        "viscoelasticity", "power_law_relaxation", "poroelasticity", "adhesion", "jkr_adhesion",
-        "tool_compliance", "force_gain", "force_bias", "time_delay", "backlash",
-    }
-)  # fmt: skip
-"""Effects that a touch feels alike whatever was touched long before it."""
 
 
 class LaboratoryRobot:
@@ -112,7 +105,7 @@ class LaboratoryRobot:
         if suggestion.kind in ("rigid", "free"):
             return self._without_object(suggestion.kind)
         self._touches.append(self._touch(suggestion))
-        forgets = self.effects.keys() <= FORGETFUL
+        forgets = all(effect(name).forgets for name in self.effects)
         if self.made and not forgets:
             raise SceneError(
                 "an exploration of this phantom cannot be gone on with: its effects remember earlier touches"

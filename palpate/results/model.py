@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Model(Result, room.Model):
-    """An object that can be felt: mesh, material, support, tool, presses and effects; SI units, device frame.
+    """An object that can be felt: mesh, material, support, tool, presses and effects; m, N, Pa, device frame.
 
     Every field is that of `mechanics.model.Model`: `material.young_modulus_pa`, `support.normal`,
     `tool.tip_radius_m`, mesh, effects. `plot`: the object with the places touched. `show`: the

@@ -51,7 +51,7 @@ class Effect:
     frame. on_readings( readings, parameters): acts in the instrument. on_shape(phantom, parameters):
     changes the object's surface.
     needs_finite: whether it has no meaning at small strains. least_strength: below 0 where it may be the
-    other way round.
+    other way round. forgets: a touch feels it alike whatever was touched long before.
     """
 
     name: str
@@ -63,6 +63,7 @@ class Effect:
     on_shape: Callable[[Phantom, Parameters], Phantom] | None = None
     needs_finite: bool = False
     least_strength: float = 0.0
+    forgets: bool = False
 
 
 def unit(rng: np.random.Generator) -> np.ndarray:

@@ -192,14 +192,16 @@ EFFECTS = (
         "object",
         lambda strength, bench: {"g": [0.3 * strength], "tau_s": [0.3]},
         on_force=_viscoelastic,
+        forgets=True,
     ),
     Effect(
         "power_law_relaxation",
         "object",
         lambda strength, bench: {"share": 0.15 * strength, "exponent": 0.3},
         on_force=_power_law,
+        forgets=True,
     ),
-    Effect("poroelasticity", "object", _seeping, on_force=_poroelastic),
+    Effect("poroelasticity", "object", _seeping, on_force=_poroelastic, forgets=True),
     Effect(
         "tip_radius",
         "contact",
@@ -217,8 +219,9 @@ EFFECTS = (
         "contact",
         lambda strength, bench: {"pull_off_n": 0.1 * strength, "range_m": 0.0006},
         on_force=_adhere,
+        forgets=True,
     ),
-    Effect("jkr_adhesion", "contact", _sticking, on_force=_sticky),
+    Effect("jkr_adhesion", "contact", _sticking, on_force=_sticky, forgets=True),
 )
 """Effects of contact and of relaxation."""
 

@@ -102,6 +102,7 @@ EFFECTS = (
         "instrument",
         lambda strength, bench: {"stiffness_n_per_m": 1200.0 / strength},
         on_readings=_bend,
+        forgets=True,
     ),
     Effect("tool_gravity_inertia", "instrument", _gravity, on_readings=_weigh),
     Effect(
@@ -109,12 +110,14 @@ EFFECTS = (
         "instrument",
         _gain,
         on_readings=lambda r, p: replace(r, force=r.force @ np.array(p["matrix"]).T),
+        forgets=True,
     ),
     Effect(
         "force_bias",
         "instrument",
         lambda strength, bench: {"bias_n": (0.05 * strength * unit(bench.rng)).round(6).tolist()},
         on_readings=lambda r, p: replace(r, force=r.force + p["bias_n"]),
+        forgets=True,
     ),
     Effect(
         "force_drift",
@@ -123,13 +126,18 @@ EFFECTS = (
         on_readings=lambda r, p: replace(r, force=r.force + np.outer(r.t, p["rate_n_per_s"])),
     ),
     Effect(
-        "time_delay", "instrument", lambda strength, bench: {"delay_s": 0.02 * strength}, on_readings=_late
+        "time_delay",
+        "instrument",
+        lambda strength, bench: {"delay_s": 0.02 * strength},
+        on_readings=_late,
+        forgets=True,
     ),
     Effect(
         "backlash",
         "instrument",
         lambda strength, bench: {"width_m": 0.25e-3 * strength},
         on_readings=lambda r, p: replace(r, position=_play(r.position, p["width_m"])),
+        forgets=True,
     ),
 )
 """Effects on the readings, in the order in which the instrument adds them."""
