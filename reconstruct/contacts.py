@@ -112,7 +112,8 @@ class Filtered:
 
     free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
     free motion; more where inertia is left. weight: the tool's share of free_air, None where forces were
-    taken as they are.
+    taken as they are. followed: whether no constant, drift and weight explain it, so that it was followed
+    from one touch to the next (reconstruct.passing).
     """
 
     signals: Signals
@@ -120,6 +121,7 @@ class Filtered:
     spread: np.ndarray
     cutoff_hz: float
     weight: ToolWeight | None = None
+    followed: bool = False
 
     @cached_property
     def least(self) -> float:
@@ -411,7 +413,8 @@ def filtered_of(
         return less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
 
     raw = recording.force_on_tool - again.force
-    return followed(between(t, raw, air, lambda drift: followed(drift).touching()))
+    found = followed(between(t, raw, air, lambda drift: followed(drift).touching()))
+    return replace(found, followed=True)
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

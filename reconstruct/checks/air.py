@@ -23,6 +23,9 @@ def air(sight: Sight) -> Iterator[Finding]:
     pushes = np.linalg.norm(sight.touches.push, axis=1)
     peak = float(np.median(pushes)) if len(pushes) else float(np.percentile(sight.size, 99))
     white = sight.noise_n * noise_gain(sight.rate_hz, sight.cutoff_hz)
+    if sight.filtered.followed:
+        yield _followed(sight, peak)
+        return
     # a fifth of the samples at least is of a tip in the air, whatever the rest is
     wander = float(np.percentile(sight.size, 20))
     share, loud = wander / max(peak, 1e-9), wander / white
@@ -35,6 +38,24 @@ def air(sight: Sight) -> Iterator[Finding]:
         f"{loud:.0f} times what its white noise makes of it; up to {_LOUD:g} is usual",
         "let the sensor warm up, lift the tip for a second between presses, log the tool's orientation",
         float(share) if share < _LOST else np.inf,
+        np.inf,
+        (float(sight.recording.t[0]), float(sight.recording.t[-1])),
+        ("fx", "fy", "fz"),
+    )
+
+
+def _followed(sight: Sight, peak: float) -> Finding:
+    """What no constant, drift and weight explain, and how far the line through a touch may miss it."""
+    filtered = sight.filtered
+    wander = float(np.linalg.norm(filtered.free_air.std(axis=0)))
+    miss = float(filtered.spread.min())
+    return Finding(
+        "drift",
+        f"in the air the force wanders by {wander:.2g} N rms, as a tool's weight does that turns unseen; it "
+        "is followed from one touch to the next",
+        f"over a touch to within {miss:.2g} N an axis, {100 * miss / peak:.0f} % of what a press peaks at",
+        "log the tool's orientation, let the sensor warm up",
+        miss / max(peak, 1e-9),
         np.inf,
         (float(sight.recording.t[0]), float(sight.recording.t[-1])),
         ("fx", "fy", "fz"),
