@@ -477,8 +477,11 @@ def write_recording(
     table = description_table(recording)
     if truth is not None:
         table["truth"] = dict(truth)
+    # each segment under a header of its own, last: a description begins with [recording]
+    segments = table.pop("segment", [])
+    words = [dump_toml(table), *("[[segment]]\n" + dump_toml(each) for each in segments)]
     with atomic_file(description, kind) as temporary:
-        temporary.write_text(dump_toml(table), encoding="utf-8")
+        temporary.write_text("\n".join(words), encoding="utf-8")
     return path
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from mechanics.errors import RecordingError
 from mechanics.recording import Recording, dump_toml, read_recording, write_recording
+from mechanics.segments import Segment
 
 TOML = """[recording]
 sample_rate_hz = 1000.0
@@ -43,6 +44,17 @@ def test_round_trip_keeps_samples_and_description(tmp_path):
     assert again.quaternion is not None and again.boundary_phase == (0.0, 0.02)
     assert again.truth["effects"] == ["adhesion"] and again.tip_radius_m == 0.004
     assert not again.position.flags.writeable
+
+
+def test_a_recording_with_segments_is_written_over_itself(tmp_path):
+    t = np.arange(50) / 1000
+    wave = np.column_stack([np.sin(t), np.cos(t), t])
+    parts = (Segment("trace", 0.0, 0.02), Segment("rigid", 0.02, 0.04))
+    recording = Recording(t, wave, -wave, 1000.0, 0.004, segments=parts)
+    for _ in range(2):
+        write_recording(tmp_path / "rec.csv", recording)
+    assert read_recording(tmp_path / "rec.toml").segments == recording.segments
+    assert "[[segment]]" in (tmp_path / "rec.toml").read_text()
 
 
 def test_any_of_the_files_names_the_recording_and_a_byte_order_mark_is_read(tmp_path):
