@@ -26,7 +26,8 @@ print(curve)
 depth = np.linspace(0, 0.003, 50)
 hertz = 4 / 3 * E / (1 - NU**2) * np.sqrt(RADIUS) * depth**1.5
 figure, axes = plt.subplots(figsize=(6, 4), layout="constrained")
-axes.plot(1e3 * curve.depth_m, curve.force_n[:, 2], label="rendered")
+push = curve.force @ curve.normal
+axes.plot(1e3 * curve.depth, push, label="rendered")
 axes.plot(1e3 * depth, hertz, "--", label="Hertz, half-space")
 axes.set(xlabel="depth [mm]", ylabel="force [N]")
 axes.legend()
@@ -35,6 +36,8 @@ axes.legend()
 # The block is not endless, so it gives a little more than a half-space does; Hertz's parabola is not a
 # sphere, so it runs ahead where a press is deep.
 
+approach = slice(0, curve.deepest + 1)
 for d in (0.0005, 0.001, 0.002):
     law = 4 / 3 * E / (1 - NU**2) * np.sqrt(RADIUS) * d**1.5
-    print(f"{1e3 * d:.1f} mm: {curve.force_at(d)[2] / law:.3f} of Hertz")
+    felt = np.interp(d, curve.depth[approach], push[approach])
+    print(f"{1e3 * d:.1f} mm: {felt / law:.3f} of Hertz")
