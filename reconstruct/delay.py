@@ -73,7 +73,9 @@ def _gap_and_speed(signals: Signals, contact: Found) -> tuple[float, float, floa
     if not travel.max() > 0.0:  # a touch from the side: the tip was never below its first place
         return None
     first = int(np.flatnonzero(travel >= 0.9 * travel.max())[-1])
-    away = np.flatnonzero(travel[first:] < -_AWAY_M)
+    # a force that reads late is still felt where a fast hand has long gone
+    quiet = np.arange(len(travel)) >= contact.end - contact.peak
+    away = np.flatnonzero((travel < -_AWAY_M)[first:] & quiet[first:])
     part = slice(first, first + int(away[0]) if len(away) else None)
     moved, travel, push = moved[part], travel[part], push[part]
     block = max(1, len(travel) // _FIT_SAMPLES)

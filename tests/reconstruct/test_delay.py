@@ -19,7 +19,7 @@ def shift_of_first_touch(exploration) -> float:
     return float(np.median(TIP - q.max(axis=1)))
 
 
-@pytest.mark.parametrize("delay", [0.02, 0.008, -0.01])
+@pytest.mark.parametrize("delay", [0.02, 0.008, -0.01, 0.06])
 def test_a_delay_is_found_and_first_touch_comes_out_right(on_time, delay):
     late = read_earlier(on_time, -delay)
     exploration = explore(late)
