@@ -164,6 +164,17 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         reasons.append(
             f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
         )
+    wanders = t.free_air - level - sum(parts.values(), nothing)
+    told = t.vector_noise_n < np.sqrt((wanders[t.counted] ** 2).sum(axis=1).mean())
+    if told and INERTIA.name not in excluded:
+        # a tool that turns unseen: what was followed through the touches is nearer than any constant, which
+        # is then no bias but the weight's own mean
+        parts = {n: part for n, part in parts.items() if n == DRIFT.name}
+        parts[INERTIA.name] = t.free_air - sum(parts.values(), nothing)
+        parameters[INERTIA.name] = {"mass_kg": max(free.mass_kg, 0.0), "tared": True}
+        level = np.zeros(3)
+        reasons = reasons[: len(parts) - 1]
+        reasons.append("in free air the force wanders as the weight of a tool does that turns unseen")
     if (
         np.abs(level).max() > Z * level_se
         and np.linalg.norm(level) > LEAST_BIAS_N
