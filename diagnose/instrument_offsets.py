@@ -164,9 +164,8 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         reasons.append(
             f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
         )
-    wanders = t.free_air - level - sum(parts.values(), nothing)
-    told = t.vector_noise_n < np.sqrt((wanders[t.counted] ** 2).sum(axis=1).mean())
-    if told and INERTIA.name not in excluded:
+    wanders = float(np.linalg.norm((t.free_air - sum(parts.values(), nothing))[t.counted].std(axis=0)))
+    if t.free_air.any() and wanders > t.vector_noise_n and INERTIA.name not in excluded:
         # a tool that turns unseen: what was followed through the touches is nearer than any constant, which
         # is then no bias but the weight's own mean
         parts = {n: part for n, part in parts.items() if n == DRIFT.name}
