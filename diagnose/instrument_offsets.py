@@ -120,7 +120,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     duration = np.ptp(t.t) + 1e-9
     parts: dict[str, np.ndarray] = {}
     parameters: dict[str, dict] = {}
-    reasons = []
+    reasons: dict[str, str] = {}
     level, level_se = free.bias_n.copy(), free.bias_se_n
     drift = np.abs(free.rate_n_per_s).max()
     if drift > Z * free.rate_se_n_per_s and drift * duration / np.sqrt(12) > LEAST_BIAS_N / 2:
@@ -128,7 +128,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
             # a drifting zero was zero when the recording began
             parts[DRIFT.name] = t.t[:, None] * free.rate_n_per_s
             parameters[DRIFT.name] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
-            reasons.append(f"in free air the force drifts by {drift * duration:.3f} N over the presses")
+            reasons[DRIFT.name] = f"in free air the force drifts by {drift * duration:.3f} N over the presses"
             middle = free.t.mean()
             level = level - middle * free.rate_n_per_s
             level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
@@ -150,7 +150,9 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         }
         level = level - weight
         level_se = float(np.hypot(level_se, turning.se_n))
-        reasons.append(f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared")
+        reasons[INERTIA.name] = (
+            f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared"
+        )
     heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
     if heavy and turning is None and INERTIA.name not in excluded:
         weight = -STANDARD_GRAVITY * forward.model.support.normal
@@ -161,7 +163,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
             level = level - free.mass_kg * weight
         parts[INERTIA.name] = part
         parameters[INERTIA.name] = {"mass_kg": free.mass_kg, "tared": not untared}
-        reasons.append(
+        reasons[INERTIA.name] = (
             f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
         )
     wanders = float(np.linalg.norm((t.free_air - sum(parts.values(), nothing))[t.counted].std(axis=0)))
@@ -172,8 +174,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         parts[INERTIA.name] = t.free_air - sum(parts.values(), nothing)
         parameters[INERTIA.name] = {"mass_kg": max(free.mass_kg, 0.0), "tared": True}
         level = np.zeros(3)
-        reasons = reasons[: len(parts) - 1]
-        reasons.append("in free air the force wanders as the weight of a tool does that turns unseen")
+        reasons[INERTIA.name] = "in free air the force wanders as the weight of a tool does that turns unseen"
     if (
         np.abs(level).max() > Z * level_se
         and np.linalg.norm(level) > LEAST_BIAS_N
@@ -181,7 +182,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     ):
         parts[BIAS.name] = np.broadcast_to(level, t.local_force.shape).copy()
         parameters[BIAS.name] = {"bias_n": level.tolist()}
-        reasons.append(f"in free air the force reads {np.linalg.norm(level):.3f} N")
+        reasons[BIAS.name] = f"in free air the force reads {np.linalg.norm(level):.3f} N"
     if not parts:
         return InstrumentOffsets((), {}, nothing, ())
     mass_se = free.mass_se_kg if turning is None else turning.se_n / STANDARD_GRAVITY
@@ -199,7 +200,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     intervals = {
         n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters
     }
-    return InstrumentOffsets(tuple(order), parameters, taken, tuple(reasons), intervals)
+    return InstrumentOffsets(tuple(order), parameters, taken, tuple(reasons.values()), intervals)
 
 
 def _around(value: ArrayLike, error: float) -> list:

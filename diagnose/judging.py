@@ -13,7 +13,7 @@ from diagnose.first_touch import first_touches
 from diagnose.fit import Descent, Fit, fit, settings_of
 from diagnose.forward import Forward
 from diagnose.leave_one_out import held_out, levelled
-from diagnose.naming import WEIGHTS, lower_closure
+from diagnose.naming import WEIGHTS, lower_closure, share_closed
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.effects.base import Effect
 from mechanics.options import option
@@ -214,8 +214,7 @@ class Search:
         noise = 3 * t.noise_n**2
         least = self.smallest_n**2
         samples = self.whitener.counts()
-        excess = max(float(old.plain.sum() / samples.sum()) - noise, least)
-        share = float((old.plain.sum() - new.plain.sum()) / samples.sum()) / excess
+        share = float(share_closed(old.plain, new.plain, samples, noise, least))
         closes = lower_closure(old.plain, new.plain, samples, noise, least)
         return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
 
