@@ -1,4 +1,4 @@
-"""Every law of tissue through the servo at 1 kHz: its own force along the hand's way, and no energy for the hand.
+"""Every law of tissue through the servo at 1 kHz: its own force along the hand's way, and no energy given.
 
 Along the way that the hand took, the elastic force is the same renderer's without the law; what the law makes
 of it is the laboratory's, which is written apart from the compiled step and its few exponentials.
@@ -73,24 +73,22 @@ def followed(renderer: FemRenderer, position: np.ndarray) -> np.ndarray:
 
 
 def told(name: str, keys: dict[str, Any], position: np.ndarray, elastic: np.ndarray) -> np.ndarray:
-    """(n,) N, what the law itself makes of the elastic force (n,) along the way."""
+    """(n,) N, what the law itself makes of the elastic force (n,) along the way, touch by touch: what has let
+    go is forgotten."""
     depth = TOP + TIP - position[:, 2]
     if name == "strain_stiffening":
         return stiffened(keys["c20_over_c10"], depth, elastic)
-    begun = np.diff((depth > 0).astype(int), prepend=0) > 0
-    number = np.cumsum(begun) - 1
-    last = np.flatnonzero(depth > 0)[-1]
-    leg = np.full(len(depth), WAY_IN)
-    for k in range(number.max() + 1):
-        rows = np.flatnonzero(number == k)
-        leg[rows[int(np.argmax(depth[rows])) + 1 :]] = WAY_OUT
-    number[last + 150 :] = -1
-    none = np.zeros_like(position)
-    motion = Motion(none, np.tile(UP, (len(depth), 1)), number, leg, 1e3 * depth, none, none, (0.0, 0.0))
     parameters = {**keys, "tip_radius_m": TIP, "plane_strain_modulus_pa": E_STAR}
-    made = effect(name).on_force
-    assert made is not None
-    return made(elastic[:, None] * UP, motion, np.tile(UP, (len(depth), 1)), parameters)[:, 2]
+    law, out = effect(name).on_force, np.zeros(len(depth))
+    assert law is not None
+    for begun in np.flatnonzero(np.diff((depth > 0).astype(int)) > 0) + 1:
+        gone = begun + int(np.argmax(depth[begun:] < -0.5 * TIP))
+        rows = np.arange(begun - 1, gone)
+        leg = np.where(np.arange(len(rows)) > np.argmax(depth[rows]), WAY_OUT, WAY_IN)
+        none, up = np.zeros((len(rows), 3)), np.tile(UP, (len(rows), 1))
+        motion = Motion(none, up, np.zeros(len(rows), int), leg, 1e3 * depth[rows], none, none, (0.0, 0.0))
+        out[rows] = law(elastic[rows, None] * UP, motion, up, parameters)[:, 2]
+    return out
 
 
 def stiffened(ratio: float, depth: np.ndarray, elastic: np.ndarray) -> np.ndarray:
