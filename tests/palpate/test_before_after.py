@@ -77,7 +77,7 @@ def test_recordings_without_a_common_frame_share_no_place():
 
 def test_it_prints_draws_and_writes_a_page(tmp_path):
     result = dressed(Changes, changes(side(16e3), side(20e3, seed=1)))
-    assert "explained by young modulus" in str(result)
+    assert "the object itself differs" in str(result)
     held = result.as_json()
     assert held["differs"] is True and held["explained_by"] == ["young_modulus"] and len(held["places"]) == 9
     assert result.report(tmp_path / "page.html").read_text().startswith("<!doctype html>")
