@@ -109,6 +109,8 @@ class Changes:
     def cause(self) -> str:
         """What explains the difference, in words."""
         effects = " and ".join(n.replace("_", " ") for n in self.explained_by if n != _OBJECT)
+        if not self.differs:
+            return f"what differs is {effects}"
         if _OBJECT not in self.explained_by:
             return f"explained by {effects}" if effects else "nothing explains it"
         return "the object itself differs" + (f", beside {effects}" if effects else "")

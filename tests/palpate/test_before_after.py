@@ -68,6 +68,7 @@ def test_an_effect_of_both_is_told_where_its_parameters_lie_apart():
     one = side(16e3, effects=("friction_slip",), intervals={"friction_slip": {"mu": [0.1, 0.2]}})
     two = side(16e3, effects=("friction_slip",), intervals={"friction_slip": {"mu": [0.4, 0.6]}}, seed=1)
     assert changes(one, two).explained_by == ("friction_slip",)
+    assert "what differs is friction slip" in changes(one, two).summary
     assert changes(one, one).explained_by == ()
 
 
