@@ -20,7 +20,7 @@ import numpy as np
 from mechanics.errors import RecordingError
 from palpate import api
 from palpate.benchmarks.timing import table
-from palpate.benchmarks.tissue_laws import BEEF, SILICONES, holds_table
+from palpate.benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
 from palpate.results.material import CEILING, FLOORS, Material
 
 SUMMARY = "measured data of other instruments: held-out curves beside floor and ceiling"
@@ -132,7 +132,7 @@ def _fish(folder: Path, arguments: argparse.Namespace) -> Rows:
 
 
 def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
-    files = sorted((folder / "csv").glob(f"{arguments.session}_[RF]*.csv"))[: arguments.pieces]
+    files = pieces_of(folder, arguments.session)[: arguments.pieces]
     if len(files) < 6:
         raise RecordingError(
             f"'{folder}' holds {len(files)} pieces of session {arguments.session}; at least 6 are needed"

@@ -14,6 +14,7 @@ every piece.
 from __future__ import annotations
 
 import argparse
+import re
 from pathlib import Path
 from typing import Any
 
@@ -49,9 +50,18 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     }
 
 
+_PIECE = re.compile(r"(\d+_)+(FF|RDG)(\d_)?\d[a-z]$", re.IGNORECASE)
+"""A piece's name, its session once or twice before it; the others are averages and longer tests."""
+
+
+def pieces_of(folder: Path, session: str) -> list[Path]:
+    """The pieces of beef of a session."""
+    return [p for p in sorted((folder / "csv").glob(f"{session}_*.csv")) if _PIECE.match(p.stem)]
+
+
 def holds_table(folder: Path, session: str, most: int) -> dict[str, dict[str, float]]:
     """Print and return `unseen_holds` of a session's pieces."""
-    figures = unseen_holds(sorted((folder / "csv").glob(f"{session}_[RF]*.csv"))[:most])
+    figures = unseen_holds(pieces_of(folder, session)[:most])
     rows = [[form, f"{f['rms_n']:.3f} N", f"{f['closed']:.0%}"] for form, f in figures.items()]
     print(table(["memory", "unseen holds miss by (rms)", "closed of what none leaves"], rows))
     return figures
