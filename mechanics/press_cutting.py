@@ -137,8 +137,8 @@ def cut(
     onset_error_m: (p,) standard errors. free_air: (n, 3) N, as late as the force. trace_s: when the base was
     traced. others_s: further contacts, which are neither presses nor free air. noise_n: N, of a sample; None:
     the stated or a usual one. until_s: (p,) s, when each stood above the noise last, where that is known.
-    kinds: (p,) of the presses; a "cycle" or "points" has contact before and after and lasts until then, and no
-    row beyond is its own.
+    kinds: (p,) of the presses; a "cycle" or "points" has contact before and after and lasts until then, and
+    no row beyond is its own.
     """
     t, count = recording.t, len(onset_s)
     normal = np.asarray(normal, dtype=float).reshape(-1, 3)
