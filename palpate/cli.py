@@ -62,8 +62,8 @@ def main(argv: Sequence[str] | None = None) -> int:
         if _is_ours(error.name):
             raise
         print(
-            f"{prog}: the library '{error.name}' is not installed for {sys.executable}; run the Python that "
-            "Palpate was installed into, or install it into this one: 'python -m pip install .' in its folder",
+            f"{prog}: the library '{error.name}' is not installed for {sys.executable}: run the Python that "
+            "Palpate was installed into, or install it into this one ('pip install .' in its folder)",
             file=sys.stderr,
         )
         return 2
