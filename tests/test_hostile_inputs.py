@@ -656,6 +656,42 @@ def test_absurd_options_are_refused_before_any_work(folder, record, tmp_path, mo
     assert not list(tmp_path.glob("new*"))
 
 
+def curve(t=1.0, z=1.0, fz=1.0, rows=400):
+    """A sphere's indentation of 2 mm into 20 kPa, its columns times anything."""
+    time = np.linspace(0.0, 2.0, rows)
+    depth = 0.002 * (1 - np.abs(time - 1))
+    table = np.column_stack([t * time, -z * depth, fz * 1.9e4 * np.sqrt(0.005) * depth**1.5])
+    return text_of(table, "t,z,fz")
+
+
+def relaxation(t=1.0, value=1.0, rows=400):
+    time = np.linspace(0.0, 2.0, rows)
+    return text_of(np.column_stack([t * time, value * (1 + np.exp(-time))]), "time,relaxation modulus")
+
+
+TIP = ("--tip-radius", "0.005")
+CURVES = {
+    "travel of kilometres": ("travels 1995 m.*--units position", curve(z=1e6), *TIP),
+    "a load beyond any": ("load above 1e\\+09 N.*--units force", curve(fz=1e300), *TIP),
+    "a few rows": ("3 rows in order of time: 8", curve(rows=3), *TIP),
+    "time backwards": ("1 rows in order of time: 8", curve(t=-1.0), *TIP),
+    "a layer thinner than the dent": ("into a layer of 1e-09 m", curve(), *TIP, "--layer", "1e-9"),
+    "nu of 2": ("between -1 and 0.5", curve(), *TIP, "--poisson-ratio", "2"),
+    "nu of -3": ("between -1 and 0.5", curve(), *TIP, "--poisson-ratio", "-3"),
+    "a relaxation of two rows": ("2 rows in order of time: 8", relaxation(rows=2)),
+    "a relaxation beyond any": ("above 1e\\+15", relaxation(t=1e300)),
+    "a modulus beyond any": ("above 1e\\+15", relaxation(value=1e300)),
+}
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_hostile_curves_of_a_machine_are_refused_in_one_line(tmp_path, name, recwarn):
+    words, text, *line = CURVES[name]
+    (tmp_path / "dent.csv").write_text(text)
+    refused(words, "material", str(tmp_path / "dent.csv"), "--fast", *line)
+    assert not list(recwarn)
+
+
 def test_every_default_is_within_its_range():
     from devices.registry import DEVICES, options_of
     from palpate.keywords import FUNCTIONS, kinds

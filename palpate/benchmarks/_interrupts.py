@@ -88,7 +88,7 @@ def _jobs(sound: Path, out: Path) -> dict[str, Job]:
         "material": Job(("material", *(str(sound / f"dent-{k}.csv") for k in range(3)), "--kind",
                          "indentation", "--tip-radius", "0.005", "--fast", "--json", file("material.json"))),
         "calibrate": Job(("calibrate", recording, "--modulus", "29e3", "-o", file("tool.toml"))),
-        "explore": Job(("explore", "--phantom", "dome", "-o", file("explored.csv.gz"), "--most", "2"), 2.0),
+        "explore": Job(("explore", "--phantom", "dome", "-o", file("explored.csv.gz"), "--most", "4"), 2.0),
         "changes": Job(("compare", recording, str(sound / "again.csv"), "--no-diagnosis", "--json",
                         file("changes.json"))),
         "demo": Job(("demo", "-o", file("demo"), "--no-window", "--no-diagnosis", "--seconds", "2")),
