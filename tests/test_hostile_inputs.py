@@ -10,6 +10,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
@@ -830,6 +831,30 @@ def test_a_process_that_follows_its_parent_ends_with_it():
     child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
     child.stdin.close()
     assert child.wait(20) == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it ends by itself, after its time")
+def test_the_mesher_ends_when_its_parent_is_killed(tmp_path):
+    """One that would mesh for an hour, as fTetWild does on some surfaces."""
+    from reconstruct import tetwild
+
+    (tmp_path / "pytetwild.py").write_text("import time; open('begun', 'w'); time.sleep(3600)")
+    words = f"[sys.executable, '-c', {tetwild._CHILD!r}, str(os.getpid()), '60']"
+    code = f"import os, subprocess, sys; subprocess.run({words})"
+    parent = subprocess.Popen([sys.executable, "-S", "-c", code], cwd=tmp_path)
+    begun = tmp_path / "begun"
+    assert _within(20.0, begun.exists)
+    [child] = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
+    parent.kill()
+    parent.wait()
+    assert _within(5.0, lambda: not Path(f"/proc/{child}/cmdline").exists())
+
+
+def _within(seconds, happened):
+    end = time.monotonic() + seconds
+    while not happened() and time.monotonic() < end:
+        time.sleep(0.02)
+    return happened()
 
 
 def test_a_worker_of_the_laboratory_ends_when_its_parent_is_killed(tmp_path):
