@@ -232,6 +232,16 @@ def test_a_misspelt_key_is_told_and_a_key_of_ones_own_is_not(record):
     assert len(told) == 1
 
 
+def test_a_segment_of_another_time_is_told_and_one_within_is_not(record):
+    within = '[[segment]]\nkind = "press"\nstart_s = 0.1\nend_s = 0.2\n'
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(read_recording(record(description=DESCRIPTION + within)).segments) == 1
+    later = within.replace("0.1", "1e6").replace("0.2", "1e7")
+    with pytest.warns(MisspeltKey, match="1 segments lie outside the recording, from 0 to 0.399 s"):
+        read_recording(record(description=DESCRIPTION + within + later))
+
+
 def test_a_slow_clock_is_taken_for_milliseconds_only_where_it_may_be_one(record):
     unstated = described("sample_rate_hz = 1000.0", "")
     for step, like in ((1.0, True), (0.02, False)):
