@@ -347,7 +347,7 @@ def read_recording(path: Path | str) -> Recording:
         first = beside[0]
         warnings.warn(
             f"'{description}': {len(beside)} segments lie outside the recording, from {t[0]:.6g} to "
-            f"{t[-1]:.6g} s, and are not read (first: {first.kind} from {first.start_s:g} to {first.end_s:g} s)",
+            f"{t[-1]:.6g} s, and are not read (first: {first.kind}, {first.start_s:g} to {first.end_s:g} s)",
             MisspeltKey,
             stacklevel=2,
         )
