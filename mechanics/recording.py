@@ -441,6 +441,7 @@ def _read_table(path: Path) -> dict[str, np.ndarray]:
 
 
 def _description_of(path: Path) -> list[tuple[Path, Kind]]:
+    path = samples_path(path)
     stem = path.name.removesuffix(".gz").removesuffix(".csv")
     return [(path.with_name(stem + ".toml"), DESCRIPTION)]
 

@@ -643,6 +643,8 @@ ABSURD = {
         "--depth",
         "inf",
     ),
+    "a recording that is none": ("must end in .csv", "explore", "--phantom", "dome", "-o", "new.txt"),
+    "a laboratory's recording that is none": ("must end in .csv", "simulate", "block", "-o", "new.mat"),
     "a place of 1e200": ("beyond any quantity", "press", "M", "--at", "1e200,0,0", "--direction", "0,0,-1"),
     "a direction of 1e200": (
         "beyond any quantity",
