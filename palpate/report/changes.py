@@ -14,7 +14,7 @@ from palpate.report.quantities import Quantity
 from palpate.report.view3d import Colouring, View, thing_of, usual_colourings
 
 _COLOURS = ("#1d3557", "#c1121f")
-_RATIO = Quantity("second over first modulus", "", 1.0, "PuOr", least_share=0.2)
+_RATIO = Quantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
 
 
 def write_report(path: Path | str, result: Changes) -> Path:
