@@ -189,9 +189,8 @@ class TouchWindow:
     def _picture(self, side: int) -> ObjectPicture:
         self.plotter.subplot(0, side)
         for place, strength in LIGHTS:
-            self.plotter.add_light(
-                pyvista.Light(position=place, light_type="camera light", intensity=strength)
-            )
+            light = pyvista.Light(position=place, light_type="camera light", intensity=strength)
+            self.plotter.add_light(light, only_active=True)
         name = self._names[side]
         over = self._text(heading(name, felt=side == 0), (0.98, 0.985), "top", size=14)
         over.prop.justification_horizontal = "right"
