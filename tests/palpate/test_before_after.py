@@ -38,7 +38,7 @@ def side(modulus, *, share=0.03, effects=(), intervals=None, beside=None, seed=0
         effects=effects, entries=entries, young_modulus_pa=beside or modulus, summary="told", kind="effect",
         candidates=(),
     )  # fmt: skip
-    return Side(SimpleNamespace(name=f"rec {seed}"), model, diagnosis)
+    return Side(SimpleNamespace(name=f"rec {seed}", path=None), model, diagnosis)
 
 
 def test_one_object_twice_shows_no_difference():
@@ -81,7 +81,8 @@ def test_it_prints_draws_and_writes_a_page(tmp_path):
     assert "the object itself differs" in str(result)
     held = result.as_json()
     assert held["differs"] is True and held["explained_by"] == ["young_modulus"] and len(held["places"]) == 9
-    assert result.report(tmp_path / "page.html").read_text().startswith("<!doctype html>")
+    page = result.report(tmp_path / "page.html").read_text()
+    assert page.startswith("<!doctype html>") and 'class="view3d"' in page and "What to do next" in page
 
 
 def test_a_model_goes_with_one_recording(tmp_path, capsys):

@@ -56,6 +56,13 @@ def test_a_slabs_top_goes_through_the_first_touches(ground):
     assert put.mesh is not None and put.mesh.volumes.sum() == pytest.approx(put.surface.volume_m3)
 
 
+@pytest.mark.parametrize(("slab_m", "words"), [(1e-9, "deep into a slab of 1e-06 mm"), (1e-3, "deep into")])
+def test_a_slab_thinner_than_its_presses_are_deep_is_refused(ground, slab_m, words):
+    recording, found = ground
+    with pytest.raises(SurfaceError, match=words):
+        place(recording, found, GeometryOptions(slab_m=slab_m), mesh_size_m=0.01, spacing_m=0.003)
+
+
 def test_touches_at_one_place_leave_nothing_out_and_crash_nothing():
     centres = np.array([[0, 0, 0.05], [1e-4, 0, 0.05], [0, 1e-4, 0.05], [1e-4, 1e-4, 0.05]])
     angle = np.linspace(0, 2 * np.pi, 40, endpoint=False)
