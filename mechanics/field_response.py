@@ -11,7 +11,7 @@ import numpy as np
 
 from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
 from mechanics.places import Places
-from mechanics.smooth_field import TIP_DEPTH_IN_RADII, Shares, SmoothField
+from mechanics.smooth_field import TIP_DEPTH_IN_RADII, Shares
 
 
 def shares_of(places: Places, answer: np.ndarray) -> Shares:
@@ -42,16 +42,11 @@ def tips_of(places: Places) -> np.ndarray:
     return places.point - TIP_DEPTH_IN_RADII * places.model.tool.tip_radius_m * places.normal
 
 
-def changed(places: Places, field: SmoothField) -> tuple[np.ndarray, np.ndarray]:
-    """(far (p, 3, 3) 1/m in local frames, dent_ratio (p,)) of presses on an object with a field."""
-    fields = energy_fields(places)
-    return far_of(places, fields, np.exp(field.at(fields.centroid)), np.exp(-field.at(tips_of(places))))
-
-
 def far_of(
     places: Places, fields: EnergyFields, ratio: np.ndarray, softness: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The same of elements' ratios (m,) and the softness under each tip (p,)."""
+    """(far (p, 3, 3) 1/m in local frames, dent_ratio (p,)) of presses on an object whose elements are of
+    ratios (m,) and whose softness under each tip is (p,)."""
     # what the far field takes off is of the modulus under the tip: the half-space, and what the energies'
     # elements are too wide for, so that the same ratio everywhere is another modulus
     taken = fields.energy.sum(axis=1)[places.place] - places.far
