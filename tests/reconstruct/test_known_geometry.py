@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import json
+from argparse import Namespace
 from types import SimpleNamespace
 
 import numpy as np
@@ -15,14 +15,15 @@ from diagnose.leave_one_out import held_out
 from mechanics.effects.registry import effect
 from mechanics.errors import ContactError, OptionError, SurfaceError
 from mechanics.press_sites import sites_of
-from mechanics.recording import write_recording
 from palpate import cli
+from palpate.sources import given_model
 from reconstruct.contacts import explore
 from reconstruct.known_shape import GeometryOptions, nowhere, place, stated_geometry
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import Seen
 from reconstruct.shapes.implicit import implicit_held_out
 from reconstruct.slides import without_slides
+from scenes.scene import Scene
 
 
 @pytest.mark.parametrize(("pitch_m", "count"), [(0.005, 5), (0.003, 15), (0.002, 9)])
@@ -158,21 +159,12 @@ def test_the_modulus_of_a_half_space_needs_no_tracing():
     assert made.young_modulus_pa == pytest.approx(MODULUS_PA, rel=0.06) and low < high
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("command", ["compare", "diagnose"])
-def test_a_surfaces_file_is_the_model_of_a_recording_without_tracing(tmp_path, command, capsys):
-    """Owners of a CAD model were refused, and compare asked for a tracing that it did not use."""
-    recording = raster((3, 3), 0.008, tilt=False)
-    block = trimesh.creation.box(extents=(80, 80, 40))
-    block.apply_translation([0, 0, -20])
-    block.export(tmp_path / "part.stl")
-    path = write_recording(tmp_path / "rec.csv.gz", recording)
-    words = [command, str(path), *(["--model"] if command == "compare" else []), str(tmp_path / "part.stl")]
-    words += ["--unit", "mm", "--modulus", "9e3", "--json", str(tmp_path / "out.json")]
-    assert cli.main(words + (["--fast"] if command == "diagnose" else [])) == 0
-    found = json.loads((tmp_path / "out.json").read_text())
-    if command == "compare":
-        assert found["rmse_n"]["fem"] < 0.1
-    else:
-        assert found["young_modulus_pa"] == pytest.approx(MODULUS_PA, rel=0.1)
-    capsys.readouterr()
+def test_a_surfaces_file_is_the_model_of_a_recording(tmp_path):
+    """Of compare --model and of diagnose: owners of a CAD model were refused."""
+    trimesh.creation.box(extents=(80, 80, 40)).export(tmp_path / "part.stl")
+    given = Namespace(modulus=9e3, nu=None, unit="mm", up=None, sink=None)
+    scene = given_model(given, str(tmp_path / "part.stl"))
+    assert isinstance(scene, Scene) and scene.kind == "mesh"
+    assert (scene.young_modulus_pa, scene.unit) == (9e3, "mm")
+    with pytest.raises(OptionError, match="needs --model FILE"):
+        given_model(given, None)
