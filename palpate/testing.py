@@ -19,6 +19,7 @@ from palpate import api
 from palpate.keywords import options as options_of
 
 if TYPE_CHECKING:
+    from palpate.api.telling import ModelLike
     from palpate.results.curve import Curve
     from render.base import Renderer
 
@@ -33,11 +34,11 @@ def press_model() -> Callable[..., Curve]:
     ours = {option.name for option in options_of("renderer")}
 
     @cache
-    def renderer_of(model: api.ModelLike, name: str, given: tuple[tuple[str, Any], ...]) -> Renderer:
+    def renderer_of(model: ModelLike, name: str, given: tuple[tuple[str, Any], ...]) -> Renderer:
         return api.renderer(model, name, progress=False, **dict(given))
 
     def pressed(
-        model_or_scene: api.ModelLike,
+        model_or_scene: ModelLike,
         at: Sequence[float],
         direction: Sequence[float] | None = None,
         depth_m: float = 0.004,

@@ -495,11 +495,13 @@ SEEN = 4.7
 
 def detectable_n(weighing: Weighing) -> dict[str, float]:
     """{cause: N rms over contact samples beside the modulus} of the smallest size that shows in these
-    presses, in the form that shows best."""
+    presses, in the form that shows best, and matters."""
     _, curve, _ = projected(weighing)
     inflation = weighing.forward.touches.noise.variance_inflation
-    least = SEEN * np.sqrt(inflation) * weighing.sizes / np.sqrt(np.maximum(curve, 1e-300))
-    return {n: float(least[[m == n for m in weighing.names]].min()) for n in dict.fromkeys(weighing.names)}
+    shows = SEEN * np.sqrt(inflation) * weighing.sizes / np.sqrt(np.maximum(curve, 1e-300))
+    matters = least_that_matters(weighing.forward)
+    names = dict.fromkeys(weighing.names)
+    return {n: max(matters, float(shows[[m == n for m in weighing.names]].min())) for n in names}
 
 
 def words(name: str) -> str:

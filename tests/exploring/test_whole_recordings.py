@@ -1,6 +1,8 @@
 """What an exploration knows in the end is what reconstruction says of its recording, and the labelled cause
 stands alone."""
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -31,6 +33,16 @@ def test_the_labelled_cause_stands_alone(shared_recordings, name):
     state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
     assert state.causes.standing(0.95) == [name.replace("-", "_")]
     assert np.isfinite(state.modulus_pa)
+
+
+@pytest.mark.slow
+def test_a_sound_object_under_a_sensor_with_a_bias_and_a_drift_has_no_cause(shared_recordings):
+    recording = read_recording(shared_recordings / "silicone-2-block.toml")
+    zero = np.array([0.2, -0.1, 0.3]) + np.outer(recording.t / recording.t[-1], [0.0, 0.1, 0.1])
+    recording = dataclasses.replace(recording, force_on_tool=recording.force_on_tool + zero)
+    state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
+    assert "none" in state.causes.standing(0.95), state.causes.ratio
+    assert state.causes.misfit < 1.5
 
 
 @pytest.mark.slow
