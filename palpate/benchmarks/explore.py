@@ -1,7 +1,7 @@
 """Guided exploration against other orders of touching: presses and seconds until the goals are met.
 
 Sealed phantoms: objects of the pool of varied ones, modulus and noise drawn by seed, a third without any
-effect, the others with one cause at 2 to 4 times the size from which it shows and matters. The laboratory's robot
+effect, the others with one cause at 2 to 4 times the size from which it shows and matters. The robot
 explores each in every order, with errors of place, depth and speed, the same goals and the same stop rule.
 Told are presses and seconds until shape and modulus, and until the cause, were as sure as asked for, and what
 was true then. Each exploration is kept in the work folder by its content: a run that was interrupted goes on.
