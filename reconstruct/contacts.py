@@ -120,8 +120,8 @@ class Filtered:
 
     free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
     free motion; more where inertia is left. weight: the tool's share of free_air, None where forces were
-    taken as they are. followed: whether no constant, drift and weight explain it, so that it was followed
-    from one touch to the next (reconstruct.passing).
+    taken as they are. air: (n,) bool, where the tip only passes, if no constant, drift and weight explain
+    the free air, so that it was followed from one touch to the next (reconstruct.passing); else None.
     """
 
     signals: Signals
@@ -129,7 +129,12 @@ class Filtered:
     spread: np.ndarray
     cutoff_hz: float
     weight: ToolWeight | None = None
-    followed: bool = False
+    air: np.ndarray | None = None
+
+    @property
+    def followed(self) -> bool:
+        """Whether the free air was followed from one touch to the next."""
+        return self.air is not None
 
     @cached_property
     def least(self) -> float:
@@ -140,6 +145,8 @@ class Filtered:
         """(n,) bool, a new array: where something is touched, on the way or on purpose."""
         gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
         contrast = self.signals.magnitude / self.spread
+        if self.air is not None:
+            contrast = np.where(self.air, 0.0, contrast)
         return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
 
     @cached_property
@@ -452,11 +459,11 @@ def filtered_of(
     off = missed(t, filtered - again.force, air)
 
     def followed(drift: np.ndarray) -> Filtered:
-        return less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
+        there = less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
+        return replace(there, air=air)
 
     raw = recording.force_on_tool - again.force
-    found = followed(between(t, raw, air, lambda drift: followed(drift).touching()))
-    return replace(found, followed=True)
+    return followed(between(t, raw, air, lambda drift: followed(drift).touching()))
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

@@ -10,8 +10,11 @@ from matplotlib.figure import Figure
 
 from palpate.before_after import Changes
 from palpate.report.page import Page
+from palpate.report.quantities import Quantity
+from palpate.report.view3d import Colouring, View, thing_of, usual_colourings
 
 _COLOURS = ("#1d3557", "#c1121f")
+_RATIO = Quantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
 
 
 def write_report(path: Path | str, result: Changes) -> Path:
@@ -32,19 +35,46 @@ def write_report(path: Path | str, result: Changes) -> Path:
          "places within 12 mm of one another, each with its own ratio" if result.places
          else "the two recordings share too few places, or no frame"),
     ])  # fmt: skip
+    page.next_step(_what_next(result))
+    figure = Figure(figsize=(8, 3.4))
+    draw(result, figure.subplots())
+    page.view(
+        view_of(result), figure, "Moduli with 95 % intervals, or the ratio at every place that both pressed."
+    )
     rows = []
     for side in (result.before, result.after):
         interval = side.model.material.young_modulus_ci95_pa
         verdict = side.diagnosis.summary if side.diagnosis is not None else "not diagnosed"
-        rows.append([side.recording.name, side.modulus_pa, *interval, side.beside_effects_pa, verdict])
+        kilo = (v / 1e3 for v in (side.modulus_pa, *interval, side.beside_effects_pa))
+        rows.append([side.recording.name, *kilo, verdict])
     page.heading("Both by themselves")
-    page.table(["recording", "modulus, Pa", "from", "to", "beside effects, Pa", "verdict"], rows)
+    page.table(["recording", "modulus [kPa]", "from", "to", "beside effects [kPa]", "verdict"], rows)
     for reason in result.reasons:
         page.paragraph(reason[:1].upper() + reason[1:] + ".")
-    figure = Figure(figsize=(8, 3.4))
-    draw(result, figure.subplots())
-    page.figure(figure, "Moduli with 95 % intervals, and the ratio at every place that both pressed.")
+    if result.places:
+        page.figure(figure, "The ratio at every place that both pressed, with its 95 % interval.")
     return page.write(path)
+
+
+def view_of(result: Changes) -> View:
+    """The first's object, coloured by the ratio at places that both pressed, else by its own moduli."""
+    model = result.before.model
+    if not result.places:
+        return View(thing_of(model), model.presses.point, usual_colourings(model))
+    ratios = np.array([place.ratio for place in result.places])
+    ratio = Colouring(_RATIO, None, ratios, "At places that both pressed; in between what is near.")
+    return View(thing_of(model), np.array([place.point for place in result.places]), [ratio])
+
+
+def _what_next(result: Changes) -> str:
+    first, second = result.before.recording.path or "REC", result.after.recording.path or "REC2"
+    if result.before.diagnosis is None:
+        words = f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"
+    elif result.explained_by:
+        words = f"see the evidence: `palpate diagnose {second} --report PAGE.html`"
+    else:
+        words = f"feel either: `palpate touch {first}`, `palpate touch {second}`"
+    return f"What to do next: {words}."
 
 
 def draw(result: Changes, ax: Axes) -> None:

@@ -13,6 +13,7 @@ from matplotlib.figure import Figure
 from mechanics.recording import Recording
 from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.report.page import Page, save_figures
+from palpate.report.quantities import readable
 from reconstruct.checks.base import Finding
 from reconstruct.checks.sight import CHANNELS
 
@@ -37,7 +38,7 @@ def write_report(path: Path | str, checkup: Checkup) -> Path:
     figures["whole"] = whole
     save_figures(path.with_suffix(""), figures)
     page = Page(f"Check-up of {checkup.recording.name}")
-    page.lead(checkup.lines()[0])
+    page.lead(checkup.lines()[0] + ".")
     page.paragraph(_meaning(checkup))
     page.next_step(_what_next(checkup))
     if checkup.findings:
@@ -45,17 +46,23 @@ def write_report(path: Path | str, checkup: Checkup) -> Path:
             ["finding", "grave", "adds to the modulus's error", "how sure"],
             [[f.name, "grave" if f.grave else "-", _share(f.error), f.sure] for f in checkup.findings],
         )
-    page.figure(whole, "Force over the whole recording; the stretches of the findings are shaded.")
+    shaded = "; the stretches of the findings are shaded" if checkup.findings else ""
+    page.figure(whole, f"Force over the whole recording{shaded}.")
     for k, finding in enumerate(checkup.findings):
         page.heading(f"{k + 1}. {finding.name}{' (grave)' if finding.grave else ''}")
         page.paragraph(f"{finding.saw[0].upper()}{finding.saw[1:]}.")
         page.paragraph(f"How sure: {finding.sure}. What to do: {finding.todo}.")
         page.figure(figures[f"finding-{k + 1}"], _caption(finding))
     page.heading("What was measured")
-    page.table(["quantity", "here", "usual"], [list(row) for row in checkup.seen])
+    page.table(["quantity", "here", "usual"], [_seen(*row) for row in checkup.seen])
     for figure in figures.values():
         plt.close(figure)
     return page.write(path)
+
+
+def _seen(words: str, here: float, usual: float) -> list[object]:
+    label, values = readable(words, [here, usual])
+    return [label, *values]
 
 
 def _meaning(checkup: Checkup) -> str:

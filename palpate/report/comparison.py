@@ -63,7 +63,7 @@ def write_report(path: Path | str, result: Comparison, name: str) -> Path:
             "folds over sites",
             len(result.presses),
             *(1e3 * result.rmse_n[m] for m in names),
-            *("" for _ in names),
+            *("–" for _ in names),
         ]
     ]
     for r in result.regions:

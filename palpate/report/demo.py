@@ -212,7 +212,7 @@ def diagnosis_words(result: DemoResult) -> str:
     rest = [name.replace("_", " ") for name in found.effects if not (deep and name == known())]
     if rest:
         words += f" The rendered curves do not have {' and '.join(rest)}: what to do about that stands in "
-        words += "the page of `palpate diagnose REC --report PAGE.html`."
+        words += f"the page of `palpate diagnose {result.recording.path or 'REC'} --report PAGE.html`."
     return words
 
 

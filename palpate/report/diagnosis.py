@@ -46,7 +46,7 @@ def write_report(path: Path | str, recording: Recording, model: Model, result: D
     page = Page(f"Simulated touch against measured touch: {recording.name}")
     page.lead(verdict(result))
     page.cards(answers(result, typical))
-    page.next_step(_what_next(result, model))
+    page.next_step(_what_next(result, model, recording.path or "REC"))
     page.view(view_of(model, result), first_picture(model, result), _caption(result))
     page.figure(gains_picture(result), _gains_caption(result))
     _next_touch(page, result)
@@ -59,9 +59,8 @@ def write_report(path: Path | str, recording: Recording, model: Model, result: D
     return page.write(path)
 
 
-def _what_next(result: Diagnosis, model: Model) -> str:
+def _what_next(result: Diagnosis, model: Model, recording: Path | str) -> str:
     """What to do with the answer, in a sentence."""
-    recording = "REC"
     kept = [e.name for e in result.entries if e.name in result.effects and e.domain != "instrument"]
     instrument = [e.name for e in result.entries if e.name in result.effects and e.domain == "instrument"]
     said = []

@@ -19,6 +19,8 @@ if TYPE_CHECKING:
     from palpate.report.view3d import View
 
 PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
+_LEGIBLE = 0.6
+"""Of a picture's own width: the least at which its letters can be read; a phone scrolls the rest."""
 
 
 class Page:
@@ -103,9 +105,9 @@ class Page:
         return scripts()
 
 
-def scrolling(table: str) -> str:
-    """A table that scrolls by itself where it is wider than the page, by keyboard too."""
-    return f'<div class="scroll" tabindex="0">{table}</div>'
+def scrolling(wide: str) -> str:
+    """A table or picture that scrolls by itself where it is wider than the page, by keyboard too."""
+    return f'<div class="scroll" tabindex="0">{wide}</div>'
 
 
 @cache
@@ -118,12 +120,18 @@ def _words(text: str) -> str:
 
 
 def _figure(picture: Any, caption: str) -> str:
-    data = base64.b64encode(png_bytes(picture)).decode()
+    data = png_bytes(picture)
     caption = html.escape(caption)
-    return (
-        f'<figure><img alt="{caption}" src="data:image/png;base64,{data}">'
-        f"<figcaption>{caption}</figcaption></figure>"
+    drawn = (
+        f'<img alt="{caption}" style="--legible:{_LEGIBLE * _width(data):.0f}px" '
+        f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
     )
+    return f"<figure>{scrolling(drawn)}<figcaption>{caption}</figcaption></figure>"
+
+
+def _width(png: bytes) -> int:
+    """Pixels across, of a PNG's first chunk."""
+    return int.from_bytes(png[16:20], "big")
 
 
 def png_bytes(picture: Any) -> bytes:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -42,3 +44,16 @@ MODULUS = Quantity("modulus", "kPa", 1e-3, "cividis", least_share=0.5)
 UNCERTAINTY = Quantity("shape uncertainty", "mm", 1e3, "Purples")
 FROM_ZERO = (ERROR, UNCERTAINTY, DEPTH)
 """Whose colours begin at nothing."""
+
+_UNIT = re.compile(r"^(.*)\[(m|m/s|N|N/m|Pa|s)\]$")
+_NOTHING = 1e-9
+
+
+def readable(label: str, values: Sequence[float]) -> tuple[str, list[float]]:
+    """SI values as people read them, and their label so: 'speed [m/s]' of 0.04 is 'speed [mm/s]' of 40."""
+    found = _UNIT.match(label)
+    if not found:
+        return label, list(values)
+    most = max((abs(v) for v in values if abs(v) > _NOTHING), default=1.0)
+    prefix, scale = ("k", 1e-3) if found[2] == "Pa" else ("m", 1e3) if most < 1.0 else ("", 1.0)
+    return f"{found[1]}[{prefix}{found[2]}]", [0.0 if abs(v) <= _NOTHING else scale * v for v in values]

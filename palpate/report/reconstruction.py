@@ -182,10 +182,10 @@ def _summary(page: Page, result: Reconstruction) -> None:
         f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations."
     )
     page.paragraph(_meaning(result))
-    where = model.path or "MODEL"
+    where, recording = model.path or "MODEL", result.exploration.recording.path or "REC"
     page.next_step(
         f"What to do next: feel it: `palpate touch {where}`; see what it leaves out: "
-        f"`palpate diagnose REC --model {where} --report PAGE.html`."
+        f"`palpate diagnose {recording} --model {where} --report PAGE.html`."
     )
     for finding in result.findings:
         page.paragraph(finding.line())
@@ -269,6 +269,9 @@ def _one_d(page: Page, result: Reconstruction) -> None:
     page.table(*one_d_comparison(result))
 
 
+_PARAMETERS = {"k_v": "stiffness k_V", "k_h": "stiffness k_H", "e_pa": "modulus e"}
+
+
 def _trends(page: Page, trends: list[Trend]) -> None:
     if not trends:
         page.paragraph("Fewer than five presses on the side: no trend with height can be told.")
@@ -281,8 +284,10 @@ def _trends(page: Page, trends: list[Trend]) -> None:
     page.table(
         ["parameter", "Pearson r", "p", "Spearman", "p", "change over the height"],
         [
-            [t.name, f"{t.pearson:+.2f}", _chance(t.pearson_p), f"{t.spearman:+.2f}", _chance(t.spearman_p)]
-            + [f"{100 * t.change:+.1f} %"]
+            [
+                *(_PARAMETERS[t.name], f"{t.pearson:+.2f}", _chance(t.pearson_p)),
+                *(f"{t.spearman:+.2f}", _chance(t.spearman_p), f"{100 * t.change:+.1f} %"),
+            ]
             for t in trends
         ],
     )

@@ -19,11 +19,11 @@ from reconstruct.pipeline import Reconstruction
 from reconstruct.uniaxial import profiles
 
 PAPER_TABLE = (
-    ("paper #1", "cylinder, radius 40 mm, height 80 mm", 29.0, 28.73),
-    ("paper #2", "block, 105 x 105 x 47 mm", 16.0, 10.73),
-    ("paper #3", "near half-sphere, radius 60 mm, height 55 mm", 16.0, 11.31),
+    ("paper #1", "cylinder radius 0.040 height 0.080", 29.0, 28.73),
+    ("paper #2", "block 0.105 x 0.105 x 0.047", 16.0, 10.73),
+    ("paper #3", "near half-sphere radius 0.060 height 0.055", 16.0, 11.31),
 )
-"""Table 1 of the paper: sample, geometry, known and estimated modulus in kPa."""
+"""Table 1 of the paper: sample, geometry in metres, known and estimated modulus in kPa."""
 
 PAPER_SECONDS = {"contacts": 10.0, "1D models": 0.5, "modulus": 3.0, "whole": 45.0}
 """The paper's own times, section 3, s (upper bounds)."""
@@ -39,7 +39,7 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
     where it is stated."""
     header = [
         "sample",
-        "geometry",
+        "geometry [m]",
         "known e [kPa]",
         "estimated e [kPa]",
         "95 % interval",

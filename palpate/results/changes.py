@@ -15,6 +15,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
+    from palpate.report.view3d import View
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Changes(Result, room.Changes):
@@ -30,6 +32,12 @@ class Changes(Result, room.Changes):
         from palpate.report.changes import write_report
 
         return write_report(path, self)
+
+    def view(self) -> View:
+        """The first object to be turned, coloured by what changed where both pressed."""
+        from palpate.report.changes import view_of
+
+        return view_of(self)
 
     def lines(self) -> list[str]:
         """What `print` says, line by line, with units."""

@@ -24,9 +24,10 @@ def frame(view: View, title: str, picture: Any) -> str:
 
     page = Page(title)
     page.view(view, picture, title)
+    # inside a division: of a bare frame IPython says to use its own, which knows addresses alone
     return (
-        f'<iframe srcdoc="{html.escape(page.html())}" title="{html.escape(title)}" width="100%" '
-        f'height="{HEIGHT_PX}" style="border:0"></iframe>'
+        f'<div><iframe srcdoc="{html.escape(page.html())}" title="{html.escape(title)}" width="100%" '
+        f'height="{HEIGHT_PX}" style="border:0"></iframe></div>'
     )
 
 

@@ -96,9 +96,9 @@ class ObjectPicture:
 
     def _colour_by(self, name: str, colours: Colours, limits: tuple[float, float]) -> None:
         self._plotter.subplot(*self._place)
-        opacity = 1.0
+        opacity, culling = 1.0, "none"
         if self._actor is not None:
-            opacity = self._actor.prop.opacity
+            opacity, culling = self._actor.prop.opacity, self._actor.prop.culling
             self._plotter.remove_actor(self._actor, render=False)
             self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
         self._bar = f"{self._title}{name}"
@@ -124,7 +124,7 @@ class ObjectPicture:
             },
             render=False,
         )
-        self._actor.prop.interpolation = "Gouraud"
+        self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
 
     def _shade(self) -> None:
         """As the tip feels it: by the contact normals, turned as the surface has turned since."""
@@ -136,6 +136,8 @@ class ObjectPicture:
         """Show what is inside."""
         if self._actor is not None:
             self._actor.prop.opacity = 0.45 if on else 1.0
+            # what is seen through is its front alone, whatever the order of its triangles
+            self._actor.prop.culling = "back" if on else "none"
 
     def show_inclusion(self, region: Region | None) -> None:
         """A ball where the inclusion is, or nothing."""

@@ -25,6 +25,7 @@ from palpate.window.frames import Frame
 from palpate.window.game import Game
 from palpate.window.keys import help_text
 from palpate.window.orbit import Orbit
+from palpate.window.pace import Pace
 from palpate.window.picture import ObjectPicture
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M, Pointer
 from palpate.window.session import TouchSession
@@ -45,6 +46,8 @@ SLIDER_AT = 0.36
 PANEL_SHARE = 0.42
 """Of the charts' row: the panel of words, which covers nothing."""
 LEAST_TYPE = 9
+LIGHTS = (((-0.5, 0.8, 1.0), 0.8), ((0.9, -0.1, 0.6), 0.35))
+"""Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
 LETTER = 0.62
 """Mean width of a letter over its type's size."""
 
@@ -87,9 +90,12 @@ class TouchWindow:
             groups=halves[1:] if self.sides == 2 else halves,  # type: ignore[arg-type]  # it takes slices too
             title=f"Palpate: {scene.title}",
             border=False,
+            lighting="none",
         )
         for renderer in self.plotter.renderers:
             renderer.set_background("#f4f6f8")
+            # blending in any order takes several passes over the whole picture; a shadow needs one
+            renderer.UseOITOff()
         # smoothing edges costs more than all the rest where there is no graphics card
         window = self.plotter.render_window
         assert window is not None, "a plotter has one until it is closed"
@@ -97,6 +103,7 @@ class TouchWindow:
         self._headings: list[pyvista.Text] = []
         self._texts: list[tuple[pyvista.Text, int]] = []
         self._scaled_for = (0, 0)
+        self._pace = Pace()
         self.pictures = [self._picture(side) for side in range(self.sides)]
         self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
         self.plotter.subplot(1, 0)
@@ -181,6 +188,9 @@ class TouchWindow:
 
     def _picture(self, side: int) -> ObjectPicture:
         self.plotter.subplot(0, side)
+        for place, strength in LIGHTS:
+            light = pyvista.Light(position=place, light_type="camera light", intensity=strength)
+            self.plotter.add_light(light, only_active=True)
         name = self._names[side]
         over = self._text(heading(name, felt=side == 0), (0.98, 0.985), "top", size=14)
         over.prop.justification_horizontal = "right"
@@ -280,7 +290,6 @@ class TouchWindow:
             limits = common_limits(maps)
             for picture, stiffness in zip(self.pictures, maps, strict=False):
                 picture.colour_by_stiffness(stiffness, limits)
-        self._charts.update(self.session.trace)
         lines = status(self.session, self.scene, self.pointer, frame, self.notice)
         if self.game is not None:
             lines += self.game.lines(time.perf_counter())
@@ -291,6 +300,7 @@ class TouchWindow:
         if self._slider is not None:
             self._slider.GetSliderRepresentation().SetValue(1e3 * self.pointer.press_depth_m)
         self._scale_type()
+        self._thin_out()
         width, _ = self.plotter.window_size
         letters = int(PANEL_SHARE * width / (LETTER * self._status.prop.font_size))
         self._status.input = "\n".join(part for line in lines for part in wrap(line, max(letters, 20)))
@@ -298,11 +308,22 @@ class TouchWindow:
             over.input = heading(name, felt=side == 0)
         self.frames += 1
 
+    def _thin_out(self) -> None:
+        """Draw what is felt; the second picture, words and plots as often as the pace allows."""
+        beside, words = self._pace.next(time.perf_counter())
+        if words:
+            self._charts.update(self.session.trace)
+        *pictures, panel = self.plotter.renderers
+        for renderer in pictures[1:]:
+            renderer.SetDraw(beside)
+        panel.SetDraw(words)
+
     def _scale_type(self) -> None:
         """Type grows and shrinks with the window."""
         width, height = self.plotter.window_size
         if (width, height) != self._scaled_for:
             self._scaled_for = width, height
+            self._pace.forget()
             share = min(width / SIZE[0], height / SIZE[1])
             for text, points in self._texts:
                 text.prop.font_size = max(LEAST_TYPE, round(points * share))

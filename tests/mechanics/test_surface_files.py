@@ -5,17 +5,19 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import meshio
 import numpy as np
 import pytest
 import pyvista
 import trimesh
+from pyvista import examples
 
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import SurfaceError
 from mechanics.standing import standing
-from mechanics.surface_files import ClosedSurface, read_surface
+from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 
 SIZE_MM = (60, 50, 40)
 
@@ -62,6 +64,17 @@ def without(shell: trimesh.Trimesh, gone: np.ndarray, path):
     shell.update_faces(~gone)
     shell.export(path)
     return path
+
+
+@pytest.mark.parametrize("name", ["nut", "ant", "hexbeam", "uniform"])
+def test_a_visualisers_own_examples_are_solids(tmp_path, name):
+    """Files that come with PyVista; of a grid without cells of its own nothing was read."""
+    path = next(Path(examples.__file__).parent.glob(f"{name}.*"))
+    size = float(np.ptp(np.reshape(pyvista.read(path).bounds, (3, 2)), axis=1).max())
+    unit = next(unit for unit, metres in UNITS.items() if 0.004 < size * metres < 1)
+    found = read_surface(path, unit)
+    assert found.size_m == pytest.approx(size * UNITS[unit], rel=1e-5)
+    assert trimesh.Trimesh(found.vertices, found.triangles, process=False).is_volume
 
 
 def test_small_and_flat_holes_are_closed(tmp_path):

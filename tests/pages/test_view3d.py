@@ -262,4 +262,4 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))
     model = model_of(Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015))
     assert model.show() is None
-    assert len(shown) == 1 and shown[0].startswith("<iframe srcdoc=") and "view3d" in shown[0]
+    assert len(shown) == 1 and shown[0].startswith("<div><iframe srcdoc=") and "view3d" in shown[0]

@@ -38,7 +38,7 @@ def side(modulus, *, share=0.03, effects=(), intervals=None, beside=None, seed=0
         effects=effects, entries=entries, young_modulus_pa=beside or modulus, summary="told", kind="effect",
         candidates=(),
     )  # fmt: skip
-    return Side(SimpleNamespace(name=f"rec {seed}"), model, diagnosis)
+    return Side(SimpleNamespace(name=f"rec {seed}", path=None), model, diagnosis)
 
 
 def test_one_object_twice_shows_no_difference():
@@ -68,6 +68,7 @@ def test_an_effect_of_both_is_told_where_its_parameters_lie_apart():
     one = side(16e3, effects=("friction_slip",), intervals={"friction_slip": {"mu": [0.1, 0.2]}})
     two = side(16e3, effects=("friction_slip",), intervals={"friction_slip": {"mu": [0.4, 0.6]}}, seed=1)
     assert changes(one, two).explained_by == ("friction_slip",)
+    assert "what differs is friction slip" in changes(one, two).summary
     assert changes(one, one).explained_by == ()
 
 
@@ -77,10 +78,11 @@ def test_recordings_without_a_common_frame_share_no_place():
 
 def test_it_prints_draws_and_writes_a_page(tmp_path):
     result = dressed(Changes, changes(side(16e3), side(20e3, seed=1)))
-    assert "explained by young modulus" in str(result)
+    assert "the object itself differs" in str(result)
     held = result.as_json()
     assert held["differs"] is True and held["explained_by"] == ["young_modulus"] and len(held["places"]) == 9
-    assert result.report(tmp_path / "page.html").read_text().startswith("<!doctype html>")
+    page = result.report(tmp_path / "page.html").read_text()
+    assert page.startswith("<!doctype html>") and 'class="view3d"' in page and "What to do next" in page
 
 
 def test_a_model_goes_with_one_recording(tmp_path, capsys):
