@@ -605,6 +605,7 @@ def test_an_output_replaces_no_input_and_nothing_of_another_kind(folder, record,
     assert contents(tmp_path) == before
 
 
+EXPLORE = ("explore", "--phantom", "dome", "-o", "new.csv")
 ABSURD = {
     "a mesh of 1e-5": ("from 0.0005 to 0.2 m", "reconstruct", "REC", "-o", "new", "--mesh-size", "1e-5"),
     "a memory of nan": ("not a finite number", "batch", "REC", "-o", "new", "--memory", "nan"),
@@ -643,6 +644,12 @@ ABSURD = {
         "--depth",
         "inf",
     ),
+    "deeper than the object": ("from 0.01 to 0.9", *EXPLORE, "--deepest-share", "5"),
+    "a phantom of 0 Pa": ("young_modulus_pa is 0", *EXPLORE, "--modulus", "0"),
+    "a phantom of nan Pa": ("young_modulus_pa is nan", *EXPLORE, "--modulus", "nan"),
+    "a phantom of 1e30 Pa": ("young_modulus_pa is 1e.30", *EXPLORE, "--modulus", "1e30"),
+    "an object of nu 0.5": ("from 0 to 0.4999", *EXPLORE, "--poisson-ratio", "0.5"),
+    "a touch of no force": ("from 0.01 to", *EXPLORE, "--strongest", "0"),
     "a recording that is none": ("must end in .csv", "explore", "--phantom", "dome", "-o", "new.txt"),
     "a laboratory's recording that is none": ("must end in .csv", "simulate", "block", "-o", "new.mat"),
     "a place of 1e200": ("beyond any quantity", "press", "M", "--at", "1e200,0,0", "--direction", "0,0,-1"),
@@ -703,6 +710,20 @@ def test_hostile_curves_of_a_machine_are_refused_in_one_line(tmp_path, name, rec
     (tmp_path / "dent.csv").write_text(text)
     refused(words, "material", str(tmp_path / "dent.csv"), "--fast", *line)
     assert not list(recwarn)
+
+
+def test_a_robot_that_misses_the_object_feels_its_way_to_the_nearest_place(monkeypatch):
+    """With what the program itself installs: another library was asked for."""
+    from palpate.exploring.robot import LaboratoryRobot
+    from scenes.phantoms import phantom
+
+    monkeypatch.setitem(sys.modules, "rtree", None)
+    thing = phantom("dome")
+    robot = LaboratoryRobot(thing)
+    top = float(thing.vertices[:, 2].max())
+    touch = robot._landed(np.array([0.5, 0.0, 0.5 * top + 0.05]), np.array([0.0, 0.0, -1.0]), 0.002)
+    assert 1e3 * thing.vertices[:, 0].max() * 0.5 < touch.point[0] <= 1e3 * thing.vertices[:, 0].max() + 1e-3
+    assert touch.normal[0] > 0.5
 
 
 def test_every_default_is_within_its_range():

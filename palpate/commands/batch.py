@@ -85,7 +85,7 @@ def options_of(values: list[str]) -> dict[str, dict[str, Any]]:
             raise OptionError(f"--set '{text}' must be STEP.OPTION=VALUE, such as diagnose.fast=true")
         try:
             read: Any = tomllib.loads(f"x = {value}")["x"]
-        except tomllib.TOMLDecodeError:
+        except (tomllib.TOMLDecodeError, RecursionError):
             read = value
         found.setdefault(step, {})[option] = read
     return found

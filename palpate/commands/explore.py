@@ -16,7 +16,8 @@ import sys
 import numpy as np
 
 from mechanics.errors import OptionError
-from mechanics.recording import SAMPLES, read_recording
+from mechanics.options import check_ranges
+from mechanics.recording import POISSON, SAMPLES, read_recording
 from palpate.arguments import (
     add_input,
     add_json,
@@ -107,6 +108,8 @@ def run(arguments: argparse.Namespace) -> int:
     goals = options_from(arguments, GoalOptions)
     check_goals(goals)
     reach = options_from(arguments, ReachOptions)
+    if not POISSON.takes(arguments.poisson_ratio):
+        raise OptionError(f"--poisson-ratio is {arguments.poisson_ratio}; it must be {POISSON.words}")
     if arguments.robot:
         return _robot(arguments, goals, reach)
     if arguments.device:
@@ -181,11 +184,13 @@ def _phantom(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOpti
     from scenes.phantoms import phantom
 
     thing = phantom(arguments.phantom)
+    options = SimulateOptions(young_modulus_pa=arguments.modulus, tip_radius_m=arguments.tip_radius)
+    check_ranges(options)
     robot = LaboratoryRobot(
         thing,
         effects_from(arguments.effect),
         seed=arguments.seed,
-        options=SimulateOptions(young_modulus_pa=arguments.modulus, tip_radius_m=arguments.tip_radius),
+        options=options,
         robot=options_from(arguments, RobotOptions),
     )
     explorer = _explorer(arguments, goals, reach, robot.instrument, thing.poisson_ratio)

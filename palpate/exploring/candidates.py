@@ -37,9 +37,11 @@ class ReachOptions:
     """What the hand or the robot may do."""
 
     deepest_m: float = option(0.006, "never press deeper", unit="m", flag="--deepest")
-    deepest_share: float = option(0.18, "nor deeper than this share of the material under the tip")
+    deepest_share: float = option(
+        0.18, "nor deeper than this share of the material under the tip", low=0.01, high=0.9
+    )
     strongest_n: float = option(
-        5.0, "nor with more force, as far as that can be told", unit="N", flag="--strongest"
+        5.0, "nor with more force, as far as that can be told", unit="N", flag="--strongest", low=0.01
     )
     press_speed_m_per_s: float = option(0.02, "speed of a press", unit="m/s")
     air_speed_m_per_s: float = option(0.12, "speed through the air", unit="m/s")

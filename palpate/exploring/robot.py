@@ -17,6 +17,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from mechanics.errors import SceneError
+from mechanics.nearest import closest
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from palpate.exploring.explorer import Suggestion
@@ -200,7 +201,7 @@ class LaboratoryRobot:
         if met is None:
             # a miss: the nearest place to where it aimed stands for where the robot feels its way to
             at = np.atleast_2d(start + 0.05 * way)
-            hits, _, faces = trimesh.proximity.closest_point(self._surface, at)
+            hits, faces, _ = closest(self._surface.vertices, self._surface.faces, at)
             met = hits[0], int(faces[0])
         point, normal = met[0], self._surface.face_normals[met[1]]
         if point[2] < 0.004:

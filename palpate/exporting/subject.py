@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.effects.registry import effect
+from mechanics.errors import OptionError
 from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.nearest import closest
@@ -71,8 +72,12 @@ class Subject:
 
 def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None = None) -> Subject:
     """The press of a model that shows that it works: at: (3,) m, the surface point nearest to it is
-    pressed; None: the middle of the top. depth_m: None is half the tip's radius."""
+    pressed; None: the middle of the top. depth_m: None is half the tip's radius. Raises OptionError for a
+    place further from the object than that is wide, or a depth beyond its height."""
     up, mesh = model.support.normal, model.mesh
+    height = float(model.support.height(mesh.points).max())
+    if depth_m is not None and depth_m > height:
+        raise OptionError(f"--depth is {depth_m:g} m, and the object is {height:.4g} m high: press less deep")
     surface = mesh.touchable_surface[:, :3]
     if at is None:
         spots = mesh.points[np.unique(surface)]
@@ -80,6 +85,12 @@ def subject_of(model: Model, at: np.ndarray | None = None, depth_m: float | None
         middle = np.array([(spots @ a).max() + (spots @ a).min() for a in (u, v)]) / 2
         at = middle[0] * u + middle[1] * v + (spots @ up).max() * up
     spot, triangle, _ = closest(mesh.points, surface, np.asarray(at, dtype=float)[None])
+    away, across = float(np.linalg.norm(spot[0] - at)), float(np.ptp(mesh.points, axis=0).max())
+    if away > across:
+        raise OptionError(
+            f"--at lies {away:.4g} m from the object, which is {across:.4g} m across: name a place near its "
+            "surface, in metres"
+        )
     corners = mesh.points[surface[triangle[0]]]
     normal = np.cross(corners[1] - corners[0], corners[2] - corners[0])
     return Subject(

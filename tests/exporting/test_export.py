@@ -137,6 +137,8 @@ def test_the_command_says_what_is_lost_and_refuses_in_one_line(tmp_path, capsys)
         (["--to", "gmsh", "-o", str(tmp_path / "a.msh"), "--unit", "mm"], "in metres"),
         (["--to", "stl", "-o", str(tmp_path / "a.stl"), "--unit", "feet"], "allowed are m, cm"),
         (["--to", "sofa", "-o", str(tmp_path / "a.scn"), "--depth", "0"], "greater than 0"),
+        (["--to", "sofa", "-o", str(tmp_path / "a.scn"), "--depth", "5"], "high: press less deep"),
+        (["--to", "abaqus", "-o", str(tmp_path / "a.inp"), "--at", "9,9,9"], "from the object, which is"),
     ):
         capsys.readouterr()
         assert cli.main(["export", str(folder), *bad]) == 2
