@@ -59,7 +59,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     found = []
     for _ in range(arguments.recordings):
         for law in arguments.laws:
-            strength = np.sign(least) * np.exp(rng.uniform(*np.log(np.abs([least, most]))))
+            strength = np.sign(least) * np.exp(rng.uniform(*np.sort(np.log(np.abs([least, most])))))
             seed, number = int(rng.integers(100_000, 200_000)), int(rng.integers(0, OBJECTS))
             found.append(
                 one(law, round(float(strength), 2), seed, number, arguments.presses, arguments.touches)
