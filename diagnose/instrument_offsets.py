@@ -18,7 +18,7 @@ from diagnose.gaps import closed_share, gap
 from diagnose.judging import Candidate
 from diagnose.result import EffectEntry
 from diagnose.rigid import Rigid
-from diagnose.whiten import Whitener
+from diagnose.whiten import FOLLOWED, Whitener
 from mechanics.effects.force_bias import EFFECT as BIAS
 from mechanics.effects.force_drift import EFFECT as DRIFT
 from mechanics.effects.force_gain import EFFECT as GAIN
@@ -166,12 +166,13 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         reasons[INERTIA.name] = (
             f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
         )
+    followed = None
     wanders = float(np.linalg.norm((t.free_air - sum(parts.values(), nothing))[t.counted].std(axis=0)))
     if t.free_air.any() and wanders > t.vector_noise_n and INERTIA.name not in excluded:
         # a tool that turns unseen: what was followed through the touches is nearer than any constant, which
         # is then no bias but the weight's own mean
         parts = {n: part for n, part in parts.items() if n == DRIFT.name}
-        parts[INERTIA.name] = t.free_air - sum(parts.values(), nothing)
+        parts[INERTIA.name] = followed = t.free_air - sum(parts.values(), nothing)
         parameters[INERTIA.name] = {"mass_kg": max(free.mass_kg, 0.0), "tared": True}
         level = np.zeros(3)
         reasons[INERTIA.name] = "in free air the force wanders as the weight of a tool does that turns unseen"
@@ -185,6 +186,10 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         reasons[BIAS.name] = f"in free air the force reads {np.linalg.norm(level):.3f} N"
     if not parts:
         return InstrumentOffsets((), {}, nothing, ())
+    if INERTIA.name in parts and t.free_air.any():
+        # what the table reads in the air, filtered as the forces are, is nearer than a mass times an
+        # acceleration of thinned positions
+        parts[INERTIA.name] = t.free_air - sum((p for n, p in parts.items() if n != INERTIA.name), nothing)
     mass_se = free.mass_se_kg if turning is None else turning.se_n / STANDARD_GRAVITY
     mass_kg = parameters.get(INERTIA.name, {}).get("mass_kg", 0.0)
     error = {
@@ -195,7 +200,8 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
     taken = sum(local.values())
-    forward.touches = dataclasses.replace(t, force=t.force - sum(parts.values()))
+    columns = t.columns if followed is None else {**t.columns, FOLLOWED: followed}
+    forward.touches = dataclasses.replace(t, force=t.force - sum(parts.values()), columns=columns)
     order = sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum()))
     intervals = {
         n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters

@@ -157,6 +157,10 @@ def bench_of(
         size = half_space_size(contact)
     else:
         thick = length * layer_m
+        if deepest >= thick:
+            raise ContactError(
+                f"the tip goes {deepest / length:.3g} m into a layer of {layer_m:g} m: state its thickness"
+            )
         wide = 2 * _MARGIN * thick + 4 * contact
         size = np.array([wide, wide, thick])
     mesh = flat_mesh(size, 0.01, _CELLS)

@@ -19,6 +19,11 @@ from mechanics.effects.settings import Settings
 from mechanics.options import option
 from mechanics.presses import Presses
 
+FOLLOWED = "followed"
+"""Column of touches whose free air was followed from before to after them: (n, 3) N, what was taken off."""
+_MODES = 2
+"""Of a Brownian bridge, that hold 76 % of its variance."""
+
 
 @dataclass(frozen=True)
 class NuisanceOptions:
@@ -123,7 +128,28 @@ def nuisance_columns(
         ("site", np.column_stack([zero, zero, normal]) * options.tilt),
         ("press", tangential * options.stick),
         ("site", f * (bend * options.law)[:, None]),
+        *(("press", column) for column in _bridges(t)),
     ]
+
+
+def _bridges(t: Presses) -> list[np.ndarray]:
+    """(n, 3) N each: what free air that was followed straight through a touch may have done in between.
+
+    A random walk from its value before to its value after, as fast as these two tell: a Brownian bridge by
+    its first modes, along each axis of the device.
+    """
+    if FOLLOWED not in t.columns:
+        return []
+    air, bumps = t.columns[FOLLOWED], np.zeros((_MODES, len(t.t)))
+    for part in t.parts:
+        if part.stop - part.start < 2:
+            continue
+        walked = float(np.linalg.norm(air[part.stop - 1] - air[part.start])) / np.sqrt(3)
+        along = (t.t[part] - t.t[part.start]) / (t.t[part.stop - 1] - t.t[part.start])
+        for k, bump in enumerate(bumps, start=1):
+            bump[part] = walked * np.sqrt(2) / (k * np.pi) * np.sin(k * np.pi * along)
+    axes = t.frame[t.press]
+    return [axes[:, :, k] * bump[:, None] for bump in bumps for k in range(3)]
 
 
 def _by_site(t: Presses, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:

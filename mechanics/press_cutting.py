@@ -22,6 +22,8 @@ SETTLED_S = 0.5
 """Free air begins this long after the base was traced."""
 _SMOOTH_S = 0.015
 _LET_GO = 0.02
+_MOST_AFTER_S = 0.1
+"""A touch is lost so soon after it no longer stands above the noise, or then."""
 
 
 def loss_of_touch(
@@ -36,7 +38,8 @@ def loss_of_touch(
 ) -> float:
     """The time, s, at which a press's force is back at what it was in the air.
 
-    t: (n,) s at about rate_hz; push: (n,) N, as read along the outward normal, of noise_n a sample. limit_s:
+    t: (n,) s at about rate_hz; push: (n,) N along the outward normal, of noise_n a sample, net of what is
+    read in free air where that is known: a tool that turns weighs as much as a soft object presses. limit_s:
     no later than this. Back: the mean over 15 ms within 2 % of the greatest, or three times its own noise, of
     the median from 150 to 30 ms before first touch.
     """
@@ -133,8 +136,9 @@ def cut(
 
     onset_error_m: (p,) standard errors. free_air: (n, 3) N, as late as the force. trace_s: when the base was
     traced. others_s: further contacts, which are neither presses nor free air. noise_n: N, of a sample; None:
-    the stated or a usual one. kinds: (p,) of the presses; a "cycle" or "points" has contact before and after
-    and lasts until until_s (p,), s, and no row beyond is its own.
+    the stated or a usual one. until_s: (p,) s, when each stood above the noise last, where that is known.
+    kinds: (p,) of the presses; a "cycle" or "points" has contact before and after and lasts until then, and
+    no row beyond is its own.
     """
     t, count = recording.t, len(onset_s)
     normal = np.asarray(normal, dtype=float).reshape(-1, 3)
@@ -149,9 +153,11 @@ def cut(
             assert until_s is not None
             end[i] = until_s[i]
             continue
+        if until_s is not None:
+            limits[i] = min(limits[i], max(until_s[i], peak_s[i]) + delay_s + _MOST_AFTER_S)
         near = slice(*np.searchsorted(t, [onset[i] - 0.2, max(limits[i], peak_s[i]) + 0.2]))
         end[i] = loss_of_touch(
-            t[near], recording.force_on_tool[near] @ normal[i], recording.sample_rate_hz,
+            t[near], (recording.force_on_tool - free)[near] @ normal[i], recording.sample_rate_hz,
             onset_s=onset[i], peak_s=peak_s[i], limit_s=limits[i], noise_n=noise,
         )  # fmt: skip
     pieces = []

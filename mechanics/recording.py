@@ -99,7 +99,8 @@ _MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
 
 
 class MisspeltKey(UserWarning):
-    """A key of a recording's TOML looks like one that is known; it was not read."""
+    """Something in a recording's TOML was not read: a key that looks like one that is known, a segment of a
+    time that was not recorded."""
 
 
 @dataclass(frozen=True)
@@ -341,6 +342,15 @@ def read_recording(path: Path | str) -> Recording:
         check_sane(recording)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
+    beside = [s for s in recording.segments if s.end_s < t[0] or s.start_s > t[-1]]
+    if beside:
+        first = beside[0]
+        warnings.warn(
+            f"'{description}': {len(beside)} segments lie outside the recording, from {t[0]:.6g} to "
+            f"{t[-1]:.6g} s, and are not read (first: {first.kind}, {first.start_s:g} to {first.end_s:g} s)",
+            MisspeltKey,
+            stacklevel=2,
+        )
     if "calibration" in tool:
         from mechanics.calibration import read_calibration
 
@@ -431,6 +441,7 @@ def _read_table(path: Path) -> dict[str, np.ndarray]:
 
 
 def _description_of(path: Path) -> list[tuple[Path, Kind]]:
+    path = samples_path(path)
     stem = path.name.removesuffix(".gz").removesuffix(".csv")
     return [(path.with_name(stem + ".toml"), DESCRIPTION)]
 

@@ -163,6 +163,7 @@ def _boundary(grid: Any) -> trimesh.Trimesh:
     if isinstance(grid, pyvista.UnstructuredGrid):
         solid = np.isin(grid.celltypes, _SOLID)
         grid = grid.extract_cells(np.flatnonzero(solid).tolist()) if solid.any() else grid
+    if not isinstance(grid, pyvista.PolyData):
         grid = grid.extract_surface(algorithm="dataset_surface", nonlinear_subdivision=0)
     shell = grid.triangulate()
     if shell.n_cells == 0 or not len(shell.faces):

@@ -24,6 +24,7 @@ _95 = 1.96
 _NEAR_M = 0.012
 """Sites of the two recordings that lie nearer are one place."""
 _LEAST_PLACES = 4
+_OBJECT = "young_modulus"
 _HALVES = 0.5
 """Effects explain a difference of moduli where beside them it is at most this share of it."""
 
@@ -102,8 +103,17 @@ class Changes:
         size = f"{100 * (self.ratio - 1):+.0f} % (95 % interval {low:+.0f} to {high:+.0f} %)"
         if not self.differs and not self.explained_by:
             return f"no difference that these recordings can show: modulus {size}"
-        words = " and ".join(n.replace("_", " ") for n in self.explained_by)
-        return f"modulus {size}; explained by {words}" if words else f"modulus {size}; nothing explains it"
+        return f"modulus {size}; {self.cause}"
+
+    @property
+    def cause(self) -> str:
+        """What explains the difference, in words."""
+        effects = " and ".join(n.replace("_", " ") for n in self.explained_by if n != _OBJECT)
+        if not self.differs:
+            return f"what differs is {effects}"
+        if _OBJECT not in self.explained_by:
+            return f"explained by {effects}" if effects else "nothing explains it"
+        return "the object itself differs" + (f", beside {effects}" if effects else "")
 
 
 def changes(before: Side, after: Side) -> Changes:
@@ -126,8 +136,14 @@ def changes(before: Side, after: Side) -> Changes:
             explained = causes
             reasons.append(f"beside its effects the modulus differs by {100 * (beside[0] - 1):+.0f} % only")
         else:
-            explained = ["young_modulus", *causes]
-            reasons.append("the moduli differ beside the effects of both as well")
+            explained = [_OBJECT, *causes]
+            if beside is not None:
+                shift = f"{100 * (beside[0] - 1):+.0f} %"
+                reasons.append(
+                    f"beside the effects of both the moduli still differ by {shift}"
+                    if causes
+                    else f"no effect that only one has could bring it about: {shift} beside those of both"
+                )
     else:
         explained = causes
     for name in own:

@@ -48,16 +48,27 @@ class Ended(KeyboardInterrupt):
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
     before = _listen(_leave)
+    prog = "palpate"
     try:
         # nothing is open yet, and libraries that are half loaded do not bear an exception: leave at once
         words = list(sys.argv[1:] if argv is None else argv)
         command, module, code = _loaded(words)
         if module is None:
             return code
+        prog = command.prog
         _listen(_interrupt)
         return _run(command, module, words[1:])
+    except ModuleNotFoundError as error:
+        if _is_ours(error.name):
+            raise
+        print(
+            f"{prog}: the library '{error.name}' is not installed for {sys.executable}: run the Python that "
+            "Palpate was installed into, or install it into this one ('pip install .' in its folder)",
+            file=sys.stderr,
+        )
+        return 2
     except KeyboardInterrupt as how:
-        print(f"{command.prog}: interrupted", file=sys.stderr)
+        print(f"{prog}: interrupted", file=sys.stderr)
         code = 143 if isinstance(how, Ended) else 130
         if argv is None:
             _end(code)
@@ -79,15 +90,14 @@ def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, int]:
     name = argv[0]
     if name not in COMMANDS:
         parser.error(f"'{name}' is no command; allowed are {', '.join(COMMANDS)}")
-    try:
-        module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
-    except ModuleNotFoundError as error:
-        if error.name != f"palpate.commands.{name}":
-            raise
-        print(f"palpate {name}: not in this version yet; see CHANGELOG.md for what is", file=sys.stderr)
-        return parser, None, 2
-
+    module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
     return *_with_arguments(name, module), 0
+
+
+def _is_ours(name: str | None) -> bool:
+    """Whether a module that is missing is a part of this program: that is a bug, not an installation."""
+    ours = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
+    return name is None or name.partition(".")[0] in ours
 
 
 def _with_arguments(name: str, module: Any) -> tuple[argparse.ArgumentParser, Any]:

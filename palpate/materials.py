@@ -51,6 +51,8 @@ def material_of(
     names = tuple(Path(f).name for f in files)
     if layer_m is not None and not layer_m > 0:
         raise OptionError(f"--layer is {layer_m} m; it must be greater than 0")
+    if not -1 < poisson_ratio < 0.5:
+        raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must lie between -1 and 0.5")
     if tests.kind in ("compression", "tension"):
         return _uniaxial(tests, names)
     if tests.kind == "relaxation":

@@ -15,7 +15,9 @@ from pathlib import Path
 import numpy as np
 
 from diagnose.specimen import Curve
+from mechanics.bounds import LARGEST_N
 from mechanics.errors import OptionError, RecordingError
+from mechanics.recording import WIDEST_PATH_M
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import without_unit
@@ -24,6 +26,8 @@ from reconstruct.external.uniaxial import Uniaxial, of_compression, read_tension
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
+_LEAST_ROWS = 8
+_BEYOND = 1e15
 _TIPS_M = (1e-9, 0.1)
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
 
@@ -105,6 +109,14 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
     order = np.argsort(t[good], kind="stable")
     t, value = t[good][order], value[good][order]
     fresh = np.concatenate([[True], np.diff(t) > 0])
+    if fresh.sum() < _LEAST_ROWS:
+        raise RecordingError(
+            f"'{path}' has {int(fresh.sum())} rows in order of time: {_LEAST_ROWS} are needed"
+        )
+    if max(np.abs(t).max(), np.abs(value).max()) > _BEYOND:
+        raise RecordingError(
+            f"'{path}' holds numbers above {_BEYOND:g}, beyond any quantity here in SI units"
+        )
     return t[fresh], value[fresh]
 
 
@@ -154,9 +166,28 @@ def _generic(path: Path, columns: dict[str, str], units: dict[str, str]) -> Curv
     good = np.isfinite(t) & np.isfinite(z) & np.isfinite(push)
     t, travel, push = t[good], -z[good], push[good]
     fresh = np.concatenate([[True], np.diff(t) > 0])
-    if fresh.sum() < 8:
-        raise RecordingError(f"'{path}' has {int(fresh.sum())} rows in order of time: 8 are needed")
+    if fresh.sum() < _LEAST_ROWS:
+        raise RecordingError(
+            f"'{path}' has {int(fresh.sum())} rows in order of time: {_LEAST_ROWS} are needed"
+        )
+    if np.ptp(travel) > WIDEST_PATH_M:
+        raise RecordingError(
+            f"'{path}': the tip travels {np.ptp(travel):.4g} m, which may be {WIDEST_PATH_M:g} m: name "
+            "the unit, as in --units position=um"
+        )
+    if np.abs(push).max() > LARGEST_N:
+        raise RecordingError(
+            f"'{path}' holds a load above {LARGEST_N:g} N: name its unit, as in --units force=uN"
+        )
     return Curve(t[fresh], travel[fresh], push[fresh], path.name)
+
+
+def _in_order(path: Path, t: np.ndarray) -> np.ndarray:
+    """(n,) bool: rows whose time is later than the one before."""
+    fresh = np.concatenate([[True], np.diff(t) > 0])[: len(t)]
+    if fresh.sum() < _LEAST_ROWS:
+        raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {_LEAST_ROWS} are needed")
+    return fresh
 
 
 def _names(tables: list[Table]) -> str:

@@ -23,7 +23,7 @@ from mechanics.samples import runs
 from mechanics.segments import ON_SUPPORT
 from reconstruct.baseline import free_air_force
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
-from reconstruct.delay import force_delay
+from reconstruct.delay import Delay, delay_by_places, force_delay
 from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
@@ -43,6 +43,14 @@ _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
 _DELAY_ROUNDS = 4
+_FAR_S, _UNLIKE_S = 0.04, 0.01
+"""A force that reads later than the first is read earlier before touches are looked for, where touches agree
+within the second (standard error): first and last touch alone are found to some 80 ms."""
+_LEAST_SPAN_S = 0.05
+_SLIDE = 8.0
+"""Tip radii: touches that go further are slides."""
+_TIPS_M = (1e-3, 0.02)
+"""Radii that are believed for that."""
 
 
 @dataclass(frozen=True)
@@ -112,8 +120,8 @@ class Filtered:
 
     free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
     free motion; more where inertia is left. weight: the tool's share of free_air, None where forces were
-    taken as they are. followed: whether no constant, drift and weight explain it, so that it was followed
-    from one touch to the next (reconstruct.passing).
+    taken as they are. air: (n,) bool, where the tip only passes, if no constant, drift and weight explain
+    the free air, so that it was followed from one touch to the next (reconstruct.passing); else None.
     """
 
     signals: Signals
@@ -121,7 +129,12 @@ class Filtered:
     spread: np.ndarray
     cutoff_hz: float
     weight: ToolWeight | None = None
-    followed: bool = False
+    air: np.ndarray | None = None
+
+    @property
+    def followed(self) -> bool:
+        """Whether the free air was followed from one touch to the next."""
+        return self.air is not None
 
     @cached_property
     def least(self) -> float:
@@ -132,7 +145,35 @@ class Filtered:
         """(n,) bool, a new array: where something is touched, on the way or on purpose."""
         gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
         contrast = self.signals.magnitude / self.spread
+        if self.air is not None:
+            contrast = np.where(self.air, 0.0, contrast)
         return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
+
+    @cached_property
+    def traced(self) -> tuple[int, int]:
+        """Samples [first, last) of the tracing; (0, 0) where none is found."""
+        recording = self.signals.recording
+        given, touching = _traced(recording), self.touching()
+        try:
+            return find_interval(recording.t, self.signals.position, touching, given, recording.tip_radius_m)
+        except ContactError:
+            return 0, 0
+
+    @cached_property
+    def spans(self) -> list[tuple[int, int]]:
+        """[start, end) samples of each touch after the tracing, short ones and slides left out."""
+        recording, path, touching = self.signals.recording, self.signals.position, self.touching()
+        touching[: self.traced[1]] = False
+        shortest = max(3, round(_LEAST_SPAN_S * recording.sample_rate_hz))
+        found = [(a, b) for a, b in runs(touching) if b - a >= shortest and a > 0 and b < len(recording.t)]
+        reach = _SLIDE * float(np.clip(recording.tip_radius_m, *_TIPS_M))
+        return [(a, b) for a, b in found if np.ptp(path[a:b], axis=0).max() < reach]
+
+    @cached_property
+    def late(self) -> Delay:
+        """How late the force reads, by places that are passed twice."""
+        signals = self.signals
+        return delay_by_places(signals.recording.t, signals.position, signals.magnitude, self.spans)
 
 
 def explore(
@@ -165,13 +206,15 @@ def explore(
     tared = unbroken and not _off_the_object(recording, options, cutoff_hz)
     if filtered is None or tared:
         filtered = filtered_of(recording, cutoff_hz, tared=tared)
+    shifts = method != "paper" and options.correct_delay
+    delay, error = 0.0, 0.0
+    if shifts and _is_far(filtered.late):
+        delay, error = filtered.late.seconds, filtered.late.error_s
+        filtered = filtered_of(read_earlier(recording, delay), cutoff_hz, tared=tared)
     found = _searched(filtered, given)
-    if method == "paper" or not options.correct_delay:
-        return _tabled(recording, found, given)
     step = force_delay(found.signals, found.contacts)
-    if not step.certain:
+    if not shifts or not (step.certain or delay):
         return _tabled(recording, found, given)
-    delay = 0.0
     for _ in range(_DELAY_ROUNDS):
         samples = round(step.seconds * recording.sample_rate_hz)
         if not samples:
@@ -179,7 +222,13 @@ def explore(
         delay += samples / recording.sample_rate_hz
         found = _searched(filtered_of(read_earlier(recording, delay), cutoff_hz, tared=tared), given)
         step = force_delay(found.signals, found.contacts)
-    return _tabled(recording, found, given, delay, step.error_s)
+    error = step.error_s if np.isfinite(step.error_s) else error
+    return _tabled(recording, found, given, delay, error)
+
+
+def _is_far(late: Delay) -> bool:
+    """Whether the force reads so late that touches would be missed or cut off."""
+    return late.error_s < _UNLIKE_S and abs(late.seconds) > _FAR_S and late.certain
 
 
 @dataclass(frozen=True)
@@ -410,11 +459,11 @@ def filtered_of(
     off = missed(t, filtered - again.force, air)
 
     def followed(drift: np.ndarray) -> Filtered:
-        return less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
+        there = less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
+        return replace(there, air=air)
 
     raw = recording.force_on_tool - again.force
-    found = followed(between(t, raw, air, lambda drift: followed(drift).touching()))
-    return replace(found, followed=True)
+    return followed(between(t, raw, air, lambda drift: followed(drift).touching()))
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

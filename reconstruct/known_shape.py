@@ -324,10 +324,15 @@ def _slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -> Pla
     contact = float(np.sqrt(radius * max(presses.depth_m.max(), 0.1 * radius)))
     spread = float(np.ptp(presses.point @ support_axes(up)[:2].T, axis=0).max())
     thickness = options.slab_m or max(_DEEP * contact, _SPREAD * spread)
-    if options.pose == "given" and np.median(np.abs(residual)) > 0.5 * thickness:
+    if presses.depth_m.max() >= thickness:
         raise SurfaceError(
-            f"first touches lie {1e3 * np.median(residual):.1f} mm over z = 0, where --pose given has the "
-            f"slab's top: register it with --pose auto"
+            f"presses go {1e3 * presses.depth_m.max():.2g} mm deep into a slab of {1e3 * thickness:.2g} mm: "
+            "state its true thickness, in metres"
+        )
+    if np.median(np.abs(residual)) > 0.5 * thickness:
+        raise SurfaceError(
+            f"first touches lie {1e3 * np.median(np.abs(residual)):.1f} mm (median) off the slab's top: "
+            + ("register it with --pose auto" if options.pose == "given" else "it is no slab")
         )
     axes = support_axes(up)
     flat = (presses.point - top) @ axes.T

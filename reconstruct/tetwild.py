@@ -21,12 +21,21 @@ MOST_TETRAHEDRA = 150_000
 _REGULAR = 2**0.5 / 12
 
 _CHILD = """
+import contextlib, ctypes, os, signal, sys
+if hasattr(signal, "alarm"):
+    signal.alarm(int(sys.argv[2]) + 10)
+with contextlib.suppress(OSError, AttributeError, TypeError):
+    ctypes.CDLL(None).prctl(1, signal.SIGKILL)
+    if os.getppid() != int(sys.argv[1]):
+        sys.exit(1)
 import numpy as np, pytetwild
 given = np.load("surface.npz")
 settings = {name: given[name].item() for name in given.files if name not in ("vertices", "triangles")}
 points, cells = pytetwild.tetrahedralize(given["vertices"], given["triangles"], **settings)
 np.savez("mesh.npz", points=points, cells=cells)
 """
+"""Arguments: the parent's id, with which it ends (Linux: PR_SET_PDEATHSIG), and s after which it ends anyway.
+Signals do it, as the mesher lets no Python run beside it."""
 
 
 def tetrahedralize(
@@ -70,7 +79,7 @@ def tetrahedralize(
             )
             with contextlib.suppress(subprocess.TimeoutExpired):
                 done = subprocess.run(
-                    [sys.executable, "-c", _CHILD],
+                    [sys.executable, "-c", _CHILD, str(os.getpid()), str(round(limit_s))],
                     cwd=folder,
                     capture_output=True,
                     timeout=limit_s,

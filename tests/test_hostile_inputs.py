@@ -10,6 +10,7 @@ import re
 import signal
 import subprocess
 import sys
+import time
 import warnings
 from contextlib import contextmanager
 from pathlib import Path
@@ -229,6 +230,16 @@ def test_a_misspelt_key_is_told_and_a_key_of_ones_own_is_not(record):
     with pytest.warns(MisspeltKey, match="boundry_phase is no key: did you mean boundary_phase") as told:
         assert read_recording(path).boundary_phase is None
     assert len(told) == 1
+
+
+def test_a_segment_of_another_time_is_told_and_one_within_is_not(record):
+    within = '[[segment]]\nkind = "press"\nstart_s = 0.1\nend_s = 0.2\n'
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        assert len(read_recording(record(description=DESCRIPTION + within)).segments) == 1
+    later = within.replace("0.1", "1e6").replace("0.2", "1e7")
+    with pytest.warns(MisspeltKey, match="1 segments lie outside the recording, from 0 to 0.399 s"):
+        read_recording(record(description=DESCRIPTION + within + later))
 
 
 def test_a_slow_clock_is_taken_for_milliseconds_only_where_it_may_be_one(record):
@@ -632,6 +643,8 @@ ABSURD = {
         "--depth",
         "inf",
     ),
+    "a recording that is none": ("must end in .csv", "explore", "--phantom", "dome", "-o", "new.txt"),
+    "a laboratory's recording that is none": ("must end in .csv", "simulate", "block", "-o", "new.mat"),
     "a place of 1e200": ("beyond any quantity", "press", "M", "--at", "1e200,0,0", "--direction", "0,0,-1"),
     "a direction of 1e200": (
         "beyond any quantity",
@@ -654,6 +667,42 @@ def test_absurd_options_are_refused_before_any_work(folder, record, tmp_path, mo
     words, *line = ABSURD[name]
     refused(words, *(known.get(word, word) for word in line))
     assert not list(tmp_path.glob("new*"))
+
+
+def curve(t=1.0, z=1.0, fz=1.0, rows=400):
+    """A sphere's indentation of 2 mm into 20 kPa, its columns times anything."""
+    time = np.linspace(0.0, 2.0, rows)
+    depth = 0.002 * (1 - np.abs(time - 1))
+    table = np.column_stack([t * time, -z * depth, fz * 1.9e4 * np.sqrt(0.005) * depth**1.5])
+    return text_of(table, "t,z,fz")
+
+
+def relaxation(t=1.0, value=1.0, rows=400):
+    time = np.linspace(0.0, 2.0, rows)
+    return text_of(np.column_stack([t * time, value * (1 + np.exp(-time))]), "time,relaxation modulus")
+
+
+TIP = ("--tip-radius", "0.005")
+CURVES = {
+    "travel of kilometres": ("travels 1995 m.*--units position", curve(z=1e6), *TIP),
+    "a load beyond any": ("load above 1e\\+09 N.*--units force", curve(fz=1e300), *TIP),
+    "a few rows": ("3 rows in order of time: 8", curve(rows=3), *TIP),
+    "time backwards": ("1 rows in order of time: 8", curve(t=-1.0), *TIP),
+    "a layer thinner than the dent": ("into a layer of 1e-09 m", curve(), *TIP, "--layer", "1e-9"),
+    "nu of 2": ("between -1 and 0.5", curve(), *TIP, "--poisson-ratio", "2"),
+    "nu of -3": ("between -1 and 0.5", curve(), *TIP, "--poisson-ratio", "-3"),
+    "a relaxation of two rows": ("2 rows in order of time: 8", relaxation(rows=2)),
+    "a relaxation beyond any": ("above 1e\\+15", relaxation(t=1e300)),
+    "a modulus beyond any": ("above 1e\\+15", relaxation(value=1e300)),
+}
+
+
+@pytest.mark.parametrize("name", CURVES)
+def test_hostile_curves_of_a_machine_are_refused_in_one_line(tmp_path, name, recwarn):
+    words, text, *line = CURVES[name]
+    (tmp_path / "dent.csv").write_text(text)
+    refused(words, "material", str(tmp_path / "dent.csv"), "--fast", *line)
+    assert not list(recwarn)
 
 
 def test_every_default_is_within_its_range():
@@ -794,6 +843,30 @@ def test_a_process_that_follows_its_parent_ends_with_it():
     child = subprocess.Popen([sys.executable, "-c", code], stdin=subprocess.PIPE)
     child.stdin.close()
     assert child.wait(20) == 1
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it ends by itself, after its time")
+def test_the_mesher_ends_when_its_parent_is_killed(tmp_path):
+    """One that would mesh for an hour, as fTetWild does on some surfaces."""
+    from reconstruct import tetwild
+
+    (tmp_path / "pytetwild.py").write_text("import time; open('begun', 'w'); time.sleep(3600)")
+    words = f"[sys.executable, '-c', {tetwild._CHILD!r}, str(os.getpid()), '60']"
+    code = f"import os, subprocess, sys; subprocess.run({words})"
+    parent = subprocess.Popen([sys.executable, "-S", "-c", code], cwd=tmp_path)
+    begun = tmp_path / "begun"
+    assert _within(20.0, begun.exists)
+    [child] = Path(f"/proc/{parent.pid}/task/{parent.pid}/children").read_text().split()
+    parent.kill()
+    parent.wait()
+    assert _within(5.0, lambda: not Path(f"/proc/{child}/cmdline").exists())
+
+
+def _within(seconds, happened):
+    end = time.monotonic() + seconds
+    while not happened() and time.monotonic() < end:
+        time.sleep(0.02)
+    return happened()
 
 
 def test_a_worker_of_the_laboratory_ends_when_its_parent_is_killed(tmp_path):

@@ -1,9 +1,11 @@
-"""Long commands ended at random moments: Ctrl-C, SIGTERM, SIGKILL, a disk that is full from then on.
+"""Long commands ended at random moments: Ctrl-C, SIGTERM, SIGKILL, a disk full or failing from then on.
 
 Each command runs once whole; its results are what stands there when it runs again and is ended. Afterwards
 every result is the one of before or a whole new one, no temporary file or folder is left (after SIGKILL: once
-the next command has run), no process is, and nothing but a line or two was said. The full disk is a limit on
-the size of files (prlimit), set at that moment on the running process and all that it started.
+the next command has run), no process is, and nothing but a line or two was said. Results and scratch files
+lie on a small disk in memory, which a filler takes whole at that moment (ENOSPC); where this user may mount
+none, that end is left out. A failing write is a limit on the size of files (prlimit, EFBIG), set on the
+running process and all that it started.
 """
 
 from __future__ import annotations
@@ -22,7 +24,8 @@ import tempfile
 import time
 import tomllib
 from collections import Counter
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -31,18 +34,21 @@ import numpy as np
 from mechanics.errors import OptionError, PalpateError
 from mechanics.files import temporary_prefix
 from mechanics.model import read_model, write_model
-from mechanics.recording import read_recording, recording_files
+from mechanics.recording import read_recording, recording_files, write_recording
 from palpate.benchmarks._fuzz_cases import PRESS, cube
+from palpate.benchmarks._small_disk import SmallDisk
 from palpate.benchmarks.timing import table
 from palpate.child import module_command, module_environment
 from scenes.embedded import embedded_names, embedded_recording
 
-HOW = ("SIGINT", "SIGTERM", "SIGKILL", "full disk")
-CODES = {"SIGINT": (130, -2), "SIGTERM": (143, -15), "SIGKILL": (-9,), "full disk": (2,)}
+FULL, FAILING = "full disk", "failing write"
+HOW = ("SIGINT", "SIGTERM", "SIGKILL", FULL, FAILING)
+CODES = {"SIGINT": (130, -2), "SIGTERM": (143, -15), "SIGKILL": (-9,), FULL: (2,), FAILING: (2,)}
 """Exit codes of a command that was ended so; 0 where it was done before, or wrote nothing any more."""
 LINES = 3
 """Of standard error at most, progress left out."""
-FULL_BYTES = 4096
+FAILS_AFTER_BYTES = 4096
+_DISK_BYTES = 256 << 20
 _ENDS_S = 60.0
 _WHOLE_S = 900.0
 _ORPHANS_S = 10.0
@@ -57,9 +63,10 @@ class Job:
     weight: float = 1.0
 
 
-def _jobs(model: Path, out: Path) -> dict[str, Job]:
+def _jobs(sound: Path, out: Path) -> dict[str, Job]:
+    """By name; sound: where `_sound` put its files."""
     samples, description = recording_files(embedded_recording(embedded_names()[0]))
-    recording, folder, file = str(description), str(model), lambda end: str(out / end)
+    recording, folder, file = str(description), str(sound / "block"), lambda end: str(out / end)
     return {
         "press": Job(("press", folder, *PRESS, "-o", file("curve.csv"), "--json", file("press.json"))),
         "replay": Job(("replay", folder, recording, "-o", file("forces.csv"))),
@@ -77,11 +84,38 @@ def _jobs(model: Path, out: Path) -> dict[str, Job]:
         "batch": Job(("batch", recording, "-o", file("batch"), "--do", "reconstruct", "--workers", "1",
                       "--set", "reconstruct.mesh_size_m=0.012"), 2.0),
         "bench": Job(("bench", "elements", "--json", file("elements.json"))),
+        "model": Job(("model", str(sound / "block.stl"), "-o", file("made"), "--mesh-size", "0.008")),
+        "material": Job(("material", *(str(sound / f"dent-{k}.csv") for k in range(3)), "--kind",
+                         "indentation", "--tip-radius", "0.005", "--fast", "--json", file("material.json"))),
+        "calibrate": Job(("calibrate", recording, "--modulus", "29e3", "-o", file("tool.toml"))),
+        "explore": Job(("explore", "--phantom", "dome", "-o", file("explored.csv.gz"), "--most", "4"), 2.0),
+        "changes": Job(("compare", recording, str(sound / "again.csv"), "--no-diagnosis", "--json",
+                        file("changes.json"))),
         "demo": Job(("demo", "-o", file("demo"), "--no-window", "--no-diagnosis", "--seconds", "2")),
     }  # fmt: skip
 
 
 COMMANDS = tuple(_jobs(Path(), Path()))
+
+
+def _sound(folder: Path) -> None:
+    """What the commands read beside the embedded recording: a MODEL, its surface, a recording, dents."""
+    import trimesh
+
+    folder.mkdir()
+    block = cube()
+    write_model(folder / "block", block)
+    corners = block.mesh.surface[:, :3]
+    trimesh.Trimesh(block.mesh.points, corners).export(folder / "block.stl")
+    once = read_recording(embedded_recording(embedded_names()[0]))
+    stronger = replace(once, force_on_tool=1.2 * once.force_on_tool, object_name="again")
+    write_recording(folder / "again.csv", stronger)
+    t = np.linspace(0.0, 4.0, 2001)
+    depth = 0.002 * (1 - np.abs(t / 2 - 1))
+    for k in range(3):
+        force = (1 + 0.05 * k) * 4 / 3 * 20e3 / (1 - 0.49**2) * np.sqrt(0.005) * depth**1.5
+        table = np.column_stack([t, -depth, force])
+        np.savetxt(folder / f"dent-{k}.csv", table, delimiter=",", header="t,z,fz", comments="")
 
 
 def interrupted(
@@ -97,33 +131,33 @@ def interrupted(
     began = time.perf_counter()
     tried: Counter[tuple[str, str]] = Counter()
     broken: list[dict[str, Any]] = []
-    with tempfile.TemporaryDirectory(prefix="palpate-ends-") as folder:
-        place = _Place(Path(folder))
-        whole_s = {}
-        try:
-            for name in tqdm(names, desc="whole", disable=None):
-                whole_s[name] = place.whole(name)
-        except KeyboardInterrupt:
-            print("interrupted: the commands that ran whole until then", file=sys.stderr)
-            names, count = tuple(whole_s), 0
+    whole_s: dict[str, float] = {}
+    with _Place.made() as place:
+        ends = HOW if place.disk.mounted else tuple(how for how in HOW if how != FULL)
         weights = np.array([place.jobs[name].weight for name in names])
         for seed in tqdm(range(first, first + count), desc="ended", disable=None):
             if time.perf_counter() - began > 60 * minutes:
                 break
             random = np.random.default_rng([37, seed])
-            name, how = str(random.choice(names, p=weights / weights.sum())), HOW[seed % len(HOW)]
-            after_s = float(random.uniform(0.03, whole_s[name]))
+            name, how = str(random.choice(names, p=weights / weights.sum())), ends[seed % len(ends)]
+            share = float(random.random())
             try:
+                if name not in whole_s:
+                    whole_s[name] = place.whole(name)
+                after_s = 0.03 + share * (whole_s[name] - 0.03)
                 wrong = place.ended(name, how, after_s)
             except KeyboardInterrupt:
+                print("interrupted: what was tried until then", file=sys.stderr)
                 break
+            print(f"{seed} {name}, {how} after {after_s:.1f} of {whole_s[name]:.1f} s: "
+                  f"{'; '.join(wrong) or 'well'}", file=sys.stderr, flush=True)  # fmt: skip
             tried[name, how] += 1
             if wrong:
-                print(f"{seed} {name}, {how}: {wrong}", file=sys.stderr, flush=True)
                 broken.append({"seed": seed, "command": name, "how": how, "after_s": after_s, "wrong": wrong})
                 if keep:
                     shutil.copytree(place.out, Path(keep) / f"{seed}-{name}", dirs_exist_ok=True)
     seconds = time.perf_counter() - began
+    names = tuple(name for name in names if name in whole_s)
     rows = [[n, f"{whole_s[n]:.1f}", *(tried[n, h] for h in HOW), sum(b["command"] == n for b in broken)]
             for n in names]  # fmt: skip
     rows.append(["all", "", *(sum(tried[n, h] for n in names) for h in HOW), len(broken)])
@@ -137,15 +171,30 @@ def interrupted(
 
 
 class _Place:
-    """Where the commands run: results, scratch files and results kept aside, each in a folder of its own."""
+    """Where the commands run: results and scratch files on a small disk, sound files and the results of whole
+    runs beside it."""
 
     def __init__(self, folder: Path) -> None:
-        self.out, self.scratch, self.kept = folder / "out", folder / "scratch", folder / "kept"
+        self.disk = SmallDisk(folder / "disk", _DISK_BYTES)
+        self.out, self.scratch = self.disk.folder / "out", self.disk.folder / "scratch"
+        self.kept = folder / "kept"
         for each in (self.out, self.scratch, self.kept):
             each.mkdir()
-        self.model = write_model(folder / "block", cube())
-        self.jobs = _jobs(self.model, self.out)
+        _sound(folder / "sound")
+        self.model = folder / "sound" / "block"
+        self.jobs = _jobs(folder / "sound", self.out)
         self._environment = module_environment(TMPDIR=str(self.scratch))
+
+    @classmethod
+    @contextlib.contextmanager
+    def made(cls) -> Iterator[_Place]:
+        """One in a temporary folder, which is gone afterwards."""
+        with tempfile.TemporaryDirectory(prefix="palpate-ends-") as folder:
+            place = cls(Path(folder))
+            try:
+                yield place
+            finally:
+                place.disk.end()
 
     def whole(self, name: str) -> float:
         """Run a command whole; s."""
@@ -158,7 +207,7 @@ class _Place:
         for entry in list(self.out.iterdir()):
             target = self.kept / name / entry.name
             target.parent.mkdir(exist_ok=True)
-            os.replace(entry, target)
+            shutil.move(entry, target)
         return seconds
 
     def ended(self, name: str, how: str, after_s: float) -> list[str]:
@@ -171,10 +220,15 @@ class _Place:
             process.wait(after_s)
         family = _family(process.pid)
         done = process.poll() is not None
-        if how == "full disk":
+        if how == FULL:
+            self.disk.fill()
+            code = _waited(process, _WHOLE_S)
+            self.disk.empty()
+        elif how == FAILING:
+            limit = (FAILS_AFTER_BYTES, resource.RLIM_INFINITY)
             for pid in family:
                 with contextlib.suppress(OSError):
-                    resource.prlimit(pid, resource.RLIMIT_FSIZE, (FULL_BYTES, resource.RLIM_INFINITY))
+                    resource.prlimit(pid, resource.RLIMIT_FSIZE, limit)
             code = _waited(process, _WHOLE_S)
         else:
             with contextlib.suppress(OSError):

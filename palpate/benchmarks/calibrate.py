@@ -43,29 +43,34 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         own = [row for row in rows if row["name"] == name]
         told = [row for row in own if row["found"] is not None]
         covered = [row["covered"] for row in told if row["covered"] is not None]
+        widths = [row["width"] for row in told if row["width"] is not None]
         found[name] = {
             "cases": len(own),
             "told": len(told),
             "median_error": float(np.median([row["error"] for row in told])) if told else None,
+            "median_width": float(np.median(widths)) if widths else None,
             "covered": sum(covered),
             "of": len(covered),
         }
-    head = ["parameter", "cases", "told", "median error", "interval covers"]
+    head = ["parameter", "cases", "told", "median error", "interval's width", "interval covers"]
     cells = []
     for name, f in found.items():
-        error = "" if f["median_error"] is None else f["median_error"]
-        cells.append([name, f["cases"], f["told"], error, f"{f['covered']} of {f['of']}"])
+        error, width = ("" if f[key] is None else f[key] for key in ("median_error", "median_width"))
+        cells.append([name, f["cases"], f["told"], error, width, f"{f['covered']} of {f['of']}"])
     print(table(head, cells))
     return {"rows": rows, "parameters": found}
 
 
 def _judged(name: str, true: float, value: float | None, interval: Any, unit: float) -> dict[str, Any]:
     """unit: what the error is over; the truth where it is a share."""
-    covered = None
+    covered = width = None
     if interval is not None and value is not None:
         covered = bool(min(interval) <= true <= max(interval))
+        width = float(max(interval) - min(interval)) / unit
     error = None if value is None else abs(value - true) / unit
-    return {"name": name, "true": true, "found": value, "error": error, "covered": covered}
+    return {
+        "name": name, "true": true, "found": value, "error": error, "covered": covered, "width": width,
+    }  # fmt: skip
 
 
 def _plate(seed: int) -> list[dict[str, Any]]:

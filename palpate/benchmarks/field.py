@@ -29,10 +29,12 @@ from palpate.comparison import (
     RIVALS,
     CompareOptions,
     Comparison,
+    Prepared,
     as_touched,
     compare_presses,
+    prepare,
 )
-from reconstruct.modulus_field import LEVEL_BIAS, asked_for, fit_field, with_field
+from reconstruct.modulus_field import asked_for, fit_field, map_sd, with_field
 
 SUMMARY = "held-out presses of tissue: FEM with a field against one modulus, 1D models and moduli by place"
 PER_PLACE, TRUTH = "modulus-by-place", "truth"
@@ -46,6 +48,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--log-sd", type=float, default=0.35, help="standard deviation of ln E")
     parser.add_argument("--touch-error", type=float, default=3e-4, help="of first touches", metavar="M")
     parser.add_argument("--seed", type=int, default=0, help="of the first slab")
+    parser.add_argument("--map", action="store_true", help="the map alone, no presses held out")
 
 
 def per_place(result: Comparison, options: CompareOptions) -> np.ndarray:
@@ -84,9 +87,9 @@ def beyond(error_n: float, least_n: float) -> float:
     return float(np.sqrt(max(error_n**2 - least_n**2, 1e-12)))
 
 
-def map_of(slab: Tissue, result: Comparison) -> dict[str, float]:
+def map_of(slab: Tissue, prepared: Prepared) -> dict[str, float]:
     """How true the field of all presses is at the touched places."""
-    own = min(result.prepared.own.values(), key=lambda o: o.fit.cost.sum())
+    own = min(prepared.own.values(), key=lambda o: o.fit.cost.sum())
     found = fit_field(own, np.arange(len(slab.presses)))
     if found is None:
         return {}
@@ -96,6 +99,7 @@ def map_of(slab: Tissue, result: Comparison) -> dict[str, float]:
     places = found.field.places[:touched]
     true = slab.log_ratio(places) + np.log(slab.modulus_pa)
     told = found.level + found.field.log_ratio[:touched]
+    sd = map_sd(found, slab.presses.tip_radius_m)[:touched]
     return {
         "asked_for": float(asked_for(found)),
         "gain": found.gain,
@@ -104,7 +108,7 @@ def map_of(slab: Tissue, result: Comparison) -> dict[str, float]:
         "rms_error": float(np.sqrt(np.mean((told - true) ** 2))),
         "correlation": float(np.corrcoef(told, true)[0, 1]) if true.std() > 0 else float("nan"),
         "contrast": float(np.polyfit(true, told, 1)[0]) if true.std() > 0 else float("nan"),
-        "coverage": float(np.mean(np.abs(told - true) < 1.96 * np.hypot(found.sd[:touched], LEVEL_BIAS))),
+        "coverage": float(np.mean(np.abs(told - true) < 1.96 * sd)),
     }
 
 
@@ -118,6 +122,11 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         seed = arguments.seed + k
         for error, ways in ((0.0, ("read",)), (arguments.touch_error, ("read", "moved"))):
             slab = tissue(seed, log_sd=sd, raster=arguments.raster, touch_error_m=error)
+            if arguments.map:
+                told = map_of(slab, prepare(slab.presses, slab.model))
+                found["cases"].append({"seed": seed, "log_sd": sd, "touch_error_m": error, "map": told})
+                print(f"slab {seed}, touches {1e3 * error:g} mm" + _map_words(told), flush=True)
+                continue
             for way in ways:
                 rms, result = errors(slab, way)
                 noise = result.noise_n
@@ -131,11 +140,13 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                     "folds_with_a_field": sum(field is not None for field in result.fields),
                 }  # fmt: skip
                 if way == ways[0]:
-                    row["map"] = map_of(slab, result)
+                    row["map"] = map_of(slab, result.prepared)
                 found["cases"].append(row)
                 _say(row)
         progress("slabs", (k + 1) / count)
     progress.close()
+    if arguments.map:
+        return found
     found["summary"] = _summary(found["cases"])
     print(table(["setting", *_COLUMNS], [[name, *row] for name, row in found["summary"].items()]))
     return found
@@ -150,9 +161,13 @@ def _say(row: dict[str, Any]) -> None:
         + f" mN (noise {1e3 * row['vector_noise_n']:.1f}); FEM over the better 1D model "
         f"{row['fem_over_best_1d']:.2f} (the slab itself {row['truth_over_best_1d']:.2f}), beyond the truth "
         f"{row['fem_over_best_1d_beyond_truth']:.2f}; a field in {row['folds_with_a_field']} folds"
-        + "".join(f"; {key} {value:.2f}" for key, value in row.get("map", {}).items()),
+        + _map_words(row.get("map", {})),
         flush=True,
     )
+
+
+def _map_words(told: dict[str, float]) -> str:
+    return "".join(f"; {key} {value:.2f}" for key, value in told.items())
 
 
 _COLUMNS = (

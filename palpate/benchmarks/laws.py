@@ -29,7 +29,7 @@ from scenes.variety.writing import write
 
 SUMMARY = "laws of tissue as whole recordings: named, and how near?"
 LAWS = ("power_law_relaxation", "poroelasticity", "jkr_adhesion", "adhesion")
-OBJECTS, PRESSES = 6, (18, 36)
+OBJECTS, LEAST_PRESSES = 6, 18
 SKIPPED = ("tip_radius_m", "plane_strain_modulus_pa")
 """Keys of the laboratory that are no parameter of the law."""
 
@@ -42,6 +42,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--strength", type=float, nargs=2, default=(0.5, 2.5), metavar=("LEAST", "MOST"),
         help="between which strengths are drawn, evenly in their logarithm; both may be negative",
     )  # fmt: skip
+    parser.add_argument("--presses", type=natural, default=36, help="of a recording, at most (default: 36)")
     parser.add_argument("--seed", type=natural, default=913, help="of the draws (default: 913)")
     parser.add_argument("--touches", type=Path, metavar="FOLDER", help="solved touches (default: the user's)")
 
@@ -60,17 +61,19 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         for law in arguments.laws:
             strength = np.sign(least) * np.exp(rng.uniform(*np.log(np.abs([least, most]))))
             seed, number = int(rng.integers(100_000, 200_000)), int(rng.integers(0, OBJECTS))
-            found.append(one(law, round(float(strength), 2), seed, number, arguments.touches))
+            found.append(
+                one(law, round(float(strength), 2), seed, number, arguments.presses, arguments.touches)
+            )
             print(_line(found[-1]), flush=True)
     head = ["law", "strength", "object", "verdict", "key", "true", "found", "95 % interval", "holds"]
     print(table(head, [row for each in found for row in _rows(each)]))
     return {"recordings": found}
 
 
-def one(law: str, strength: float, seed: int, number: int, touches: Path | None) -> dict[str, Any]:
+def one(law: str, strength: float, seed: int, number: int, most: int, touches: Path | None) -> dict[str, Any]:
     """One recording of a law, and what came of it."""
     drawn = replace(draw(seed), number=number)
-    drawn = replace(drawn, presses=int(np.clip(drawn.presses, *PRESSES)))
+    drawn = replace(drawn, presses=int(np.clip(drawn.presses, LEAST_PRESSES, max(most, LEAST_PRESSES))))
     made = explored(drawn, {law: strength}, it=thing(number), sizes=False, cache=touches)
     truth = dict(made.recording.truth or {})
     row: dict[str, Any] = {

@@ -120,6 +120,8 @@ def pairs(texts: list[str], flag: str, example: str) -> dict[str, str]:
         name, found, value = text.partition("=")
         if not found or not value:
             raise OptionError(f"{flag} '{text}' must be two words like {example}")
+        if name.strip() in pairs:
+            raise OptionError(f"{flag} says '{name.strip()}' twice: say it once")
         pairs[name.strip()] = value.strip()
     return pairs
 

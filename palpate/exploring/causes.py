@@ -7,6 +7,9 @@ by Ville's inequality it ever exceeds 1 / alpha with a probability of at most al
 alpha times the mean is the set of causes: whatever is true stays in it through the whole exploration with
 probability 1 - alpha, however often one looks, and whenever one stops.
 
+'None' is not nothing: it is every cause at every size that is too small to matter, so that an error of our
+own law, which many presses show ever more plainly, rules it out only once it is a gap that one would feel.
+
 The likelihood is Gaussian and linear about the ideal model: the modulus is free; first touches, places and
 the law's own errors (those of one place and those that all places share) have widths of their own
 (diagnose.whiten, COMMON); every form of a cause is a column, the change of force that it brings about.
@@ -26,6 +29,9 @@ import numpy as np
 from diagnose.first_touch import first_touches
 from diagnose.fit import Fit, fit, settings_of
 from diagnose.forward import Forward
+from diagnose.freeair import free_air_of
+from diagnose.instrument_offsets import find_instrument_offsets
+from diagnose.judging import AttributionOptions
 from diagnose.pipeline import untold_effects
 from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
@@ -48,8 +54,10 @@ FALSE_ALARMS = 0.02
 LEAST_PRESSES = 6
 SIZES = np.geomspace(1.0, 100.0, 13)
 """Sizes of a cause that are weighed, times `least_n`."""
-LEAST = 0.1
-"""Of a reading's noise: the smallest size of a cause that is weighed."""
+SMALL = np.linspace(0.0, 1.0, 5)
+"""Sizes that are none, times `least_n`: what is too small to matter, a cause or an error of ours alike."""
+LEAST_SHARE = 0.01
+"""Of the force: a smaller change does not matter, however plainly many presses show it."""
 SHARES = (0.3, 1.0, 3.0)
 """Steps from where an effect does nothing, of its starts, at which its form is taken."""
 SUPPORT_GIVES = 1.5e-5
@@ -157,10 +165,17 @@ def causes_of(estimate: Estimate, least_n: float | None = None) -> tuple[Causes,
     weighing = weigh(estimate)
     if weighing is None:
         return None
-    least = least_n or LEAST * weighing.forward.touches.noise.raw_n
+    least = least_n or least_that_matters(weighing.forward)
     causes = judge(weighing, least)
     modulus = modulus_beside(weighing, causes.standing(0.95)[0])
     return dataclasses.replace(causes, modulus_pa=modulus), weighing
+
+
+def least_that_matters(forward: Forward) -> float:
+    """N rms over contact samples: the smallest gap that a diagnosis names, or LEAST_SHARE of the force."""
+    t = forward.touches
+    force = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
+    return max(AttributionOptions().smallest * t.vector_noise_n, LEAST_SHARE * force)
 
 
 def modulus_beside(w: Weighing, name: str) -> float:
@@ -269,7 +284,12 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     places = Places(
         model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature
     )
-    return Forward(touches, places), site_stiffness_sd(touches, model, NuisanceOptions())
+    forward = Forward(touches, places)
+    if e.exploration is not None:
+        # bias, drift and the tool's weight are told by free air, not by presses
+        free = free_air_of(e.exploration.recording, e.presses_placed)
+        find_instrument_offsets(forward, free, None, set())
+    return forward, site_stiffness_sd(touches, model, NuisanceOptions())
 
 
 def _model(e: Estimate, presses: Presses) -> Model:
@@ -406,10 +426,12 @@ def judge(weighing: Weighing, least_n: float) -> Causes:
     misfit = (fitted - explained.max(initial=0.0)) / w.dof
     target, curve = with_support(w, target, curve)
     over = w.forward.touches.noise.variance_inflation * max(1.0, misfit)
-    log = {NONE: 0.0}
+    log, small = {NONE: 0.0}, []
     for name in names[1:]:
         rows = [i for i, n in enumerate(w.names) if n == name]
-        log[name] = _log_mean(_evidence(w, rows, target, curve, least_n, over))
+        log[name] = _log_mean(_evidence(w, rows, target, curve, least_n * SIZES, over))
+        small.append(_log_mean(_evidence(w, rows, target, curve, least_n * SMALL, over)))
+    log[NONE] = _log_mean(np.array(small or [0.0]))
     return Causes(log, least_n, float(misfit))
 
 
@@ -452,11 +474,12 @@ def likeliest(w: Weighing, name: str, least_n: float) -> tuple[Act, float] | Non
 
 
 def _evidence(
-    w: Weighing, rows: list[int], target: np.ndarray, curve: np.ndarray, least_n: float, over: float
+    w: Weighing, rows: list[int], target: np.ndarray, curve: np.ndarray, sizes_n: np.ndarray, over: float
 ) -> np.ndarray:
-    """Log likelihood ratios to 'none' of the forms `rows` at all sizes, both signs where it has both."""
+    """Log likelihood ratios to the ideal model of the forms `rows` at all sizes (k,) N, both signs where it
+    has both."""
     size = np.maximum(w.sizes[rows], 1e-9)
-    factor = least_n * SIZES[None] / size[:, None]
+    factor = sizes_n[None] / size[:, None]
     signs = (1.0, -1.0) if w.names[rows[0]] in TWO_SIGNED else (1.0,)
     log = [s * factor * target[rows, None] - 0.5 * factor**2 * curve[rows, None] for s in signs]
     return np.concatenate(log).ravel() / over

@@ -261,7 +261,7 @@ def _one_clock(
 def _offset(place: _Stream, push: _Stream, said: Said, notes: list[str]) -> float:
     """s to add to the force's clock: what was said; 0 where the clocks overlap; else by cross-correlation."""
     assert place.t is not None and push.t is not None
-    if isinstance(said.offset_s, int | float):
+    if isinstance(said.offset_s, int | float) and np.isfinite(said.offset_s):
         notes.append(f"force's clock moved by {said.offset_s:g} s, as said")
         return float(said.offset_s)
     if said.offset_s not in (None, "auto"):
@@ -369,7 +369,10 @@ def _signs(position: np.ndarray, force: np.ndarray) -> list[str]:
 
 
 def _matrix(value: Any) -> np.ndarray:
-    turn = np.asarray(value, dtype=float)
+    try:
+        turn = np.asarray(value, dtype=float)
+    except (TypeError, ValueError):
+        turn = np.zeros(0)
     if (
         turn.shape != (3, 3)
         or not np.allclose(turn @ turn.T, np.eye(3), atol=1e-3)

@@ -26,23 +26,38 @@ import numpy as np
 
 from mechanics.errors import RecordingError
 from mechanics.files import read_toml
+from mechanics.recording import SCHEMA
+from mechanics.schema import ANY, Key, Schema, check_table
 from palpate.importing.tables import Table
 from palpate.importing.units import SI, plain, unit_in, without_unit
 
 ROLES = ("t", "x", "y", "z", "fx", "fy", "fz", "qw", "qx", "qy", "qz")
 KIND = {"t": "time", **dict.fromkeys("xyz", "position"), **dict.fromkeys(("fx", "fy", "fz"), "force")}
-_TABLES = {
-    "columns": ROLES,
-    "units": tuple(SI),
-    "tool": ("tip_radius_m", "mass_kg", "flange_to_tip_m"),
-    "sensor": ("force_on", "frame", "rotation"),
-    "clock": ("offset_s", "rate_hz"),
-    "tare": ("start_s", "end_s"),
-    "object": (
-        "name", "poisson_ratio", "shape", "shape_unit", "shape_pose", "shape_up", "shape_sink_m",
-        "slab_m", "half_space",
-    ),
-}  # fmt: skip
+_NUMBERS = {
+    "tip_radius_m": Key(low=1e-9, high=0.1, unit="m"),
+    "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
+    "flange_to_tip_m": Key(low=-2.0, high=2.0, size=3, unit="m"),
+    "rate_hz": Key(low=1e-3, high=1e6, unit="Hz"),
+    "tare_s": Key(size=2, unit="s"),
+}
+_SCHEMA: Schema = {
+    "columns": dict.fromkeys(ROLES),
+    "units": dict.fromkeys(SI, Key(str)),
+    "tool": {name: _NUMBERS[name] for name in ("tip_radius_m", "mass_kg", "flange_to_tip_m")},
+    "sensor": {
+        "force_on": Key(str, choices=("tool", "object")),
+        "frame": Key(str, choices=("device", "tool")),
+        "rotation": ANY,
+    },
+    "clock": {"offset_s": ANY, "rate_hz": _NUMBERS["rate_hz"]},
+    "tare": {"start_s": Key(unit="s"), "end_s": Key(unit="s", required=True)},
+    "object": {
+        key: form
+        for key, form in SCHEMA["object"].items()  # type: ignore[union-attr]
+        if key != "model"
+    },
+}
+"""What a mapping file may hold."""
 
 
 @dataclass(frozen=True)
@@ -78,19 +93,17 @@ class Said:
                 raise RecordingError(f"units of '{kind}' are not asked for; allowed are {', '.join(SI)}")
             if plain(unit) not in SI[kind]:
                 raise RecordingError(f"'{unit}' is no unit of {kind}; allowed are {', '.join(SI[kind])}")
+        for name, key in _NUMBERS.items():
+            given = getattr(self, name)
+            if given is not None and not key.takes(np.asarray(given).tolist()):
+                raise RecordingError(f"{name} is {given}; it must be {key.words}")
 
 
 def read_mapping(path: Path | str) -> dict[str, Any]:
     """The fields of a mapping file; raises RecordingError for one that is no TOML or has another key."""
     path = Path(path)
     held = read_toml(path, RecordingError)
-    for table, keys in held.items():
-        allowed = _TABLES.get(table)
-        if allowed is None or not isinstance(keys, dict):
-            raise RecordingError(f"'{path}' has '{table}'; allowed are the tables {', '.join(_TABLES)}")
-        for key in keys:
-            if key not in allowed:
-                raise RecordingError(f"'{path}' has '{key}' in [{table}]; allowed are {', '.join(allowed)}")
+    check_table(held, _SCHEMA, path, RecordingError, strict=True)
     found: dict[str, Any] = {}
     for table in ("columns", "units"):
         if table in held:
@@ -98,7 +111,7 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
     for table in ("tool", "sensor", "clock"):
         found |= held.get(table, {})
     if "tare" in held:
-        found["tare_s"] = (float(held["tare"].get("start_s", 0.0)), float(held["tare"].get("end_s", 0.0)))
+        found["tare_s"] = (float(held["tare"].get("start_s", 0.0)), float(held["tare"]["end_s"]))
     if "object" in held:
         found["thing"] = held["object"]
     return found

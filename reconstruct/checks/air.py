@@ -11,8 +11,9 @@ from reconstruct.checks.sight import Sight
 from reconstruct.filtering import noise_gain
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
-_LATE_S = 0.075
-"""A force that reads later than this is not corrected reliably (reconstruct.delay)."""
+_LATE_S, _LATEST_S = 0.075, 0.25
+"""A force that reads later than the first is told of, one later than the second is not corrected: presses
+keep 0.3 s of samples around them."""
 _CERTAIN = 5.0
 _ALIKE_S = 0.01
 """Touches that disagree by more about the delay are none, or drags."""
@@ -63,19 +64,22 @@ def _followed(sight: Sight, peak: float) -> Finding:
 
 
 def delay(sight: Sight) -> Iterator[Finding]:
-    """A force that reads later (or earlier) than reconstruction can correct."""
-    late, error = sight.lag_s
-    if error > _ALIKE_S or abs(late) < _LATE_S + _CERTAIN * error:
+    """A force that reads so late or early that there are two clocks; grave beyond what can be corrected."""
+    late, error = abs(sight.late.seconds), sight.late.error_s
+    if error > _ALIKE_S or late < _LATE_S + _CERTAIN * error:
         return
     a, b = sight.spans[len(sight.spans) // 2]
-    room = round(abs(late) * sight.rate_hz)
+    room = round(late * sight.rate_hz)
+    touches = sight.touches
+    rise_s = float(np.median(touches.peak - touches.start)) / sight.rate_hz
+    way, mended = "late" if sight.late.seconds > 0 else "early", late < _LATEST_S
     yield Finding(
         "delay",
-        f"the force reads {abs(late) * 1e3:.0f} +- {error * 1e3:.0f} ms {'late' if late > 0 else 'early'}; "
-        f"up to {_LATE_S * 1e3:.0f} ms is corrected",
-        f"{abs(late) / error:.0f} standard errors, {len(sight.lags)} touches that pass one place twice",
+        f"the force reads {late * 1e3:.0f} +- {error * 1e3:.0f} ms {way}; "
+        + ("that is taken off" if mended else f"up to {_LATEST_S * 1e3:.0f} ms is taken off"),
+        f"{late / error:.0f} standard errors, {sight.late.presses} touches that pass one place twice",
         "log position and force by one clock, or shift the force's times",
-        np.inf,
+        1.5 * error / max(rise_s, error) if mended else np.inf,
         float(min(0.5 * (late / error) ** 2 / np.log(10), 300)),
         (
             float(sight.recording.t[max(a - room, 0)]),

@@ -113,13 +113,12 @@ def seen(sight: Sight | None) -> Seen:
     if sight is None:
         return ()
     rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
-    late, error = sight.lag_s
     free = np.linalg.norm(sight.air, axis=1)
     return (
         *rows,
         ("rate by the times of the samples [Hz]", sight.rate_hz, np.nan),
         ("touches after the trace", float(len(sight.spans)), np.nan),
-        ("the force reads late [s]", late if np.isfinite(error) else np.nan, 0.0),
+        ("the force reads late [s]", sight.late.seconds if np.isfinite(sight.late.error_s) else np.nan, 0.0),
         ("force in free air, mean [N]", float(free.mean()), np.nan),
         ("force in free air, change over the recording [N]", float(np.ptp(sight.air, axis=0).max()), np.nan),
         ("steps of the force [N]", float(sight.step[3:].max()), 0.0),

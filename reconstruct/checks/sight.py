@@ -10,24 +10,17 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import ContactError
 from mechanics.recording import Recording
-from mechanics.robust import spread_about_zero
-from mechanics.samples import runs
-from reconstruct.boundary import find_interval
 from reconstruct.contacts import Filtered, filtered_of
+from reconstruct.delay import Delay
 from reconstruct.filtering import FilterOptions, white_noise_std
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples
-_LEAST_S = 0.05
 _EVEN = 0.02
 """The stated rate is believed where it is so near to the samples' own."""
-_SLIDE = 8.0
-_TIPS_M = (1e-3, 0.02)
 _GAP_S = 1.0
 _BLOCK = 32
-_SHIFTS_S = np.arange(-0.5, 0.5001, 0.004)
 
 
 @dataclass(frozen=True)
@@ -107,6 +100,7 @@ class Sight:
             position=self.position,
             force_on_tool=self.force,
             sample_rate_hz=self.rate_hz,
+            tip_radius_m=self.tip_radius_m,
         )
         return filtered_of(believed, self.cutoff_hz)
 
@@ -146,30 +140,25 @@ class Sight:
         """(n,) bool, whether something is touched."""
         return self.filtered.touching()
 
-    @cached_property
+    @property
     def traced(self) -> tuple[int, int]:
         """Samples [first, last) of the tracing; (0, 0) where none is found."""
-        recording = self.recording
-        phase = recording.boundary_phase
-        try:
-            return find_interval(self.t, self.path, self.contact, phase, self.tip_radius_m)
-        except ContactError:
-            return 0, 0
+        return self.filtered.traced
 
-    @cached_property
+    @property
     def spans(self) -> list[tuple[int, int]]:
         """[start, end) of each touch after the tracing, short ones and slides left out."""
-        contact = self.contact.copy()
-        contact[: self.traced[1]] = False
-        shortest = max(3, round(_LEAST_S * self.rate_hz))
-        found = [(a, b) for a, b in runs(contact) if b - a >= shortest and a > 0 and b < len(self.t)]
-        reach = _SLIDE * float(np.clip(self.tip_radius_m, *_TIPS_M))
-        return [(a, b) for a, b in found if np.ptp(self.path[a:b], axis=0).max() < reach]
+        return self.filtered.spans
+
+    @property
+    def late(self) -> Delay:
+        """How late the force reads, by places that are passed twice."""
+        return self.filtered.late
 
     @cached_property
     def touches(self) -> Touches:
-        """The touches, their force read earlier by `lag_s`."""
-        late = round(self.lag_s[0] * self.rate_hz)
+        """The touches, their force read earlier by `late`."""
+        late = round(self.late.seconds * self.rate_hz)
         rows = []
         for a, b in self.spans:
             peak = a + int(np.argmax(self.size[a:b]))
@@ -178,33 +167,6 @@ class Sight:
         table = np.array(rows, dtype=float).reshape(-1, 9)
         start, peak, end = table[:, :3].T.astype(int)
         return Touches(start, peak, end, table[:, 3:6], table[:, 6:])
-
-    @cached_property
-    def lags(self) -> np.ndarray:
-        """(k,) s: how late each touch's force reads. Where the force passes three tenths of its peak on its
-        way up and down the tip is at nearly the same place; the shift of time that brings both together."""
-        out = []
-        for a, b in self.spans:
-            level = self.size[a:b] > 0.3 * self.size[a:b].max()
-            first, last = a + np.flatnonzero(level)[[0, -1]]
-            gap = np.zeros(len(_SHIFTS_S))
-            for axis in range(3):
-                x = self.path[:, axis]
-                up = np.interp(self.t[first] - _SHIFTS_S, self.t, x)
-                gap += (up - np.interp(self.t[last] - _SHIFTS_S, self.t, x)) ** 2
-            best = int(np.argmin(gap))
-            if 0 < best < len(gap) - 1:
-                out.append(_SHIFTS_S[best])
-        return np.array(out)
-
-    @cached_property
-    def lag_s(self) -> tuple[float, float]:
-        """How late the force reads, s, and its standard error (infinite where fewer than 6 touches say)."""
-        if len(self.lags) < 6:
-            return 0.0, np.inf
-        middle = float(np.median(self.lags))
-        scatter = max(spread_about_zero(self.lags - middle), 0.004)
-        return middle, 1.25 * scatter / float(np.sqrt(len(self.lags)))
 
 
 def _without_gaps(t: np.ndarray) -> np.ndarray:

@@ -237,6 +237,54 @@ def test_what_is_missing_is_one_line(tmp_path, content, said, words):
     assert len(str(refused.value).splitlines()) == 1
 
 
+MAPPINGS = {
+    "a table that is a number": ("columns = 3", "it must be a table"),
+    "a table that nobody knows": ("[nothing]\na = 1", "nothing is no key"),
+    "a key that nobody knows": ('[columns]\nq = "a"', "q is no key"),
+    "a unit that is a number": ("[units]\nforce = 3", "it must be a text"),
+    "a tip that is a text": ('[tool]\ntip_radius_m = "a"', "tip_radius_m = 'a'"),
+    "a tip of nan": ("[tool]\ntip_radius_m = nan", "tip_radius_m = nan"),
+    "a negative mass": ("[tool]\nmass_kg = -1", "from 0 to 5 kg"),
+    "an arm of two": ("[tool]\nflange_to_tip_m = [1, 2]", "a list of 3 numbers"),
+    "a frame of a list": ("[sensor]\nframe = [1]", "one of device, tool"),
+    "a rotation of words": ('[sensor]\nrotation = "a"', "3 x 3 rotation"),
+    "a ragged rotation": ("[sensor]\nrotation = [[1], [1, 2]]", "3 x 3 rotation"),
+    "a rate of a text": ('[clock]\nrate_hz = "a"', "rate_hz = 'a'"),
+    "a rate of 0": ("[clock]\nrate_hz = 0", "from 0.001 to"),
+    "a clock of nan": ("[clock]\noffset_s = nan", "seconds or auto"),
+    "a tare of a text": ('[tare]\nstart_s = "x"\nend_s = 1', "start_s = 'x'"),
+    "a tare without an end": ("[tare]\nstart_s = 0", "end_s is missing"),
+    "a slab of a list": ("[object]\nslab_m = [1]", r"slab_m = \[1\]"),
+    "a path to a model": ('[object]\nmodel = "../../etc"', "model is no key"),
+}
+
+
+@pytest.mark.parametrize("name", MAPPINGS)
+def test_hostile_mappings_are_refused_in_one_line(tmp_path, name):
+    content, words = MAPPINGS[name]
+    rows = "\n".join(f"{k},0,0,{k},0,0,1" for k in range(200))
+    (tmp_path / "log.csv").write_text(f"t,x_m,y_m,z_m,fx,fy,fz\n{rows}\n")
+    (tmp_path / "map.toml").write_text(content)
+    given = {} if "tip" in name else {"tip_radius_m": TIP}
+    with pytest.raises(RecordingError, match=words) as refused:
+        pp.read_table(tmp_path / "log.csv", mapping=tmp_path / "map.toml", **given)
+    assert len(str(refused.value).splitlines()) == 1
+
+
+def test_one_thing_said_twice_is_refused(tmp_path, capsys):
+    (tmp_path / "a.csv").write_text("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n")
+    words = ("--units", "force=N,force=mN", "--dry-run")
+    assert cli.main(["import", str(tmp_path / "a.csv"), *words]) == 2
+    assert "says 'force' twice" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", [("--tool-mass", "-1"), ("--rate", "1e12"), ("--tip-radius", "5")])
+def test_impossible_numbers_are_refused(tmp_path, capsys, words):
+    (tmp_path / "log.csv").write_text("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n")
+    assert cli.main(["import", str(tmp_path / "log.csv"), "--dry-run", *words]) == 2
+    assert "it must be a number from" in capsys.readouterr().err
+
+
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="a limit that only Linux has")
 @pytest.mark.parametrize("name", ["log.csv.gz", "log.npz"])
 def test_a_small_file_that_unpacks_to_gigabytes_is_refused(tmp_path, monkeypatch, name):

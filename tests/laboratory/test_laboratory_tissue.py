@@ -6,8 +6,11 @@ import numpy as np
 import pytest
 
 from mechanics.effects.jkr_adhesion import LAW as STICKY
+from mechanics.effects.jkr_adhesion import _set as set_adhesion
+from mechanics.effects.jkr_adhesion import edge_share
 from mechanics.effects.poroelasticity import LAW as POROUS
 from mechanics.effects.power_law_relaxation import prony_terms
+from mechanics.effects.settings import Touch
 from mechanics.effects.viscoelasticity import LAW as PRONY
 from scenes.laboratory.effects import effect
 from scenes.laboratory.motion import Motion
@@ -68,14 +71,18 @@ def test_drainage(touch) -> None:
     assert 1.15 < held[0] / held[-1] < 1.4
 
 
-def test_a_contact_that_sticks(touch) -> None:
+@pytest.mark.parametrize("reach", [1e-6, 0.1, 0.4])
+def test_a_contact_that_sticks(touch, reach) -> None:
+    """From the limit of Johnson, Kendall & Roberts, 3/2 pi w R, towards that of Derjaguin, Muller & Toporov,
+    2 pi w R."""
     work = 0.01 * E_STAR * RADIUS
     keys = {
-        "work_j_per_m2": work, "healed": 0.2, "range_m": 1e-6, "tip_radius_m": RADIUS,
+        "work_j_per_m2": work, "healed": 0.2, "range_m": reach * RADIUS, "tip_radius_m": RADIUS,
         "plane_strain_modulus_pa": E_STAR,
     }  # fmt: skip
     found = made("jkr_adhesion", keys, touch)
-    lift = 2 * np.pi * work / (E_STAR * RADIUS)
-    numbers = np.array([0.2 * lift, 0.0, lift, 0.0, 2e-4, RADIUS, E_STAR * RADIUS**2])
-    assert found.min() == pytest.approx(-1.5 * np.pi * work * RADIUS, rel=2e-3)
-    assert found == pytest.approx(rendered(STICKY, numbers, *touch), abs=0.01 * -found.min())
+    sticky = Touch()
+    set_adhesion(sticky, keys, E_STAR, 0.0, RADIUS)
+    assert found == pytest.approx(rendered(STICKY, sticky.numbers[STICKY], *touch), abs=0.01 * -found.min())
+    pulls = 2 - 0.5 * edge_share(work, reach * RADIUS, E_STAR, RADIUS)
+    assert found.min() == pytest.approx(-pulls * np.pi * work * RADIUS, rel=0.02)

@@ -76,6 +76,25 @@ def test_net_undoes_bias_and_delay():
     assert late.net.delay_s == 0 and np.abs(late.net.free_air).max() == 0
 
 
+def test_a_weight_that_turns_after_a_touch_does_not_prolong_it():
+    made = recording()
+    # the tool turns by 0.3 N while the hand lifts it, 50 ms before the force is gone
+    turned = np.outer(0.3 * np.clip((made.t % 2.0 - 1.78) / 0.05, 0.0, 1.0), UP)
+    heavy = dataclasses.replace(made, force_on_tool=made.force_on_tool + turned)
+    plain, known = table(made), table(heavy, free_air=turned)
+    assert known.end_s == pytest.approx(plain.end_s, abs=0.002)
+    assert (table(heavy).end_s > plain.end_s + 0.1).all()
+
+
+def test_a_touch_is_lost_soon_after_it_stood_above_the_noise_last():
+    made = recording()
+    wrong = np.outer(0.1 * (made.t % 2.0 > 1.6), UP)
+    heavy = dataclasses.replace(made, force_on_tool=made.force_on_tool + wrong)
+    until = 2.0 * np.arange(6) + 1.83
+    assert (table(heavy, until_s=until).end_s <= until + 0.11).all()
+    assert (table(heavy).end_s > until + 0.12).any()
+
+
 def test_thinning_keeps_means_and_whitens_by_its_root():
     presses = table(recording())
     thin = presses.thinned(0.01)

@@ -3,16 +3,21 @@ units."""
 
 from __future__ import annotations
 
+import json
+import sys
+from pathlib import Path
+
 import meshio
 import numpy as np
 import pytest
 import pyvista
 import trimesh
+from pyvista import examples
 
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import SurfaceError
 from mechanics.standing import standing
-from mechanics.surface_files import ClosedSurface, read_surface
+from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 
 SIZE_MM = (60, 50, 40)
 
@@ -59,6 +64,17 @@ def without(shell: trimesh.Trimesh, gone: np.ndarray, path):
     shell.update_faces(~gone)
     shell.export(path)
     return path
+
+
+@pytest.mark.parametrize("name", ["nut", "ant", "hexbeam", "uniform"])
+def test_a_visualisers_own_examples_are_solids(tmp_path, name):
+    """Files that come with PyVista; of a grid without cells of its own nothing was read."""
+    path = next(Path(examples.__file__).parent.glob(f"{name}.*"))
+    size = float(np.ptp(np.reshape(pyvista.read(path).bounds, (3, 2)), axis=1).max())
+    unit = next(unit for unit, metres in UNITS.items() if 0.004 < size * metres < 1)
+    found = read_surface(path, unit)
+    assert found.size_m == pytest.approx(size * UNITS[unit], rel=1e-5)
+    assert trimesh.Trimesh(found.vertices, found.triangles, process=False).is_volume
 
 
 def test_small_and_flat_holes_are_closed(tmp_path):
@@ -131,6 +147,64 @@ def test_bad_files_are_one_line(tmp_path, capfd, name, content, words):
 
 def surface_of(shell: trimesh.Trimesh) -> ClosedSurface:
     return ClosedSurface(np.array(shell.vertices), np.array(shell.faces), "thing.stl")
+
+
+NOTED: list[str] | None = None
+
+
+def note(event: str, arguments: tuple) -> None:
+    if NOTED is not None and event in ("open", "socket.connect", "socket.getaddrinfo", "subprocess.Popen"):
+        NOTED.append(f"{event} {arguments}")
+
+
+@pytest.fixture
+def opened(monkeypatch):
+    """What is opened, called or started while a test runs (hooks stay for good, so this one sleeps)."""
+    sys.addaudithook(note)
+    noted: list[str] = []
+    monkeypatch.setattr(sys.modules[__name__], "NOTED", noted)
+    return noted
+
+
+@pytest.mark.parametrize("uri", ["../secret.bin", "ABSOLUTE", "file://ABSOLUTE", "http://127.0.0.1:9/s.bin"])
+def test_a_gltf_reads_nothing_outside_its_folder_and_calls_nobody(tmp_path, opened, uri):
+    """Its triangles lie in a buffer that is named: a sound one, outside of the file's folder."""
+    (tmp_path / "folder").mkdir()
+    box = trimesh.creation.box(extents=SIZE_MM)
+    places, corners = np.asarray(box.vertices, "<f4").tobytes(), np.asarray(box.faces, "<u4").tobytes()
+    (tmp_path / "secret.bin").write_bytes(places + corners)
+    attributes = {"attributes": {"POSITION": 0}, "indices": 1}
+    buffer = {"uri": uri.replace("ABSOLUTE", f"{tmp_path}/secret.bin"), "byteLength": len(places + corners)}
+    (tmp_path / "folder" / "block.gltf").write_text(json.dumps({
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0]}], "nodes": [{"mesh": 0}],
+        "meshes": [{"primitives": [attributes]}],
+        "accessors": [
+            {"bufferView": 0, "componentType": 5126, "count": len(box.vertices), "type": "VEC3"},
+            {"bufferView": 1, "componentType": 5125, "count": box.faces.size, "type": "SCALAR"},
+        ],
+        "bufferViews": [
+            {"buffer": 0, "byteLength": len(places)},
+            {"buffer": 0, "byteOffset": len(places), "byteLength": len(corners)},
+        ],
+        "buffers": [buffer],
+    }))  # fmt: skip
+    opened.clear()
+    with pytest.raises(SurfaceError) as refusal:
+        read_surface(tmp_path / "folder" / "block.gltf", "mm")
+    assert "\n" not in str(refusal.value) and len(str(refusal.value)) < 400
+    assert not [x for x in opened if "secret" in x or "passwd" in x or not x.startswith("open")]
+
+
+def test_an_obj_reads_nothing_outside_its_folder_and_calls_nobody(tmp_path, opened):
+    path = written(tmp_path, "block.obj")
+    (tmp_path / "secret.mtl").write_text("newmtl a\nmap_Kd /etc/passwd\n")
+    folder = tmp_path / "folder"
+    folder.mkdir()
+    for where in ("../secret.mtl", str(tmp_path / "secret.mtl"), "http://127.0.0.1:9/s.mtl"):
+        (folder / "block.obj").write_text(f"mtllib {where}\nusemtl a\n{path.read_text()}")
+        opened.clear()
+        assert volume(read_surface(folder / "block.obj", "mm")) == pytest.approx(1.2e-4, rel=1e-6)
+        assert not [x for x in opened if "secret.mtl" in x or "passwd" in x or not x.startswith("open")]
 
 
 def test_an_object_without_a_foot_says_what_to_do_and_can_be_cut():

@@ -7,6 +7,7 @@ import json
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -76,3 +77,20 @@ def test_json_holds_no_nan_and_is_alone_on_stdout(tmp_path, capsys):
     assert json.loads(capsys.readouterr().out) == {"a": [1.0, None], "b": 3}
     emit_json({"a": 1}, str(tmp_path / "x.json"))
     assert json.loads((tmp_path / "x.json").read_text()) == {"a": 1}
+
+
+def test_a_python_without_a_library_is_told_in_one_line():
+    """Such as the system's own, in the checkout's folder: no site-packages."""
+    words = [sys.executable, "-S", "-m", "palpate", "check", "x.csv"]
+    said = subprocess.run(words, capture_output=True, text=True, cwd=Path(cli.__file__).parent.parent)
+    assert said.returncode == 2
+    assert said.stderr.startswith("palpate: the library '") and said.stderr.count("\n") == 1
+
+
+def test_a_missing_part_of_the_program_itself_is_no_matter_of_installing(monkeypatch):
+    def load(argv):
+        raise ModuleNotFoundError("no", name="reconstruct.nothing")
+
+    monkeypatch.setattr(cli, "_loaded", load)
+    with pytest.raises(ModuleNotFoundError):
+        cli.main(["check", "x.csv"])

@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 
 from palpate.benchmarks import _interrupts
+from palpate.benchmarks._small_disk import SmallDisk
 from palpate.cli import parser_of
 from palpate.importing.tables import SUFFIXES
 
@@ -18,3 +19,22 @@ def test_every_command_that_is_interrupted_is_one_that_works_on_files_that_are_t
     inputs = [Path(word) for word in argv[1:] if "recordings" in word]
     assert all(file.is_file() for file in inputs)
     assert argv[0] != "import" or inputs[0].suffix in SUFFIXES
+
+
+@pytest.fixture
+def small(tmp_path):
+    made = SmallDisk(tmp_path / "disk", 1 << 20)
+    if not made.mounted:
+        pytest.skip("this user may mount no disk in memory")
+    yield made
+    made.end()
+
+
+def test_a_small_disk_is_full_until_it_is_emptied(small):
+    small.fill()
+    with pytest.raises(OSError, match="No space left"):
+        (small.folder / "file").write_bytes(b"x")
+    small.empty()
+    (small.folder / "file").write_bytes(bytes(1 << 19))
+    small.end()
+    assert not small.mounted and not list(small.folder.iterdir())

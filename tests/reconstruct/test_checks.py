@@ -69,8 +69,8 @@ def test_what_is_found_says_where_and_how_sure(cylinder):
 def test_the_delay_of_the_force_is_read_off_places_passed_twice(cylinder):
     for late_s in (-0.04, 0.0, 0.15):
         force = np.roll(cylinder[0].force_on_tool, round(late_s * 1000), axis=0)
-        seen, error = Sight(dataclasses.replace(cylinder[0], force_on_tool=force)).lag_s
-        assert seen == pytest.approx(late_s, abs=0.006) and error < 0.003
+        seen = Sight(dataclasses.replace(cylinder[0], force_on_tool=force)).late
+        assert seen.seconds == pytest.approx(late_s, abs=0.006) and seen.error_s < 0.003
 
 
 def test_grave_findings_refuse_unless_forced(cylinder):

@@ -31,6 +31,15 @@ def test_a_delay_is_found_and_first_touch_comes_out_right(on_time, delay):
     assert exploration.recording is late
 
 
+@pytest.mark.parametrize("delay", [0.2, -0.15])
+def test_a_force_of_another_clock_is_found_before_touches_are_looked_for(on_time, delay):
+    """They are nowhere in it: first and last touch alone find none."""
+    exploration = explore(read_earlier(on_time, -delay))
+    assert exploration.delay_s == pytest.approx(delay, abs=0.002)
+    assert len(exploration.presses.onset_s) == len(explore(on_time).presses.onset_s)
+    assert abs(shift_of_first_touch(exploration)) < 1e-4
+
+
 def test_a_force_on_time_is_left_alone(on_time):
     exploration = explore(on_time)
     assert exploration.delay_s == 0 and exploration.delay_error_s == 0

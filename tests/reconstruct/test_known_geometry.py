@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from types import SimpleNamespace
 
 import numpy as np
@@ -14,6 +15,7 @@ from diagnose.leave_one_out import held_out
 from mechanics.effects.registry import effect
 from mechanics.errors import ContactError, OptionError, SurfaceError
 from mechanics.press_sites import sites_of
+from mechanics.recording import write_recording
 from palpate import cli
 from reconstruct.contacts import explore
 from reconstruct.known_shape import GeometryOptions, nowhere, place, stated_geometry
@@ -52,6 +54,13 @@ def test_a_slabs_top_goes_through_the_first_touches(ground):
     assert np.allclose(height, 0.02 + TIP_M, atol=2e-4)
     assert put.about["kind"] == "slab" and put.about["residual_rms_m"] < 1e-4
     assert put.mesh is not None and put.mesh.volumes.sum() == pytest.approx(put.surface.volume_m3)
+
+
+@pytest.mark.parametrize(("slab_m", "words"), [(1e-9, "deep into a slab of 1e-06 mm"), (1e-3, "deep into")])
+def test_a_slab_thinner_than_its_presses_are_deep_is_refused(ground, slab_m, words):
+    recording, found = ground
+    with pytest.raises(SurfaceError, match=words):
+        place(recording, found, GeometryOptions(slab_m=slab_m), mesh_size_m=0.01, spacing_m=0.003)
 
 
 def test_touches_at_one_place_leave_nothing_out_and_crash_nothing():
@@ -147,3 +156,23 @@ def test_the_modulus_of_a_half_space_needs_no_tracing():
     made = pp.reconstruct(raster(), half_space=True, progress=False)
     low, high = made.young_modulus_ci95_pa
     assert made.young_modulus_pa == pytest.approx(MODULUS_PA, rel=0.06) and low < high
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("command", ["compare", "diagnose"])
+def test_a_surfaces_file_is_the_model_of_a_recording_without_tracing(tmp_path, command, capsys):
+    """Owners of a CAD model were refused, and compare asked for a tracing that it did not use."""
+    recording = raster((3, 3), 0.008, tilt=False)
+    block = trimesh.creation.box(extents=(80, 80, 40))
+    block.apply_translation([0, 0, -20])
+    block.export(tmp_path / "part.stl")
+    path = write_recording(tmp_path / "rec.csv.gz", recording)
+    words = [command, str(path), *(["--model"] if command == "compare" else []), str(tmp_path / "part.stl")]
+    words += ["--unit", "mm", "--modulus", "9e3", "--json", str(tmp_path / "out.json")]
+    assert cli.main(words + (["--fast"] if command == "diagnose" else [])) == 0
+    found = json.loads((tmp_path / "out.json").read_text())
+    if command == "compare":
+        assert found["rmse_n"]["fem"] < 0.1
+    else:
+        assert found["young_modulus_pa"] == pytest.approx(MODULUS_PA, rel=0.1)
+    capsys.readouterr()

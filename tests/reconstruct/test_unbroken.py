@@ -23,6 +23,7 @@ from reconstruct.known_shape import nowhere
 from reconstruct.placing import presses_on
 from reconstruct.points import explore_points
 from reconstruct.unbroken import free_air_seen
+from render.replay import replay_error
 
 
 def seen(recording):
@@ -122,6 +123,17 @@ def test_a_model_of_another_recording_needs_no_tracing(slab, made):
     # the tip is the recording's, in places and in the law alike
     assert with_tip_of(slab, found).tool.tip_radius_m == TIP_M == found.tip_radius_m
     assert untold_effects(found) >= ({"time_delay", "viscoelasticity"} if made is points else set())
+
+
+def test_a_replay_of_contact_that_is_never_left_counts_all_of_it(slab):
+    """The quietest 30 % were taken for air."""
+    recording = cyclic()
+    found = presses_on(recording, slab)
+    error = replay_error(recording, found, np.zeros_like(recording.force_on_tool))
+    pressed = (recording.t > found.onset_s.min()) & (recording.t < found.end_s.max())
+    moving = np.linalg.norm(np.gradient(recording.position, axis=0)[:, :2], axis=1) > 1e-5
+    assert error.contact[pressed & ~moving].mean() > 0.98
+    assert error.relative == pytest.approx(1.0)
 
 
 def test_points_that_cannot_be_read_are_one_line():

@@ -87,3 +87,50 @@ def test_instrument_effects_are_not_rendered(base):
     plain = force(render_with(base), IN)
     biased = force(render_with(base, force_bias={"bias_n": [0, 0, 1.0]}, time_delay={"delay_s": 0.02}), IN)
     assert plain.tobytes() == biased.tobytes()
+
+
+def pressed(renderer, depth, seconds):
+    """Force of a step to a depth, held."""
+    return force(renderer, np.concatenate([[1e-3], np.full(round(seconds * 1000), -depth)]))
+
+
+def test_a_springpot_relaxes_by_a_power_of_time(base):
+    elastic = pressed(render_with(base), 3e-3, 0.01)[-1]
+    slow = pressed(render_with(base, power_law_relaxation={"share": 0.2, "exponent": 0.3}), 3e-3, 3.0)
+    over = slow / elastic - 1
+    assert over[3000] / over[300] == pytest.approx(10**-0.3, rel=0.02)
+    # the springpot's own kernel, share t^-exponent of the elastic force
+    assert over[1000] == pytest.approx(0.2, rel=0.02)
+
+
+def test_drainage_relaxes_slower_under_a_wider_contact(base):
+    wet = render_with(base, poroelasticity={"share": 0.5, "diffusivity_m2_per_s": 3e-5})
+    over = {}
+    for depth in (1e-3, 4e-3):
+        elastic = pressed(render_with(base), depth, 0.01)[-1]
+        over[depth] = pressed(wet, depth, 2.0) / elastic - 1
+    # the contact's radius squared goes with the depth, and so does the time
+    for ms in (50, 200, 500):
+        assert over[4e-3][4 * ms] == pytest.approx(over[1e-3][ms], abs=0.02)
+    assert over[1e-3][1] > 0.4 > 0.1 > over[1e-3][500]
+
+
+@pytest.mark.parametrize("range_m", [1e-6, 5e-4])
+def test_surfaces_that_stick_pull_by_their_work_and_less_before_they_touched(base, range_m):
+    """Johnson, Kendall & Roberts pull 3/2 pi w R at the most, Derjaguin's 2 pi w R; what heals pulls less."""
+    work = 4.0
+    sticky = render_with(base, jkr_adhesion={"work_j_per_m2": work, "healed": 0.3, "range_m": range_m})
+    found = force(sticky, np.concatenate([IN[::2], IN[::-2], np.linspace(1e-3, 3e-3, 100)]))
+    unit = np.pi * work * TIP
+    assert 1.4 * unit < -found.min() < 2.1 * unit
+    assert -found.min() > 2 * -found[:100].min()
+    assert found[-1] == 0.0 and np.isfinite(found).all()
+
+
+def test_exponential_stiffening_and_softening_show_where_it_is_deep(base):
+    plain = force(render_with(base), IN)
+    hard, soft = (force(render_with(base, strain_stiffening={"c20_over_c10": c}), IN) for c in (1.5, -0.1))
+    early = 60  # 0.2 mm deep
+    assert hard[early] == pytest.approx(plain[early], rel=0.08)
+    assert hard[-1] > 1.1 * plain[-1] and soft[-1] < hard[-1] / 1.1
+    assert np.isfinite(hard).all() and np.isfinite(soft).all()

@@ -72,25 +72,35 @@ def _power_law(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parame
     return let_go(out, force, motion, normals)
 
 
-def _jkr_branch(give: float, lift: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(travel, force, contact radius) from pull-off on, of a sphere of radius 1 on a half-space with E* 1, in
-    series with a spring; lift: 2 pi times the work of adhesion."""
+def _branch(give: float, lift: float, pull: float) -> tuple[np.ndarray, np.ndarray]:
+    """(travel, contact radius) from pull-off on, of a sphere of radius 1 on a half-space with E* 1, in series
+    with a spring; lift: 2 pi times the work of adhesion at the edge, pull: the same of the contact as a
+    whole."""
     a = np.geomspace(1e-4, 3.0, 20001)
-    force = 4 / 3 * a**3 - 2 * a * np.sqrt(lift * a)
-    travel = a**2 - np.sqrt(lift * a) + give * force
+    travel = a**2 - np.sqrt(lift * a) + give * (4 / 3 * a**3 - 2 * a * np.sqrt(lift * a) - pull)
     first = int(np.argmin(travel))
-    return travel[first:], force[first:], a[first:]
+    return travel[first:], a[first:]
+
+
+def _at_the_edge(work: float, reach: float) -> float:
+    """Share of the work, in E* R, that acts at the contact's edge where the attraction reaches so far, in R:
+    1 is Johnson, Kendall & Roberts, 0 Derjaguin, Muller & Toporov (Carpick, Ogletree & Salmeron 1999)."""
+    maugis = 1.157 * (work**2 / reach**3) ** (1 / 3)
+    return 4.04 * maugis**1.4 / (1 + 4.04 * maugis**1.4)
 
 
 def _sticky(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameters) -> np.ndarray:
-    """Johnson, Kendall & Roberts: the contact holds until it is unstable, and begins with another work.
+    """The contact holds until it is unstable, and begins with another work.
 
     Dents are Hertz's, in series with what the object gives as a whole, told by the deepest state. A contact
-    whose edge is pinned, at the turn, is a flat punch.
+    whose edge is pinned, at the turn, is a flat punch. What does not act at the edge pulls on the contact as
+    a whole, and beyond it over its range.
     """
     out, radius = force.copy(), p["tip_radius_m"]
     unit = p["plane_strain_modulus_pa"] * radius**2
-    lift = 2 * np.pi * p["work_j_per_m2"] / (p["plane_strain_modulus_pa"] * radius)
+    work, reach = p["work_j_per_m2"] * radius / unit, p["range_m"] / radius
+    edge = _at_the_edge(work, reach)
+    lift, whole = 2 * np.pi * work * edge, 2 * np.pi * work * (1 - edge)
     for number in np.unique(motion.touch[motion.touch >= 0]):
         rows = np.flatnonzero(motion.touch == number)
         aside = motion.leg[rows] == SIDEWAYS
@@ -103,20 +113,26 @@ def _sticky(force: np.ndarray, motion: Motion, normals: np.ndarray, p: Parameter
         give = np.zeros(len(rows))
         give[inside] = (travel[inside] - (0.75 * push[inside]) ** (2 / 3)) / push[inside]
         usual = max(float(give[np.argmax(push)]), 0.0)
-        pulled = _jkr_branch(usual, lift)
-        begun = _jkr_branch(usual, p["healed"] * lift)
+        pulled = _branch(usual, lift, whole)
+        begun = _branch(usual, p["healed"] * lift, p["healed"] * whole)
         elastic = 4 / 3 * np.where(travel > 0, np.interp(travel, *_without(usual)), 0.0) ** 3
-        a, touched = 0.0, False
+        a, touched, turned = 0.0, False, 0.0
         for k, row in enumerate(rows):
             if not touched and not inside[k]:
                 continue
             touched = True
+            turned = float(np.clip(turned - (travel[k] - travel[max(k - 1, 0)]) / reach, 0, 1))
+            pull = whole * (p["healed"] + turned * (1 - p["healed"]))
             grown, kept = (
-                np.interp(travel[k], b[0], b[2]) if travel[k] >= b[0][0] else 0.0 for b in (begun, pulled)
+                np.interp(travel[k], b[0], b[1]) if travel[k] >= b[0][0] else 0.0 for b in (begun, pulled)
             )
             a = max(min(a, kept), grown) if (a > 0 or travel[k] >= 0) else 0.0
             punch = 4 / 3 * a**3
-            now = punch - 2 * a * (a**2 + usual * punch - travel[k]) / (1 + 2 * a * usual)
+            now = punch - 2 * a * (a**2 + usual * (punch - pull) - travel[k]) / (1 + 2 * a * usual) - pull
+            if a == 0:
+                # nothing touches: the pull falls in a straight line, and lifts the surface that it pulls on
+                left = 1 - usual * pull / reach
+                now = -min(pull, pull * max(1 + travel[k] / reach, 0.0) / left) if left > 0 else 0.0
             out[row] += (now - elastic[k]) * unit * normals[row]
     return out
 
@@ -127,12 +143,18 @@ def _without(give: float) -> tuple[np.ndarray, np.ndarray]:
     return a**2 + give * 4 / 3 * a**3, a
 
 
+_RANGES = (2e-4, 0.4)
+"""Of the attraction, in tip radii, between which it is drawn: from the limit of Johnson, Kendall & Roberts
+towards that of Derjaguin, Muller & Toporov."""
+
+
 def _sticking(strength: float, bench: Bench) -> dict[str, Any]:
     plane_strain = bench.modulus_pa / (1 - 0.49**2)
+    reach = float(np.exp(bench.rng.uniform(*np.log(_RANGES))))
     return {
         "work_j_per_m2": 0.02 * strength * plane_strain * bench.tip_radius_m,
         "healed": 0.2,
-        "range_m": 1e-6,
+        "range_m": float(f"{reach * bench.tip_radius_m:.3g}"),
         "tip_radius_m": bench.tip_radius_m,
         "plane_strain_modulus_pa": plane_strain,
     }
