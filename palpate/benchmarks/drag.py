@@ -83,11 +83,15 @@ def _lines(renderer: Any, height_m: float) -> dict[str, np.ndarray]:
 
 
 def _hits(arrays: Any, begin: np.ndarray, along: np.ndarray) -> np.ndarray:
-    """Where rays from (n, 3) m first meet the surface; those that miss are left out."""
+    """Where rays from (n, 3) m first meet the surface, where they do."""
     surface = _surface(arrays)
     ends = begin + 2 * np.linalg.norm(np.ptp(arrays.vertices, axis=0)) * along
-    hits = [surface.ray_trace(a, b, first_point=True)[0] for a, b in zip(begin, ends, strict=True)]
-    return np.array([hit for hit in hits if len(hit)])
+    line = []
+    for a, b in zip(begin, ends, strict=True):
+        hits = surface.ray_trace(a, b)[0]  # its `first_point` may be the last
+        if len(hits):
+            line.append(hits[np.argmin(np.linalg.norm(hits - a, axis=1))])
+    return np.array(line)
 
 
 def _surface(arrays: Any) -> Any:

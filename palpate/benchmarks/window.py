@@ -3,7 +3,8 @@
 A mouse presses into the middle of the first picture while frames go by, off screen, as fast as they come.
 `tick` is everything but the drawing (state in, surface and shadow moved, words, plots), which a graphics card
 does not make faster: 1 over it is what a card could reach at most. The processor's own time stands beside the
-clock's, for machines that do something else as well.
+clock's, for machines that do something else as well. Then each part is drawn alone: where pictures are slow,
+the second one, words and plots come less often (palpate.window.pace).
 """
 
 from __future__ import annotations
@@ -27,6 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--size", type=int, nargs=2, default=[1280, 800], metavar=("W", "H"), help="pixels")
     parser.add_argument("--beside", action=argparse.BooleanOptionalAction, default=True,
                         help="a second picture beside the first, as scenes have it")  # fmt: skip
+    parser.add_argument("--picture", metavar="PNG", help="save the window as it is in the press")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -60,6 +62,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             window.controls.press(down)
             _frames(window, arguments.frames // 3)  # until the tip is there
             found[name] = _frames(window, arguments.frames)
+        if arguments.picture:
+            window.plotter.screenshot(arguments.picture)
+        found["parts"] = _parts(window, arguments.frames)
         found["drawn by"] = _card(window)
         window.plotter.close()
     channel.close()
@@ -74,15 +79,31 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     header = ["the tip is", "tick [ms]", "draw [ms]", "both, 95 % [ms]", "CPU [ms]", "pictures a second",
               "on a free core", "at most, drawn for nothing"]  # fmt: skip
     print(table(header, rows))
+    print(table(["drawn alone", "CPU [ms]"], [[name, 1e3 * cpu] for name, cpu in found["parts"].items()]))
     return found
 
 
-def _frames(window: Any, count: int) -> dict[str, float]:
-    """Medians over `count` pictures, s, by the clock; cpu_s: of this process, both together."""
+def _parts(window: Any, count: int) -> dict[str, float]:
+    """Median processor time, s, of drawing each part of the window by itself, and all of them."""
+    *pictures, panel = window.plotter.renderers
+    parts = {"what is felt": pictures[:1], "second picture": pictures[1:], "words and plots": [panel],
+             "all": [*pictures, panel]}  # fmt: skip
+    found = {}
+    for name, drawn in parts.items():
+        for renderer in window.plotter.renderers:
+            renderer.SetDraw(renderer in drawn)
+        found[name] = _frames(window, count, move=False)["cpu_s"]
+    return found
+
+
+def _frames(window: Any, count: int, *, move: bool = True) -> dict[str, float]:
+    """Medians over `count` pictures, s, by the clock; cpu_s: of this process, both together. move: tick
+    before each."""
     ticks, draws, cpu = [], [], []
     for _ in range(count):
         used, began = time.process_time(), time.perf_counter()
-        window.tick()
+        if move:
+            window.tick()
         between = time.perf_counter()
         window.plotter.render()
         ticks.append(between - began)

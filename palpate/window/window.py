@@ -46,7 +46,7 @@ SLIDER_AT = 0.36
 PANEL_SHARE = 0.42
 """Of the charts' row: the panel of words, which covers nothing."""
 LEAST_TYPE = 9
-LIGHTS = (((-0.5, 0.8, 1.0), 0.8), ((0.9, -0.1, 0.6), 0.35))
+LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
 """Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
 LETTER = 0.62
 """Mean width of a letter over its type's size."""
