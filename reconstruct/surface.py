@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -40,6 +40,10 @@ _DIRECTION_RAD, _LEAST_LIKELY = np.radians(15.0), 3.0
 _POOR_M = 0.0012
 """Above this held-out error of the best shape, the implicit surface is tried as well."""
 
+_BELOW_M = 1e-4
+"""No surface reaches this far below the support it stands on."""
+
+Drawn = tuple[np.ndarray, np.ndarray, np.ndarray]
 Redraw = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 
@@ -164,7 +168,7 @@ def _found(
         return _implicit(
             evidence, options, "no point sees the whole base outline, which the other shapes need"
         )
-    best = max(tried, key=score)
+    best, (vertices, triangles, deviation) = _best_drawn(tried, options.surface_spacing_m)
     error = held_out_error(best)
     if options.surface == "auto" and error > _POOR_M:
         implicit = _implicit(
@@ -172,7 +176,6 @@ def _found(
         )
         if implicit.held_out_m["implicit"] < 0.8 * error:
             return implicit
-    vertices, triangles, deviation = draw(best, options.surface_spacing_m)
 
     def redraw(spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
         coarse = draw(best, spacing_m)[:2]
@@ -196,6 +199,22 @@ def _found(
         uncertainty_m=np.hypot(deviation, _spread(vertices, best, tried)),
         bracket_m3=bounds(replace(evidence, normals=facing)),
     )
+
+
+def _best_drawn(tried: Sequence[Explained], spacing_m: float) -> tuple[Explained, Drawn]:
+    """The shape with the best score of those that can be drawn, and its drawing (reconstruct.shapes.drawing).
+
+    A field beside a shape may run away where nothing was touched: below the support, or far beyond all that
+    was. Raises SurfaceError where every one does.
+    """
+    for each in sorted(tried, key=score, reverse=True):
+        drawn = draw(each, spacing_m)
+        touched = np.vstack([each.seen.centres, each.seen.outline])
+        size = np.ptp(touched, axis=0).max()
+        beyond = np.maximum(drawn[0] - touched.max(axis=0), touched.min(axis=0) - drawn[0]).max()
+        if beyond < size and drawn[0][:, 2].min() > -_BELOW_M:
+            return each, drawn
+    raise SurfaceError("no shape stays near what was touched: touch more places, all round the object")
 
 
 def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:

@@ -40,8 +40,8 @@ def executed():
 @pytest.mark.slow
 def test_a_result_shows_itself_and_its_show_is_the_view_of_the_pages(executed, tmp_path: Path):
     _, itself, shown = (cell.outputs for cell in executed.cells)
-    own = itself[0].data["text/html"]
-    assert "20.0 kPa" in own and "data:image/png;base64" in own
+    own = next(output.data["text/html"] for output in itself if output.output_type == "execute_result")
+    assert "20.00 kPa" in own and "data:image/png;base64" in own
     assert [output.output_type for output in shown] == ["display_data"], "no warning, no None, no bitmap"
     page = re.search('srcdoc="(.*?)" title', shown[0].data["text/html"], re.DOTALL)[1]
     assert "view3d" in html.unescape(page)

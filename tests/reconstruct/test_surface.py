@@ -233,3 +233,22 @@ def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_wa
     cylinder = tried["cylinder"]
     assert isinstance(cylinder.shape, Prism)
     assert direction_score(dish) > direction_score(cylinder) + 2
+
+
+def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeypatch):
+    """A field beside a block once ended 1.8 m below the support."""
+    from reconstruct import surface as module
+
+    evidence, _ = touch(phantom_truth("cylinder"), 0)
+    honest, tried = module.draw, []
+
+    def runs_away_first(explained, spacing_m):
+        vertices, triangles, deviation = honest(explained, spacing_m)
+        tried.append(explained.name)
+        return (vertices * [1, 1, -30] if len(tried) == 1 else vertices), triangles, deviation
+
+    monkeypatch.setattr(module, "draw", runs_away_first)
+    found = reconstruct_surface(evidence)
+    assert len(tried) > 1 and found.method == tried[1]
+    height = (found.vertices - found.support_point) @ found.support_normal
+    assert -1e-6 < height.min() and height.max() < 0.2
