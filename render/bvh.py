@@ -32,37 +32,28 @@ def build_bvh(corners: np.ndarray) -> Bvh:
     low, high = corners.min(axis=1), corners.max(axis=1)
     centre = (low + high) / 2
     order = np.arange(len(corners))
-    boxes: list[tuple] = []
-
-    def split(start: int, end: int) -> int:
-        box = len(boxes)
-        boxes.append(())
-        members = order[start:end]
-        corner_low, corner_high = low[members].min(axis=0), high[members].max(axis=0)
-        if end - start <= _LEAF:
-            boxes[box] = (corner_low, corner_high, -1, -1, start, end - start)
-            return box
-        spread = centre[members]
-        axis = int((spread.max(axis=0) - spread.min(axis=0)).argmax())
-        order[start:end] = members[np.argsort(spread[:, axis], kind="stable")]
-        middle = (start + end) // 2
-        left = split(start, middle)
-        right = split(middle, end)
-        boxes[box] = (corner_low, corner_high, left, right, start, 0)
-        return box
-
-    split(0, len(corners))
-    box_low, box_high, *numbers = zip(*boxes, strict=True)
-    left, right, start, held = (np.array(column, dtype=np.int64) for column in numbers)
-    return Bvh(
-        np.array(box_low),
-        np.array(box_high),
-        left,
-        right,
-        start,
-        held,
-        order,
-    )
+    corner_low, corner_high, children, parts = [], [], [], []
+    # no recursion: a function that knows itself is a cycle, and the servo collects no garbage
+    waiting = [(0, len(corners), -1, 0)]
+    while waiting:
+        begin, end, parent, side = waiting.pop()
+        if parent >= 0:
+            children[parent][side] = len(children)
+        members = order[begin:end]
+        corner_low.append(low[members].min(axis=0))
+        corner_high.append(high[members].max(axis=0))
+        is_leaf = end - begin <= _LEAF
+        parts.append((begin, end - begin if is_leaf else 0))
+        if not is_leaf:
+            spread = centre[members]
+            axis = int((spread.max(axis=0) - spread.min(axis=0)).argmax())
+            order[begin:end] = members[np.argsort(spread[:, axis], kind="stable")]
+            middle = (begin + end) // 2
+            waiting += [(middle, end, len(children), 1), (begin, middle, len(children), 0)]
+        children.append([-1, -1])
+    left, right = np.array(children, dtype=np.int64).T.copy()
+    start, held = np.array(parts, dtype=np.int64).T.copy()
+    return Bvh(np.array(corner_low), np.array(corner_high), left, right, start, held, order)
 
 
 @njit(cache=True, error_model="numpy")
