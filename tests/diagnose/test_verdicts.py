@@ -223,7 +223,9 @@ def test_a_bar_says_what_finite_strain_takes_away_beside_an_effect(delayed):
 
 def test_the_demo_says_which_simulation_is_diagnosed_and_its_json_has_the_verdict(delayed):
     _, model, result = delayed
-    words = diagnosis_words(SimpleNamespace(diagnosis=result, model=model))
+    words = diagnosis_words(
+        SimpleNamespace(diagnosis=result, model=model, recording=SimpleNamespace(path="demo.csv.gz"))
+    )
     assert "starts from the simplest one" in words and "do not have time delay" in words
     found = demo.diagnosis_json(result)
     assert found["verdict"]["effects"] == ["time_delay"] and found["gap_after_n"] < found["gap_before_n"]

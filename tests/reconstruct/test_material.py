@@ -125,7 +125,7 @@ def test_what_is_no_test_or_two_kinds_is_one_line(tmp_path, capsys):
     t = np.arange(50) / 10
     np.savetxt(
         tmp_path / "up.csv",
-        np.column_stack([t, t, -t]),
+        np.column_stack([t, 0.1 * t, -t]),
         delimiter=",",
         header="time,travel,load",
         comments="",

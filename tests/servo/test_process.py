@@ -192,13 +192,13 @@ def test_a_killed_window(fake, on_orphan):
     parent.kill()
     parent.wait()
     if on_orphan == "stop":
-        assert eventually(lambda: not process_runs(process_id), 5.0)
+        assert eventually(lambda: not process_runs(process_id))
     else:
         time.sleep(0.5)
         assert process_runs(process_id)
         assert eventually(lambda: pressing(fake)), "the hand goes on feeling without a window"
         os.kill(process_id, signal.SIGTERM)
-        assert eventually(lambda: not process_runs(process_id), 5.0)
+        assert eventually(lambda: not process_runs(process_id))
     assert fake.force_n() == (0.0, 0.0, 0.0)
 
 
@@ -228,7 +228,7 @@ def test_a_servo_whose_parent_was_killed_ends_though_its_input_does_not(when):
     assert process_runs(process_id)
     parent.kill()
     parent.wait()
-    assert eventually(lambda: not process_runs(process_id), 5.0)
+    assert eventually(lambda: not process_runs(process_id))
 
 
 def test_a_servo_that_outlives_its_window_ends_with_its_force(fake):
@@ -243,7 +243,7 @@ def test_a_servo_that_outlives_its_window_ends_with_its_force(fake):
     parent.wait()
     fake.event("device-disconnected")
     fake.status["calibrated"] = False
-    assert eventually(lambda: not process_runs(process_id), 5.0)
+    assert eventually(lambda: not process_runs(process_id))
     assert fake.force_n() == (0.0, 0.0, 0.0)
 
 
@@ -297,7 +297,7 @@ def test_a_stopped_window_takes_the_force_with_it(fake):
     finally:
         parent.kill()
         parent.wait()
-    assert eventually(lambda: not process_runs(process_id), 5.0)
+    assert eventually(lambda: not process_runs(process_id))
 
 
 def test_what_loosens_a_protection_is_said(servo):

@@ -151,9 +151,10 @@ def test_colour_by_stiffness(driven: Driven) -> None:
     values = surface[STIFFNESS]
     assert 20 < np.median(values) < 300
     changed = np.abs(driven.picture().astype(int) - before).mean()
+    assert changed > 5
     driven.key("c")
-    back = np.abs(driven.picture().astype(int) - before).mean()
-    assert changed > 5 and back < 0.1 * changed
+    # what is not felt is drawn by turns where drawing is slow
+    driven.until(lambda f: np.abs(driven.picture().astype(int) - before).mean() < 0.1 * changed)
 
 
 def test_an_inclusion_is_dragged_and_felt(driven: Driven) -> None:
