@@ -32,7 +32,8 @@ def build_bvh(corners: np.ndarray) -> Bvh:
     low, high = corners.min(axis=1), corners.max(axis=1)
     centre = (low + high) / 2
     order = np.arange(len(corners))
-    corner_low, corner_high, children, parts = [], [], [], []
+    corner_low, corner_high, parts = [], [], []
+    children: list[list[int]] = []
     # no recursion: a function that knows itself is a cycle, and the servo collects no garbage
     waiting = [(0, len(corners), -1, 0)]
     while waiting:
