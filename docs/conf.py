@@ -90,6 +90,13 @@ def _escaped(line: str) -> str:
     )
 
 
+def short_navigation(app, page, template, context, doctree):
+    """Beside a page stand those of its own branch: all of the reference beside each took half of the time."""
+    if whole := context.get("toctree"):
+        context["toctree"] = lambda **how: whole(**how | {"collapse": True, "maxdepth": 2})
+
+
 def setup(app):
     """Sphinx's hook."""
     app.connect("autodoc-process-docstring", plain_words)
+    app.connect("html-page-context", short_navigation, priority=400)
