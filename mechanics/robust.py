@@ -46,6 +46,13 @@ def spread_about_zero(values: np.ndarray) -> float:
     return GAUSSIAN * float(np.median(np.abs(values)))
 
 
+def weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
+    """The least of the values (n,) up to which half of their weights (n,) lie."""
+    order = np.argsort(values)
+    total = np.cumsum(weights[order])
+    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
+
+
 def biweight(
     fit: Callable[[np.ndarray], tuple[Fitted, np.ndarray]],
     count: int,

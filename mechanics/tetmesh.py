@@ -143,11 +143,12 @@ def lone_faces(tetrahedra: np.ndarray) -> np.ndarray:
 
 def vertex_normals(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(n, 3) unit outward normals, weighted by the triangles' area; zero where no triangle touches a node."""
-    corners = triangles[:, :3]
-    p = points[corners]
-    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    nodes, each = triangles.ravel(), np.repeat(area, triangles.shape[1], axis=0)
-    # far faster than adding row by row, and the touch window does it at every picture
-    normals = np.stack([np.bincount(nodes, axis, len(points)) for axis in each.T], axis=1)
-    length = np.linalg.norm(normals, axis=1, keepdims=True)
+    # far faster than rows' cross products added one by one, and the touch window does it at every picture
+    x, y, z = (np.take(axis, triangles[:, :3].T) for axis in points.T)
+    (ax, bx), (ay, by), (az, bz) = ((c[1:] - c[0]) for c in (x, y, z))
+    area = (ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
+    nodes = triangles.T.ravel()
+    each = (np.tile(axis, triangles.shape[1]) for axis in area)
+    normals = np.stack([np.bincount(nodes, axis, len(points)) for axis in each], axis=1)
+    length = np.sqrt(np.einsum("ij,ij->i", normals, normals))[:, None]
     return normals / np.where(length > 0, length, 1.0)

@@ -18,7 +18,7 @@ from scipy.stats import theilslopes
 from mechanics.errors import OptionError
 from mechanics.options import option
 from mechanics.presses import Presses
-from mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey
+from mechanics.robust import EFFICIENT, GAUSSIAN, spread_about_zero, tukey, weighted_median
 from mechanics.sites import TouchSites
 from reconstruct.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
@@ -156,22 +156,16 @@ def combine(
     value = np.log(np.where(good, modulus, 1.0))
     error = np.where(good, relative_error, 1.0)
     count = np.bincount(site)[site].astype(float)
-    centre = _weighted_median(value[good], 1 / count[good])
+    centre = weighted_median(value[good], 1 / count[good])
     for _ in range(20):  # not robust.biweight: each press has a reach of its own, and sites share a weight
         deviation = value - centre
-        scale = max(GAUSSIAN * _weighted_median(np.abs(deviation[good]), 1 / count[good]), 0.01)
+        scale = max(GAUSSIAN * weighted_median(np.abs(deviation[good]), 1 / count[good]), 0.01)
         robust = tukey(deviation / (EFFICIENT * np.hypot(scale, error)))
         weight = np.where(good, robust / (count * scale**2 + error**2), 0.0)
         before, centre = centre, float((weight * value).sum() / weight.sum())
         if abs(centre - before) < 1e-8:
             break
     return float(np.exp(centre)), weight / weight.sum(), float(scale)
-
-
-def _weighted_median(values: np.ndarray, weights: np.ndarray) -> float:
-    order = np.argsort(values)
-    total = np.cumsum(weights[order])
-    return float(values[order][np.searchsorted(total, 0.5 * total[-1])])
 
 
 def _greatest_consistent(

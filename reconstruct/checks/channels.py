@@ -15,6 +15,8 @@ from mechanics.samples import runs
 from reconstruct.checks.base import Finding, decades_of_tail, p_words, sure
 from reconstruct.checks.sight import CHANNELS, Sight
 
+_NINE_OF_TEN = 1.645
+"""Standard deviations within which nine of ten readings of a Gaussian lie."""
 _WINDOW_S, _LEAST_WINDOW = 0.25, 10
 _STUCK_S = 1.5
 _MOST_STUCK = 0.25  # of touches or time: a wide play holds a reading still for some presses
@@ -90,6 +92,7 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
     # what presses mostly along an axis may slide on something flat and hard across it: the traced support
     held = (load > _ALONG * np.linalg.norm(load, axis=1, keepdims=True)) & (load > _FELT * sight.spread_n)
     resolution = max(float(np.median(least[:3])), 1e-6)
+    fastest = _fastest(sight, count, size)
     worst: tuple[float, int, int, list[int]] | None = None
     for k in range(6):
         if np.ptp(sight.values[:, k]) == 0:
@@ -109,6 +112,10 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
             decades = -many * float(np.log10(usual))
             if (b - a) * size / sight.rate_hz < _STUCK_S or many < 3 or not sure(decades):
                 continue
+            if k < 3 and b < count:  # what was stuck comes back with a jump, a hand that held still does not
+                elsewhere = np.delete(fastest[:, k], np.arange(a, b + 1))
+                if fastest[b - 1 : b + 1, k].max() <= elsewhere.max():
+                    continue
             if worst is None or b - a > worst[2] - worst[1]:
                 worst = (decades, a, b, [k])
             elif (a, b) == worst[1:3]:
@@ -132,6 +139,13 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         (begin, end),
         names,
     )
+
+
+def _fastest(sight: Sight, count: int, size: int) -> np.ndarray:
+    """(count, 6) fastest change of each channel, per second, within each window and into the next."""
+    change = np.abs(np.diff(sight.values, axis=0)) / np.maximum(np.diff(sight.t), 1e-9)[:, None]
+    change = np.vstack([change, np.zeros((1, 6))])
+    return change[: count * size].reshape(count, size, 6).max(axis=1)
 
 
 def _limited(sight: Sight) -> Iterator[Finding]:
@@ -239,7 +253,10 @@ def _spiky(sight: Sight) -> Iterator[Finding]:
         # a spike steps up and down; what swings, as a hand with a heavy tool does, only turns
         steep = np.minimum(np.abs(values[first] - values[first - 1]), np.abs(values[last] - values[last - 1]))
         short = (length <= max(1, _SPIKE_S * sight.rate_hz)) & (first > 2) & (steep > _STEEP * top)
-        found += [(k, int(i), float(abs(off[i])) / scale) for i in first[short]]
+        for i in first[short]:
+            about = np.abs(off[max(i - 5 * width, 0) : i + 5 * width])
+            if abs(off[i]) > _SPIKES * np.quantile(about, 0.9) / _NINE_OF_TEN:  # out of its surroundings too
+                found.append((k, int(i), float(abs(off[i])) / scale))
     if len(found) < _LEAST_SPIKES:
         return
     names = tuple(CHANNELS[k] for k in sorted({k for k, _, _ in found}))

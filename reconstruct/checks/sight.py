@@ -138,7 +138,7 @@ class Sight:
     @cached_property
     def contact(self) -> np.ndarray:
         """(n,) bool, whether something is touched."""
-        return self.filtered.touching()
+        return self.filtered.touching
 
     @property
     def traced(self) -> tuple[int, int]:

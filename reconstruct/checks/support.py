@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from mechanics.robust import spread_about_zero
+from mechanics.robust import spread_about_zero, weighted_median
 from reconstruct.checks.base import Finding
 from reconstruct.contacts import Exploration
 
@@ -79,7 +79,8 @@ def _hollow(exploration: Exploration) -> Iterator[Finding]:
 
 
 def _size(exploration: Exploration) -> Iterator[Finding]:
-    """Walls followed down to the support along their slope must meet it where it was traced."""
+    """The base ends no farther in than what bulges over it, and no farther out than walls lead along their
+    slope: where a wall is upright the two are one."""
     boundary, presses = exploration.boundary, exploration.presses
     up = boundary.support_normal
     rise = presses.contact_normal @ up
@@ -88,23 +89,28 @@ def _size(exploration: Exploration) -> Iterator[Finding]:
     if wall.sum() < _LEAST:
         return
     middle = boundary.outline.mean(axis=0)
+    rim = boundary.outline - middle
+    extent = np.linalg.norm(rim, axis=1)
     along = presses.contact_normal[wall] - rise[wall, None] * up
     flat = np.linalg.norm(along, axis=1)
     along /= flat[:, None]
+
+    def over(place: np.ndarray) -> np.ndarray:
+        """(n,) log of how far out places (n, 3) are, over the traced base in their direction."""
+        place = place - middle
+        place = place - (place @ up)[:, None] * up
+        reach = np.maximum(np.linalg.norm(place, axis=1), 1e-6)
+        nearest = np.argmax((place / reach[:, None]) @ (rim / extent[:, None]).T, axis=1)
+        return np.log(reach / np.maximum(extent[nearest], 1e-6))
+
     # the wall's tangent, followed down by the height: outwards where the wall leans in
-    foot = presses.point[wall] + (height[wall] * rise[wall] / flat)[:, None] * along - middle
-    foot -= (foot @ up)[:, None] * up
-    reach = np.linalg.norm(foot, axis=1)
-    rim = boundary.outline - middle
-    bearing = rim / np.linalg.norm(rim, axis=1)[:, None]
-    nearest = np.argmax((foot / np.maximum(reach, 1e-9)[:, None]) @ bearing.T, axis=1)
-    traced = np.linalg.norm(rim[nearest], axis=1)
-    ratio = np.log(np.maximum(reach, 1e-6) / np.maximum(traced, 1e-6))
-    # a curved wall leaves its tangent by as much as it is high: the lower a press, the better it tells
-    weight = 1 / (0.05 + (height[wall] / traced) ** 2)
-    order = np.argsort(ratio)
-    total = np.cumsum(weight[order])
-    centre = float(ratio[order][np.searchsorted(total, 0.5 * total[-1])])
+    here = over(presses.point[wall])
+    foot = over(presses.point[wall] + (height[wall] * rise[wall] / flat)[:, None] * along)
+    least, most = np.minimum(here, foot), np.maximum(here, foot)
+    ratio = np.where(least > 0, least, np.minimum(most, 0.0))
+    # the lower a press, the better it tells
+    weight = 1 / (0.05 + (height[wall] / np.median(extent)) ** 2)
+    centre = weighted_median(ratio, weight)
     error = 1.25 * max(spread_about_zero(ratio - centre), 0.05) / np.sqrt(wall.sum())
     if abs(centre) < np.log(_SCALE) + _CERTAIN * error:
         return

@@ -8,7 +8,7 @@ from closed_forms import hertz_force
 
 from mechanics.errors import MeshError
 from mechanics.pardiso import available
-from mechanics.refine import refined_near_surface, typical_edge
+from mechanics.refine import refined_around, refined_near_surface, typical_edge
 from mechanics.sites import mean_curvature, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import touch_force
@@ -60,6 +60,23 @@ def test_sites_leave_the_callers_arrays_writable(box):
         sites.far[0] = 0
     with pytest.raises(MeshError, match="normals not 0"):
         touch_sites(mesh, points, normals * 0, 0.3)
+
+
+def test_a_spot_of_tiny_elements_makes_no_place_softer(box):
+    """The mesher leaves one now and then: by number they were most of the edges, the patch became a point and
+    a modulus came out at a quarter."""
+    mesh = box((6, 6, 3), (0.1, 0.1, 0.05))
+    spotted, corner = mesh, np.array([0.05, 0.05, 0.05])
+    for _ in range(5):
+        spotted, _ = refined_around(spotted, corner, 0.006, 0.001)
+    edges = spotted.points[spotted.touchable_surface[:, :3]]
+    assert np.median(np.linalg.norm(edges - np.roll(edges, 1, axis=1), axis=2)) < 0.5 * typical_edge(mesh)
+    assert typical_edge(spotted) == pytest.approx(typical_edge(mesh), rel=0.05)
+    place = np.array([[0.0, 0, 0.05]]), np.array([[0.0, 0, 1.0]])
+    far = [
+        touch_sites(m, *place, 0.49, solver=Solver(m.quadratic(), 0.49)).far[0, 0, 0] for m in (mesh, spotted)
+    ]
+    assert far[1] == pytest.approx(far[0], rel=0.03)
 
 
 def test_refinement_keeps_shape_base_and_conformity(box):

@@ -66,6 +66,17 @@ def test_what_is_found_says_where_and_how_sure(cylinder):
     assert "p = 1e-" in found.sure and found.decades > 6
 
 
+def test_a_hand_that_held_still_along_one_axis_is_no_stuck_channel(cylinder):
+    recording = cylinder[0]
+    position = np.array(recording.position)
+    held = np.interp(recording.t, [19.5, 20.0, 26.0, 26.5], [0.0, 1.0, 1.0, 0.0])
+    held = held**2 * (3 - 2 * held)
+    position[:, 1] += held * (position[np.searchsorted(recording.t, 20.0), 1] - position[:, 1])
+    assert not any(
+        f.name == "stuck channel" for f in check(dataclasses.replace(recording, position=position))
+    )
+
+
 def test_the_delay_of_the_force_is_read_off_places_passed_twice(cylinder):
     for late_s in (-0.04, 0.0, 0.15):
         force = np.roll(cylinder[0].force_on_tool, round(late_s * 1000), axis=0)
