@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 
 BY_TRIMESH = (".stl", ".obj", ".ply", ".gltf", ".glb", ".off", ".3mf")
 BY_VTK = (".vtp", ".vtu", ".vtk")
-BY_MESHIO = (".msh", ".inp")
+BY_MESHIO = {".msh": "gmsh", ".inp": "abaqus"}
+"""And as what: of an ending that it does not know for sure it tries every reader, one of which never ends."""
 SUFFIXES = (*BY_TRIMESH, *BY_VTK, *BY_MESHIO)
 UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
 """Metres in a file's unit of length."""
@@ -117,7 +118,7 @@ def _shell_of(path: Path) -> trimesh.Trimesh:
     try:
         with bounded_memory(path, SurfaceError):
             if suffix in BY_TRIMESH:
-                loaded: Any = trimesh.load(path, force="mesh")
+                loaded: Any = trimesh.load(path, force="mesh", resolver=_within(path.resolve().parent))
                 if not isinstance(loaded, trimesh.Trimesh):
                     raise SurfaceError(f"'{path}' holds no triangles: export the object as a surface")
                 return loaded
@@ -127,12 +128,29 @@ def _shell_of(path: Path) -> trimesh.Trimesh:
             import pyvista
 
             with _silent():
-                return _boundary(pyvista.from_meshio(meshio.read(path)))
+                return _boundary(pyvista.from_meshio(meshio.read(path, file_format=BY_MESHIO[suffix])))
     except SurfaceError:
         raise
     except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
         reason = "it is damaged" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
         raise SurfaceError(f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason})") from error
+
+
+def _within(folder: Path) -> Any:
+    """Finds the files that a file names, in its own folder alone: trimesh below 5 follows any path."""
+    from trimesh.resolvers import FilePathResolver
+
+    class Within(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            wanted = (folder / name.strip()).resolve()
+            if not (wanted.is_relative_to(folder) and wanted.is_file()):
+                raise FileNotFoundError(f"it names '{name.strip()}', which is no file in its folder")
+            return wanted.read_bytes()
+
+        def namespaced(self, namespace: str) -> Any:
+            return _within(folder / namespace)
+
+    return Within(str(folder))
 
 
 @contextlib.contextmanager

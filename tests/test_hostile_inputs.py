@@ -20,7 +20,14 @@ import pytest
 
 from mechanics.box_mesh import box_mesh
 from mechanics.effects.registry import NAMES, effect_keys
-from mechanics.errors import CacheError, FileError, ModelError, PalpateError, RecordingError, SceneError
+from mechanics.errors import (
+    CacheError,
+    FileError,
+    ModelError,
+    PalpateError,
+    RecordingError,
+    SceneError,
+)
 from mechanics.files import (
     JSON,
     Kind,
@@ -36,7 +43,7 @@ from mechanics.files import (
 from mechanics.material import Ball, Material, Skin
 from mechanics.model import MODEL, Model, Support, Tool, read_model, write_model
 from mechanics.options import check_range, option
-from mechanics.recording import MisspeltKey, base_model_of, read_recording
+from mechanics.recording import NotRead, base_model_of, read_recording
 from mechanics.store import read_arrays, write_arrays
 from palpate import cli
 from scenes.scene import load_scene
@@ -227,7 +234,7 @@ def test_a_misspelt_key_is_told_and_a_key_of_ones_own_is_not(record):
     path = record(
         description=described("boundary_phase", "boundry_phase") + "colour = 'red'\n[mine]\na = 1\n"
     )
-    with pytest.warns(MisspeltKey, match="boundry_phase is no key: did you mean boundary_phase") as told:
+    with pytest.warns(NotRead, match="boundry_phase is no key: did you mean boundary_phase") as told:
         assert read_recording(path).boundary_phase is None
     assert len(told) == 1
 
@@ -238,7 +245,7 @@ def test_a_segment_of_another_time_is_told_and_one_within_is_not(record):
         warnings.simplefilter("error")
         assert len(read_recording(record(description=DESCRIPTION + within)).segments) == 1
     later = within.replace("0.1", "1e6").replace("0.2", "1e7")
-    with pytest.warns(MisspeltKey, match="1 segments lie outside the recording, from 0 to 0.399 s"):
+    with pytest.warns(NotRead, match="1 segments lie outside the recording, from 0 to 0.399 s"):
         read_recording(record(description=DESCRIPTION + within + later))
 
 
@@ -702,6 +709,17 @@ CURVES = {
     "a relaxation beyond any": ("above 1e\\+15", relaxation(t=1e300)),
     "a modulus beyond any": ("above 1e\\+15", relaxation(value=1e300)),
 }
+
+
+def test_rows_without_a_number_are_told_of_and_most_of_them_refused(tmp_path, capsys):
+    lines = curve().splitlines()
+    some = [",".join([*line.split(",")[:2], "nan"]) if k % 10 == 5 else line for k, line in enumerate(lines)]
+    (tmp_path / "dent.csv").write_text("\n".join(some) + "\n")
+    assert cli.main(["material", str(tmp_path / "dent.csv"), "--fast", *TIP]) == 0
+    assert "40 of 400 rows lack a number and are left out, the first is row 5" in capsys.readouterr().err
+    most = [",".join([*line.split(",")[:2], "nan"]) if k % 10 > 3 else line for k, line in enumerate(lines)]
+    (tmp_path / "dent.csv").write_text("\n".join(most) + "\n")
+    refused("240 of 400 rows lack a number", "material", str(tmp_path / "dent.csv"), "--fast", *TIP)
 
 
 @pytest.mark.parametrize("name", CURVES)

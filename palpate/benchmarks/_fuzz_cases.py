@@ -220,7 +220,8 @@ def _options(sound: Sound, random: np.random.Generator, folder: Path) -> Case:
         ["demo", str(sound.recording), "-o", str(out / "demo"), "--no-window"],
         ["batch", str(sound.recording), "-o", str(out / "batch"), "--workers", "1"],
     ))  # fmt: skip
-    flag, number = _chosen(random, _flags(base[0]))
+    # of a command without values one that is none
+    flag, number = _chosen(random, _flags(base[0]) or [("--not-an-option", False)])
     # what goes on for minutes gets only what can be no value
     long = base[0] in ("simulate", "reconstruct", "compare", "diagnose", "demo", "batch")
     absurd = [e.decode() for e in EXTREMES] if not long else list(_NO_VALUE)

@@ -128,6 +128,7 @@ def _declaring(kind: str, cells: str) -> bytes:
     [
         ("bad.stl", b"hello", "no triangles"),
         ("bad.msh", b"foo", "cannot be read as msh"),
+        ("cut.msh", b"(10 (1 1 f 1)(\n" + bytes(9), "cannot be read as msh"),
         ("bad.inp", b"\x00\xff", "cannot be read as inp"),
         ("bad.vtu", b"<a/>", "is damaged: VTK cannot read it"),
         ("thing.step", b"", "allowed are stl, obj"),
