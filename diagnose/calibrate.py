@@ -54,6 +54,9 @@ _DRAWS = 400
 _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)
 _BRISK, _TAKES_UP, _PRESSED = 0.2, 0.3, 0.1
 _CORRELATED = 10.0
+_LEAST_SAMPLES = 20
+_UNLIKE = 0.1
+"""Share by which the presses' own compliances may differ on a rigid plate."""
 _PLAIN_Z = 4.0
 _LAW_SD = (1e-3, 5e-6, 2e-4)
 """What filter and sampling leave besides noise: share of the tool's give, m of half the play, s of the delay
@@ -231,7 +234,7 @@ def calibrate_on_plate(recording: Recording, exploration: Exploration) -> Calibr
     shifted = {tau: delayed(presses.parts, presses.t, net, -tau) for tau in _DELAYS_S}
     for i, part in enumerate(presses.parts):
         inside = (presses.t[part] >= presses.onset_s[i]) & (presses.t[part] <= presses.end_s[i])
-        if inside.sum() < 20:
+        if inside.sum() < _LEAST_SAMPLES:
             continue
         deep = -low_pass(presses.position[part], rate, 25.0) @ plate
         moving = np.gradient(deep, 1 / rate)
@@ -266,6 +269,14 @@ def calibrate_on_plate(recording: Recording, exploration: Exploration) -> Calibr
     sd = np.hypot(sd, [_LAW_SD[0] * abs(give), _LAW_SD[1]])
     delay_sd = float(np.hypot(delay_sd, _LAW_SD[2]))
     stiff = give > _PLAIN_Z * sd[0]
+    unlike = _unlike(shifted[_DELAYS_S[best]][rows] @ plate, travel, sense, each)
+    if stiff and unlike > _UNLIKE:
+        raise ContactError(
+            f"what yields differs from press to press by {100 * unlike:.0f} % of {1e3 * give:.3g} mm/N, and "
+            f"a tool on a rigid plate yields alike at every place (to {100 * _UNLIKE:.0f} %): this is no "
+            "rigid plate, or it moves; press a clamped plate of metal or glass, or give --modulus of a known "
+            "object"
+        )
     interval: dict[str, Any] = {"delay_s": [delay - 1.96 * delay_sd, delay + 1.96 * delay_sd]}
     if stiff:
         interval["stiffness_n_per_m"] = [1 / (give + 1.96 * sd[0]), 1 / max(give - 1.96 * sd[0], 1e-9)]
@@ -290,6 +301,32 @@ def calibrate_on_plate(recording: Recording, exploration: Exploration) -> Calibr
             "not_told": absent + ([] if stiff else ["tool's bending: stiffer than can be told"]),
         },
     )
+
+
+def _unlike(push: np.ndarray, travel: np.ndarray, sense: np.ndarray, each: np.ndarray) -> float:
+    """Standard deviation of the presses' own compliances, less what their errors make, over their mean (the
+    random-effects estimate of DerSimonian and Laird, 1986).
+
+    push (n,) N, travel (n,) m, sense (n,) in or out, each (n,) the press of every sample.
+    """
+    found = []
+    for k in np.unique(each):
+        own = each == k
+        if own.sum() < _LEAST_SAMPLES:
+            continue
+        columns = np.column_stack([push[own], sense[own], np.ones(own.sum())])
+        slope, *_ = np.linalg.lstsq(columns, travel[own], rcond=None)
+        left = travel[own] - columns @ slope
+        spread = np.linalg.pinv(columns.T @ columns)[0, 0] * (left @ left) / (own.sum() - 3)
+        found.append((float(slope[0]), float(spread) * _CORRELATED))
+    if len(found) < 3:
+        return 0.0
+    gives, variances = np.array(found).T
+    weights = 1 / np.maximum(variances, 1e-300)
+    mean = float(gives @ weights / weights.sum())
+    excess = float(weights @ (gives - mean) ** 2) - (len(gives) - 1)
+    between = max(excess, 0.0) / max(weights.sum() - (weights**2).sum() / weights.sum(), 1e-300)
+    return float(np.sqrt(between) / max(abs(mean), 1e-300))
 
 
 def _plate_normal(centre: np.ndarray, usual: np.ndarray) -> np.ndarray:

@@ -98,9 +98,9 @@ _MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
 """Bytes of samples, and of unpacked ones a packed byte (numbers pack to a fifth)."""
 
 
-class MisspeltKey(UserWarning):
-    """Something in a recording's TOML was not read: a key that looks like one that is known, a segment of a
-    time that was not recorded."""
+class NotRead(UserWarning):
+    """Something in a file was not read: a key that looks like one that is known, a segment of a time that was
+    not recorded, rows without a number."""
 
 
 @dataclass(frozen=True)
@@ -287,7 +287,7 @@ def read_recording(path: Path | str) -> Recording:
     samples, description = recording_files(path)
     table = read_toml(description, RecordingError)
     for note in check_table(table, SCHEMA, description, RecordingError, strict=False):
-        warnings.warn(note, MisspeltKey, stacklevel=2)
+        warnings.warn(note, NotRead, stacklevel=2)
     about, sensor = table.get("recording", {}), table.get("sensor", {})
     thing, tool = table.get("object", {}), table.get("tool", {})
     for name, part, key in (("recording", about, "force_on"), ("tool", tool, "tip_radius_m")):
@@ -348,7 +348,7 @@ def read_recording(path: Path | str) -> Recording:
         warnings.warn(
             f"'{description}': {len(beside)} segments lie outside the recording, from {t[0]:.6g} to "
             f"{t[-1]:.6g} s, and are not read (first: {first.kind}, {first.start_s:g} to {first.end_s:g} s)",
-            MisspeltKey,
+            NotRead,
             stacklevel=2,
         )
     if "calibration" in tool:

@@ -125,7 +125,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
 
     from mechanics.errors import PalpateError
     from mechanics.files import sweep_scratch, told
-    from mechanics.recording import MisspeltKey
+    from mechanics.recording import NotRead
     from palpate.arguments import check_paths
 
     def refused(words: str) -> int:
@@ -135,7 +135,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
     plain = warnings.showwarning
 
     def warned(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-        if issubclass(category, MisspeltKey):
+        if issubclass(category, NotRead):
             refused(f"warning: {message}")
         else:
             plain(message, category, *rest, **more)

@@ -8,6 +8,7 @@ import` reads them.
 from __future__ import annotations
 
 import re
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +18,7 @@ import numpy as np
 from diagnose.specimen import Curve
 from mechanics.bounds import LARGEST_N
 from mechanics.errors import OptionError, RecordingError
-from mechanics.recording import WIDEST_PATH_M
+from mechanics.recording import WIDEST_PATH_M, NotRead
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import without_unit
@@ -105,14 +106,10 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
     if len(table.columns) < 2:
         raise RecordingError(f"'{path}' has one column: a relaxation needs time and modulus, force or stress")
     t, value = (np.asarray(v, float) for v in list(table.columns.values())[:2])
-    good = np.isfinite(t) & np.isfinite(value)
+    good = _numbers(path, t, value)
     order = np.argsort(t[good], kind="stable")
     t, value = t[good][order], value[good][order]
-    fresh = np.concatenate([[True], np.diff(t) > 0])
-    if fresh.sum() < _LEAST_ROWS:
-        raise RecordingError(
-            f"'{path}' has {int(fresh.sum())} rows in order of time: {_LEAST_ROWS} are needed"
-        )
+    fresh = _in_order(path, t)
     if max(np.abs(t).max(), np.abs(value).max()) > _BEYOND:
         raise RecordingError(
             f"'{path}' holds numbers above {_BEYOND:g}, beyond any quantity here in SI units"
@@ -163,13 +160,9 @@ def _generic(path: Path, columns: dict[str, str], units: dict[str, str]) -> Curv
         raise RecordingError(
             f"'{path}' needs time, travel and load in columns of one length: {_names(tables)}"
         )
-    good = np.isfinite(t) & np.isfinite(z) & np.isfinite(push)
+    good = _numbers(path, t, z, push)
     t, travel, push = t[good], -z[good], push[good]
-    fresh = np.concatenate([[True], np.diff(t) > 0])
-    if fresh.sum() < _LEAST_ROWS:
-        raise RecordingError(
-            f"'{path}' has {int(fresh.sum())} rows in order of time: {_LEAST_ROWS} are needed"
-        )
+    fresh = _in_order(path, t)
     if np.ptp(travel) > WIDEST_PATH_M:
         raise RecordingError(
             f"'{path}': the tip travels {np.ptp(travel):.4g} m, which may be {WIDEST_PATH_M:g} m: name "
@@ -180,6 +173,25 @@ def _generic(path: Path, columns: dict[str, str], units: dict[str, str]) -> Curv
             f"'{path}' holds a load above {LARGEST_N:g} N: name its unit, as in --units force=uN"
         )
     return Curve(t[fresh], travel[fresh], push[fresh], path.name)
+
+
+def _numbers(path: Path, *columns: np.ndarray) -> np.ndarray:
+    """(n,) bool: rows that hold a number in every column, more than half of them; the others are told of."""
+    good = np.isfinite(np.column_stack(columns)).all(axis=1)
+    lost = int((~good).sum())
+    if 2 * lost > len(good):
+        raise RecordingError(
+            f"'{path}': {lost} of {len(good)} rows lack a number, the first is row {np.argmin(good) + 1}: "
+            "name the columns, as in --column fz=Load"
+        )
+    if lost:
+        warnings.warn(
+            f"'{path}': {lost} of {len(good)} rows lack a number and are left out, the first is row "
+            f"{np.argmin(good) + 1}",
+            NotRead,
+            stacklevel=2,
+        )
+    return good
 
 
 def _in_order(path: Path, t: np.ndarray) -> np.ndarray:

@@ -13,11 +13,12 @@ from flat_ground import MODULUS_PA, TIP_M, raster
 import palpate as pp
 from diagnose.calibrate import STIFFEST, calibrate_on_plate, instrument_of
 from mechanics.calibration import Calibration, read_calibration, write_calibration
-from mechanics.errors import OptionError, RecordingError
+from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.samples import delayed
 from reconstruct.contacts import explore
 from reconstruct.known_shape import nowhere
+from scenes.embedded import embedded_recording
 
 
 def on_plate(stiffness: float, play_m: float, delay_s: float, bias: np.ndarray, seed: int = 0):
@@ -56,6 +57,12 @@ def test_a_rigid_plate_tells_stiffness_play_and_delay(stiffness, play_m, delay_s
     low, high = found.interval["stiffness_n_per_m"]
     assert low < found.stiffness_n_per_m < high
     assert "tip_radius_m" in found.about["not_told"]
+
+
+def test_a_soft_object_is_no_rigid_plate():
+    recording = read_recording(embedded_recording())
+    with pytest.raises(ContactError, match="differs from press to press"):
+        calibrate_on_plate(recording, explore(recording, boundary=nowhere(recording), unbroken=True))
 
 
 def test_a_recording_that_names_a_calibration_is_read_as_an_ideal_instrument_had(tmp_path):
