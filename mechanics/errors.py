@@ -20,6 +20,10 @@ class ContactError(PalpateError):
     """A recording holds no usable boundary phase or too few palpations."""
 
 
+class LoudAirError(ContactError):
+    """What the sensor reads in free motion hides the presses."""
+
+
 class NoBaseError(ContactError):
     """A recording does not trace a base, and none was given."""
 

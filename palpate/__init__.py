@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from mechanics.errors import DeviceError as DeviceError
     from mechanics.errors import DiagnosisError as DiagnosisError
     from mechanics.errors import FileError as FileError
+    from mechanics.errors import LoudAirError as LoudAirError
     from mechanics.errors import MeshError as MeshError
     from mechanics.errors import ModelError as ModelError
     from mechanics.errors import NoBaseError as NoBaseError
@@ -90,7 +91,7 @@ _DOOR = {
     "palpate.results.batch": "Batch",
     "render.base": "Renderer",
     "mechanics.errors": (
-        "PalpateError FileError RecordingError ContactError NoBaseError SurfaceError MeshError ModelError "
+        "PalpateError FileError RecordingError ContactError LoudAirError NoBaseError SurfaceError MeshError ModelError "
         "CacheError OptionError DeviceError SceneError DiagnosisError"
     ),
 }

@@ -11,18 +11,25 @@ _SHARE = 0.12
 
 
 def free_air_force(
-    t: np.ndarray, force: np.ndarray, spread_n: float, *, reach: float = 5.0
+    t: np.ndarray,
+    force: np.ndarray,
+    spread_n: float,
+    *,
+    reach: float = 5.0,
+    touched: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """Free-air force (n, 3) N interpolated over time, and the share of windows where it was found.
 
     Free air is where readings crowd: in each window of 8 s the densest cluster of low-passed readings (n, 3)
     within `reach` times their noise `spread_n` (N an axis). Windows without such a crowd, or far from their
-    neighbours', are passed over. Where no window has one the force is zero.
+    neighbours', are passed over. Where no window has one the force is zero. touched: (n,) bool, where
+    something is touched for certain: a tracing crowds as well.
     """
+    may = np.ones(len(t), dtype=bool) if touched is None else ~touched
     starts = np.arange(t[0], t[-1], _WINDOW_S / 2)
     times, levels = [], []
     for start in starts:
-        inside = np.flatnonzero((t >= start) & (t < start + _WINDOW_S))
+        inside = np.flatnonzero(may & (t >= start) & (t < start + _WINDOW_S))
         if len(inside) < 20:
             continue
         chosen = inside[np.linspace(0, len(inside) - 1, min(_SAMPLES, len(inside))).astype(int)]
@@ -35,6 +42,8 @@ def free_air_force(
         crowd = gap[best] < reach * spread_n
         times.append(float(np.mean(t[chosen[crowd]])))
         levels.append(np.median(f[crowd], axis=0))
+    if not times and touched is not None:  # nothing else was recorded: air is in there too
+        return free_air_force(t, force, spread_n, reach=reach)
     if not times:
         return np.zeros_like(force), 0.0
     at, level = np.array(times), np.array(levels)

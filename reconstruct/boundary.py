@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import gaussian_filter1d
+from scipy.ndimage import distance_transform_edt, gaussian_filter1d, label
 
 from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.options import option
@@ -20,6 +20,10 @@ _LEAST_PIECE = 2.0  # tip radii; less tells no plane
 _FLAT = 0.1  # tip radii off the plane
 _MOMENT_S = 0.05  # a contact that is shorter is no press
 _THINNED = 5  # samples
+_FOOT = 0.4  # tip radii: a wider gap in a tracing is open, a wider leap parts its strokes; off it is the air
+_STEP_M = 0.0005
+_LEAST_STEPS = 20
+_DRAWN = 200
 
 
 @dataclass(frozen=True)
@@ -125,6 +129,23 @@ def find_interval(
     )
 
 
+def in_its_plane(position: np.ndarray, inside: np.ndarray, tip_radius_m: float) -> np.ndarray:
+    """(n,) bool: samples of a tracing that lie in the plane of most of its way; the others are in the air.
+
+    position: (n, 3) m. inside: (n,) bool, when the base is stated to be traced.
+    """
+    way = _resampled(position[inside], _STEP_M) if inside.any() else position[inside]
+    if len(way) < _LEAST_STEPS:
+        return inside
+    corners = way[np.random.default_rng(0).integers(len(way), size=(_DRAWN, 3))]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    near = np.abs(way @ normals.T - np.einsum("ij,ij->i", corners[:, 0], normals)) < _FLAT * tip_radius_m
+    on = way[near[:, np.argmax(near.sum(axis=0))]]  # the plane of three points that holds most of the way
+    centre, normal, _ = fit_plane(on)
+    return inside & (np.abs((position - centre) @ normal) < _FOOT * tip_radius_m)
+
+
 def _coplanar(
     t: np.ndarray, position: np.ndarray, found: list[tuple[int, int]], start: int, limit_m: float
 ) -> tuple[int, int]:
@@ -174,20 +195,32 @@ def find_boundary(
     height = (path - centre) @ normal - tip_radius_m
     path = path[np.abs(height) < max(6 * flatness, 2e-4)]
     path = path - ((path - centre) @ normal)[:, None] * normal
-    path = _resampled(path, 0.0005)
-    if len(path) < 20:
+    face = _enclosed(path, normal, _FOOT * tip_radius_m)
+    if face is not None:
+        path = path[face.away(path) < face.reach_m]
+    strokes = _strokes(path, _FOOT * tip_radius_m)
+    if sum(map(len, strokes)) < _LEAST_STEPS:
         raise ContactError("the boundary phase is shorter than 1 cm: trace the object's whole base")
-    smooth = gaussian_filter1d(path, 3.0, axis=0, mode="nearest")
-    tangent = np.gradient(smooth, axis=0)
-    tangent /= np.linalg.norm(tangent, axis=1, keepdims=True)
+    smoothed = [gaussian_filter1d(stroke, 3.0, axis=0, mode="nearest") for stroke in strokes]
+    smooth = np.concatenate(smoothed)
     winding = _winding(smooth, normal)
-    if abs(winding) < 0.8 * 2 * np.pi:
+    if face is None and abs(winding) < 0.8 * 2 * np.pi:
         raise ContactError(
             f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least "
             "288 are needed: trace the whole base"
         )
-    outward = np.cross(tangent, normal) * np.sign(winding)
-    outline = smooth - tip_radius_m * outward
+    sideways = []
+    for stroke in smoothed:
+        tangent = np.gradient(stroke, axis=0)
+        side = np.cross(tangent / np.linalg.norm(tangent, axis=1, keepdims=True), normal)
+        step = tip_radius_m * side
+        out = (
+            np.sign(winding)
+            if face is None
+            else face.away(stroke + step).sum() - face.away(stroke - step).sum()
+        )
+        sideways.append(side * np.sign(out))
+    outline = smooth - tip_radius_m * np.concatenate(sideways)
     chosen = farthest_points(outline, options.base_spacing_m)
     return Boundary(
         support_point=outline.mean(axis=0),
@@ -198,6 +231,60 @@ def find_boundary(
         interval=interval,
         flatness_m=flatness,
     )
+
+
+@dataclass(frozen=True)
+class _Face:
+    """What a path on the support closes in, on a grid in its plane: `distance` m of each cell from it."""
+
+    middle: np.ndarray
+    axes: np.ndarray
+    corner: np.ndarray
+    cell_m: float
+    distance: np.ndarray
+    reach_m: float
+
+    def away(self, points: np.ndarray) -> np.ndarray:
+        """(n,) m, how far points (n, 3) are from the face; beyond the grid as far as its rim."""
+        flat = (points - self.middle) @ self.axes.T
+        at = np.clip(((flat - self.corner) / self.cell_m).astype(int), 0, np.array(self.distance.shape) - 1)
+        return self.distance[tuple(at.T)]
+
+
+def _enclosed(path: np.ndarray, normal: np.ndarray, near_m: float) -> _Face | None:
+    """The largest face that a path (n, 3) m goes round, gaps of up to `near_m` closed; None where it is open.
+
+    Samples farther from it than `reach_m` were on the support alone: there the tip came down beside the
+    object and slid up to it, or slid away.
+    """
+    axes, middle = np.linalg.svd(normal[None])[2][1:], path.mean(axis=0)
+    flat = (path - middle) @ axes.T
+    cell = max(near_m / 4, float(np.ptp(flat, axis=0).max()) / 600)
+    wide = round(0.5 * near_m / cell)
+    corner = flat.min(axis=0) - (4 * wide + 4) * cell
+    steps = np.linalg.norm(np.diff(flat, axis=0), axis=1)
+    drawn = [flat]
+    for i in np.flatnonzero((steps > 0.5 * cell) & (steps < near_m)):
+        share = np.arange(0, 1, 0.5 * cell / steps[i])[:, None]
+        drawn.append((1 - share) * flat[i] + share * flat[i + 1])
+    at = ((np.concatenate(drawn) - corner) / cell).astype(int)
+    wall = np.zeros(at.max(axis=0) + 4 * wide + 5, dtype=bool)
+    wall[tuple(at.T)] = True
+    faces, _ = label(distance_transform_edt(~wall) > wide)
+    sizes = np.bincount(faces.ravel())
+    sizes[[0, faces[0, 0]]] = 0
+    if not sizes.any():
+        return None
+    distance = distance_transform_edt(faces != np.argmax(sizes)) * cell
+    return _Face(middle, axes, corner, cell, distance, wide * cell + 0.5 * near_m)
+
+
+def _strokes(path: np.ndarray, gap_m: float) -> list[np.ndarray]:
+    """The path cut where it leaps by more than `gap_m`, each piece at equal steps; pieces of less
+    than three steps are no stroke."""
+    leaps = np.flatnonzero(np.linalg.norm(np.diff(path, axis=0), axis=1) > gap_m) + 1
+    found = [_resampled(piece, _STEP_M) for piece in np.split(path, leaps)]
+    return [piece for piece in found if len(piece) > 3]
 
 
 def _resampled(path: np.ndarray, step_m: float) -> np.ndarray:

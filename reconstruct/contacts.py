@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import ContactError, OptionError
+from mechanics.errors import ContactError, LoudAirError, OptionError
 from mechanics.options import option
 from mechanics.press_cutting import cut
 from mechanics.press_sites import SITE_M
@@ -22,7 +22,7 @@ from mechanics.recording import Recording
 from mechanics.samples import runs
 from mechanics.segments import ON_SUPPORT
 from reconstruct.baseline import free_air_force
-from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
+from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval, in_its_plane
 from reconstruct.delay import Delay, delay_by_places, force_delay
 from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
@@ -49,6 +49,9 @@ within the second (standard error): first and last touch alone are found to some
 _LEAST_SPAN_S = 0.05
 _SLIDE = 8.0
 """Tip radii: touches that go further are slides."""
+_LOOSE = 0.5
+"""Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
+presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0210)."""
 _TIPS_M = (1e-3, 0.02)
 """Radii that are believed for that."""
 
@@ -141,8 +144,9 @@ class Filtered:
         """How many spreads a touch must reach (reconstruct.free_noise)."""
         return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
 
+    @cached_property
     def touching(self) -> np.ndarray:
-        """(n,) bool, a new array: where something is touched, on the way or on purpose."""
+        """(n,) bool: where something is touched, on the way or on purpose."""
         gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
         contrast = self.signals.magnitude / self.spread
         if self.air is not None:
@@ -150,19 +154,24 @@ class Filtered:
         return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
 
     @cached_property
-    def traced(self) -> tuple[int, int]:
-        """Samples [first, last) of the tracing; (0, 0) where none is found."""
+    def tracing(self) -> tuple[int, int]:
+        """Samples [first, last) of the tracing. Raises ContactError where none is found."""
         recording = self.signals.recording
-        given, touching = _traced(recording), self.touching()
+        given, radius = _traced(recording), recording.tip_radius_m
+        return find_interval(recording.t, self.signals.position, self.touching, given, radius)
+
+    @cached_property
+    def traced(self) -> tuple[int, int]:
+        """The tracing; (0, 0) where none is found."""
         try:
-            return find_interval(recording.t, self.signals.position, touching, given, recording.tip_radius_m)
+            return self.tracing
         except ContactError:
             return 0, 0
 
     @cached_property
     def spans(self) -> list[tuple[int, int]]:
         """[start, end) samples of each touch after the tracing, short ones and slides left out."""
-        recording, path, touching = self.signals.recording, self.signals.position, self.touching()
+        recording, path, touching = self.signals.recording, self.signals.position, self.touching.copy()
         touching[: self.traced[1]] = False
         shortest = max(3, round(_LEAST_SPAN_S * recording.sample_rate_hz))
         found = [(a, b) for a, b in runs(touching) if b - a >= shortest and a > 0 and b < len(recording.t)]
@@ -315,7 +324,7 @@ def _searched(filtered: Filtered, given: _Given) -> _Found:
     peaks = signals.magnitude[[c.peak for c in found.contacts]]
     automatic = given.method == "noise" and given.contact.contact_threshold_n is None
     if automatic and len(peaks) and np.median(peaks) < _CLEAR * found.threshold_n:
-        raise ContactError(
+        raise LoudAirError(
             f"the presses reach {np.median(peaks):.2g} N in the middle, where free motion alone reaches "
             f"{found.threshold_n:.2g} N: weaker ones are lost; press deeper"
         )
@@ -341,7 +350,7 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     method, options, boundary = given.method, given.contact, given.known_base
     high = PAPER_THRESHOLD_N if method == "paper" else filtered.least * float(filtered.spread.min())
     high = options.contact_threshold_n or high
-    touching = filtered.touching()
+    touching = filtered.touching.copy()
     if not touching.any():
         raise ContactError(
             f"no contact: the force never leaves the noise ({signals.noise_n:.3g} N an axis): "
@@ -349,10 +358,9 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
         )
     start = 0
     if boundary is None:
-        radius = recording.tip_radius_m
-        interval = find_interval(recording.t, signals.position, touching, _traced(recording), radius)
-        boundary = find_boundary(signals.position, signals.force, touching, interval, radius, given.boundary)
-        start = interval[1]
+        traced, radius = filtered.tracing, recording.tip_radius_m
+        boundary = find_boundary(signals.position, signals.force, touching, traced, radius, given.boundary)
+        start = traced[1]
     touching[:start] = False
     least_peak = options.least_peak_n or high
     contacts: list[Found] = []
@@ -405,6 +413,15 @@ def _traced(recording: Recording) -> tuple[float, float] | None:
     return recording.boundary_phase or (stated[0] if stated else None)
 
 
+def _sliding(recording: Recording, position: np.ndarray) -> np.ndarray:
+    """(n,) bool: where the base is traced for certain; nowhere where nobody states when, or all would be."""
+    stated, t = _traced(recording), recording.t
+    if stated is None:
+        return np.zeros(len(t), dtype=bool)
+    on = in_its_plane(position, (t >= stated[0]) & (t <= stated[1]), recording.tip_radius_m)
+    return on & ~on.all()
+
+
 def _on_support(recording: Recording, a: int, b: int) -> str:
     """Why the contact of samples [a, b), stated to be with the support, is no palpation; '' elsewhere."""
     middle = float(recording.t[(a + b - 1) // 2])
@@ -446,11 +463,13 @@ def filtered_of(
         return less(None, np.zeros_like(filtered), lambda size: white)
     weight = tool_weight(recording, filtered, cutoff_hz, near=near)
     left = filtered - weight.force
-    drift, _ = free_air_force(t, left, max(white, crowd_scale(np.linalg.norm(left, axis=1))))
-    steady = less(weight, drift, crowd_scale)
+    sliding = _sliding(recording, position)
+    scale = max(white, crowd_scale(np.linalg.norm(left[~sliding], axis=1)))
+    drift, _ = free_air_force(t, left, scale, touched=sliding)
+    steady = less(weight, drift, lambda size: crowd_scale(size[~sliding]))
     if steady.spread.min() <= noise:
         return steady  # free air is as quiet as its sensor: there is nothing to follow
-    air = passing(t, position, steady.signals.force, recording.tip_radius_m, _traced(recording))
+    air, traced = passing(t, position, steady.signals.force, recording.tip_radius_m, _traced(recording))
     slow = slowly(t, recording.force_on_tool - weight.force, air)
     if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
         return steady
@@ -458,12 +477,12 @@ def filtered_of(
     again = tool_weight(recording, filtered - slow, cutoff_hz)
     off = missed(t, filtered - again.force, air)
 
-    def followed(drift: np.ndarray) -> Filtered:
+    def followed(drift: np.ndarray, loose: np.ndarray) -> Filtered:
         there = less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
-        return replace(there, air=air)
+        return replace(there, spread=np.hypot(there.spread, _LOOSE * np.where(traced, 0.0, loose)), air=air)
 
     raw = recording.force_on_tool - again.force
-    return followed(between(t, raw, air, lambda drift: followed(drift).touching()))
+    return followed(*between(t, raw, air, lambda *seen: followed(*seen).touching))
 
 
 def passing_zero(rate_hz: float, cutoff_hz: float) -> int:

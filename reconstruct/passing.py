@@ -54,8 +54,8 @@ def passing(
     force: np.ndarray,
     tip_radius_m: float,
     traced_s: tuple[float, float] | None = None,
-) -> np.ndarray:
-    """(n,) bool: where the tip only passes, so that it is in the air.
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) bool: where the tip only passes, so that it is in the air; and where it is on the support.
 
     position (n, 3) m and force (n, 3) N low-passed. traced_s: when the base is traced, where it is stated.
     """
@@ -69,7 +69,7 @@ def passing(
     if traced_s is not None:
         on |= (t >= traced_s[0]) & (t <= traced_s[1])
     margin = np.ones(2 * max(1, round(_MARGIN_S * rate)) + 1, dtype=bool)
-    return ~binary_dilation(near | on, margin)
+    return ~binary_dilation(near | on, margin), on
 
 
 def _knots(position: np.ndarray, step_m: float, every: int) -> np.ndarray:
@@ -144,21 +144,22 @@ def slowly(t: np.ndarray, raw: np.ndarray, air: np.ndarray) -> np.ndarray | None
     rate = (len(t) - 1) / (t[-1] - t[0])
     if air.sum() < _LEAST_S * rate:
         return None
-    return gaussian_filter1d(_followed(t, raw, air), _SLOW_S * rate, axis=0)
+    return gaussian_filter1d(_followed(t, raw, air)[0], _SLOW_S * rate, axis=0)
 
 
 def between(
-    t: np.ndarray, raw: np.ndarray, air: np.ndarray, touching: Callable[[np.ndarray], np.ndarray]
-) -> np.ndarray:
-    """(n, 3) N: the force of free air, found where the tip passes, `air` (n,) bool.
+    t: np.ndarray, raw: np.ndarray, air: np.ndarray, touching: Callable[[np.ndarray, np.ndarray], np.ndarray]
+) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) N: the force of free air, found where the tip passes, `air` (n,) bool; and (n,) N an axis, how
+    far it may have gone another way where it is not seen.
 
-    raw: (n, 3) N as read. touching: (n,) bool of a free-air force (n, 3), where something is touched despite
-    it: the rest is air as well.
+    raw: (n, 3) N as read. touching: (n,) bool of both, where something is touched despite them: the rest is
+    air as well.
     """
     margin = np.ones(2 * max(1, round(_CLEAR_S * (len(t) - 1) / (t[-1] - t[0]))) + 1, dtype=bool)
     found = _followed(t, raw, air)
     for _ in range(_ROUNDS):
-        found = _followed(t, raw, air | ~binary_dilation(touching(found), margin))
+        found = _followed(t, raw, air | ~binary_dilation(touching(*found), margin))
     return found
 
 
@@ -179,22 +180,25 @@ def missed(t: np.ndarray, force: np.ndarray, air: np.ndarray) -> float:
     return crowd_median(np.linalg.norm(off, axis=1))
 
 
-def _followed(t: np.ndarray, force: np.ndarray, free: np.ndarray) -> np.ndarray:
-    """(n, 3) N: the force followed through the free samples, straight from one to the next across touches.
+def _followed(t: np.ndarray, force: np.ndarray, free: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) N: the force followed through the free samples, straight from one to the next across touches;
+    and (n,) N an axis, its standard deviation there, a Brownian bridge's.
 
     A random walk of blocks, smoothed; how fast it walks is told by the force's own changes nearby, beyond
     noise.
     """
-    block = ((t - t[0]) / _BLOCK_S).astype(int)
+    lasts = max(_BLOCK_S, 2 * float(t[-1] - t[0]) / (len(t) - 1))
+    block = ((t - t[0]) / lasts).astype(int)
     count = np.bincount(block, weights=free, minlength=block[-1] + 1)
     used = np.flatnonzero(count > 0)
     total = np.column_stack([np.bincount(block, weights=free * force[:, k])[used] for k in range(3)])
     level = total / count[used][:, None]
-    centre = t[0] + (used + 0.5) * _BLOCK_S
-    lag = max(2, round(_LAG_S / _BLOCK_S))
+    centre = t[0] + (used + 0.5) * lasts
+    lag = max(2, round(_LAG_S / lasts))
     noise, walk = _walk(used, level, lag)
     gap = np.diff(centre)
-    stiff = noise / np.maximum(0.5 * (walk[1:] + walk[:-1]) * gap / _BLOCK_S, 1e-6 * noise)
+    rate = 0.5 * (walk[1:] + walk[:-1]) / lasts
+    stiff = noise / np.maximum(rate * gap, 1e-6 * noise)
     weight = np.minimum(count[used] / np.median(count[used]), 1.0)
     bands = np.zeros((2, len(used)))
     bands[1] = weight
@@ -202,7 +206,11 @@ def _followed(t: np.ndarray, force: np.ndarray, free: np.ndarray) -> np.ndarray:
     bands[1, :-1] += stiff
     bands[0, 1:] = -stiff
     smooth = solveh_banded(bands, weight[:, None] * level)
-    return np.column_stack([np.interp(t, centre, smooth[:, k]) for k in range(3)])
+    left = np.clip(np.searchsorted(centre, t, side="right") - 1, 0, len(centre) - 2)
+    apart = np.maximum(gap[left] - lasts, 0.0)  # neighbours are not apart
+    into = np.clip(t - centre[left] - 0.5 * lasts, 0.0, apart)
+    loose = np.sqrt(rate[left] * into * (apart - into) / np.maximum(apart, lasts))
+    return np.column_stack([np.interp(t, centre, smooth[:, k]) for k in range(3)]), loose
 
 
 def _walk(used: np.ndarray, level: np.ndarray, lag: int) -> tuple[float, np.ndarray]:
@@ -213,6 +221,8 @@ def _walk(used: np.ndarray, level: np.ndarray, lag: int) -> tuple[float, np.ndar
         return first, ((level[first + step] - level[first]) ** 2).mean(axis=1)
 
     _, one = changes(1)
+    if not len(one):  # no two blocks are neighbours
+        one = (np.diff(level, axis=0, append=level[-1:]) ** 2).mean(axis=1)
     noise = max(0.5 * float(np.median(one)) / 0.79, 1e-12)
     first, far = changes(lag)
     if len(first) < lag:

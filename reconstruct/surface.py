@@ -16,7 +16,7 @@ from mechanics.progress import Progress, silent
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError, first_guesses
 from reconstruct.shapes.drawing import draw
-from reconstruct.shapes.evidence import Evidence, support_axes
+from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence, support_axes
 from reconstruct.shapes.fit import Seen, fit
 from reconstruct.shapes.hull import hull_surface
 from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
@@ -39,6 +39,9 @@ _DIRECTION_RAD, _LEAST_LIKELY = np.radians(15.0), 3.0
 
 _POOR_M = 0.0012
 """Above this held-out error of the best shape, the implicit surface is tried as well."""
+
+_LOOSE_M, _LOOSE = 0.0006, 3.0
+"""A first touch whose own error is beyond this, and so many times the median's, places no surface."""
 
 _BELOW_M = 1e-4
 """No surface reaches this far below the support it stands on."""
@@ -111,21 +114,27 @@ class Surface:
 
 
 def evidence_of(exploration: Exploration) -> Evidence:
-    """What an exploration says about the shape. Raises SurfaceError where it has no base outline."""
-    boundary = exploration.boundary
+    """What an exploration says about the shape: of touches known by far less well than most nothing.
+
+    Raises SurfaceError where it has no base outline.
+    """
+    boundary, presses = exploration.boundary, exploration.presses
     if boundary is None:
         raise SurfaceError(
             "the recording has no base outline: trace the base or give a model whose base stands in"
         )
+    error = presses.onset_error_m
+    fourth = np.sort(error)[:LEAST_TOUCHES][-1]
+    told = error <= max(_LOOSE_M, _LOOSE * float(np.median(error)), fourth)
     return Evidence(
         support_point=boundary.support_point,
         support_normal=boundary.support_normal,
         outline=boundary.outline,
         outline_centres=boundary.centres,
-        centres=exploration.presses.centre,
-        normals=exploration.presses.contact_normal,
-        centre_error_m=exploration.presses.onset_error_m,
-        site=exploration.presses.site,
+        centres=presses.centre[told],
+        normals=presses.contact_normal[told],
+        centre_error_m=error[told],
+        site=presses.site[told],
         tip_radius_m=exploration.recording.tip_radius_m,
     )
 

@@ -174,8 +174,7 @@ def causes_of(estimate: Estimate, least_n: float | None = None) -> tuple[Causes,
 def least_that_matters(forward: Forward) -> float:
     """N rms over contact samples: the smallest gap that a diagnosis names, or LEAST_SHARE of the force."""
     t = forward.touches
-    force = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
-    return max(AttributionOptions().smallest * t.vector_noise_n, LEAST_SHARE * force)
+    return max(AttributionOptions().smallest * t.vector_noise_n, LEAST_SHARE * t.force_rms_n)
 
 
 def modulus_beside(w: Weighing, name: str) -> float:

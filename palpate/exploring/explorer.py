@@ -9,7 +9,15 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.errors import ContactError, DiagnosisError, MeshError, ModelError, OptionError, SurfaceError
+from mechanics.errors import (
+    ContactError,
+    DiagnosisError,
+    LoudAirError,
+    MeshError,
+    ModelError,
+    OptionError,
+    SurfaceError,
+)
 from mechanics.nearest import distance
 from mechanics.recording import Recording, write_recording
 from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions, first_places, weighed
@@ -147,7 +155,7 @@ class Explorer:
         self._order, self._rng = order, np.random.default_rng([seed, 61])
         self._estimate = Estimate()
         self._base: Boundary | None = None
-        self._trouble = ""
+        self._trouble, self._air_hides = "", False
         self._asked: list[np.ndarray] = []
         self._tests: list[float] = []
         self._causes: tuple[Causes, Weighing] | None = None
@@ -208,9 +216,9 @@ class Explorer:
                 )
                 self._tested(before)
                 self._weigh()
-            self._trouble = ""
+            self._trouble, self._air_hides = "", False
         except (ContactError, SurfaceError, MeshError, DiagnosisError, ModelError) as error:
-            self._trouble = str(error)
+            self._trouble, self._air_hides = str(error), isinstance(error, LoudAirError)
 
     def _tested(self, before: Estimate) -> None:
         """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""
@@ -288,6 +296,11 @@ class Explorer:
         """The touch that tells the most a second, or the word to stop, each with its reason."""
         if not any(s.kind == "trace" for s in self.segments):
             return Suggestion("trace", "the base's outline is not known: slide once around the object's foot")
+        if self._air_hides and "free" not in self._kinds:
+            why = "what the tool reads in the air hides the presses: wave and turn it there for three seconds"
+            return Suggestion("free", f"{why} ({self._trouble})")
+        if self._base is None and sum(s.kind == "trace" for s in self.segments) >= self.goals.most:
+            return Suggestion("stop", f"no tracing could be understood ({self._trouble})")
         if self._base is None:
             return Suggestion("trace", f"the tracing could not be understood ({self._trouble}): trace again")
         state = self.state
@@ -297,8 +310,6 @@ class Explorer:
             return Suggestion(
                 "stop", f"{self._made} presses were made, as many as allowed; " + self._words(state)
             )
-        if "free" not in self._kinds and self._trouble.startswith("in free motion"):
-            return Suggestion("free", f"{self._trouble}: wave and turn the tool in the air for three seconds")
         if self._estimate.surface is None:
             return self._first()
         best = self._best(state)

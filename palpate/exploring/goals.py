@@ -25,7 +25,7 @@ class GoalOptions:
     cause_at: float | None = option(
         None, "how surely one cause alone must be left, or none (0.95)", flag="--cause-at"
     )
-    most: int = option(40, "never more presses than these", flag="--most")
+    most: int = option(40, "never more presses than these, nor tracings", flag="--most")
 
     def __post_init__(self) -> None:
         """Raises OptionError for goals that cannot be."""

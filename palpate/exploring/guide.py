@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.model import Model
+from mechanics.segments import ON_SUPPORT
 from palpate.exploring.explorer import Explorer, State, Suggestion
 from palpate.exploring.ghost import Ghost
 from palpate.exploring.rows import Segment
@@ -25,12 +26,21 @@ AIR_S = 0.3
 """In the air for so long, a segment has ended."""
 LEAST_S = 0.05
 """A shorter contact is a brush."""
+ON_IT = 1.2
+"""Tip radii above the support, a tip's centre is on it."""
+WHAT = {
+    "stop": "done",
+    "trace": "slide around the foot",
+    "rigid": "press the bare support",
+    "free": "wave in the air",
+}
+"""What to do, by kind of suggestion; a press has its depth."""
 
 
 class Guide:
     """Call `follow` at every frame; read `ghost` and `lines`.
 
-    model: what is felt; of it only how far its foot has been gone round is read.
+    model: what is felt; of it only how far its foot has been gone round is read, and where the support is.
     """
 
     def __init__(
@@ -38,7 +48,7 @@ class Guide:
     ) -> None:
         self.explorer = explorer
         self._servo, self._worker, self._path = servo, worker, path
-        self._tracing = BaseTracing(model)
+        self._tracing, self._support = BaseTracing(model), model.support
         self._next = int(servo.arrays.ring_head[0])
         self._rows: list[np.ndarray] = []
         self._first: int | None = None
@@ -90,39 +100,47 @@ class Guide:
 
     @property
     def _still_tracing(self) -> bool:
-        """Whether the base was not all gone round yet."""
-        return not any(s.kind == "trace" for s in self.explorer.segments)
+        """Whether the base was not all gone round yet, or not so that it was understood."""
+        return self._suggestion.kind == "trace"
 
     def _take_in(self) -> None:
         rows, self._rows = np.concatenate(self._rows), []
-        kind = "trace" if self._still_tracing else "press"
+        self._worker.run("thinking of the next touch", lambda: self._think(rows))
+
+    def _think(self, rows: np.ndarray) -> None:
+        """Take samples in, as what was asked for once all before them were taken in."""
         segment = Segment(
-            kind,
+            self._kind(rows),
             rows["tick"] * self._servo.options.period_ns * 1e-9,
             rows["tip"],
             rows["rendered"],
             rows["quaternion"],
         )
-        # before the next frame asks, so that what follows is no second tracing
         self.explorer.segments.append(segment)
-        self._worker.run("thinking of the next touch", self._think)
-
-    def _think(self) -> None:
         self.explorer.bring_up_to_date()
         self.explorer.save(self._path)
         self._state, self._suggestion = self.explorer.state, self.explorer.suggest()
 
+    def _kind(self, rows: np.ndarray) -> str:
+        asked = self._suggestion.kind
+        touched = np.linalg.norm(rows["rendered"], axis=1) > TOUCHING_N
+        height = self._support.height(rows["tip"][touched])
+        if asked in ON_SUPPORT and height.size and height.max() < ON_IT * self._servo.tip_radius_m:
+            return asked
+        return "trace" if self._still_tracing else "press"
+
     def lines(self) -> list[str]:
         """For the panel: what to do, and what is known."""
         s, state = self._suggestion, self._state
-        known = "nothing is known yet"
+        why = state.trouble.split(" (")[0].split(":")[0]
+        known = f"no shape yet: {why}" if why else "nothing is known yet"
         if state.surface:
             low, high = state.modulus_ci95_pa
             known = (
                 f"{state.made} presses: {state.modulus_pa / 1e3:.1f} kPa ({low / 1e3:.1f} to "
                 f"{high / 1e3:.1f}), surface within {1e3 * state.surface_error_m:.1f} mm"
             )
-        what = {"stop": "done", "trace": "slide around the foot"}.get(s.kind, "")
+        what = WHAT.get(s.kind, "")
         if s.kind == "trace":
             what += f" ({100 * self._tracing.share:.0f} % traced)"
         if s.kind == "press":

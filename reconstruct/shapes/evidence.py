@@ -15,6 +15,9 @@ import numpy as np
 from mechanics.errors import SurfaceError
 from mechanics.press_sites import sites_of
 
+LEAST_TOUCHES = 4
+"""Fewer carry no surface."""
+
 
 @dataclass(frozen=True)
 class Evidence:
@@ -53,9 +56,10 @@ class Evidence:
             raise SurfaceError(
                 f"the base outline has {len(self.outline)} points; 8 are needed: trace the whole base"
             )
-        if self.centres.ndim != 2 or len(self.centres) < 4:
+        if self.centres.ndim != 2 or len(self.centres) < LEAST_TOUCHES:
             raise SurfaceError(
-                f"{len(self.centres)} touches carry no surface; at least 4 are needed: touch more places"
+                f"{len(self.centres)} touches carry no surface; at least {LEAST_TOUCHES} are needed: touch "
+                "more places"
             )
         if self.normals.shape != self.centres.shape or self.outline_centres.shape != self.outline.shape:
             raise SurfaceError("normals need one row a touch, outline_centres one row an outline point")

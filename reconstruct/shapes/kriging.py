@@ -120,11 +120,12 @@ class Explained:
         inverse = cho_solve(self._factor, np.eye(len(self.gap)))
         weighted = inverse @ self.gap
         error, density = [], []
+        far = max(_FAR_M, float(np.median(self.seen.error_m)))
         for site in np.unique(self.seen.sites):
             own = np.flatnonzero(self.seen.sites == site)
             block = inverse[np.ix_(own, own)]
             miss = np.linalg.solve(block, weighted[own])
-            good = self.seen.error_m[own] < _FAR_M
+            good = self.seen.error_m[own] <= far
             if good.any():
                 error.append(np.sqrt(np.mean(miss[good] ** 2)))
             # Gaussian, but a miss beyond four deviations counts linearly: one bad press must not decide

@@ -2,6 +2,7 @@
 
 import io
 import json
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -12,6 +13,8 @@ from palpate.exploring.explorer import Explorer
 from palpate.exploring.goals import GoalOptions, Standing, surface_error
 from palpate.exploring.protocol import segment_of, serve
 from palpate.exploring.rows import Instrument, Segment, together
+
+from ..reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 def test_the_surfaces_error_is_the_quantile_of_a_gaussian():
@@ -83,6 +86,39 @@ def test_a_robot_is_told_to_trace_first_and_its_bad_lines_keep_nothing():
     assert first["state"]["young_modulus_pa"] is None and not first["state"]["done"]
     assert len(errors) == 3 and all("error" in e for e in errors)
     assert not explorer.segments and not kept
+
+
+def test_tracings_that_are_never_understood_end_as_presses_do():
+    explorer = Explorer(Instrument(0.005), GoalOptions(most=4))
+    t = np.arange(3000) / 1000
+    air = 0.01 * np.random.default_rng(0).normal(size=(len(t), 3))
+    for _ in range(4):
+        assert explorer.suggest().kind == "trace"
+        explorer.add(Segment("trace", t, np.column_stack([0.05 * np.sin(t), 0 * t, 0.1 + 0 * t]), air))
+    told = explorer.suggest()
+    assert told.kind == "stop" and explorer.state.trouble in told.why
+
+
+def test_where_the_air_hides_the_presses_it_is_asked_to_be_shown_and_what_is_shown_is_no_press():
+    recording, onsets = explore_cylinder(noise=0.01)
+    after = recording.t > recording.boundary_phase[1]
+    force = np.where(after[:, None], 0.043, 1.0) * recording.force_on_tool
+    force += 0.02 * np.random.default_rng(0).normal(size=force.shape)
+    cuts = [0, *np.searchsorted(recording.t, onsets - 0.3), len(force)]
+    explorer = Explorer(Instrument(recording.tip_radius_m))
+    for k, (a, b) in enumerate(pairwise(cuts)):
+        rows = recording.t[a:b], recording.position[a:b], force[a:b]
+        explorer.segments.append(Segment("press" if k else "trace", *rows))
+    explorer.bring_up_to_date()
+    told = explorer.suggest()
+    assert told.kind == "free" and explorer.state.trouble in told.why
+    t = np.arange(3000) / 1000
+    waved = recording.position[-1] + 0.02 * np.column_stack(
+        [np.sin(5 * t), np.cos(4 * t) - 1, 1 - np.cos(3 * t)]
+    )
+    explorer.add(Segment("free", t, waved, 0.02 * np.random.default_rng(1).normal(size=waved.shape)))
+    assert explorer.suggest().kind != "free"  # it is asked for once
+    assert len(onsets) == explorer.state.made == sum(s.kind == "press" for s in explorer.segments)
 
 
 def test_a_line_is_a_segment():

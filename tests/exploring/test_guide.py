@@ -19,6 +19,8 @@ class FakeServo:
     tip_radius_m = 0.005
     options = SimpleNamespace(rate_hz=RATE, period_ns=1_000_000)
 
+    height_m = 0.05
+
     def __init__(self):
         self.rows = np.zeros(0, dtype=ROW)
         self.arrays = SimpleNamespace(ring_head=[0])
@@ -30,7 +32,7 @@ class FakeServo:
         """So long in the air (0 N) or touching."""
         new = np.zeros(int(seconds * RATE), dtype=ROW)
         new["tick"] = len(self.rows) + np.arange(len(new))
-        new["tip"], new["quaternion"] = [0.0, 0.0, 0.05], [1.0, 0, 0, 0]
+        new["tip"], new["quaternion"] = [0.0, 0.0, self.height_m], [1.0, 0, 0, 0]
         new["rendered"] = [0.0, 0.0, force_n]
         self.rows = np.concatenate([self.rows, new])
 
@@ -39,15 +41,15 @@ class FakeExplorer:
     """Keeps what it was given."""
 
     def __init__(self):
-        self.segments, self.saved = [], 0
+        self.segments, self.saved, self.tracings = [], 0, 1
 
     def suggest(self):
-        if not self.segments:
+        if len(self.segments) < self.tracings:
             return Suggestion("trace", "nothing is known")
         point, normal = np.array([0.0, 0.0, 0.03]), np.array([0.0, 0.0, 1.0])
         return Suggestion("press", "here least is known", point, normal, 0.004)
 
-    state = SimpleNamespace(surface="", made=0)
+    state = SimpleNamespace(surface="", made=0, trouble="")
 
     def bring_up_to_date(self):
         pass
@@ -62,7 +64,8 @@ def guided(monkeypatch, tmp_path):
     monkeypatch.setattr(module, "BaseTracing", lambda model: tracing)
     worker = SimpleNamespace(run=lambda words, job: job())
     servo, explorer = FakeServo(), FakeExplorer()
-    return Guide(explorer, servo, None, worker, tmp_path / "rec.csv.gz"), servo, explorer, tracing
+    model = SimpleNamespace(support=SimpleNamespace(height=lambda tips: tips[:, 2]))
+    return Guide(explorer, servo, model, worker, tmp_path / "rec.csv.gz"), servo, explorer, tracing
 
 
 def _frames(guide, servo, *stretches):
@@ -86,6 +89,28 @@ def test_lifting_off_while_tracing_ends_nothing_and_a_brush_is_no_press(guided):
     trace, press = explorer.segments
     assert len(servo.rows) - 150 <= len(trace.t) + len(press.t) <= len(servo.rows)
     assert press.t[0] == pytest.approx(trace.t[-1] + 1 / RATE)
+
+
+def test_what_follows_a_tracing_that_was_not_understood_goes_on_with_it(guided):
+    guide, servo, explorer, tracing = guided
+    explorer.tracings = 2
+    tracing.done = True
+    _frames(guide, servo, *[(0.2, 0.0), (0.5, 0.7), (0.4, 0.0)] * 3)
+    assert [s.kind for s in explorer.segments] == ["trace", "trace", "press"]
+
+
+def test_a_press_that_was_asked_for_on_the_bare_support_is_none_of_the_object(guided):
+    guide, servo, explorer, tracing = guided
+    tracing.done = True
+    _frames(guide, servo, (0.2, 0.0), (0.5, 0.7), (0.4, 0.0))
+    explorer.suggest = lambda: Suggestion("rigid", "a yielding tool and a soft object both stand")
+    a_press = (0.2, 0.0), (0.5, 2.0), (0.4, 0.0)
+    _frames(guide, servo, *a_press * 2)
+    assert guide.lines()[0].startswith("press the bare support: a yielding tool")
+    servo.height_m = 0.005
+    _frames(guide, servo, *a_press)
+    # what was done counts: the second was on the object all the same
+    assert [s.kind for s in explorer.segments] == ["trace", "press", "press", "rigid"]
 
 
 def test_the_ghost_stands_a_tips_radius_above_the_place(guided):

@@ -7,7 +7,7 @@ import pytest
 from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 from mechanics.errors import ContactError
-from reconstruct.boundary import BoundaryOptions, farthest_points, fit_plane
+from reconstruct.boundary import BoundaryOptions, farthest_points, find_boundary, fit_plane, in_its_plane
 from reconstruct.contacts import explore
 
 
@@ -44,6 +44,22 @@ def test_contact_that_outlasts_the_stated_phase_belongs_to_it():
     start, end = recording.boundary_phase
     early = dataclasses.replace(recording, boundary_phase=(start, end - 0.1))
     assert explore(early).boundary.interval == explore(recording).boundary.interval
+
+
+@pytest.mark.parametrize("ways", [(1, 1), (1, -1)])
+def test_a_base_may_be_traced_in_strokes_that_come_up_to_it_from_beside(ways):
+    """As a mouse does, side by side: strokes overlap, some go back, each begins beside the object."""
+    pieces, part = [], 2 * np.pi / 8
+    for k in range(8):
+        angle = np.linspace(k * part, (k + 1.25) * part, 2000)[:: ways[k % 2]]
+        up, away = np.linspace(0.052, 0.045, 100), np.linspace(0.045, 0.05, 100)
+        beside = np.concatenate([up, np.full(1800, 0.045), away])
+        pieces.append(beside[:, None] * np.column_stack([np.cos(angle), np.sin(angle)]))
+    path = np.column_stack([np.concatenate(pieces), np.full(16000, 0.005)])
+    force, touching = np.tile([0.0, 0.0, 0.5], (len(path), 1)), np.ones(len(path), dtype=bool)
+    found = find_boundary(path, force, touching, (0, len(path)), 0.005, BoundaryOptions())
+    radius = np.hypot(*found.outline[:, :2].T)
+    assert np.quantile(np.abs(radius - 0.04), 0.9) < 2e-4 and np.abs(radius - 0.04).max() < 1.5e-3
 
 
 def test_no_phase_is_an_error_that_names_the_remedies():
@@ -94,3 +110,15 @@ def test_a_trace_that_was_broken_off_for_seconds_is_detected_whole():
     found = explore(dataclasses.replace(recording, t=t, force_on_tool=force)).boundary.interval
     assert abs(found[0] - first) < 100
     assert abs(found[1] - last) < 100
+
+
+def test_a_stated_tracing_is_touched_where_it_lies_in_its_plane_and_lifted_strokes_are_air():
+    t = np.arange(0, 20, 0.001)
+    angle = 2 * np.pi * t / 20
+    lifted = (t % 5) > 4.2
+    path = np.column_stack([0.04 * np.cos(angle), 0.04 * np.sin(angle), np.where(lifted, 0.008, 0.0)])
+    path = path @ TILTED.rotation.T + [0.1, -0.2, 0.3]
+    stated = t < 19
+    np.testing.assert_array_equal(in_its_plane(path, stated, 0.004), stated & ~lifted)
+    nowhere = np.zeros(len(t), dtype=bool)
+    assert not in_its_plane(path, nowhere, 0.004).any()

@@ -3,10 +3,11 @@
 import dataclasses
 
 import numpy as np
+import pytest
 from exploration_of_cylinder import explore_cylinder
 
 from reconstruct.contacts import filtered_of
-from reconstruct.passing import missed, passing
+from reconstruct.passing import between, missed, passing
 
 
 def test_no_touch_is_taken_for_air_whatever_its_force_and_whether_or_not_the_tracing_is_stated():
@@ -14,7 +15,7 @@ def test_no_touch_is_taken_for_air_whatever_its_force_and_whether_or_not_the_tra
     force = recording.force_on_tool
     touching = np.linalg.norm(force, axis=1) > 0
     for traced in (None, recording.boundary_phase):
-        air = passing(recording.t, recording.position, force, recording.tip_radius_m, traced)
+        air, _ = passing(recording.t, recording.position, force, recording.tip_radius_m, traced)
         assert not (air & touching).any()
         assert air.sum() > 0.3 * (~touching).sum()
 
@@ -29,7 +30,7 @@ def test_a_force_that_turns_unseen_is_followed_through_the_presses(cylinder):
     pressing = (t > onsets[0] - 0.5) & (t < onsets[-1] + 0.5)
     off = (read.free_air - turned - whole.free_air)[pressing]
     assert np.sqrt(np.mean(off**2)) < 0.05
-    assert (read.touching() == whole.touching())[pressing].mean() > 0.95
+    assert (read.touching == whole.touching)[pressing].mean() > 0.95
 
 
 def test_where_nothing_turns_the_walk_is_not_taken():
@@ -47,3 +48,18 @@ def test_a_line_across_quiet_air_misses_what_the_noise_of_three_samples_makes():
     air = np.ones(4000, dtype=bool)
     assert 0.9 < missed(t, force, air) / (0.01 * np.sqrt(1.5)) < 1.1
     assert np.isinf(missed(t, force, ~air))
+
+
+def test_how_far_the_air_may_have_gone_unseen_is_a_brownian_bridges():
+    rng = np.random.default_rng(1)
+    t, per_s = np.arange(0, 40, 0.002), 0.0005  # N^2/s an axis
+    walk = np.cumsum(np.sqrt(0.002 * per_s) * rng.normal(size=(len(t), 3)), axis=0)
+    raw = walk + 0.01 * rng.normal(size=walk.shape)
+    unseen = (t % 4) > 2
+    followed, loose = between(t, raw, ~unseen, lambda *_: unseen)
+    assert loose[~unseen].max() < 0.3 * loose.max()
+    middle = np.abs(t % 4 - 3) < 0.1
+    assert np.median(loose[middle]) == pytest.approx(np.sqrt(per_s * 2 / 4), rel=0.3)
+    # and so far it is off
+    off = np.sqrt(np.mean((followed - walk)[middle] ** 2))
+    assert 0.5 < off / np.median(loose[middle]) < 1.6

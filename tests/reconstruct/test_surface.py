@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from exploration_of_cylinder import explore_cylinder
 
 from mechanics.errors import SurfaceError
 from palpate.benchmarks._surface_truth import OWN, phantom_truth, touch
@@ -252,3 +254,30 @@ def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeyp
     assert len(tried) > 1 and found.method == tried[1]
     height = (found.vertices - found.support_point) @ found.support_normal
     assert -1e-6 < height.min() and height.max() < 0.2
+
+
+def test_a_first_touch_known_by_far_less_well_than_the_others_places_no_surface():
+    from reconstruct.contacts import explore
+    from reconstruct.surface import evidence_of
+
+    found = explore(explore_cylinder(noise=0.01)[0])
+    error = found.presses.onset_error_m.copy()
+    every = evidence_of(found)
+    assert len(every.centres) == len(error)
+    error[[2, 5]] = 0.005
+    sure = evidence_of(replace(found, presses=replace(found.presses, onset_error_m=error)))
+    np.testing.assert_array_equal(sure.centres, np.delete(every.centres, [2, 5], axis=0))
+    np.testing.assert_array_equal(sure.site, np.delete(every.site, [2, 5]))
+    # where all are known as badly, all count
+    all_loose = evidence_of(replace(found, presses=replace(found.presses, onset_error_m=0 * error + 0.005)))
+    assert len(all_loose.centres) == len(error)
+    # and four are kept, whatever they are
+    p = found.presses
+    five = SimpleNamespace(
+        centre=p.centre[:5],
+        contact_normal=p.contact_normal[:5],
+        site=p.site[:5],
+        onset_error_m=np.array([1e-4, 1e-4, 0.004, 1e-4, 0.005]),
+    )
+    few = SimpleNamespace(boundary=found.boundary, recording=found.recording, presses=five)
+    np.testing.assert_array_equal(evidence_of(few).centres, p.centre[:4])
