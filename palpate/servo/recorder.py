@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 import tempfile
 from pathlib import Path
 
@@ -22,26 +24,34 @@ class Recorder:
 
     def __init__(self, servo: Servo) -> None:
         self._servo = servo
-        self._spool = tempfile.TemporaryFile(prefix="palpate-rows-")
+        self._spool = tempfile.TemporaryFile(prefix="palpate-rows-", buffering=0)
+        self._kept = 0
         self._next = int(servo.arrays.ring_head[0])
 
     def collect(self) -> np.ndarray:
-        """Take what came since the last time, and return it; raises RecordingError where it finds no room."""
-        rows, self._next = self._servo.history(self._next)
+        """Take what came since the last time, and return it. Raises RecordingError where it finds no room,
+        and takes it once more the next time."""
+        rows, following = self._servo.history(self._next)
+        data = rows.tobytes()
         try:
-            self._spool.write(rows.tobytes())
-            self._spool.flush()
+            if self._spool.write(data) != len(data):  # a disk that fills up takes the first part
+                raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
         except OSError as error:
+            self._spool.seek(self._kept)
+            self._spool.truncate()
             raise RecordingError(
                 f"the recording finds no room in {tempfile.gettempdir()} ({error.strerror}): free some, "
                 "or set TMPDIR to another place"
             ) from error
+        self._kept += len(data)
+        self._next = following
         return rows
 
     def recording(self, tip_radius_m: float, object_name: str = "object") -> Recording:
         """What was collected; raises RecordingError where there is nothing."""
         self._spool.seek(0)
         rows = np.frombuffer(self._spool.read(), dtype=ROW)
+        self._spool.seek(self._kept)
         rows = rows[np.isfinite(rows["tip"]).all(axis=1)]
         if len(rows) < 2:
             raise RecordingError("nothing was recorded: the servo ran for less than two ticks")

@@ -20,12 +20,12 @@ class Beside:
 
     def follow(self, tips_m: np.ndarray) -> np.ndarray:
         """(n,) N, the size of its force at each of (n, 3) m tips, one a tick."""
-        sizes = np.zeros(len(tips_m))
-        for i, tip in enumerate(np.ascontiguousarray(tips_m)):
-            forces = self._scene.step(self._state, tip[None])[1]
-            sizes[i] = np.linalg.norm(forces[0])
-            self._force = forces[0]
-        return sizes
+        if not len(tips_m):
+            return np.zeros(0)
+        steps_s = np.full(len(tips_m), self._state.touch.dt_s)
+        forces = self._scene.follow(self._state, np.ascontiguousarray(tips_m[:, None]), steps_s)[:, 0]
+        self._force = forces[-1]
+        return np.linalg.norm(forces, axis=1)
 
     def view(self) -> View:
         """Where it stands now."""

@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
+from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Self
@@ -318,13 +319,17 @@ class TouchSession:
     def close(self) -> None:
         """Force off, servo ended, recording written."""
         self._servo.disable()
-        if self.recording is not None:
-            self.recording.collect()
-        self._servo.stop()
-        self.worker.wait()
-        self.end_recording()
-        self._servo.close()
-        self._inclusion.close()
+        with ExitStack() as rest:  # all of it, from the last, though one fails
+            for each in (
+                self._inclusion.close,
+                self._servo.close,
+                self.end_recording,
+                self.worker.wait,
+                self._servo.stop,
+            ):
+                rest.callback(each)
+            if self.recording is not None:
+                self.recording.collect()
 
     def __enter__(self) -> Self:
         return self

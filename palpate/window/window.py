@@ -281,8 +281,10 @@ class TouchWindow:
         return frame
 
     def _draw(self, frame: Frame) -> None:
+        beside, words = self._pace.next(time.perf_counter())
+        self._thin_out(beside, words)
         below = self.pointer.below(frame.tip_m)
-        for picture, view in zip(self.pictures, frame.views, strict=False):
+        for picture, view in zip(self.pictures if beside else self.pictures[:1], frame.views, strict=False):
             picture.update(frame, view, below)
         self._play(frame)
         if self._coloured and self.session.inclusion_felt and (self.game is None or self.game.answered):
@@ -291,7 +293,7 @@ class TouchWindow:
             for picture, stiffness in zip(self.pictures, maps, strict=False):
                 picture.colour_by_stiffness(stiffness, limits)
         lines = status(self.session, self.scene, self.pointer, frame, self.notice)
-        if self.game is not None:
+        if self.game is not None and (self.game.answered or not self._guiding):
             lines += self.game.lines(time.perf_counter())
         if self.guide is not None and self._ghost is not None:
             self.guide.follow()
@@ -300,7 +302,6 @@ class TouchWindow:
         if self._slider is not None:
             self._slider.GetSliderRepresentation().SetValue(1e3 * self.pointer.press_depth_m)
         self._scale_type()
-        self._thin_out()
         width, _ = self.plotter.window_size
         letters = int(PANEL_SHARE * width / (LETTER * self._status.prop.font_size))
         self._status.input = "\n".join(part for line in lines for part in wrap(line, max(letters, 20)))
@@ -308,9 +309,13 @@ class TouchWindow:
             over.input = heading(name, felt=side == 0)
         self.frames += 1
 
-    def _thin_out(self) -> None:
-        """Draw what is felt; the second picture, words and plots as often as the pace allows."""
-        beside, words = self._pace.next(time.perf_counter())
+    @property
+    def _guiding(self) -> bool:
+        """Whether a next touch is suggested: one thing is asked for at a time."""
+        return self.guide is not None and self.guide.suggestion.kind != "stop"
+
+    def _thin_out(self, beside: bool, words: bool) -> None:
+        """Draw what is felt; the second picture, and words and plots, only where the pace allows them."""
         if words:
             self._charts.update(self.session.trace)
         *pictures, panel = self.plotter.renderers

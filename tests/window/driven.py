@@ -11,7 +11,17 @@ import numpy as np
 from palpate.window.frames import Frame
 from palpate.window.window import CHARTS_SHARE, TouchWindow
 
+from .small import SIZE
+
 FRAME_S = 0.005
+HALF = SIZE[0] / 2
+SIDES = [
+    np.array([0.0, -1.0, 0.0]),
+    np.array([1.0, 0.0, 0.0]),
+    np.array([0.0, 1.0, 0.0]),
+    np.array([-1.0, 0, 0]),
+]
+TRACING_M_PER_S = 0.03
 
 
 def eventually(condition: Callable[[], bool], seconds: float = 20.0) -> bool:
@@ -106,6 +116,44 @@ class Driven:
                 return
         raise AssertionError(f"the right button does not turn the view: {off():.2f} rad to go")
 
+    def look_down(self, elevation: float) -> None:
+        """Turn the view with the right button until the eye stands so high above the horizon, rad."""
+        width, height = self.window.plotter.window_size
+
+        def off() -> float:
+            camera = self.window.picture_renderers[0].GetActiveCamera()
+            eye = np.subtract(camera.GetPosition(), camera.GetFocalPoint())
+            return float(elevation - np.arcsin(eye[2] / np.linalg.norm(eye)))
+
+        for _ in range(12):
+            x, y = 0.5 * width / self.window.sides, 0.6 * height
+            self.pixel(x, y)
+            self.button(True, "Right")
+            for _ in range(10):
+                y -= np.clip(200.0 * off(), -12.0, 12.0)
+                self.pixel(x, y)
+            self.button(False, "Right")
+            if abs(off()) < 0.05:
+                return
+        raise AssertionError(f"the right button does not tilt the view: {off():.2f} rad to go")
+
     def picture(self) -> np.ndarray:
         self.window.plotter.render()
         return self.window.plotter.screenshot(return_img=True)
+
+
+def along_the_foot(driven: Driven, side: np.ndarray) -> None:
+    """Button down on the support before a side of the block, mouse along its foot, button up."""
+    right = np.array([-side[1], side[0], 0.0])
+    reach = HALF + 0.008
+    driven.mouse_at(HALF * side + 0.006 * side - reach * right)
+    driven.until(lambda f: np.linalg.norm(f.tip_m - driven.window.pointer.tip_m) < 1e-4)
+    driven.wait(0.3)
+    driven.button(True)
+    driven.wait(0.6)
+    start, duration = time.perf_counter(), 2 * reach / TRACING_M_PER_S
+    while (share := (time.perf_counter() - start) / duration) < 1.0:
+        driven.mouse_at(HALF * side + 0.004 * side + (2 * share - 1) * reach * right)
+        driven.wait(0.01)
+    driven.button(False)
+    driven.wait(0.4)

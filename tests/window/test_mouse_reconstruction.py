@@ -17,34 +17,8 @@ from palpate.window.window import TouchWindow
 from reconstruct.pipeline import reconstruct
 from scenes.scene import Scene
 
-from .driven import Driven
+from .driven import HALF, SIDES, Driven, along_the_foot
 from .small import SIZE
-
-SIDES = [
-    np.array([0.0, -1.0, 0.0]),
-    np.array([1.0, 0.0, 0.0]),
-    np.array([0.0, 1.0, 0.0]),
-    np.array([-1.0, 0, 0]),
-]
-HALF = SIZE[0] / 2
-TRACING_M_PER_S = 0.03
-
-
-def along_the_foot(driven: Driven, side: np.ndarray) -> None:
-    """Button down on the support before the side, mouse along its foot, button up."""
-    right = np.array([-side[1], side[0], 0.0])
-    reach = HALF + 0.008
-    driven.mouse_at(HALF * side + 0.006 * side - reach * right)
-    driven.until(lambda f: np.linalg.norm(f.tip_m - driven.window.pointer.tip_m) < 1e-4)
-    driven.wait(0.3)
-    driven.button(True)
-    driven.wait(0.6)
-    start, duration = time.perf_counter(), 2 * reach / TRACING_M_PER_S
-    while (share := (time.perf_counter() - start) / duration) < 1.0:
-        driven.mouse_at(HALF * side + 0.004 * side + (2 * share - 1) * reach * right)
-        driven.wait(0.01)
-    driven.button(False)
-    driven.wait(0.4)
 
 
 def press(driven: Driven, place: np.ndarray) -> None:

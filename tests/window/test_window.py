@@ -5,14 +5,17 @@ from __future__ import annotations
 import threading
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
+from mechanics.material import Ball
 from mechanics.model import Model
 from mechanics.recording import read_recording
+from palpate.window.game import Game
 from palpate.window.picture import STIFFNESS
 from palpate.window.session import TouchSession
 from palpate.window.window import CHARTS_SHARE, TouchWindow
@@ -247,6 +250,20 @@ def test_only_what_does_something_is_offered(driven: Driven) -> None:
     assert not {"f", "i"} & driven.window.controls.offered, "a 1D model knows neither friction nor a ball"
     driven.session.set_renderer("fem")
     driven.session.worker.wait()
+
+
+def test_a_guided_person_is_asked_for_one_thing_at_a_time(driven: Driven, monkeypatch) -> None:
+    window = driven.window
+    guide = SimpleNamespace(suggestion=SimpleNamespace(kind="press"))
+    monkeypatch.setattr(window, "game", Game([Ball((0.0, 0.0, 0.02), 0.005, 8.0)], np.array([0.0, 0.0, 1.0])))
+    driven.wait(0.05)
+    assert "a nodule is hidden" in window._status.input
+    monkeypatch.setattr(window, "guide", guide)
+    driven.wait(0.05)
+    assert "a nodule is hidden" not in window._status.input
+    guide.suggestion.kind = "stop"
+    driven.wait(0.05)
+    assert "a nodule is hidden" in window._status.input
 
 
 def test_the_panel_covers_no_picture(driven: Driven) -> None:

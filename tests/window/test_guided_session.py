@@ -1,0 +1,71 @@
+"""A person with only a mouse is guided: traces the base, presses at the ghost, until told to stop."""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from devices.channel import PoseChannel
+from devices.registry import DeviceChoice
+from mechanics.model import Model
+from mechanics.recording import read_recording
+from palpate.exploring.explorer import Explorer
+from palpate.exploring.goals import GoalOptions
+from palpate.exploring.guide import Guide
+from palpate.exploring.rows import Instrument
+from palpate.window.session import TouchSession
+from palpate.window.window import TouchWindow
+from reconstruct.pipeline import reconstruct
+from scenes.scene import Scene
+
+from .driven import SIDES, Driven, along_the_foot
+
+MOST = 12
+
+
+def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
+    """One press where and as deep as it is suggested, seen from outside; waits for the next suggestion."""
+    s, made = guide.suggestion, guide.state.made
+    if np.hypot(*s.normal[:2]) > 0.15:
+        driven.look_from(float(np.arctan2(s.normal[1], s.normal[0])))
+    driven.look_down(float(np.clip(np.arcsin(s.normal[2]), 0.3, 1.2)))
+    driven.window.pointer.go_deep(1e3 * s.depth_m)
+    driven.mouse_at(s.point)
+    driven.wait(1.5)
+    driven.button(True)
+    driven.wait(s.depth_m / 0.02 + 0.8)
+    driven.button(False)
+    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy, frames=20_000)
+
+
+@pytest.mark.slow
+def test_a_guided_person_knows_the_object_after_a_dozen_presses(block: Model, tmp_path: Path) -> None:
+    channel = PoseChannel.create()
+    channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
+    device = DeviceChoice("mouse", {"channel": str(channel.path)})
+    with TouchSession(block, title="Block", device=device) as session:
+        session.start()
+        session.enable()
+        instrument = Instrument(session.servo.tip_radius_m, session.servo.options.rate_hz, {})
+        explorer = Explorer(instrument, GoalOptions(modulus_within=0.1, most=MOST))
+        guide = Guide(explorer, session.servo, block, session.worker, tmp_path / "guided.csv.gz")
+        scene = Scene("block", "model", "", title="Block")
+        window = TouchWindow(session, scene, channel, off_screen=True, guide=guide)
+        driven = Driven(window)
+        for side in (*SIDES, *SIDES):
+            if "traced" in guide.lines()[0]:
+                driven.look_from(np.arctan2(side[1], side[0]))
+                along_the_foot(driven, side)
+        driven.until(lambda frame: guide.suggestion.kind == "press" and not session.worker.busy)
+        while guide.suggestion.kind == "press":
+            as_the_ghost_says(driven, guide)
+        window.plotter.close()
+    channel.close()
+    assert guide.suggestion.kind == "stop" and guide.state.made <= MOST
+    low, high = guide.state.modulus_ci95_pa
+    assert low < block.material.young_modulus_pa < high
+    model = reconstruct(read_recording(tmp_path / "guided.csv.gz"))
+    assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.1)
