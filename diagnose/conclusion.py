@@ -186,12 +186,11 @@ def _errors(evidence: Evidence) -> dict[str, float]:
     """Our own errors in newtons rms: sensor noise, repeatability of sites, shape, and the rest of the
     model."""
     t = evidence.forward.touches
-    rms = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
     residual = evidence.found.final.residual
     return {
         "sensor": evidence.noise_n,
         "repeatability": repeat_scatter(residual, t),
-        "shape": float(np.sqrt(np.mean(evidence.site_sd**2)) * rms),
+        "shape": float(np.sqrt(np.mean(evidence.site_sd**2)) * t.force_rms_n),
         "model": float(np.sqrt(max((residual[t.counted] ** 2).sum(axis=1).mean() - 3 * t.noise_n**2, 0))),
     }
 

@@ -166,13 +166,14 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         reasons[INERTIA.name] = (
             f"in free air the force follows the hand's acceleration: {free.mass_kg * 1e3:.0f} g of tool"
         )
-    followed = None
+    followed = False
     wanders = float(np.linalg.norm((t.free_air - sum(parts.values(), nothing))[t.counted].std(axis=0)))
     if t.free_air.any() and wanders > t.vector_noise_n and INERTIA.name not in excluded:
         # a tool that turns unseen: what was followed through the touches is nearer than any constant, which
         # is then no bias but the weight's own mean
         parts = {n: part for n, part in parts.items() if n == DRIFT.name}
-        parts[INERTIA.name] = followed = t.free_air - sum(parts.values(), nothing)
+        parts[INERTIA.name] = nothing  # told below
+        followed = True
         parameters[INERTIA.name] = {"mass_kg": max(free.mass_kg, 0.0), "tared": True}
         level = np.zeros(3)
         reasons[INERTIA.name] = "in free air the force wanders as the weight of a tool does that turns unseen"
@@ -200,7 +201,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
     taken = sum(local.values())
-    columns = t.columns if followed is None else {**t.columns, FOLLOWED: followed}
+    columns = {**t.columns, FOLLOWED: parts[INERTIA.name]} if followed else t.columns
     forward.touches = dataclasses.replace(t, force=t.force - sum(parts.values()), columns=columns)
     order = sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum()))
     intervals = {

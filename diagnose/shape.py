@@ -60,7 +60,7 @@ def repeat_scatter(residual: np.ndarray, touches: Presses) -> float:
     if not factors:
         return float("nan")
     spread = np.concatenate(factors)
-    rms = np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean())
+    rms = t.force_rms_n
     return float(np.sqrt((spread**2).sum() / max(len(spread) / 2, 1)) * rms)
 
 

@@ -172,7 +172,7 @@ def _shape(evidence: Evidence, answer: Answer) -> None:
     factor, error = site_factors(found.final.found, t)
     per_site = np.array([evidence.site_sd[t.site == s].mean() for s in range(t.sites)])
     gain, spread = heterogeneity(factor, error, per_site)
-    felt_n = spread * float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
+    felt_n = spread * t.force_rms_n
     if gain <= evidence.shape_gain or felt_n <= SHAPE_FELT * evidence.noise_n:
         return
     allowed = [n for n in _rest() if n not in evidence.excluded]

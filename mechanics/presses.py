@@ -276,6 +276,11 @@ class Presses:
         return float(np.sqrt(3) * self.noise.raw_n)
 
     @property
+    def force_rms_n(self) -> float:
+        """N, rms of the force 3-vector over contact samples."""
+        return float(np.sqrt((self.local_force[self.counted] ** 2).sum(axis=1).mean()))
+
+    @property
     def thinned_away(self) -> float:
         """N^2, what thinning took off the mean square of the 3-vector."""
         return 3 * (self.noise.raw_n**2 - self.noise_n**2)

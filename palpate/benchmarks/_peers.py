@@ -8,10 +8,12 @@ metres.
 from __future__ import annotations
 
 import ast
+import importlib
 import inspect
 import textwrap
 import time
 from abc import ABC, abstractmethod
+from typing import Any
 
 import numpy as np
 
@@ -27,6 +29,10 @@ NEAR_M = 0.009
 SETTLE_S, TIMESTEP_S = 0.1, 0.001
 FLEX_POISSON = 0.45
 """At 0.49 its linear tetrahedra lock, and its solver of the elastic forces does not converge."""
+NEWTON_TIMESTEP_S, NEWTON_SWEEPS, NEWTON_STEPS = 0.005, 20, 40
+"""Steps at each depth, half of them moving; three times as many change the force by 1 %."""
+NEWTON_CONTACT, NEWTON_SKIN_M = 1e5, 1e-4
+"""N/m of one contact, against some 500 N/m of the node below; and what keeps surfaces apart."""
 
 
 class Peer(ABC):
@@ -186,7 +192,71 @@ class Flex(Peer):
         return np.array(forces)
 
 
-PEERS: tuple[type[Peer], ...] = (Palpate, PointLoad, ByHand, Flex)
+class Newton(Peer):
+    """Newton's vertex block descent: linear tetrahedra, the ball led by hand and left to settle; it touches
+    faces and edges too, not nodes alone."""
+
+    name, made_for = "Newton", "many robots at once on a graphics card, some of what they hold soft"
+
+    def __init__(self, mesh: TetMesh, young_pa: float, poisson: float, radius_m: float) -> None:
+        # typed by nobody where they are not installed, and other than they are used where they are
+        newton: Any = importlib.import_module("newton")
+        warp: Any = importlib.import_module("warp")
+        warp.config.log_level = warp.LOG_WARNING
+        nu = min(poisson, FLEX_POISSON)
+        none, upright = warp.vec3(0.0), warp.quat_identity()
+        builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
+        hard = newton.ModelBuilder.ShapeConfig(ke=NEWTON_CONTACT, kd=0.0, mu=0.5)
+        builder.add_shape_sphere(builder.add_body(is_kinematic=True), radius=radius_m, cfg=hard)
+        builder.add_soft_mesh(
+            pos=none, rot=upright, scale=1.0, vel=none, density=1000.0, particle_radius=NEWTON_SKIN_M,
+            vertices=[warp.vec3(*point) for point in mesh.points.tolist()],
+            indices=mesh.tetrahedra.ravel().tolist(),
+            k_mu=young_pa / (2 + 2 * nu), k_lambda=young_pa * nu / ((1 + nu) * (1 - 2 * nu)), k_damp=0.0,
+        )  # fmt: skip
+        for node in np.flatnonzero(mesh.fixed):
+            builder.particle_mass[node] = 0.0
+        builder.color()
+        self.model, self.radius_m = builder.finalize(device="cpu"), radius_m
+        self.model.soft_contact_ke, self.model.soft_contact_kd = NEWTON_CONTACT, 0.0
+        self.model.soft_contact_mu = 0.5
+        self.collisions = newton.CollisionPipeline(
+            self.model, soft_contact_gap=0.002, enable_rigid_soft_full_surface_contact=True
+        )
+        self.contacts = self.collisions.contacts()
+        self.solver = newton.solvers.SolverVBD(
+            self.model, iterations=NEWTON_SWEEPS, integrate_with_external_rigid_solver=True,
+            particle_enable_tile_solve=False,
+        )  # fmt: skip
+        self.seen = self.solver.observables({"contact_f"}, contacts=self.contacts)
+        self._step(self.model.state(), self.model.state(), mesh.points.max(axis=0) + 1.0)  # compiles
+
+    def _step(self, now: Any, then: Any, tip: np.ndarray) -> np.ndarray:
+        pose = np.array([[*tip, 0.0, 0.0, 0.0, 1.0]], np.float32)
+        now.body_q.assign(pose)
+        then.body_q.assign(pose)
+        now.clear_forces()
+        self.collisions.collide(now, self.contacts)
+        self.solver.step(now, then, None, self.contacts, NEWTON_TIMESTEP_S, observables=self.seen)
+        return self.seen.contact_f.numpy()[self.contacts.rigid_contact_max :, :3].sum(axis=0)
+
+    def force(self, point: np.ndarray, normal: np.ndarray, depths_m: np.ndarray) -> np.ndarray:
+        """The contact forces on the ball after it has rested at each depth."""
+        now, then = self.model.state(), self.model.state()
+        forces, last = [], -1e-3
+        for depth in depths_m:
+            began = time.process_time()
+            for k in range(NEWTON_STEPS):
+                at = last + (depth - last) * min(1.0, 2.0 * (k + 1) / NEWTON_STEPS)
+                push = self._step(now, then, point + (self.radius_m + NEWTON_SKIN_M - at) * normal)
+                now, then = then, now
+            self.step_s += time.process_time() - began
+            self.steps, last = self.steps + NEWTON_STEPS, depth
+            forces.append(float(push @ normal))
+        return np.array(forces)
+
+
+PEERS: tuple[type[Peer], ...] = (Palpate, PointLoad, ByHand, Flex, Newton)
 
 
 def lines_of(peer: type[Peer]) -> int:

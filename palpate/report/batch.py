@@ -16,6 +16,7 @@ from matplotlib.figure import Figure
 from palpate.batching.run import Batch
 from palpate.batching.steps import THUMBNAIL
 from palpate.batching.summary import Entry
+from palpate.comparison import RIVALS
 from palpate.report.page import Page
 
 MOST_OBJECTS = 12
@@ -243,7 +244,7 @@ def _row(result: Batch, entry: Entry, steps: Sequence[str]) -> list[Cell]:
         if rmse is None:
             cells += [Cell(), Cell()]
         else:
-            best = min(value for name, value in rmse.items() if name != "fem")
+            best = min(rmse[name] for name in RIVALS)
             fem = _link(result, row.recording, "compare", f"{1e3 * rmse['fem']:.0f}")
             cells += [Cell(fem, rmse["fem"]), _number(best, 1e3, 0)]
     cpu = sum(seconds for seconds, _ in entry.cost.values())

@@ -9,6 +9,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
+from mechanics.recording import Recording
 from palpate.comparison import HOMOGENEOUS, MODELS, RIVALS, Comparison, stiffness_along, verdict
 from palpate.report.object3d import draw_object, spread_over
 from palpate.report.page import Page
@@ -31,16 +32,16 @@ _MARKS = ("o", "^", "s", "x")
 DEPTH_M = 0.004
 
 
-def write_report(path: Path | str, result: Comparison, name: str) -> Path:
+def write_report(path: Path | str, result: Comparison, recording: Recording) -> Path:
     """One self-contained page; returns its path."""
-    page = Page(f"Who predicts the next touch: {name}")
+    page = Page(f"Who predicts the next touch: {recording.name}")
     words = verdict(result)
     page.lead(words[:1].upper() + words[1:] + ".")
     page.paragraph(meaning(result))
+    model = result.model.path or "MODEL"
     page.next_step(
-        f"What to do next: feel it: `palpate touch {result.model.path or 'MODEL'} --beside hunt-crossley`; "
-        "ask "
-        "what the FEM still leaves out: `palpate diagnose REC`."
+        f"What to do next: feel it: `palpate touch {model} --beside hunt-crossley`; ask what the FEM still "
+        f"leaves out: `palpate diagnose {recording.path or 'REC'} --model {model}`."
     )
     page.view(
         view_of(result),

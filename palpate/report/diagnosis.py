@@ -42,7 +42,7 @@ MOST_EFFECTS = 8
 def write_report(path: Path | str, recording: Recording, model: Model, result: Diagnosis) -> Path:
     """Write one self-contained HTML page; returns its path."""
     t, _, _ = gap_of(result)
-    typical = float(np.sqrt((t.local_force[t.counted] ** 2).sum(axis=1).mean()))
+    typical = t.force_rms_n
     page = Page(f"Simulated touch against measured touch: {recording.name}")
     page.lead(verdict(result))
     page.cards(answers(result, typical))

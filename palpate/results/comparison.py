@@ -31,7 +31,7 @@ class Comparison(Result, room.Comparison):
         """Write tables and pictures as one HTML page."""
         from palpate.report.comparison import write_report
 
-        return write_report(path, self, self.recording.name)
+        return write_report(path, self, self.recording)
 
     def lines(self) -> list[str]:
         """What `print` says, line by line, with units."""

@@ -75,7 +75,7 @@ def test_memory_of_a_task_is_measured_by_itself(tmp_path):
 @pytest.mark.parametrize("end", ["left", "killed", "interrupted"])
 def test_nothing_is_left_running(tmp_path, end):
     """Ctrl-C, the end of the block, and the sudden death of the parent end workers and what these started."""
-    said = tmp_path / "processes.txt"
+    said, seen = tmp_path / "processes.txt", tmp_path / "seen.txt"
     script = f"""
 import signal
 from pathlib import Path
@@ -88,7 +88,7 @@ quick = Task("errands:write", {{"value": 1}}, root / "quick", {{"path": str(root
 slow = Task("errands:linger", {{}}, root / "slow", {{"path": {str(said)!r}}})
 class Left(Exception): ...
 def tell(status):
-    if {end == "left"} and Path({str(said)!r}).exists(): raise Left
+    if {end == "left"} and Path({str(seen)!r}).exists(): raise Left
 with LocalExecutor(2) as executor:
     run(Graph([quick, slow]), executor, root, tell=tell)
 """
@@ -98,6 +98,7 @@ with LocalExecutor(2) as executor:
     wait_for(lambda: said.exists() and len(said.read_text().split()) == 2 and (tmp_path / "quick").exists())
     processes = list(map(int, said.read_text().split()))
     assert all(map(alive, processes))
+    seen.write_text("all of them run\n")
     if end != "left":
         parent.send_signal(signal.SIGKILL if end == "killed" else signal.SIGINT)
     began = time.monotonic()

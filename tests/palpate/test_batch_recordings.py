@@ -57,7 +57,9 @@ def quick(monkeypatch):
                     "object": about.get("object", {}).get("name"), "presses": 24,
                     "young_modulus_pa": e, "young_modulus_ci95_pa": [0.9 * e, 1.1 * e],
                 },
-                "compare": {"rmse_n": {"fem": 0.1, "kelvin-voigt": 0.3, "hunt-crossley": 0.2}},
+                "compare": {
+                    "rmse_n": {"fem": 0.1, "kelvin-voigt": 0.3, "hunt-crossley": 0.17, "fem-homogeneous": 0.1}
+                },
                 "diagnose": {
                     "kind": "effect", "effects": ["viscoelasticity", "time_delay"], "candidates": [],
                     "gap_before_n": 0.2, "gap_after_n": 0.05,
@@ -198,6 +200,8 @@ def test_the_page_links_every_report_and_escapes_what_people_name_things(tmp_pat
     for file in ("thumbnail.png", "reconstruct.html", "compare.html", "diagnose.html"):
         assert f"l%C3%B6%C3%9F%20%26%20%3Cb%3E/{file}" in page
     assert "http" not in page  # nothing is fetched
+    # the FEM of one modulus is no 1D model
+    assert 'data-name="of best 1D [mN]" data-by="0.17"' in page
 
 
 def test_parquet_has_the_same_columns(tmp_path, quick):
