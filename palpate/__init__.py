@@ -91,8 +91,8 @@ _DOOR = {
     "palpate.results.batch": "Batch",
     "render.base": "Renderer",
     "mechanics.errors": (
-        "PalpateError FileError RecordingError ContactError LoudAirError NoBaseError SurfaceError MeshError ModelError "
-        "CacheError OptionError DeviceError SceneError DiagnosisError"
+        "PalpateError FileError RecordingError ContactError LoudAirError NoBaseError SurfaceError MeshError "
+        "ModelError CacheError OptionError DeviceError SceneError DiagnosisError"
     ),
 }
 _HOME = {name: module for module, names in _DOOR.items() for name in names.split()}
