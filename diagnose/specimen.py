@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from diagnose.fit import Descent, settings_of
 from diagnose.judging import AttributionOptions
@@ -353,9 +354,9 @@ def approach_of(bench: Bench) -> Approach:
         for name, order in (("hunt-crossley", 0), ("regression", 5)):
             errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
         back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
-        given = max(np.trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
+        given = max(trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
         # a curve that ends in its hold gives nothing back to be weighed
-        gone = 1 + np.trapezoid(push[back], u[back]) / given
+        gone = 1 + trapezoid(push[back], u[back]) / given
         work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
         pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from mechanics.dent import dent_law
 from mechanics.recording import read_recording
@@ -96,7 +97,7 @@ def _verification() -> dict[str, float]:
     halved = np.sort(np.concatenate([depths, (depths[1:] + depths[:-1]) / 2, [0.15]]))
     more, more_energy = straight_press(thing, finite, point, normal, halved, Fineness())
     note("load steps halved: change at 5 mm", force[-1] / more[-1] - 1, "0.02")
-    work = np.trapezoid(np.concatenate([[0], more]), np.concatenate([[0], halved]))
+    work = trapezoid(np.concatenate([[0], more]), np.concatenate([[0], halved]))
     # the penalty's springs hold the rest of the work
     note("work of the tip / stored energy - 1", work / more_energy[-1] - 1, "0.02")
     start = time.process_time()
