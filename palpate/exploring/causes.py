@@ -20,7 +20,6 @@ is not exact.
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -88,13 +87,12 @@ class Causes:
 
     log_evidence: of each cause and 'none', log M over the ideal model's. least_n: N rms over contact samples,
     the smallest size of a cause that is weighed. misfit: lack of fit (whitened mean square) that the best one
-    leaves. modulus_pa: with the likeliest hypothesis taken into account.
+    leaves.
     """
 
     log_evidence: dict[str, float]
     least_n: float
     misfit: float
-    modulus_pa: float = float("nan")
 
     @property
     def ratio(self) -> dict[str, float]:
@@ -125,7 +123,6 @@ class Causes:
             "ratio": self.ratio,
             "least_n": self.least_n,
             "misfit": self.misfit,
-            "young_modulus_pa": self.modulus_pa if np.isfinite(self.modulus_pa) else None,
         }
 
 
@@ -141,13 +138,14 @@ Act = Callable[[Settings, Forward], None]
 
 @dataclass(frozen=True)
 class Weighing:
-    """What the evidence comes from: forward model and base fit; acts, names, sizes (f,): of the forms, what
-    each does, its cause, and N, rms of its change of force beside the modulus. gram (k, k): whitened and
-    summed over sites, of the residual, the modulus, `own` common errors, then the forms. dof: readings.
-    site_sd: (p,) share by which each place's stiffness may be off. springs: (f,) m/N by which a form lets the
-    tool yield; on_support: the same as read off the rigid support, and its standard error."""
+    """What the evidence comes from: forward model, its nuisances, base fit; acts, names, sizes (f,): of the
+    forms, what each does, its cause, and N, rms of its change of force beside the modulus. gram (k, k):
+    whitened and summed over sites, of the residual, the modulus, `own` common errors, then the forms. dof:
+    readings. site_sd: (p,) share by which each place's stiffness may be off. springs: (f,) m/N by which a
+    form lets the tool yield; on_support: the same as read off the rigid support, and its standard error."""
 
     forward: Forward
+    whitener: Whitener
     found: Fit
     acts: tuple[Act, ...]
     names: tuple[str, ...]
@@ -167,28 +165,13 @@ def causes_of(estimate: Estimate, least_n: float | None = None) -> tuple[Causes,
         return None
     least = least_n or least_that_matters(weighing.forward)
     causes = judge(weighing, least)
-    modulus = modulus_beside(weighing, causes.standing(0.95)[0])
-    return dataclasses.replace(causes, modulus_pa=modulus), weighing
+    return causes, weighing
 
 
 def least_that_matters(forward: Forward) -> float:
     """N rms over contact samples: the smallest gap that a diagnosis names, or LEAST_SHARE of the force."""
     t = forward.touches
     return max(AttributionOptions().smallest * t.vector_noise_n, LEAST_SHARE * t.force_rms_n)
-
-
-def modulus_beside(w: Weighing, name: str) -> float:
-    """Pa, fitted together with the form of a cause that fits best; of 'none' beside our own errors alone."""
-    k = 2 + w.own
-    columns = list(range(1, k))
-    if name != NONE:
-        target, curve = with_support(w, *projected(w)[:2])
-        rows = [i for i, n in enumerate(w.names) if n == name]
-        gain = target[rows] ** 2 / np.maximum(curve[rows], 1e-300)
-        columns.append(k + rows[int(np.argmax(gain))])
-    prior = np.diag([1e-9, *np.ones(w.own), *[1e-9] * (len(columns) - 1 - w.own)])
-    solved = np.linalg.solve(w.gram[np.ix_(columns, columns)] + prior, w.gram[columns, 0])
-    return float(w.found.modulus * np.exp(np.clip(solved[0], -2.0, 2.0)))
 
 
 def weigh(estimate: Estimate) -> Weighing | None:
@@ -232,7 +215,7 @@ def weigh(estimate: Estimate) -> Weighing | None:
     sizes = np.array([_size(c[counted], plain) for c in changes])
     dof = 3.0 * float(counted.sum())
     return Weighing(
-        forward, found, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
+        forward, whitener, found, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
         np.array(springs), _on_support(estimate),
     )  # fmt: skip
 

@@ -39,7 +39,7 @@ _MOVED_M = 0.0007
 """The mesh is made anew where the surface has left it by more than this (95 % of the vertices) ..."""
 _MOVED_SHARE = 0.25
 """... and more than this share of what the surface is uncertain by."""
-_BOOTSTRAPS = 200
+BOOTSTRAPS = 200
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ class Estimate:
     weight: of the tool. presses_placed: the table on the surface, a row of `sites` each.
     choice_error_m: within which 95 % of the surface lay when all families were tried last.
     presses_at_choice: how many there were when the shape's family was chosen last. seconds: wall time of
-    each step of this update.
+    each step of this update. covariance: (p, p) 1/m^2, of the sites' compliances by the shape's uncertainty.
     """
 
     exploration: Exploration | None = None
@@ -73,6 +73,7 @@ class Estimate:
     presses_at_choice: int = 0
     choice_error_m: float = float("inf")
     seconds: dict[str, float] = field(default_factory=dict)
+    covariance: np.ndarray | None = None
 
     @property
     def surface_error_m(self) -> float:
@@ -120,14 +121,14 @@ def updated(
         presses,
         sites,
         exploration.noise_n,
-        ModulusOptions(bootstraps=_BOOTSTRAPS),
+        ModulusOptions(bootstraps=BOOTSTRAPS),
         compliance_covariance=covariance,
         seed=seed,
     )
     clock.lap("modulus")
     return Estimate(
         exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error,
-        clock.laps,
+        clock.laps, covariance,
     )  # fmt: skip
 
 
@@ -185,7 +186,7 @@ def solved_sites(
         )
         gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):
-            solved.far[keys[i]] = _rows(made, slice(row, row + 1)), gradients[row]
+            solved.far[keys[i]] = rows_of(made, slice(row, row + 1)), gradients[row]
     parts = [solved.far[key] for key in keys]
     sites = TouchSites(
         points=np.concatenate([p.points for p, _ in parts]),
@@ -198,7 +199,8 @@ def solved_sites(
     return sites, np.array([gradient for _, gradient in parts])
 
 
-def _rows(sites: TouchSites, rows: slice) -> TouchSites:
+def rows_of(sites: TouchSites, rows: slice | np.ndarray) -> TouchSites:
+    """Some of the sites, in order."""
     return TouchSites(
         sites.points[rows], sites.normals[rows], sites.curvature[rows], sites.far[rows],
         sites.patch_width_m, sites.poisson_ratio,

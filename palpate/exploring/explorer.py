@@ -24,6 +24,7 @@ from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions,
 from palpate.exploring.causes import Causes, Weighing, causes_of, words
 from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing
+from palpate.exploring.modulus import modulus_beside
 from palpate.exploring.orders import Order
 from palpate.exploring.parting import RIGID_S, Parting, by_support, missing, partings
 from palpate.exploring.rows import Instrument, Segment, apart, check_joined, together
@@ -82,7 +83,8 @@ class Suggestion:
 
 @dataclass(frozen=True)
 class State:
-    """What is known. modulus_pa, interval: nan where nothing is known. standing: goal by goal.
+    """What is known. modulus_pa, interval: nan where nothing is known, beside causes where those are asked
+    for. standing: goal by goal.
 
     presses: found and used; made: segments of presses that were added. seconds: of exploring so far.
     update_s: wall time of the last update by step. causes: where they are asked for and can be told;
@@ -159,6 +161,7 @@ class Explorer:
         self._asked: list[np.ndarray] = []
         self._tests: list[float] = []
         self._causes: tuple[Causes, Weighing] | None = None
+        self._beside: tuple[float, tuple[float, float]] | None = None
 
     @classmethod
     def going_on(
@@ -246,6 +249,11 @@ class Explorer:
         clock = Clock()
         self._causes = causes_of(self._estimate)
         clock.lap("causes")
+        self._beside = None
+        if self._causes is not None:
+            causes, weighing = self._causes
+            self._beside = modulus_beside(self._estimate, weighing, causes, self._seed)
+        clock.lap("modulus beside causes")
         self._estimate.seconds.update(clock.laps)
 
     @property
@@ -264,6 +272,7 @@ class Explorer:
         e = self._estimate
         nan = float("nan")
         modulus, interval = (nan, (nan, nan)) if e.fit is None else (e.fit.modulus_pa, e.fit.ci95_pa)
+        modulus, interval = self._beside or (modulus, interval)
         error = nan
         if e.surface is not None:
             error = e.surface_error_m * self._doubt
@@ -350,7 +359,7 @@ class Explorer:
         e = self._estimate
         if e.surface is None or e.exploration is None or e.fit is None:
             return None
-        low, high = e.fit.ci95_pa
+        low, high = state.modulus_ci95_pa
         sd = float(np.log(high / low) / 3.92)
         presses = e.exploration.presses
         used = e.fit.weights > 0 if (e.fit.weights > 0).any() else np.ones(len(presses), dtype=bool)
@@ -362,7 +371,7 @@ class Explorer:
             self.segments[-1].position[-1],
             sd,
             min(ModulusOptions().law_bias, sd),
-            e.fit.modulus_pa,
+            state.modulus_pa,
             self.instrument.tip_radius_m,
             self.reach,
             self._partings(),

@@ -1,0 +1,113 @@
+"""The modulus beside causes: what each hypothesis takes off the presses, and the modulus of the rest.
+
+Under a cause its parameters are fitted together with the modulus (diagnose.fit), what it changes is taken off
+every press, and the modulus is that of the presses so corrected, with the interval that any presses have
+(reconstruct.modulus), widened by what the cause's own parameters leave open. Over hypotheses it is the
+mixture by their posterior probabilities.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.stats import norm
+
+from diagnose.fit import fit, settings_of
+from diagnose.forward import Forward
+from mechanics.effects.registry import effect
+from mechanics.presses import Presses
+from palpate.exploring.causes import NONE, Causes, Weighing
+from palpate.exploring.estimate import BOOTSTRAPS, Estimate, rows_of
+from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+
+MOST = 3
+"""Hypotheses that are fitted, the likeliest."""
+LEAST = 0.025
+"""Of their probabilities: what is less likely moves no end of a 95 % interval."""
+SAME_S = 1e-6
+
+
+def modulus_beside(
+    estimate: Estimate, weighing: Weighing, causes: Causes, seed: int = 0
+) -> tuple[float, tuple[float, float]]:
+    """(Pa, 95 % interval) of the modulus over the likeliest hypotheses."""
+    assert estimate.fit is not None
+    ranked = sorted(causes.probability.items(), key=lambda item: -item[1])[:MOST]
+    found, weights = [], []
+    for name, probability in ranked:
+        if probability < LEAST:
+            continue
+        made = (_by(estimate.fit), 0.0)
+        if name != NONE and effect(name).seek is None:
+            made = _beside(estimate, weighing, causes, name, seed)
+        (value, sd), more = made
+        found.append((value, float(np.hypot(sd, more))))
+        weights.append(probability)
+    values, sds = np.array(found).T
+    share = np.array(weights) / np.sum(weights)
+
+    def at(level: float) -> float:
+        span = 8 * sds.max()
+        return float(
+            np.exp(
+                brentq(
+                    lambda x: share @ norm.cdf((x - values) / sds) - level,
+                    values.min() - span,
+                    values.max() + span,
+                )
+            )
+        )
+
+    return at(0.5), (at(0.025), at(0.975))
+
+
+def _by(made: ModulusFit) -> tuple[float, float]:
+    """(log, its standard deviation)."""
+    low, high = made.ci95_pa
+    return float(np.log(made.modulus_pa)), float(np.log(high / low) / 3.92)
+
+
+def _beside(
+    estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: int
+) -> tuple[tuple[float, float], float]:
+    """((log modulus, its standard deviation), what the cause's own parameters add to it)."""
+    e = estimate
+    assert e.presses_placed is not None and e.sites is not None and e.exploration is not None
+    each = effect(name)
+    fitted = fit(w.forward, w.whitener, [each], modulus=w.found.modulus, onset=w.found.onset, iterations=8)
+    # to where the ideal model has it from the first touches as found: a play or a delay has moved those too
+    acting = settings_of(w.forward, fitted.effects, fitted.values, fitted.onset)
+    change = np.nan_to_num(w.forward.predict(acting) - w.forward.predict(w.forward.ideal(fitted.modulus)))
+    kept, presses = without(e.presses_placed, w.forward, change)
+    covariance = None if e.covariance is None else e.covariance[np.ix_(kept, kept)]
+    made = fit_modulus(
+        presses,
+        rows_of(e.sites, kept),
+        e.exploration.noise_n,
+        ModulusOptions(bootstraps=BOOTSTRAPS),
+        compliance_covariance=covariance,
+        seed=seed,
+    )
+    over = w.forward.touches.noise.variance_inflation * max(1.0, causes.misfit)
+    hessian = fitted.gram.sum(axis=0)[1:, 1:] + np.diag(fitted.prior)
+    joint = float(np.linalg.pinv(hessian)[0, 0])
+    return _by(made), float(np.sqrt(max(joint - 1 / hessian[0, 0], 0.0) * over))
+
+
+def without(presses: Presses, forward: Forward, change: np.ndarray) -> tuple[np.ndarray, Presses]:
+    """(numbers (k,) of the presses that a forward model holds, a table of those with a change taken off).
+
+    change: (n, 3) N, at the forward model's rows, in its presses' local frames.
+    """
+    t = forward.touches
+    device = np.einsum("nij,ni->nj", t.frame[t.press], change)
+    number = np.searchsorted(presses.onset_s, t.onset_s - SAME_S)
+    force = np.array(presses.force)
+    for part, i in zip(t.parts, number, strict=True):
+        own = presses.parts[i]
+        if part.stop > part.start:
+            for axis in range(3):
+                force[own, axis] -= np.interp(presses.t[own], t.t[part], device[part, axis])
+    return number, dataclasses.replace(presses, force=force).of(number)
