@@ -17,6 +17,7 @@ from scipy.stats import norm
 from diagnose.fit import fit, settings_of
 from diagnose.forward import Forward
 from mechanics.effects.registry import effect
+from mechanics.effects.time_delay import EFFECT as DELAY
 from mechanics.presses import Presses
 from palpate.exploring.causes import NONE, Causes, Weighing
 from palpate.exploring.estimate import BOOTSTRAPS, Estimate, rows_of
@@ -75,11 +76,13 @@ def _beside(
     """((log modulus, its standard deviation), what the cause's own parameters add to it)."""
     e = estimate
     assert e.presses_placed is not None and e.sites is not None and e.exploration is not None
-    each = effect(name)
-    fitted = fit(w.forward, w.whitener, [each], modulus=w.found.modulus, onset=w.found.onset, iterations=8)
+    # a delay that was found is part of every hypothesis: presses are weighed as read
+    late = (DELAY,) if e.presses_placed.delay_s and name != DELAY.name else ()
+    acting = [effect(name), *late]
+    fitted = fit(w.forward, w.whitener, acting, modulus=w.found.modulus, onset=w.found.onset, iterations=8)
     # to where the ideal model has it from the first touches as found: a play or a delay has moved those too
-    acting = settings_of(w.forward, fitted.effects, fitted.values, fitted.onset)
-    change = np.nan_to_num(w.forward.predict(acting) - w.forward.predict(w.forward.ideal(fitted.modulus)))
+    settings = settings_of(w.forward, fitted.effects, fitted.values, fitted.onset)
+    change = np.nan_to_num(w.forward.predict(settings) - w.forward.predict(w.forward.ideal(fitted.modulus)))
     kept, presses = without(e.presses_placed, w.forward, change)
     covariance = None if e.covariance is None else e.covariance[np.ix_(kept, kept)]
     made = fit_modulus(
@@ -99,7 +102,8 @@ def _beside(
 def without(presses: Presses, forward: Forward, change: np.ndarray) -> tuple[np.ndarray, Presses]:
     """(numbers (k,) of the presses that a forward model holds, a table of those with a change taken off).
 
-    change: (n, 3) N, at the forward model's rows, in its presses' local frames.
+    change: (n, 3) N, at the forward model's rows, in its presses' local frames; a delay that was found is
+    part of it, and undone.
     """
     t = forward.touches
     device = np.einsum("nij,ni->nj", t.frame[t.press], change)
@@ -110,4 +114,4 @@ def without(presses: Presses, forward: Forward, change: np.ndarray) -> tuple[np.
         if part.stop > part.start:
             for axis in range(3):
                 force[own, axis] -= np.interp(presses.t[own], t.t[part], device[part, axis])
-    return number, dataclasses.replace(presses, force=force).of(number)
+    return number, dataclasses.replace(presses, force=force, delay_s=0.0).of(number)

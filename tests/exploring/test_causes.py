@@ -32,7 +32,7 @@ def _explored(rng, columns, cause=None, size=0.0):
         both = np.column_stack([y, x])
         gram += both.T @ both
         weighing = Weighing(
-            forward, None, (), names, np.ones(len(names)), gram, OWN, float(READINGS) * (len(told) + 1),
+            forward, None, None, (), names, np.ones(len(names)), gram, OWN, float(READINGS) * (len(told) + 1),
             np.ones(1), np.zeros(len(names)), None,
         )  # fmt: skip
         told.append(judge(weighing, 0.05))

@@ -26,13 +26,18 @@ def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recor
     assert state.done
 
 
+TRUE_PA = {"time-delay": 35e3, "viscoelasticity": 24e3}
+"""As the recordings' descriptions state."""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["time-delay", "viscoelasticity"])
-def test_the_labelled_cause_stands_alone(shared_recordings, name):
+def test_the_labelled_cause_stands_alone_and_the_modulus_beside_it_is_the_true_one(shared_recordings, name):
     recording = read_recording(shared_recordings / f"example-{name}.toml")
     state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
     assert state.causes.standing(0.95) == [name.replace("-", "_")]
-    assert np.isfinite(state.modulus_pa)
+    low, high = state.modulus_ci95_pa
+    assert low < TRUE_PA[name] < high and high < 1.25 * low
 
 
 @pytest.mark.slow
