@@ -252,7 +252,8 @@ class _Face:
 
 
 def _enclosed(path: np.ndarray, normal: np.ndarray, near_m: float) -> _Face | None:
-    """The largest face that a path (n, 3) m goes round, gaps of up to `near_m` closed; None where it is open.
+    """The largest face that a path (n, 3) m goes round with most of its way, gaps of up to `near_m` closed;
+    None where it is open.
 
     Samples farther from it than `reach_m` were on the support alone: there the tip came down beside the
     object and slid up to it, or slid away.
@@ -276,7 +277,8 @@ def _enclosed(path: np.ndarray, normal: np.ndarray, near_m: float) -> _Face | No
     if not sizes.any():
         return None
     distance = distance_transform_edt(faces != np.argmax(sizes)) * cell
-    return _Face(middle, axes, corner, cell, distance, wide * cell + 0.5 * near_m)
+    face = _Face(middle, axes, corner, cell, distance, wide * cell + 0.5 * near_m)
+    return face if np.mean(face.away(path) < face.reach_m) > 0.5 else None
 
 
 def _strokes(path: np.ndarray, gap_m: float) -> list[np.ndarray]:

@@ -62,6 +62,19 @@ def test_a_base_may_be_traced_in_strokes_that_come_up_to_it_from_beside(ways):
     assert np.quantile(np.abs(radius - 0.04), 0.9) < 2e-4 and np.abs(radius - 0.04).max() < 1.5e-3
 
 
+def test_a_round_that_a_lift_leaves_open_is_not_taken_for_the_little_loop_that_it_closes():
+    angle = np.linspace(0.0, 2.1 * np.pi, 12_000)
+    lifted = (angle > 2.0) & (angle < 2.0 + 0.004 / 0.045)  # 4 mm of the way, more than what counts as closed
+    path = np.column_stack([0.045 * np.cos(angle), 0.045 * np.sin(angle), np.full(len(angle), 0.005)])
+    turn = np.linspace(0, 2 * np.pi, 150)
+    path[6_600:6_750, :2] = path[6_600, :2] + 0.0025 * np.column_stack([1 - np.cos(turn), np.sin(turn)])
+    touching = ~lifted
+    force = np.tile([0.0, 0.0, 0.5], (len(path), 1))
+    found = find_boundary(path, force, touching, (0, len(path)), 0.0047, BoundaryOptions())
+    distance = np.hypot(found.outline[:, 0], found.outline[:, 1])
+    assert 0.038 < np.median(distance) < 0.0425 and np.ptp(found.outline[:, 0]) > 0.075
+
+
 def test_no_phase_is_an_error_that_names_the_remedies():
     recording, _ = explore_cylinder(without_phase=True)
     with pytest.raises(ContactError, match="trace .*base.*model = PATH"):
