@@ -27,7 +27,8 @@ from mechanics.standing import Standing, standing
 from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 from mechanics.tetmesh import TetMesh, vertex_normals
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
-from reconstruct.contacts import Exploration, hysteresis
+from reconstruct.contacts import Exploration
+from reconstruct.filtered import hysteresis
 from reconstruct.known_base import base_of_rim
 from reconstruct.registration import (
     DIRECTION_RAD,

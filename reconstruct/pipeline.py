@@ -25,7 +25,8 @@ from reconstruct.casting import CastPoints, cast
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
-from reconstruct.contacts import ContactOptions, Exploration, Filtered, explore
+from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.filtered import Filtered
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_base import base_of_model
 from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry

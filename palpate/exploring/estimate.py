@@ -20,7 +20,8 @@ from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from palpate.exploring.goals import surface_error, vertex_areas
 from reconstruct.casting import cast
-from reconstruct.contacts import ContactOptions, Exploration, explore, filtered_of
+from reconstruct.contacts import ContactOptions, Exploration, explore
+from reconstruct.filtered import filtered_of
 from reconstruct.filtering import FilterOptions
 from reconstruct.meshing import MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus

@@ -21,7 +21,8 @@ from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
-from reconstruct.contacts import Exploration, Filtered, explore
+from reconstruct.contacts import Exploration, explore
+from reconstruct.filtered import Filtered
 from reconstruct.filtering import FilterOptions
 from reconstruct.known_shape import GeometryOptions, stated_geometry
 

@@ -11,8 +11,8 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.contacts import Filtered, filtered_of
 from reconstruct.delay import Delay
+from reconstruct.filtered import Filtered, filtered_of
 from reconstruct.filtering import FilterOptions, white_noise_std
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from reconstruct.contacts import hysteresis
+from reconstruct.filtered import hysteresis
 from reconstruct.filtering import low_pass, low_pass_at
 from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
 

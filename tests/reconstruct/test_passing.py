@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import explore_cylinder
 
-from reconstruct.contacts import filtered_of
+from reconstruct.filtered import filtered_of
 from reconstruct.passing import between, missed, passing
 
 
