@@ -1,5 +1,5 @@
-"""A recording as touches are looked for in it: low-passed, less what is read in free air, and how far that may
-be wrong."""
+"""A recording as touches are looked for in it: low-passed, less what is read in free air, and how far that
+may be wrong."""
 
 from __future__ import annotations
 
