@@ -24,6 +24,7 @@ from reconstruct.delay import Delay, force_delay
 from reconstruct.filtered import Filtered, filtered_of
 from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
+from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
@@ -56,7 +57,9 @@ class ContactOptions:
         flag="--least-peak",
     )
     least_duration_s: float = option(0.05, "a press must last so long", unit="s")
-    least_palpations: int = option(4, "fewer usable presses are an error", flag="--least-palpations")
+    least_palpations: int = option(
+        LEAST_TOUCHES, "fewer usable presses are an error", flag="--least-palpations"
+    )
     correct_delay: bool = option(
         True, "shift a force that reads late (first against last touch); never in the paper's mode",
         flag="--correct-delay",

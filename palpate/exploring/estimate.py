@@ -27,12 +27,13 @@ from reconstruct.meshing import MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.pipeline import Clock
 from reconstruct.shape_error import compliance_covariance, shape_gradients
+from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 from reconstruct.tool_weight import ToolWeight
 
 MESH_M, SURFACE_EDGE_M = 0.016, 0.010
 """Tetrahedra of the running estimate, and of its surface."""
-LEAST_PRESSES = 4
+LEAST_PRESSES = LEAST_TOUCHES
 _ALL_SHAPES_EVERY = 6
 _CONFIRMED_AFTER = 2
 """Presses since all families were tried, after which a goal that one family meets has them tried again."""

@@ -10,6 +10,7 @@ from scipy.special import erf
 
 from mechanics.errors import OptionError
 from mechanics.options import option
+from reconstruct.shapes.evidence import LEAST_TOUCHES
 
 
 @dataclass(frozen=True)
@@ -35,8 +36,8 @@ class GoalOptions:
             raise OptionError(f"--surface-within is {self.surface_within_m} m; it must be greater than 0")
         if self.cause_at is not None and not 0.5 <= self.cause_at < 1:
             raise OptionError(f"--cause-at is {self.cause_at}; it must lie between 0.5 and 1 (0.95)")
-        if self.most < 4:
-            raise OptionError(f"--most is {self.most}; a reconstruction needs 4 presses or more")
+        if self.most < LEAST_TOUCHES:
+            raise OptionError(f"--most is {self.most}; a surface needs {LEAST_TOUCHES} presses or more")
 
 
 @dataclass(frozen=True)
