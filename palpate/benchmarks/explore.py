@@ -39,6 +39,8 @@ VERSION = 3
 PHANTOMS = 2
 """Of how phantoms are drawn and how strong their causes are."""
 NAMES = ("guided", *ORDERS)
+AT, WITHIN = 12, 0.05
+"""Presses at which the modulus is held against the truth, and what counts as right."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -176,9 +178,24 @@ def alone(step: dict[str, Any]) -> bool:
     return len(step.get("standing", [])) == 1
 
 
+def by_truth(own: list[dict[str, Any]]) -> list[Any]:
+    """Of one order: the modulus after AT presses, or where the exploration ended before."""
+    last = [
+        steps[-1]
+        for m in own
+        if (steps := [s for s in m["steps"] if "modulus_half" in s and s["made"] <= AT])
+    ]
+    off = [abs(s["modulus_error"]) for s in last]
+    return [
+        len(last), 100 * _middle(off), 100 * _share([x <= WITHIN for x in off]),
+        100 * _middle([abs(s["plain_error"]) for s in last]), 100 * _middle([s["modulus_half"] for s in last]),
+        100 * _share([s["covered"] for s in last]),
+    ]  # fmt: skip
+
+
 def tables(made: list[dict[str, Any]], orders: list[str]) -> str:
-    """Both tables: shape and modulus; causes."""
-    shape, cause, heads = [], [], []
+    """All tables: shape and modulus by their own word; causes; the modulus by the truth."""
+    shape, cause, truth = [], [], []
     for order in orders:
         own = [m for m in made if m["order"] == order and m.get("steps")]
         if not own:
@@ -193,6 +210,7 @@ def tables(made: list[dict[str, Any]], orders: list[str]) -> str:
             _middle([1e3 * s["surface_m"] for _, s in met if s["surface_m"] is not None]),
             _middle([s["update_s"] for m in own for s in m["steps"] if s["presses"] >= 5]),
         ])  # fmt: skip
+        truth.append([order, *by_truth(own)])
         there = [m for m in own if m["cause"]]
         told = [(m, s) for m in there if (s := first_at(m, alone))]
         right = [s for m, s in told if s["standing"] == [m["cause"]]]
@@ -210,8 +228,10 @@ def tables(made: list[dict[str, Any]], orders: list[str]) -> str:
              "covered", "95 % of surface within [mm]", "update, median [CPU s]"]  # fmt: skip
     more = ["order", "with a cause", "right one alone", "wrong one alone", "true one ever out",
             "presses, median", "seconds", "'none' ever out where it is true"]  # fmt: skip
+    so = ["order", "phantoms", f"modulus error after {AT} [%]", f"within {100 * WITHIN:g} % [%]",
+          "without causes [%]", "half the interval [%]", "covered [%]"]  # fmt: skip
     troubles = [f"seed {m['seed']}, {m['order']}: {m['trouble']}" for m in made if m["trouble"]]
-    return "\n".join([table(heads, shape), "", table(more, cause), *troubles])
+    return "\n".join([table(heads, shape), "", table(more, cause), "", table(so, truth), *troubles])
 
 
 def _median(values: list[float], of: int) -> str:
@@ -221,6 +241,10 @@ def _median(values: list[float], of: int) -> str:
         return "-"
     middle = 0.5 * (ranked[(of - 1) // 2] + ranked[of // 2])
     return f"{middle:.0f}" if np.isfinite(middle) else "not reached"
+
+
+def _share(values: list[bool]) -> float:
+    return sum(values) / len(values) if values else float("nan")
 
 
 def _middle(values: list[float]) -> float:
