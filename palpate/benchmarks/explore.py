@@ -188,7 +188,8 @@ def by_truth(own: list[dict[str, Any]]) -> list[Any]:
     off = [abs(s["modulus_error"]) for s in last]
     return [
         len(last), 100 * _middle(off), 100 * _share([x <= WITHIN for x in off]),
-        100 * _middle([abs(s["plain_error"]) for s in last]), 100 * _middle([s["modulus_half"] for s in last]),
+        100 * _middle([abs(s["plain_error"]) for s in last]),
+        100 * _middle([s["modulus_half"] for s in last]),
         100 * _share([s["covered"] for s in last]),
     ]  # fmt: skip
 
