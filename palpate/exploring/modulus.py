@@ -35,31 +35,22 @@ def modulus_beside(
 ) -> tuple[float, tuple[float, float]]:
     """(Pa, 95 % interval) of the modulus over the likeliest hypotheses."""
     assert estimate.fit is not None
-    ranked = sorted(causes.probability.items(), key=lambda item: -item[1])[:MOST]
-    found, weights = [], []
-    for name, probability in ranked:
+    plain = _by(estimate.fit)
+    found = []
+    for name, probability in sorted(causes.probability.items(), key=lambda item: -item[1])[:MOST]:
         if probability < LEAST:
             continue
-        made = (_by(estimate.fit), 0.0)
-        if name != NONE and effect(name).seek is None:
-            made = _beside(estimate, weighing, causes, name, seed)
-        (value, sd), more = made
-        found.append((value, float(np.hypot(sd, more))))
-        weights.append(probability)
-    values, sds = np.array(found).T
-    share = np.array(weights) / np.sum(weights)
+        sought = name != NONE and effect(name).seek is None
+        log, sd = _beside(estimate, weighing, causes, name, seed) if sought else plain
+        if np.isfinite(log) and 0 < sd < np.inf:
+            found.append((log, sd, probability))
+    if not found:
+        return estimate.fit.modulus_pa, estimate.fit.ci95_pa
+    logs, sds, shares = np.array(found).T
+    low, high = logs.min() - 8 * sds.max(), logs.max() + 8 * sds.max()
 
     def at(level: float) -> float:
-        span = 8 * sds.max()
-        return float(
-            np.exp(
-                brentq(
-                    lambda x: share @ norm.cdf((x - values) / sds) - level,
-                    values.min() - span,
-                    values.max() + span,
-                )
-            )
-        )
+        return float(np.exp(brentq(lambda x: shares @ (norm.cdf((x - logs) / sds) - level), low, high)))
 
     return at(0.5), (at(0.025), at(0.975))
 
@@ -70,10 +61,8 @@ def _by(made: ModulusFit) -> tuple[float, float]:
     return float(np.log(made.modulus_pa)), float(np.log(high / low) / 3.92)
 
 
-def _beside(
-    estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: int
-) -> tuple[tuple[float, float], float]:
-    """((log modulus, its standard deviation), what the cause's own parameters add to it)."""
+def _beside(estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: int) -> tuple[float, float]:
+    """(log modulus, its standard deviation) of the presses with one cause taken off."""
     e = estimate
     assert e.presses_placed is not None and e.sites is not None and e.exploration is not None
     # a delay that was found is part of every hypothesis: presses are weighed as read
@@ -95,8 +84,10 @@ def _beside(
     )
     over = w.forward.touches.noise.variance_inflation * max(1.0, causes.misfit)
     hessian = fitted.gram.sum(axis=0)[1:, 1:] + np.diag(fitted.prior)
-    joint = float(np.linalg.pinv(hessian)[0, 0])
-    return _by(made), float(np.sqrt(max(joint - 1 / hessian[0, 0], 0.0) * over))
+    # what the cause's own parameters leave open of the modulus
+    more = max(float(np.linalg.pinv(hessian)[0, 0]) - 1 / float(hessian[0, 0]), 0.0)
+    log, sd = _by(made)
+    return log, float(np.sqrt(sd**2 + more * over))
 
 
 def without(presses: Presses, forward: Forward, change: np.ndarray) -> tuple[np.ndarray, Presses]:
