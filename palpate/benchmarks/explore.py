@@ -201,14 +201,13 @@ def tables(made: list[dict[str, Any]], orders: list[str]) -> str:
         own = [m for m in made if m["order"] == order and m.get("steps")]
         if not own:
             continue
-        met = [(m, s) for m in own if (s := first_at(m, shape_and_modulus))]
-        reached = [s for _, s in met]
+        met = [s for m in own if (s := first_at(m, shape_and_modulus))]
         shape.append([
-            order, len(own), len(met), _median([s["made"] for _, s in met], len(own)),
-            _median([s["seconds"] for _, s in met], len(own)),
-            _middle([100 * abs(s["modulus_error"]) for s in reached]),
-            f"{sum(s['covered'] for s in reached)}/{len(reached)}",
-            _middle([1e3 * s["surface_m"] for _, s in met if s["surface_m"] is not None]),
+            order, len(own), len(met), _median([s["made"] for s in met], len(own)),
+            _median([s["seconds"] for s in met], len(own)),
+            _middle([100 * abs(s["modulus_error"]) for s in met]),
+            f"{sum(s['covered'] for s in met)}/{len(met)}",
+            _middle([1e3 * s["surface_m"] for s in met if s["surface_m"] is not None]),
             _middle([s["update_s"] for m in own for s in m["steps"] if s["presses"] >= 5]),
         ])  # fmt: skip
         truth.append([order, *by_truth(own)])

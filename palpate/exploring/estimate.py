@@ -41,7 +41,7 @@ _MOVED_M = 0.0007
 """The mesh is made anew where the surface has left it by more than this (95 % of the vertices) ..."""
 _MOVED_SHARE = 0.25
 """... and more than this share of what the surface is uncertain by."""
-BOOTSTRAPS = 200
+_BOOTSTRAPS = 200
 
 
 @dataclass(frozen=True)
@@ -119,19 +119,20 @@ def updated(
     clock.lap("touch sites")
     deviation = uncertainty_at(solved.solver.mesh, surface)
     covariance = compliance_covariance(solved.solver, sites, deviation, gradient=gradient)
-    fit = fit_modulus(
-        presses,
-        sites,
-        exploration.noise_n,
-        ModulusOptions(bootstraps=BOOTSTRAPS),
-        compliance_covariance=covariance,
-        seed=seed,
-    )
+    fit = modulus_of(presses, sites, exploration.noise_n, covariance, seed)
     clock.lap("modulus")
     return Estimate(
         exploration, filtered.weight, surface, solved, presses, sites, fit, chosen_at, choice_error,
         clock.laps, covariance,
     )  # fmt: skip
+
+
+def modulus_of(
+    presses: Presses, sites: TouchSites, noise_n: float, covariance: np.ndarray, seed: int
+) -> ModulusFit:
+    """As a reconstruction's, of fewer resamples; see reconstruct.modulus.fit_modulus."""
+    options = ModulusOptions(bootstraps=_BOOTSTRAPS)
+    return fit_modulus(presses, sites, noise_n, options, compliance_covariance=covariance, seed=seed)
 
 
 def _surface(

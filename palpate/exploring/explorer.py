@@ -24,7 +24,7 @@ from palpate.exploring.candidates import TOUCH_ERROR_M, Candidate, ReachOptions,
 from palpate.exploring.causes import Causes, Weighing, causes_of, words
 from palpate.exploring.estimate import LEAST_PRESSES, Estimate, updated
 from palpate.exploring.goals import GoalOptions, Standing
-from palpate.exploring.modulus import modulus_beside
+from palpate.exploring.modulus import log_sd, modulus_beside
 from palpate.exploring.orders import Order
 from palpate.exploring.parting import RIGID_S, Parting, by_support, missing, partings
 from palpate.exploring.rows import Instrument, Segment, apart, check_joined, together
@@ -359,8 +359,7 @@ class Explorer:
         e = self._estimate
         if e.surface is None or e.exploration is None or e.fit is None:
             return None
-        low, high = state.modulus_ci95_pa
-        sd = float(np.log(high / low) / 3.92)
+        sd = log_sd(state.modulus_ci95_pa)
         presses = e.exploration.presses
         used = e.fit.weights > 0 if (e.fit.weights > 0).any() else np.ones(len(presses), dtype=bool)
         ranked = weighed(

@@ -20,8 +20,8 @@ from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY
 from mechanics.presses import Presses
 from palpate.exploring.causes import NONE, Causes, Weighing
-from palpate.exploring.estimate import BOOTSTRAPS, Estimate, rows_of
-from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from palpate.exploring.estimate import Estimate, modulus_of, rows_of
+from reconstruct.modulus import ModulusFit
 
 MOST = 3
 """Hypotheses that are fitted, the likeliest."""
@@ -55,16 +55,22 @@ def modulus_beside(
     return at(0.5), (at(0.025), at(0.975))
 
 
+def log_sd(interval: tuple[float, float]) -> float:
+    """Standard deviation of the logarithm of what has this 95 % interval."""
+    low, high = interval
+    return float(np.log(high / low) / 3.92)
+
+
 def _by(made: ModulusFit) -> tuple[float, float]:
     """(log, its standard deviation)."""
-    low, high = made.ci95_pa
-    return float(np.log(made.modulus_pa)), float(np.log(high / low) / 3.92)
+    return float(np.log(made.modulus_pa)), log_sd(made.ci95_pa)
 
 
 def _beside(estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: int) -> tuple[float, float]:
     """(log modulus, its standard deviation) of the presses with one cause taken off."""
     e = estimate
-    assert e.presses_placed is not None and e.sites is not None and e.exploration is not None
+    assert e.presses_placed is not None and e.sites is not None
+    assert e.exploration is not None and e.covariance is not None
     # a delay that was found is part of every hypothesis: presses are weighed as read
     late = (DELAY,) if e.presses_placed.delay_s and name != DELAY.name else ()
     acting = [effect(name), *late]
@@ -73,15 +79,8 @@ def _beside(estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: in
     settings = settings_of(w.forward, fitted.effects, fitted.values, fitted.onset)
     change = np.nan_to_num(w.forward.predict(settings) - w.forward.predict(w.forward.ideal(fitted.modulus)))
     kept, presses = without(e.presses_placed, w.forward, change)
-    covariance = None if e.covariance is None else e.covariance[np.ix_(kept, kept)]
-    made = fit_modulus(
-        presses,
-        rows_of(e.sites, kept),
-        e.exploration.noise_n,
-        ModulusOptions(bootstraps=BOOTSTRAPS),
-        compliance_covariance=covariance,
-        seed=seed,
-    )
+    covariance = e.covariance[np.ix_(kept, kept)]
+    made = modulus_of(presses, rows_of(e.sites, kept), e.exploration.noise_n, covariance, seed)
     over = w.forward.touches.noise.variance_inflation * max(1.0, causes.misfit)
     hessian = fitted.gram.sum(axis=0)[1:, 1:] + np.diag(fitted.prior)
     # what the cause's own parameters leave open of the modulus
