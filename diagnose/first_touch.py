@@ -7,16 +7,17 @@ import numpy as np
 from diagnose.forward import Forward
 from diagnose.whiten import Whitener
 
+REACH_M = 2.4e-3
+"""Most by which a first touch is moved."""
 
-def first_touches(
-    forward: Forward, whitener: Whitener, modulus: float, reach_m: float = 2.4e-3
-) -> np.ndarray:
+
+def first_touches(forward: Forward, whitener: Whitener, modulus: float) -> np.ndarray:
     """(p,) m, how much earlier each press met the surface than its model says: a search over shifts.
 
     Each press alone, with a free factor on its force, so that neither modulus nor shape decides it.
     """
     t = forward.touches
-    shifts = np.linspace(-reach_m, reach_m, 25)
+    shifts = np.linspace(-REACH_M, REACH_M, 25)
     cost = np.empty((len(shifts), len(t)))
     measured = np.where(t.counted, t.local_force[:, 0], 0.0)
     for i, shift in enumerate(shifts):

@@ -58,15 +58,19 @@ class Whitener:
         settings: Settings,
         options: NuisanceOptions,
         site_sd: np.ndarray | None = None,
+        onset_sd: np.ndarray | None = None,
     ) -> None:
+        """site_sd: (p,) share by which each press's stiffness may be off. onset_sd: (p,) m, of each first
+        touch. By default the options'."""
         self.touches = forward.touches
         self.variance = self.touches.noise_n**2 + options.floor_n**2
         self.blocks: list[Block] = []
-        columns = nuisance_columns(forward, settings, options, site_sd)
-        self.onset_sd = options.onset_m
-        self.onset_column = columns[0][1] / options.onset_m
+        presses = len(self.touches)
+        self.onset_sd = np.full(presses, options.onset_m) if onset_sd is None else onset_sd
+        columns = nuisance_columns(forward, settings, options, site_sd, self.onset_sd)
+        self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]
         site = options.site_stiffness if site_sd is None else site_sd
-        self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(len(self.touches))
+        self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
         for rows, matrix in _by_site(self.touches, columns):
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)
@@ -105,7 +109,11 @@ class Whitener:
 
 
 def nuisance_columns(
-    forward: Forward, settings: Settings, options: NuisanceOptions, site_sd: np.ndarray | None
+    forward: Forward,
+    settings: Settings,
+    options: NuisanceOptions,
+    site_sd: np.ndarray | None,
+    onset_sd: np.ndarray,
 ) -> list[tuple[str, np.ndarray]]:
     """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance."""
     t = forward.touches
@@ -121,7 +129,7 @@ def nuisance_columns(
     zero = np.zeros_like(normal)
     tangential = np.column_stack([zero, f[:, 1], f[:, 2]])
     return [
-        ("press", (np.nan_to_num(forward.predict(moved)) - f) * (options.onset_m / small)),
+        ("press", (np.nan_to_num(forward.predict(moved)) - f) * (onset_sd / small)[t.press][:, None]),
         ("site", f * site_sd[t.press][:, None]),
         ("press", f * options.press_stiffness),
         ("site", np.column_stack([zero, normal, zero]) * options.tilt),

@@ -34,9 +34,9 @@ from palpate.exploring.orders import ORDERS
 from scenes.laboratory.specimen import VERSION as LABORATORY
 
 SUMMARY = "guided exploration against other orders: presses and seconds until the goals are met"
-VERSION = 3
+VERSION = 4
 """Of what an exploration does: raised when kept ones say nothing of the program any more."""
-PHANTOMS = 2
+PHANTOMS = 3
 """Of how phantoms are drawn and how strong their causes are."""
 NAMES = ("guided", *ORDERS)
 AT, WITHIN = 12, 0.05

@@ -116,7 +116,6 @@ def weighed(
         if "surface" in missing:
             after = after_touch(surface.vertices, surface.uncertainty_m, row)
             gain = float(np.log(own / surface_error(after[free], area[free])))
-        nearest = int(np.argmin(((touched - point) ** 2).sum(axis=1))) if len(touched) else 0
         for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), partings, reach):
             gains = {"surface": gain}
             if "modulus" in missing:
@@ -125,8 +124,7 @@ def weighed(
                     missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
                 )
             if "cause" in missing:
-                told = UNTOLD if way.parting is None else way.parting.gain
-                gains["cause"] = float(np.atleast_1d(told)[min(nearest, np.size(told) - 1)])
+                gains["cause"] = UNTOLD if way.parting is None else way.parting.near(point)
             seconds = (
                 float(np.linalg.norm(point - here)) / reach.air_speed_m_per_s
                 + 2 * reach.clearance_m / reach.air_speed_m_per_s

@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.first_touch import first_touches
+from diagnose.first_touch import REACH_M, first_touches
 from diagnose.fit import Fit, fit, settings_of
 from diagnose.forward import Forward
 from diagnose.freeair import free_air_of
@@ -71,8 +71,10 @@ COMMON = {
 wrongly; share of the sideways force; s by which the force is late; m of all first touches; share of finite
 strain; rad by which forces are turned about each axis of the device; share of the push that goes up or down
 along the surface."""
-FIELD, FIELD_M = 0.03, 0.03
-"""Share by which the stiffness of places may be off that neighbours share, and over which distance."""
+TAILS = 3.0
+"""Degrees of freedom of the running shape's error at a touch."""
+FIELD_M = 0.03
+"""Distance over which neighbours share what a place's stiffness may be off by."""
 BALL_GRID_M, BALL_RADII_M, BALL_SHARE = 0.014, (0.008, 0.012), 0.5
 """Balls that are weighed: apart, radii, and the share by which a form is softer."""
 LITTLE = 0.1
@@ -187,11 +189,12 @@ def weigh(estimate: Estimate) -> Weighing | None:
     onset = first_touches(forward, whitener, modulus)
     found = fit(forward, whitener, [], modulus=modulus, onset=onset, iterations=6)
     settings = settings_of(forward, (), found.values, found.onset)
-    whitener = Whitener(forward, settings, nuisance, site_sd)
+    onset_sd = first_touch_sd(found.onset, nuisance.onset_m)
+    whitener = Whitener(forward, settings, nuisance, site_sd, onset_sd)
     before = np.nan_to_num(forward.predict(settings))
     residual = forward.touches.local_force - before
     residual = residual + whitener.onset_column * found.onset[forward.touches.press][:, None]
-    own = common_errors(forward, found, before)
+    own = common_errors(forward, found, before, site_sd)
     names, acts, changes, springs = [], [], [], []
     for name, act in forms_of(forward):
         change = changed(forward, found, act) - before
@@ -218,6 +221,16 @@ def weigh(estimate: Estimate) -> Weighing | None:
         forward, whitener, found, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
         np.array(springs), _on_support(estimate),
     )  # fmt: skip
+
+
+def first_touch_sd(onset: np.ndarray, usual_m: float) -> np.ndarray:
+    """(p,) m, standard deviation of each first touch, given where it lies (p,) m from its place: of Student's
+    t, as a mixture of Gaussians, the one that it then came from.
+
+    A running shape passes single touches by millimetres (an edge, a face that nobody touched yet); as
+    Gaussians of the usual width these would rule out every hypothesis but one that moves them.
+    """
+    return np.sqrt((TAILS * usual_m**2 + onset**2) / (TAILS + 1))
 
 
 def _spring(forward: Forward, found: Fit, act: Act) -> float:
@@ -253,13 +266,17 @@ def _size(change: np.ndarray, plain: np.ndarray) -> float:
 
 def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     """(forward model of the presses so far, (p,) share by which each place's stiffness may be off); on the
-    running estimate's own mesh and solved places."""
+    running estimate's own mesh and solved places. Presses that the running surface passes by more than a
+    first touch can be moved are left out: they lie on a shape that is not there yet."""
     e = estimate
     if e.solved is None or e.presses_placed is None or e.fit is None or e.surface is None:
         return None
-    if len(e.presses_placed) < LEAST_PRESSES:
+    placed = e.presses_placed
+    passed = np.einsum("pi,pi->p", placed.centre - placed.point, placed.normal) - placed.tip_radius_m
+    placed = placed.of(np.abs(passed) < REACH_M)
+    if len(placed) < LEAST_PRESSES:
         return None
-    touches = touches_of(e.presses_placed)
+    touches = touches_of(placed)
     model = _model(estimate, touches)
     sites, _ = solved_sites(e.solved, touches.point, touches.normal, model.material.poisson_ratio)
     far = np.einsum("pij,pjk,plk->pil", touches.frame, sites.far, touches.frame)
@@ -288,8 +305,9 @@ def _model(e: Estimate, presses: Presses) -> Model:
     )
 
 
-def common_errors(forward: Forward, found: Fit, before: np.ndarray) -> list[np.ndarray]:
-    """(n, 3) N each: one standard deviation of what our own law gets wrong at all places alike."""
+def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.ndarray) -> list[np.ndarray]:
+    """(n, 3) N each: one standard deviation of what our own law gets wrong at all places alike, or at
+    neighbours; site_sd: (p,) share by which each place's stiffness may be off."""
     t = forward.touches
     deepest = np.maximum(t.deepest[t.press], 1e-4)
     bend = np.clip(t.travel[:, 0], 0, None) / deepest - 0.7
@@ -313,7 +331,7 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray) -> list[np.n
     turned = [np.einsum("nij,nj->ni", frame, np.cross(axis, device)) for axis in np.eye(3)]
     up = np.einsum("nij,j->ni", frame, forward.model.support.normal)
     up[:, 0] = 0.0
-    field = np.linalg.cholesky(_field(t.point) + 1e-9 * np.eye(len(t)))
+    field = np.linalg.cholesky(_field(t.point, site_sd) + 1e-9 * np.eye(len(t)))
     return [
         before * (bend * COMMON["bend"])[:, None],
         sideways * COMMON["sideways"],
@@ -326,10 +344,10 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray) -> list[np.n
     ]
 
 
-def _field(points: np.ndarray) -> np.ndarray:
+def _field(points: np.ndarray, site_sd: np.ndarray) -> np.ndarray:
     """(p, p) covariance of the share by which the stiffness of places (p, 3) m is off."""
     squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
-    return FIELD**2 * np.exp(-squared / (2 * FIELD_M**2))
+    return np.outer(site_sd, site_sd) * np.exp(-squared / (2 * FIELD_M**2))
 
 
 def tried(presses: Presses) -> list[Effect]:

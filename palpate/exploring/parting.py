@@ -47,9 +47,14 @@ class Parting:
 
     plan: Plan
     depth_m: float
+    point: np.ndarray
     gain: np.ndarray
     first: str
     rival: str
+
+    def near(self, point: np.ndarray) -> float:
+        """The gain at the pressed place that is nearest to a point (3,) m."""
+        return float(self.gain[np.argmin(((self.point - point) ** 2).sum(axis=1))])
 
 
 def missing(causes: Causes, name: str, at: float) -> float:
@@ -76,14 +81,15 @@ def partings(weighing: Weighing, causes: Causes, at: float) -> list[Parting]:
             if form is not None:
                 change[name] = form[1] * (changed(virtual, w.found, form[0]) - before)
         ideal = virtual.ideal(float(np.exp(w.found.values[0])))
-        whitener = Whitener(virtual, ideal, NuisanceOptions(), w.site_sd)
+        whitener = Whitener(virtual, ideal, NuisanceOptions(), w.site_sd, w.whitener.onset_sd)
         gain = np.zeros(len(virtual.touches))
         for rival in rivals:
             both = np.stack([change[first] - change[rival], before], axis=2)
             gram = whitener.gram(both)
             left = gram[:, 0, 0] - gram[:, 0, 1] ** 2 / np.maximum(gram[:, 1, 1], 1e-12)
             gain += np.minimum(0.5 * left / over, missing(causes, rival, at))
-        made.append(Parting(plan, depth_of(w.forward.touches, plan), gain, first, rivals[0]))
+        touches = w.forward.touches
+        made.append(Parting(plan, depth_of(touches, plan), touches.point, gain, first, rivals[0]))
     return made
 
 

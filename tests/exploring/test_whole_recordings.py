@@ -6,7 +6,9 @@ import dataclasses
 import numpy as np
 import pytest
 
+from diagnose.first_touch import REACH_M
 from mechanics.recording import read_recording
+from palpate.exploring.causes import NONE, causes_of
 from palpate.exploring.explorer import Explorer
 from palpate.exploring.goals import GoalOptions
 
@@ -48,6 +50,28 @@ def test_a_sound_object_under_a_sensor_with_a_bias_and_a_drift_has_no_cause(shar
     state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
     assert "none" in state.causes.standing(0.95), state.causes.ratio
     assert state.causes.misfit < 1.5
+
+
+def _passed(estimate, press, by_m):
+    """The estimate, its surface running below one press's first touch."""
+    placed = estimate.presses_placed
+    position, centre = np.array(placed.position), np.array(placed.centre)
+    position[placed.parts[press]] += by_m * placed.normal[press]
+    centre[press] += by_m * placed.normal[press]
+    return dataclasses.replace(
+        estimate, presses_placed=dataclasses.replace(placed, position=position, centre=centre)
+    )
+
+
+@pytest.mark.slow
+def test_a_surface_that_passes_one_touch_is_no_cause(shared_recordings):
+    recording = read_recording(shared_recordings / "silicone-2-block.toml")
+    explorer = Explorer.going_on(recording, GoalOptions(most=60))
+    for by_m in (1.5e-3, 6e-3):
+        causes, weighing = causes_of(_passed(explorer.estimate, 3, by_m))
+        assert NONE in causes.standing(0.95), causes.ratio
+        left_out = len(explorer.estimate.presses_placed) - len(weighing.forward.touches)
+        assert left_out == (by_m > REACH_M)
 
 
 @pytest.mark.slow
