@@ -1,7 +1,8 @@
 """Laws of tissue as whole recordings: simulated, reconstructed, diagnosed; is the law named, and how near?
 
 Everything else is drawn by seed from scenes.variety (object, modulus, frame, hand, presses, instrument, what
-the file states), the law's strength within --strength. Told: the verdict, the law's keys against the truth,
+the file states), the law's strength within --strength. Told: the law's size (rms of the force's change beside
+the best common factor, over the noise of a reading's vector), the verdict, the law's keys against the truth,
 and whether their 95 % intervals hold it. Touches that were never solved are solved first (minutes an object,
 more where the law needs a solid of its own).
 """
@@ -65,7 +66,18 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 one(law, round(float(strength), 2), seed, number, arguments.presses, arguments.touches)
             )
             print(_line(found[-1]), flush=True)
-    head = ["law", "strength", "object", "verdict", "key", "true", "found", "95 % interval", "holds"]
+    head = [
+        "law",
+        "strength",
+        "object",
+        "size / noise",
+        "verdict",
+        "key",
+        "true",
+        "found",
+        "95 % interval",
+        "holds",
+    ]
     print(table(head, [row for each in found for row in _rows(each)]))
     return {"recordings": found}
 
@@ -74,11 +86,12 @@ def one(law: str, strength: float, seed: int, number: int, most: int, touches: P
     """One recording of a law, and what came of it."""
     drawn = replace(draw(seed), number=number)
     drawn = replace(drawn, presses=int(np.clip(drawn.presses, LEAST_PRESSES, max(most, LEAST_PRESSES))))
-    made = explored(drawn, {law: strength}, it=thing(number), sizes=False, cache=touches)
+    made = explored(drawn, {law: strength}, it=thing(number), sizes=True, cache=touches)
     truth = dict(made.recording.truth or {})
     row: dict[str, Any] = {
         "law": law, "strength": strength, "seed": seed, "object": made.thing.phantom.name,
         "true": truth["parameters"][law], "young_modulus_pa": truth["young_modulus_pa"],
+        "size_n": truth["sizes"][law]["rms_after_best_scale_n"], "noise_n": drawn.noise_n,
     }  # fmt: skip
     with TemporaryDirectory() as folder:
         path = write(Path(folder) / "recording.csv.gz", made.recording, drawn)
@@ -99,8 +112,14 @@ def one(law: str, strength: float, seed: int, number: int, most: int, touches: P
     }  # fmt: skip
 
 
+def _over_noise(row: Mapping[str, Any]) -> float:
+    """The law's size over the noise of a reading's vector."""
+    return float(row["size_n"] / (row["noise_n"] * np.sqrt(3)))
+
+
 def _line(row: Mapping[str, Any]) -> str:
-    head = f"{row['law']} {row['strength']:g} on {row['object']}, seed {row['seed']}: "
+    what = f"{row['law']} {row['strength']:g} ({_over_noise(row):.2g} of the noise)"
+    head = f"{what} on {row['object']}, seed {row['seed']}: "
     if "refused" in row:
         return head + f"refused ({row['refused']})"
     beside = f"; cannot be told from {', '.join(row['candidates'])}" if row["candidates"] else ""
@@ -110,6 +129,7 @@ def _line(row: Mapping[str, Any]) -> str:
 def _rows(row: Mapping[str, Any]) -> list[list[Any]]:
     """A line a key of the law."""
     verdict = "refused" if "refused" in row else "named" if row["named"] else row["kind"]
+    of = [row["law"], row["strength"], row["object"], _over_noise(row), verdict]
     out = []
     for key, true in row["true"].items():
         value, between = row.get("found", {}).get(key), row.get("interval", {}).get(key)
@@ -117,8 +137,5 @@ def _rows(row: Mapping[str, Any]) -> list[list[Any]]:
             continue
         low, high = between or (np.nan, np.nan)
         holds = "" if between is None else "yes" if low <= true <= high else "no"
-        out.append(
-            [row["law"], row["strength"], row["object"], verdict, key, f"{true:.3g}", f"{value:.3g}",
-             f"{low:.3g} to {high:.3g}", holds]
-        )  # fmt: skip
-    return out or [[row["law"], row["strength"], row["object"], verdict, "", "", "", "", ""]]
+        out.append([*of, key, f"{true:.3g}", f"{value:.3g}", f"{low:.3g} to {high:.3g}", holds])
+    return out or [[*of, "", "", "", ""]]
