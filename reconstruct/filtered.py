@@ -142,9 +142,7 @@ def filtered_of(
     steady = less(weight, drift, lambda size: crowd_scale(size[~sliding]))
     if steady.spread.min() <= noise:
         return steady  # free air is as quiet as its sensor: there is nothing to follow
-    air, traced = passing(
-        t, position, steady.signals.force, recording.tip_radius_m, stated_tracing(recording)
-    )
+    air, traced = passing(t, position, steady.signals.force, recording.tip_radius_m, sliding)
     slow = slowly(t, recording.force_on_tool - weight.force, air)
     if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
         return steady

@@ -53,11 +53,11 @@ def passing(
     position: np.ndarray,
     force: np.ndarray,
     tip_radius_m: float,
-    traced_s: tuple[float, float] | None = None,
+    sliding: np.ndarray | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) bool: where the tip only passes, so that it is in the air; and where it is on the support.
 
-    position (n, 3) m and force (n, 3) N low-passed. traced_s: when the base is traced, where it is stated.
+    position (n, 3) m and force (n, 3) N low-passed. sliding: (n,) bool, where the base is traced for certain.
     """
     rate = (len(t) - 1) / (t[-1] - t[0])
     knots = _knots(position, _STEP * tip_radius_m, max(1, round(_SEEN_S * rate)))
@@ -66,8 +66,8 @@ def passing(
     at = np.clip(np.searchsorted(knots, np.arange(len(t)), side="right") - 1, 0, len(knots) - 1)
     near = turns[at] | turns[np.minimum(at + 1, len(knots) - 1)]
     on = _on_support(position, force, knots, tip_radius_m)
-    if traced_s is not None:
-        on |= (t >= traced_s[0]) & (t <= traced_s[1])
+    if sliding is not None:
+        on |= sliding
     margin = np.ones(2 * max(1, round(_MARGIN_S * rate)) + 1, dtype=bool)
     return ~binary_dilation(near | on, margin), on
 
