@@ -58,13 +58,15 @@ class Kind:
     """A kind of file that this program writes, told by how it begins, so that nothing else is replaced.
 
     words: for people. starts: what such a file may begin with. holds: bytes that stand somewhere in it.
-    likely_bytes: room that one takes. beside: further files that are written with it, with their kinds.
+    likely_bytes: room that one takes. goes: where it is written if a path is named. beside: further files
+    that are written with it, with their kinds.
     """
 
     words: str
     starts: tuple[bytes, ...]
     holds: bytes = b""
     likely_bytes: int = 1 << 20
+    goes: Callable[[Path], Path] = lambda path: path
     beside: Callable[[Path], list[tuple[Path, Kind]]] = lambda path: []
 
     def replaceable(self, path: Path) -> bool:
@@ -240,7 +242,7 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
 
     Raises FileError that says what is in the way, or how much room is missing.
     """
-    path = Path(path)
+    path = kind.goes(Path(path)) if isinstance(kind, Kind) else Path(path)
     with writing(path):
         target = _target(path, kind)
         place = target.parent

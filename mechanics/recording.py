@@ -440,18 +440,6 @@ def _read_table(path: Path) -> dict[str, np.ndarray]:
     return dict(zip(wanted, values.T, strict=True))
 
 
-def _description_of(path: Path) -> list[tuple[Path, Kind]]:
-    path = samples_path(path)
-    stem = path.name.removesuffix(".gz").removesuffix(".csv")
-    return [(path.with_name(stem + ".toml"), DESCRIPTION)]
-
-
-DESCRIPTION = Kind("a recording's description", (b"[recording]",))
-SAMPLES = Kind(
-    "a recording", (",".join(REQUIRED_COLUMNS).encode(),), likely_bytes=1 << 24, beside=_description_of
-)
-
-
 def samples_path(path: Path | str) -> Path:
     """Where the samples of a recording to be written go; raises RecordingError for another ending."""
     path = Path(path)
@@ -460,6 +448,19 @@ def samples_path(path: Path | str) -> Path:
     if not path.name.endswith((".csv", ".csv.gz")):
         raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
     return path
+
+
+def _description_of(path: Path) -> list[tuple[Path, Kind]]:
+    path = samples_path(path)
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    return [(path.with_name(stem + ".toml"), DESCRIPTION)]
+
+
+DESCRIPTION = Kind("a recording's description", (b"[recording]",))
+SAMPLES = Kind(
+    "a recording", (",".join(REQUIRED_COLUMNS).encode(),), likely_bytes=1 << 24, goes=samples_path,
+    beside=_description_of,
+)  # fmt: skip
 
 
 def write_recording(

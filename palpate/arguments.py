@@ -247,7 +247,9 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
 
 
 def _written_at(path: Path, kind: Kind | FolderKind) -> list[Path]:
-    return [path, *(other for other, _ in kind.beside(path))] if isinstance(kind, Kind) else [path]
+    if not isinstance(kind, Kind):
+        return [path]
+    return [kind.goes(path), *(other for other, _ in kind.beside(path))]
 
 
 def _files_of(path: Path) -> list[Path]:

@@ -15,7 +15,7 @@ SI: dict[str, dict[str, float]] = {
 }  # fmt: skip
 """Kind of quantity -> unit -> what one is in SI."""
 _BRACKETS = re.compile(r"[\[({]\s*([^\])}\d][^\])}]*?)\s*[\])}]\s*(?:#\d+)?$")
-_TAIL = re.compile(r"_([A-Za-zµμ]+)$")
+_TAIL = re.compile(r"(?:\s*[_/,]\s*|\s+)([A-Za-zµμ]+)$")
 
 
 def plain(unit: str) -> str:
@@ -33,7 +33,8 @@ _OTHER = ("-", "%", "pa", "kpa", "mpa", "deg", "rad", "nm", "n/mm^2")
 
 
 def unit_in(name: str, kind: str) -> str | None:
-    """The unit of that kind that a column's name ends with, in brackets or after an underscore."""
+    """The unit of that kind that a column's name ends with: in brackets, after an underscore, space or
+    slash."""
     found = _BRACKETS.search(name) or _TAIL.search(name)
     if not found:
         return None
@@ -45,7 +46,7 @@ def unit_in(name: str, kind: str) -> str | None:
 
 
 def without_unit(name: str) -> str:
-    """The name without the unit in brackets, or after an underscore, that it ends with."""
+    """The name without the unit in brackets, or after an underscore, space or slash, that it ends with."""
     bare = _BRACKETS.sub("", name)
     tail = _TAIL.search(bare)
     return bare[: tail.start()] if tail and is_unit(tail[1]) and len(bare) > len(tail[0]) else bare

@@ -10,9 +10,15 @@ from typing import Any
 import numpy as np
 from matplotlib.figure import Figure
 
-from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file
-from mechanics.recording import DESCRIPTION, QUATERNION_COLUMNS, REQUIRED_COLUMNS, SAMPLES, dump_toml
+from mechanics.recording import (
+    DESCRIPTION,
+    QUATERNION_COLUMNS,
+    REQUIRED_COLUMNS,
+    SAMPLES,
+    dump_toml,
+    samples_path,
+)
 from palpate.importing.convert import Understood
 
 PICTURE = Kind(
@@ -27,11 +33,7 @@ def write_imported(
 ) -> Path:
     """Write NAME.csv.gz (or .csv) with nine digits, whatever the scale, and NAME.toml, which says where it
     came from; returns the samples' path."""
-    path = Path(path)
-    if path.suffix == ".toml":
-        path = path.with_suffix(".csv.gz")
-    if not path.name.endswith((".csv", ".csv.gz")):
-        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
+    path = samples_path(path)
     recording = understood.recording
     columns = [recording.t[:, None], recording.position, recording.force_on_tool]
     names = list(REQUIRED_COLUMNS)

@@ -55,6 +55,19 @@ def test_units_separator_and_decimal_comma_come_from_the_file(tmp_path, world):
     assert "x = x (mm) [mm] (guessed)" in str(made)
 
 
+@pytest.mark.parametrize("form", ["{} {}", "{}_{}", "{} [{}]", "{} ({})", "{} / {}", "{}, {}"])
+def test_a_unit_may_stand_after_a_name_in_any_of_the_usual_ways(tmp_path, world, form):
+    names = [("Time", "ms"), *((a, "mm") for a in "XYZ"), *((f"F{a}", "mN") for a in "xyz")]
+    values = np.column_stack([1e3 * world["t"], 1e3 * world["p"], 1e3 * world["f"]])
+    head = ";".join(form.format(*each) for each in names)
+    np.savetxt(tmp_path / "log.csv", values, "%.6f", ";", header=head, comments="")
+    output = tmp_path / "rec.toml"
+    words = ["import", str(tmp_path / "log.csv"), "--tip-radius", str(TIP), "-o", str(output)]
+    assert cli.main(words) == 0
+    check(pp.read_recording(output), world)
+    assert cli.main(words) == 0  # what it wrote itself is replaced
+
+
 def test_matlab_hdf5_parquet_and_numpy_hold_the_same(tmp_path, world):
     h5py, pa = pytest.importorskip("h5py"), pytest.importorskip("pyarrow")
     import pyarrow.parquet as pq
