@@ -100,8 +100,7 @@ def find_interval(
 
     given: approximate times from the recording; contact that starts inside is followed to its end. Without
     them: contacts in which the tip slides further than 8 radii while it stays in one plane, until one leaves
-    that plane. touching: (n,) bool. Raises ContactError
-    where there is none.
+    that plane for good. touching: (n,) bool. Raises ContactError where there is none.
     """
     found = runs(touching)
     if given is not None:
@@ -119,7 +118,7 @@ def find_interval(
         centre, normal, flatness = fit_plane(position[a:b])
         if flatness > _FLAT * tip_radius_m:
             continue
-        first, last = _coplanar(t, position, found, i, _FLAT * tip_radius_m)
+        first, last = _coplanar(t, position, found, i, tip_radius_m)
         if sum(_travel(position[c:d]) for c, d in found[first : last + 1]) > _LEAST_SLIDE * tip_radius_m:
             return found[first][0], found[last][1]
     raise NoBaseError(
@@ -147,24 +146,40 @@ def in_its_plane(position: np.ndarray, inside: np.ndarray, tip_radius_m: float) 
 
 
 def _coplanar(
-    t: np.ndarray, position: np.ndarray, found: list[tuple[int, int]], start: int, limit_m: float
+    t: np.ndarray, position: np.ndarray, found: list[tuple[int, int]], start: int, tip_radius_m: float
 ) -> tuple[int, int]:
     """First and last of the contacts around `start` that lie in one plane with it, none left out between.
 
     The plane is fitted anew with each contact that is tried: one straight side of a foot alone tells no
-    plane. A contact of a moment, as of a tip that bounces, ends nothing.
+    plane. A contact of a moment, as of a tip that bounces, ends nothing; nor does one that stays within a
+    tip's radius of the plane and slides nowhere, as of a tip that is lifted along the object's wall.
     """
     lasting = [k for k, (a, b) in enumerate(found) if k == start or t[b - 1] - t[a] > _MOMENT_S]
     at = lasting.index(start)
     low = high = at
+
+    def thinned(k: int) -> np.ndarray:
+        a, b = found[lasting[k]]
+        return position[a:b:_THINNED]
+
+    def off(pieces: list[np.ndarray], of: list[np.ndarray]) -> float:
+        """m, the most by which the middle of any piece is off the plane of some."""
+        centre, normal, _ = fit_plane(np.concatenate(of))
+        return max(float(np.median(np.abs((piece - centre) @ normal))) for piece in pieces)
+
+    pieces = [thinned(at)]
     for step in (1, -1):
-        while 0 <= (tried := (high if step > 0 else low) + step) < len(lasting):
-            chosen = [found[k] for k in lasting[min(low, tried) : max(high, tried) + 1]]
-            thinned = [position[a:b:_THINNED] for a, b in chosen]
-            centre, normal, _ = fit_plane(np.concatenate(thinned))
-            if max(float(np.median(np.abs((x - centre) @ normal))) for x in thinned) > limit_m:
+        tried = at
+        while 0 <= (tried := tried + step) < len(lasting):
+            own = thinned(tried)
+            together = [*pieces, own]
+            if off(together, together) <= _FLAT * tip_radius_m:
+                pieces, low, high = together, min(low, tried), max(high, tried)
+            elif (
+                _travel(position[slice(*found[lasting[tried]])]) > _LEAST_PIECE * tip_radius_m
+                or off([own], pieces) > tip_radius_m
+            ):
                 break
-            low, high = min(low, tried), max(high, tried)
     return lasting[low], lasting[high]
 
 

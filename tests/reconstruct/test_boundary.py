@@ -7,7 +7,14 @@ import pytest
 from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 from mechanics.errors import ContactError
-from reconstruct.boundary import BoundaryOptions, farthest_points, find_boundary, fit_plane, in_its_plane
+from reconstruct.boundary import (
+    BoundaryOptions,
+    farthest_points,
+    find_boundary,
+    find_interval,
+    fit_plane,
+    in_its_plane,
+)
 from reconstruct.contacts import explore
 
 
@@ -37,6 +44,20 @@ def test_a_trace_with_a_lift_in_it_is_detected_whole():
     first, last = explore(whole).boundary.interval
     found = explore(recording).boundary.interval
     assert abs(found[0] - first) < 5 and abs(found[1] - last) < 5
+
+
+def test_a_lift_along_the_objects_wall_parts_no_tracing_and_presses_end_it():
+    """A round of a foot, the tip for a moment at the wall above it; then presses on the wall."""
+    rows = []  # (angle, height, touching)
+    rows += [(a, 0.005, True) for a in np.linspace(0, 2, 2000)] + [(2, 0.0051, False)] * 10
+    rows += [(2, h, True) for h in np.linspace(0.0052, 0.0065, 200)] + [(2, 0.0051, False)] * 10
+    rows += [(a, 0.005, True) for a in np.linspace(2, 2 * np.pi, 4000)]
+    for k in range(3):
+        rows += [(k, 0.02, False)] * 500 + [(k, 0.02 + 0.00001 * i, True) for i in range(400)]
+    angle, height, touching = np.array(rows).T
+    path = np.column_stack([0.045 * np.cos(angle), 0.045 * np.sin(angle), height])
+    t = np.arange(len(path)) / 1000
+    assert find_interval(t, path, touching > 0, None, 0.005) == (0, 6220)
 
 
 def test_contact_that_outlasts_the_stated_phase_belongs_to_it():
