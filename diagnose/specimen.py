@@ -266,11 +266,13 @@ def diagnose_bench(
 
 
 def _nuisance(bench: Bench) -> NuisanceOptions:
-    """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is."""
+    """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is: the
+    floor is a share of the greatest."""
     floor = _FLOOR[bench.specimens] * PEAK_N
+    plain = NuisanceOptions(floor_n=floor, floor_share=0.0)
     if not bench.specimens:
-        return NuisanceOptions(floor_n=floor)
-    return NuisanceOptions(floor_n=floor, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
+        return plain
+    return dataclasses.replace(plain, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
 
 
 _FOLDS, _ITERATIONS, _LEAST_HOLD = 6, 6, 8

@@ -1,10 +1,12 @@
 """The noise of a comparison: sensor noise, and what our own model gets wrong from press to press and site to
 site.
 
-A residual is weighed against the covariance sigma^2 I + N N^T of its site, N holding one column a nuisance:
-how the force would change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its
-normal, of the stick, of the dent law. So effects in time are judged within presses and effects in space
-between them, against what an error of shape could do. Woodbury keeps it to small matrices.
+A residual is weighed against the covariance S + N N^T of its site. S is diagonal: sensor noise, and errors
+that no name covers, some in proportion to the force, so that a stiff object that is pressed with thousands of
+times the noise is not held to a law exact to a thousandth. N holds one column a nuisance: how the force would
+change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its normal, of the
+stick, of the dent law. So effects in time are judged within presses and effects in space between them,
+against what an error of shape could do. Woodbury keeps it to small matrices.
 """
 
 from __future__ import annotations
@@ -35,16 +37,16 @@ class NuisanceOptions:
     tilt: float = option(0.03, "error of a site's normal", unit="rad")
     stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
     law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
+    floor_share: float = option(0.01, "error of the model that no name covers, share of a sample's force")
     floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")
 
 
 @dataclass
 class Block:
-    """One group's rows (flat indices of counted samples), its nuisance N, the factor L of I + N^T N /
-    sigma^2, and L^-1 N^T."""
+    """One group's rows (flat indices of counted samples), the factor L of I + N^T N / sigma^2, and L^-1 N^T,
+    N the nuisances over how much louder than sigma their rows are."""
 
     rows: np.ndarray
-    nuisance: np.ndarray
     factor: tuple
     halved: np.ndarray
 
@@ -64,18 +66,26 @@ class Whitener:
         touch. By default the options'."""
         self.touches = forward.touches
         self.variance = self.touches.noise_n**2 + options.floor_n**2
+        before = np.nan_to_num(forward.predict(settings))
+        share = options.floor_share * np.linalg.norm(before, axis=1)
+        self.louder = np.sqrt(1 + share**2 / self.variance)
         self.blocks: list[Block] = []
         presses = len(self.touches)
         self.onset_sd = np.full(presses, options.onset_m) if onset_sd is None else onset_sd
-        columns = nuisance_columns(forward, settings, options, site_sd, self.onset_sd)
+        columns = nuisance_columns(forward, settings, before, options, site_sd, self.onset_sd)
         self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]
         site = options.site_stiffness if site_sd is None else site_sd
         self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
+        brought = 0.0
         for rows, matrix in _by_site(self.touches, columns):
+            brought += float((matrix**2).sum() + 3 * self.variance * (self.louder[rows] ** 2).sum())
+            matrix /= np.repeat(self.louder[rows], 3)[:, None]
             small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
             factor = cho_factor(small, lower=True)
             halved = solve_triangular(factor[0], matrix.T, lower=True)
-            self.blocks.append(Block(rows, matrix, factor, halved))
+            self.blocks.append(Block(rows, factor, halved))
+        self.explained = brought / float(self.counts().sum())
+        """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
 
     @property
     def groups(self) -> int:
@@ -87,7 +97,7 @@ class Whitener:
         k = x.shape[2]
         out = np.empty((self.groups, k, k))
         for i, block in enumerate(self.blocks):
-            part = x[block.rows].reshape(-1, k)
+            part = (x[block.rows] / self.louder[block.rows][:, None, None]).reshape(-1, k)
             side = block.halved @ part
             out[i] = (part.T @ part - side.T @ side / self.variance) / self.variance
         return out
@@ -101,23 +111,18 @@ class Whitener:
         """(g,) thinned contact samples of each group."""
         return np.array([len(b.rows) for b in self.blocks])
 
-    @property
-    def explained(self) -> float:
-        """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
-        nuisance = sum(float((block.nuisance**2).sum()) for block in self.blocks)
-        return 3 * self.variance + nuisance / float(self.counts().sum())
-
 
 def nuisance_columns(
     forward: Forward,
     settings: Settings,
+    before: np.ndarray,
     options: NuisanceOptions,
     site_sd: np.ndarray | None,
     onset_sd: np.ndarray,
 ) -> list[tuple[str, np.ndarray]]:
-    """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance."""
-    t = forward.touches
-    f = np.nan_to_num(forward.predict(settings))
+    """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance.
+    before: (n, 3) N, what is predicted."""
+    t, f = forward.touches, before
     moved = forward.ideal(settings.modulus)
     moved.__dict__.update(settings.__dict__)
     small = 2e-5

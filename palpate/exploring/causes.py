@@ -73,6 +73,8 @@ strain; rad by which forces are turned about each axis of the device; share of t
 along the surface."""
 TAILS = 3.0
 """Degrees of freedom of the running shape's error at a touch."""
+NUISANCE = NuisanceOptions(floor_share=0.0)
+"""As a diagnosis has them, but that 'none' holds what is small against the force already."""
 FIELD_M = 0.03
 """Distance over which neighbours share what a place's stiffness may be off by."""
 BALL_GRID_M, BALL_RADII_M, BALL_SHARE = 0.014, (0.008, 0.012), 0.5
@@ -184,13 +186,12 @@ def weigh(estimate: Estimate) -> Weighing | None:
     forward, site_sd = scene
     assert estimate.fit is not None
     modulus = estimate.fit.modulus_pa
-    nuisance = NuisanceOptions()
-    whitener = Whitener(forward, forward.ideal(modulus), nuisance, site_sd)
+    whitener = Whitener(forward, forward.ideal(modulus), NUISANCE, site_sd)
     onset = first_touches(forward, whitener, modulus)
     found = fit(forward, whitener, [], modulus=modulus, onset=onset, iterations=6)
     settings = settings_of(forward, (), found.values, found.onset)
-    onset_sd = first_touch_sd(found.onset, nuisance.onset_m)
-    whitener = Whitener(forward, settings, nuisance, site_sd, onset_sd)
+    onset_sd = first_touch_sd(found.onset, NUISANCE.onset_m)
+    whitener = Whitener(forward, settings, NUISANCE, site_sd, onset_sd)
     before = np.nan_to_num(forward.predict(settings))
     residual = forward.touches.local_force - before
     residual = residual + whitener.onset_column * found.onset[forward.touches.press][:, None]
@@ -288,7 +289,7 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
         # bias, drift and the tool's weight are told by free air, not by presses
         free = free_air_of(e.exploration.recording, e.presses_placed)
         find_instrument_offsets(forward, free, None, set())
-    return forward, site_stiffness_sd(touches, model, NuisanceOptions())
+    return forward, site_stiffness_sd(touches, model, NUISANCE)
 
 
 def _model(e: Estimate, presses: Presses) -> Model:

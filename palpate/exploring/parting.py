@@ -13,12 +13,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.next_touch import Plan, pressed
-from diagnose.whiten import NuisanceOptions, Whitener
+from diagnose.whiten import Whitener
 from mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
 from mechanics.presses import Presses
 from palpate.exploring.causes import (
     FALSE_ALARMS,
     NONE,
+    NUISANCE,
     SUPPORT_GIVES,
     Causes,
     Weighing,
@@ -81,7 +82,7 @@ def partings(weighing: Weighing, causes: Causes, at: float) -> list[Parting]:
             if form is not None:
                 change[name] = form[1] * (changed(virtual, w.found, form[0]) - before)
         ideal = virtual.ideal(float(np.exp(w.found.values[0])))
-        whitener = Whitener(virtual, ideal, NuisanceOptions(), w.site_sd, w.whitener.onset_sd)
+        whitener = Whitener(virtual, ideal, NUISANCE, w.site_sd, w.whitener.onset_sd)
         gain = np.zeros(len(virtual.touches))
         for rival in rivals:
             both = np.stack([change[first] - change[rival], before], axis=2)
