@@ -22,7 +22,8 @@ def write_report(path: Path | str, result: Changes) -> Path:
     page = Page(f"Before and after: {result.before.recording.name} and {result.after.recording.name}")
     page.lead(result.summary[:1].upper() + result.summary[1:] + ".")
     low, high = (100 * (r - 1) for r in result.ratio_ci95)
-    cause = " and ".join(n.replace("_", " ") for n in result.explained_by) or "nothing"
+    named = [n.replace("young_modulus", "Young's modulus").replace("_", " ") for n in result.explained_by]
+    cause = " and ".join(named) or "nothing"
     beside = "no diagnosis was asked for"
     if result.beside is not None:
         beside = f"beside the effects of both the second modulus is {100 * (result.beside[0] - 1):+.0f} % off"
