@@ -90,20 +90,28 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
     voxels = options.mesh_source == "voxels"
     # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
     envelope = 0.4 * sigma if voxels else min(0.15 * sigma, 0.03 * options.mesh_size_m)
+    best: TetMesh | None = None
+    least = np.inf
     for rest in reversed(range(_TRIES)):
         progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
         points, cells = tetrahedralize(
             vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope, simplify=voxels
         )
+        # a tetrahedron may be flattened, or beyond what relaxing mends; the mesher's next mesh is another
         try:
             mesh = _standing(points, cells, surface, envelope, options.radius_edge_ratio)
-            break
         except MeshError:
-            # putting the base on the support may flatten a tetrahedron; the mesher's next mesh is another
-            if not rest:
+            if not rest and best is None:
                 raise
+            continue
+        worst = float(radius_edge_ratio(mesh.points[mesh.tetrahedra]).max())
+        if worst < least:
+            best, least = mesh, worst
+        if worst <= options.radius_edge_ratio:
+            break
+    assert best is not None
     progress("meshing", 1.0)
-    return mesh
+    return best
 
 
 def as_meshed(mesh: TetMesh, surface: Surface) -> Meshing:

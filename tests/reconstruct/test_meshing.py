@@ -120,6 +120,21 @@ def test_a_mesh_size_of_nothing_is_refused(surface):
         mesh_surface(surface, MeshingOptions(mesh_size_m=0.0))
 
 
+def test_a_mesh_beyond_its_bound_is_made_anew_and_the_best_is_kept(surface, monkeypatch):
+    made, standing = [], meshing_module._standing
+    monkeypatch.setattr(meshing_module, "_standing", lambda *given: made.append(standing(*given)) or made[-1])
+
+    def worst(mesh):
+        return radius_edge_ratio(mesh.points[mesh.tetrahedra]).max()
+
+    # no mesh is that regular: all tries are made
+    found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.015, radius_edge_ratio=0.9))
+    assert len(made) == 3 and worst(found) == min(map(worst, made))
+    made.clear()
+    found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.015, radius_edge_ratio=50.0))
+    assert len(made) == 1 and found is made[0]
+
+
 def test_a_surface_off_the_support_is_refused(surface):
     lifted = Surface(
         surface.vertices + 0.02 * surface.support_normal,
