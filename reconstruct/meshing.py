@@ -105,7 +105,7 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
                 raise
             continue
         worst = float(radius_edge_ratio(mesh.points[mesh.tetrahedra]).max())
-        if worst < least:
+        if best is None or worst < least:
             best, least = mesh, worst
         if worst <= options.radius_edge_ratio:
             break
