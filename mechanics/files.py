@@ -237,12 +237,18 @@ def named_in(path: Path, value: str, error: type[PalpateError]) -> Path:
     )
 
 
+def written_at(path: Path | str, kind: Kind | FolderKind) -> list[tuple[Path, Kind | FolderKind]]:
+    """All that is written where `path` is named, each with its kind; the one that is named first."""
+    path = Path(path)
+    return [(kind.goes(path), kind), *kind.beside(path)] if isinstance(kind, Kind) else [(path, kind)]
+
+
 def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
     """Before long work: whether `path` can be written and would replace nothing but its own kind.
 
     Raises FileError that says what is in the way, or how much room is missing.
     """
-    path = kind.goes(Path(path)) if isinstance(kind, Kind) else Path(path)
+    (path, _), *beside = written_at(path, kind)
     with writing(path):
         target = _target(path, kind)
         place = target.parent
@@ -262,9 +268,8 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
         with tempfile.TemporaryFile(prefix=temporary_prefix(), dir=place) as probe:
             probe.write(bytes(_PROBE_BYTES))
             probe.flush()
-    if isinstance(kind, Kind):
-        for other, other_kind in kind.beside(path):
-            check_target(other, other_kind)
+    for other, other_kind in beside:
+        check_target(other, other_kind)
 
 
 def check_room(folder: Path, least_bytes: int, variable: str = "PALPATE_CACHE") -> None:

@@ -19,7 +19,7 @@ from typing import Any, ClassVar, NoReturn, Protocol, Self, TypeVar
 import numpy as np
 
 from mechanics.errors import OptionError, PalpateError
-from mechanics.files import JSON, FolderKind, Kind, atomic_file, check_target
+from mechanics.files import JSON, FolderKind, Kind, atomic_file, check_target, written_at
 from mechanics.options import check_range
 from mechanics.recording import recording_files
 from palpate.keywords import kinds, options
@@ -232,7 +232,7 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
                 read |= {_identity(file): flag for file in _files_of(Path(each))}
             if kind is not None:
                 targets.append((Path(each), kind))
-                for file in _written_at(*targets[-1]):
+                for file, _ in written_at(*targets[-1]):
                     if _identity(file) in written:
                         raise OptionError(
                             f"{flag} and {written[_identity(file)]} both name '{file}': name two"
@@ -244,12 +244,6 @@ def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) 
         )
     for path, kind in targets:
         check_target(path, kind)
-
-
-def _written_at(path: Path, kind: Kind | FolderKind) -> list[Path]:
-    if not isinstance(kind, Kind):
-        return [path]
-    return [kind.goes(path), *(other for other, _ in kind.beside(path))]
 
 
 def _files_of(path: Path) -> list[Path]:

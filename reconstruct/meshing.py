@@ -90,8 +90,7 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
     voxels = options.mesh_source == "voxels"
     # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
     envelope = 0.4 * sigma if voxels else min(0.15 * sigma, 0.03 * options.mesh_size_m)
-    best: TetMesh | None = None
-    least = np.inf
+    made: list[tuple[float, TetMesh]] = []
     for rest in reversed(range(_TRIES)):
         progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
         points, cells = tetrahedralize(
@@ -101,17 +100,15 @@ def fill(surface: Surface, options: MeshingOptions | None = None, progress: Prog
         try:
             mesh = _standing(points, cells, surface, envelope, options.radius_edge_ratio)
         except MeshError:
-            if not rest and best is None:
+            if not rest and not made:
                 raise
             continue
         worst = float(radius_edge_ratio(mesh.points[mesh.tetrahedra]).max())
-        if best is None or worst < least:
-            best, least = mesh, worst
+        made.append((worst, mesh))
         if worst <= options.radius_edge_ratio:
             break
-    assert best is not None
     progress("meshing", 1.0)
-    return best
+    return min(made, key=lambda each: each[0])[1]
 
 
 def as_meshed(mesh: TetMesh, surface: Surface) -> Meshing:

@@ -53,7 +53,7 @@ def passing(
     position: np.ndarray,
     force: np.ndarray,
     tip_radius_m: float,
-    sliding: np.ndarray | None = None,
+    sliding: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n,) bool: where the tip only passes, so that it is in the air; and where it is on the support.
 
@@ -65,9 +65,7 @@ def passing(
     turns = _turns_back(way, _REACH * tip_radius_m)
     at = np.clip(np.searchsorted(knots, np.arange(len(t)), side="right") - 1, 0, len(knots) - 1)
     near = turns[at] | turns[np.minimum(at + 1, len(knots) - 1)]
-    on = _on_support(position, force, knots, tip_radius_m)
-    if sliding is not None:
-        on |= sliding
+    on = _on_support(position, force, knots, tip_radius_m) | sliding
     margin = np.ones(2 * max(1, round(_MARGIN_S * rate)) + 1, dtype=bool)
     return ~binary_dilation(near | on, margin), on
 

@@ -67,17 +67,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             )
             print(_line(found[-1]), flush=True)
     head = [
-        "law",
-        "strength",
-        "object",
-        "size / noise",
-        "verdict",
-        "key",
-        "true",
-        "found",
-        "95 % interval",
-        "holds",
-    ]
+        "law", "strength", "object", "size / noise",
+        "verdict", "key", "true", "found", "95 % interval", "holds",
+    ]  # fmt: skip
     print(table(head, [row for each in found for row in _rows(each)]))
     return {"recordings": found}
 

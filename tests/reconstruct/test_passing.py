@@ -15,7 +15,7 @@ def test_no_touch_is_taken_for_air_whatever_its_force_and_whether_or_not_the_tra
     force = recording.force_on_tool
     touching = np.linalg.norm(force, axis=1) > 0
     start, end = recording.boundary_phase
-    for sliding in (None, (recording.t >= start) & (recording.t <= end)):
+    for sliding in (np.zeros(len(force), dtype=bool), (recording.t >= start) & (recording.t <= end)):
         air, _ = passing(recording.t, recording.position, force, recording.tip_radius_m, sliding)
         assert not (air & touching).any()
         assert air.sum() > 0.3 * (~touching).sum()
