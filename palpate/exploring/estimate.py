@@ -9,6 +9,7 @@ costs one solve.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -25,11 +26,13 @@ from reconstruct.filtered import filtered_of
 from reconstruct.filtering import FilterOptions
 from reconstruct.meshing import MeshingOptions, mesh_surface, uncertainty_at
 from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.one_d import OneD, fit_robust
 from reconstruct.pipeline import Clock
 from reconstruct.shape_error import compliance_covariance, shape_gradients
 from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 from reconstruct.tool_weight import ToolWeight
+from reconstruct.uniaxial import profiles
 
 MESH_M, SURFACE_EDGE_M = 0.016, 0.010
 """Tetrahedra of the running estimate, and of its surface."""
@@ -82,6 +85,15 @@ class Estimate:
         """Within which 95 % of the surface lies, by its own word and by that of all families of shapes."""
         assert self.surface is not None
         return max(free_error(self.surface), self.choice_error_m)
+
+    @cached_property
+    def one_d(self) -> tuple[OneD, ...]:
+        """Kelvin-Voigt and Hunt-Crossley of every press of `presses_placed`, as a reconstruction fits them
+        (the paper's eq. 1 and 2); fitted where they are asked for."""
+        if self.presses_placed is None or self.exploration is None:
+            return ()
+        curves = profiles(self.presses_placed, FilterOptions().cutoff_hz)
+        return tuple(fit_robust(curves, self.exploration.noise_n))
 
     @property
     def presses(self) -> int:

@@ -18,7 +18,8 @@ def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recor
     from reconstruct.pipeline import reconstruct
 
     recording = read_recording(shared_recordings / "silicone-1-cylinder.toml")
-    state = Explorer.going_on(recording, GoalOptions(most=60)).state
+    explorer = Explorer.going_on(recording, GoalOptions(most=60))
+    state = explorer.state
     model = reconstruct(recording)
     low, high = state.modulus_ci95_pa
     other = model.material.young_modulus_ci95_pa
@@ -26,6 +27,10 @@ def test_the_final_answer_is_reconstructions_within_their_intervals(shared_recor
     assert state.modulus_pa == pytest.approx(model.material.young_modulus_pa, rel=0.03)
     assert state.surface.removesuffix("+") == model.about["shape"]["surface"].removesuffix("+")
     assert state.done
+    told, fitted = explorer.estimate.one_d, model.presses.fits
+    assert len(told) == len(model.presses)
+    for name in ("k_kv", "k_hc", "r_hc"):
+        assert np.allclose([getattr(each, name) for each in told], fitted[name], rtol=0.1), name
 
 
 TRUE_PA = {"time-delay": 35e3, "viscoelasticity": 24e3}
