@@ -2,8 +2,9 @@
 
 Each seed draws one exploration (docs/variety.md); the virtual laboratory answers for its forces. Told are the
 share that is reconstructed, the error of the modulus, the coverage of its interval, the distance of the
-surface, and the presses that were found, by each nuisance. What was recorded and reconstructed before by the
-same program is read, not done again: a run that was interrupted goes on.
+surface, and the presses that were found, by each nuisance; with --diagnose also how many of these sound
+objects the diagnosis calls sound. What was recorded and reconstructed before by the same program is read, not
+done again: a run that was interrupted goes on.
 """
 
 from __future__ import annotations
@@ -12,7 +13,7 @@ import argparse
 import hashlib
 import json
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import as_completed
 from dataclasses import replace
 from pathlib import Path
@@ -20,9 +21,13 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.pipeline import diagnose
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file, cache_folder
+from mechanics.model import Model
 from palpate.arguments import progress_bar
+from palpate.benchmarks._diagnosis_cases import WEIGHT
+from palpate.benchmarks._diagnosis_scores import answer_of
 from palpate.benchmarks._rates import wilson
 from palpate.benchmarks._surface_truth import Truth
 from palpate.benchmarks.surface import deviation
@@ -94,6 +99,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--solved-only", action="store_true", help="only objects whose touches are solved already"
     )
     parser.add_argument("--effect", help="an effect of strength 1 in all of them")
+    parser.add_argument(
+        "--diagnose", action="store_true", help="diagnose what is reconstructed, with default options"
+    )
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -101,9 +109,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     work = arguments.work or cache_folder() / "variety"
     seeds = range(arguments.first, arguments.first + arguments.count)
     chosen = [s for s in seeds if not arguments.solved_only or solved(draw(s).number)]
-    version, answers = program_key(), []
+    judged = arguments.diagnose
+    version, answers = program_key((*ROOMS, "diagnose") if judged else ROOMS), []
     with progress_bar("explorations") as progress, workers_of_ours(arguments.workers) as pool:
-        waiting = [pool.submit(answered, s, work, version, arguments.effect) for s in chosen]
+        waiting = [pool.submit(answered, s, work, version, arguments.effect, judged) for s in chosen]
         for done, future in enumerate(as_completed(waiting)):
             answers.append(future.result())
             progress("explorations", (done + 1) / len(waiting))
@@ -111,17 +120,20 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return {"program": version, "explorations": answers, **report(answers)}
 
 
-def program_key() -> str:
+def program_key(rooms: Sequence[str]) -> str:
     """A key of the program text that an answer depends on."""
     root, digest = Path(__file__).parents[2], hashlib.sha256()
-    for room in ROOMS:
+    for room in rooms:
         for path in sorted((root / room).rglob("*.py")):
             digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
 
 
-def answered(seed: int, work: Path, version: str, effect: str | None = None) -> dict[str, Any]:
-    """The answer to one draw, read where the same program gave it to the same recording."""
+def answered(
+    seed: int, work: Path, version: str, effect: str | None = None, judged: bool = False
+) -> dict[str, Any]:
+    """The answer to one draw, read where the same program gave it to the same recording. judged: diagnosed
+    as well."""
     folder = work / "recordings"
     folder.mkdir(parents=True, exist_ok=True)
     effects = {effect: 1.0} if effect else {}
@@ -130,7 +142,7 @@ def answered(seed: int, work: Path, version: str, effect: str | None = None) -> 
     if path.is_file():
         found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
         return found
-    answer = {"seed": seed, "truth": _truth(varied), **_reconstructed(varied)}
+    answer = {"seed": seed, "truth": _truth(varied), **_reconstructed(varied, judged)}
     if "refused" in answer:
         answer["remedies"] = _tried(draw(seed), answer["refused"], work / "mended", effects)
     path.parent.mkdir(exist_ok=True)
@@ -176,7 +188,7 @@ def _truth(varied: Varied) -> dict[str, Any]:
     }
 
 
-def _reconstructed(varied: Varied) -> dict[str, Any]:
+def _reconstructed(varied: Varied, judged: bool = False) -> dict[str, Any]:
     start = time.process_time()
     try:
         result = reconstruct_fully(varied.recording)
@@ -205,11 +217,36 @@ def _reconstructed(varied: Varied) -> dict[str, Any]:
         "delay_s": result.exploration.delay_s,
         **deviation(shape, (result.surface.vertices - shift) @ turned, result.surface.triangles),
         "cpu_s": time.process_time() - start,
+        **({"verdict": _verdict(varied, result.model)} if judged else {}),
     }
 
 
+def _verdict(varied: Varied, model: Model) -> dict[str, Any]:
+    """What the diagnosis says; a reason where it refuses."""
+    start = time.process_time()
+    try:
+        told = diagnose(varied.recording, model).as_json()
+    except PalpateError as error:
+        return {"kind": "failed", "effects": [], "candidates": [], "why": str(error)}
+    return {
+        **told["verdict"],
+        **{key: told[key] for key in ("gap_before_n", "gap_after_n", "noise_n", "reasons")},
+        "cpu_s": time.process_time() - start,
+    }
+
+
+def _first(answer: dict[str, Any]) -> str | None:
+    """The first that the diagnosis named, 'none', 'unknown' or 'failed'; a tool's own weight is no news.
+    None where nothing was diagnosed."""
+    if "verdict" not in answer:
+        return None
+    heavy = draw(answer["seed"]).tool_mass_kg > 0
+    return answer_of({"case": {"beside": WEIGHT if heavy else ()}, "verdict": answer["verdict"]}).first
+
+
 _HEADER = ["nuisance", "group", "recordings", "reconstructed", "refused", "mended", "crashed", "within 5 %",
-           "within 10 %", "covered", "median error %", "median surface mm", "presses found"]  # fmt: skip
+           "within 10 %", "covered", "median error %", "median surface mm", "presses found",
+           "called sound"]  # fmt: skip
 
 
 def report(answers: list[dict[str, Any]]) -> dict[str, Any]:
@@ -228,7 +265,8 @@ def report(answers: list[dict[str, Any]]) -> dict[str, Any]:
     print(table(_HEADER, rows))
     print()
     for answer in answers:
-        if "error" not in answer or abs(answer["error"]) > 0.1 or not answer["covers"]:
+        named = _first(answer) not in (None, "none")
+        if "error" not in answer or abs(answer["error"]) > 0.1 or not answer["covers"] or named:
             print(_miss(answer))
     return {"figures": figures}
 
@@ -242,12 +280,16 @@ def _figures(members: list[dict[str, Any]]) -> dict[str, Any]:
     mended = sum(_mended(a) for a in members)
     found = sum(a["found"] for a in done) / max(1, sum(a["truth"]["presses"] for a in done))
     surface = float(np.median([1e3 * a["mean_m"] for a in done])) if done else float("nan")
+    firsts = [first for first in map(_first, done) if first not in (None, "failed")]
+    sound = firsts.count("none")
     return {
         "recordings": len(members), "reconstructed": len(done), "refused": refused, "mended": mended,
         "crashed": crashed,
         "within_5": close, "within_10": near, "covered": covered, "covered95": wilson(covered, len(done)),
+        "diagnosed": len(firsts), "sound": sound, "sound95": wilson(sound, len(firsts)),
         "row": [len(members), len(done), refused, mended, crashed, close, near, covered,
-                f"{100 * np.median(error):.1f}", f"{surface:.2f}", f"{100 * found:.0f} %"],
+                f"{100 * np.median(error):.1f}", f"{surface:.2f}", f"{100 * found:.0f} %",
+                f"{sound} of {len(firsts)}" if firsts else ""],
     }  # fmt: skip
 
 
@@ -270,4 +312,5 @@ def _miss(answer: dict[str, Any]) -> str:
     return what + (
         f"{100 * answer['error']:+.1f} %, interval {low:.1f} to {high:.1f} kPa, {answer['found']} presses "
         f"found, {answer['false']} false, {answer['surface']} off by {1e3 * answer['mean_m']:.2f} mm"
+        + ("" if (first := _first(answer)) in (None, "none") else f"; diagnosed: {first}")
     )
