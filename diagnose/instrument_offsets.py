@@ -1,5 +1,5 @@
-"""What the instrument does, found before any press is looked at: bias, drift and the tool's own weight in
-free air, a yielding tool on the rigid support.
+"""What is found before any press is looked at: bias, drift and the tool's own weight in free air, a yielding
+tool on the rigid support, a move of the object between two tracings of its base.
 
 It is taken off the forces and positions, so that the search for other effects starts from clean ones.
 """
@@ -17,17 +17,21 @@ from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
 from diagnose.judging import Candidate
 from diagnose.result import EffectEntry
+from diagnose.retraced import Move
 from diagnose.rigid import Rigid
 from diagnose.whiten import FOLLOWED, Whitener
 from mechanics.effects.force_bias import EFFECT as BIAS
 from mechanics.effects.force_drift import EFFECT as DRIFT
 from mechanics.effects.force_gain import EFFECT as GAIN
+from mechanics.effects.registry import effect
+from mechanics.effects.surface_offset import EFFECT as OFFSET
 from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
 Z = 6.0
 SIDEWAYS_Z = 4.0
+MOVED_Z = 4.0
 SPRING_SHARE = 0.005
 """Of a spring's compliance, beyond scatter: what a turning tool's weight adds to the force on the support."""
 LEAST_BIAS_N = 0.008
@@ -72,9 +76,8 @@ class InstrumentOffsets:
             closed, interval = closed_share(before, after, counts, noise, added, rng, 100)
             left = gap(after, counts, added)
             keys = self.parameters[name]
-            entry = EffectEntry(
-                name, "instrument", 0.97, left, closed, interval, keys, 1e3, self.intervals[name]
-            )
+            domain = effect(name).domain
+            entry = EffectEntry(name, domain, 0.97, left, closed, interval, keys, 1e3, self.intervals[name])
             result.append(entry)
         return result
 
@@ -104,6 +107,49 @@ def find_instrument_offsets(
         offsets.residual + change,
         (*offsets.reasons, yields),
         {**offsets.intervals, SPRING.name: {"stiffness_n_per_m": [float(low), float(high)]}},
+    )
+
+
+def with_move(
+    offsets: InstrumentOffsets, forward: Forward, move: Move | None, excluded: set[str]
+) -> InstrumentOffsets:
+    """The offsets, and the object's move where its base was traced twice and it shows.
+
+    forward's surface was fitted to the same presses, so it stands where the object was pressed and nothing is
+    taken off: `residual` is what the surface would miss by where its base was first traced.
+    """
+    if move is None or OFFSET.name in excluded:
+        return offsets
+    t = forward.touches
+    along, error = move.along(t.point, t.normal)
+    if (along**2).mean() <= MOVED_Z**2 * np.trace(error) / len(along):
+        return offsets
+    settings = forward.ideal(forward.model.material.young_modulus_pa)
+    here = np.nan_to_num(forward.predict(settings))
+    settings.onset = settings.onset - along
+    change = here - np.nan_to_num(forward.predict(settings))
+    if np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) < t.noise.raw_n:
+        return offsets  # too little to matter
+    sd = np.sqrt(np.diag(move.error))
+    words = (
+        f"the base traced once more lies {1e3 * np.linalg.norm(move.shift):.1f} mm and "
+        f"{np.degrees(np.linalg.norm(move.turn)):.1f} degrees from where it was traced first"
+    )
+    return InstrumentOffsets(
+        (*offsets.names, OFFSET.name),
+        {
+            **offsets.parameters,
+            OFFSET.name: {"shift_m": move.shift.tolist(), "rotation_rad": move.turn.tolist()},
+        },
+        offsets.residual + change,
+        (*offsets.reasons, words),
+        {
+            **offsets.intervals,
+            OFFSET.name: {
+                "shift_m": _around(move.shift, sd[:3]),
+                "rotation_rad": _around(move.turn, sd[3:]),
+            },
+        },
     )
 
 
@@ -210,5 +256,8 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     return InstrumentOffsets(tuple(order), parameters, taken, tuple(reasons.values()), intervals)
 
 
-def _around(value: ArrayLike, error: float) -> list:
-    return [(np.asarray(value) - 1.96 * error).tolist(), (np.asarray(value) + 1.96 * error).tolist()]
+def _around(value: ArrayLike, error: ArrayLike) -> list:
+    return [
+        (np.asarray(value) - 1.96 * np.asarray(error)).tolist(),
+        (np.asarray(value) + 1.96 * np.asarray(error)).tolist(),
+    ]

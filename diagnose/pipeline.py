@@ -12,10 +12,11 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets, read_sideways
+from diagnose.instrument_offsets import find_instrument_offsets, read_sideways, with_move
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
+from diagnose.retraced import move_of
 from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import LEAST_SITES, touches_of
@@ -83,6 +84,10 @@ def diagnose(
     allowed = effects(without=excluded)
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, excluded)
+    if model.presses.recording == presses.recording:
+        # a surface of another recording's presses leaves the move to be felt
+        move = move_of(recording, presses, model.support.normal, touches.point.mean(axis=0))
+        offsets = with_move(offsets, forward, move, excluded)
     site_sd = site_stiffness_sd(touches, model, nuisance)
     if touches.sites != presses.sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by

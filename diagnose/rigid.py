@@ -61,26 +61,43 @@ class Rigid:
         return f"on the rigid support {share:.0%} of the force along its normal is read sideways"
 
 
+@dataclass(frozen=True)
+class OnSupport:
+    """Means over blocks in which the support is touched. kind: (b,) of KINDS; place: (b, 3) m; force: (b, 3)
+    N, on the tool; way: (b, 3), a unit vector."""
+
+    kind: np.ndarray
+    place: np.ndarray
+    force: np.ndarray
+    way: np.ndarray
+
+
 def rigid_of(recording: Recording, presses: Presses, normal: np.ndarray) -> Rigid | None:
     """Read the instrument off its contact with the support; normal (3,): about the support's, outward.
 
-    None where it was touched for too short a time to tell.
+    Each kind of contact has a plane of its own: the frame may have moved in between. None where the support
+    was touched for too short a time to tell.
     """
-    seen = _contact(recording, presses, normal)
-    if seen is None:
+    rows = on_support(recording, presses, normal)
+    if rows is None:
         return None
-    plane, place, force, way = seen
+    kinds, kind = np.unique(rows.kind, return_inverse=True)
+    own = np.eye(len(kinds))[kind]
+    mean = (own.T @ rows.place) / own.sum(axis=0)[:, None]
+    place = rows.place - mean[kind]
+    widest = int(np.argmax(own.T @ (place**2).sum(axis=1)))
     for _ in range(2):  # the plane's own normal, whatever the model's support was made from
         across, along = tangents(normal)
-        push = force @ normal
-        columns = np.column_stack([-push, place @ across, place @ along, plane])
-        found, error, off = _fitted(columns, place @ normal)
-        normal = normal - found[1] * across - found[2] * along
+        push = rows.force @ normal
+        flat = [own, own * (place @ across)[:, None], own * (place @ along)[:, None]]
+        found, error, off = _fitted(np.column_stack([push, *flat]), place @ normal)
+        tilt = found[1:].reshape(3, -1)[1:, widest]
+        normal = normal - tilt[0] * across - tilt[1] * along
         normal = normal / np.linalg.norm(normal)
-    push = (force @ normal)[:, None]
+    push = (rows.force @ normal)[:, None]
     axes = np.stack(tangents(normal), axis=1)
-    columns = np.hstack([push, push * (way @ axes), np.ones_like(push)])
-    sideways = [_fitted(columns, force @ axis) for axis in axes.T]
+    columns = np.hstack([push, push * (rows.way @ axes), np.ones_like(push)])
+    sideways = [_fitted(columns, rows.force @ axis) for axis in axes.T]
     return Rigid(
         compliance=float(found[0]),
         error=error,
@@ -91,11 +108,8 @@ def rigid_of(recording: Recording, presses: Presses, normal: np.ndarray) -> Rigi
     )
 
 
-def _contact(
-    recording: Recording, presses: Presses, normal: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray] | None:
-    """Means over blocks in which the support is touched: of which kind (b, kinds) 0 or 1, place (b, 3) m,
-    force on the tool (b, 3) N, way (b, 3), a unit vector; None where they are too few."""
+def on_support(recording: Recording, presses: Presses, normal: np.ndarray) -> OnSupport | None:
+    """Where the support was touched; normal (3,): about its own, outward. None where that is too little."""
     size = max(1, round(BLOCK_S * recording.sample_rate_hz))
     found = []
     for number, kind in enumerate(KINDS):
@@ -110,18 +124,14 @@ def _contact(
             )
             way = np.gradient(place, axis=0)
             way /= np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
-            own = np.tile(np.eye(len(KINDS))[number], (blocks, 1))
-            found.append(np.hstack([own, place, force, way]))
+            found.append(np.hstack([np.full((blocks, 1), number), place, force, way]))
     if not found:
         return None
     rows = np.vstack(found)
-    plane, place, force, way = np.split(rows, np.cumsum([len(KINDS), 3, 3]), axis=1)
-    touching = force @ normal > PRESSING * presses.noise.raw_n
-    if touching.sum() < LEAST_BLOCKS:
+    rows = rows[rows[:, 4:7] @ normal > PRESSING * presses.noise.raw_n]
+    if len(rows) < LEAST_BLOCKS:
         return None
-    plane = plane[touching]
-    place = place[touching] - place[touching].mean(axis=0)
-    return plane[:, plane.any(axis=0)], place, force[touching], way[touching]
+    return OnSupport(rows[:, 0].astype(int), rows[:, 1:4], rows[:, 4:7], rows[:, 7:])
 
 
 def _fitted(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float, float]:

@@ -124,6 +124,7 @@ def cut(
     free_air: np.ndarray | None = None,
     trace_s: tuple[float, float] | None = None,
     others_s: Iterable[tuple[float, float]] = (),
+    supported: Iterable[Segment] = (),
     noise_n: float | None = None,
     delay_s: float = 0.0,
     delay_error_s: float = 0.0,
@@ -171,7 +172,7 @@ def cut(
     air = free_segments(t, touches[:, 0], touches[:, 1], begin)
     segments = [] if trace_s is None else [Segment("trace", *map(float, trace_s))]
     segments += [Segment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
-    segments += [s for s in recording.segments if s.kind in ON_SUPPORT]
+    segments += [s for s in (*recording.segments, *supported) if s.kind in ON_SUPPORT]
     point = centre - recording.tip_radius_m * normal
     table = Presses(
         starts=np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])]),

@@ -18,12 +18,13 @@ from mechanics.press_sites import SITE_M
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.samples import runs
-from mechanics.segments import ON_SUPPORT
+from mechanics.segments import ON_SUPPORT, Segment
 from reconstruct.boundary import Boundary, BoundaryOptions, find_boundary
 from reconstruct.delay import Delay, force_delay
 from reconstruct.filtered import Filtered, filtered_of
 from reconstruct.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
 from reconstruct.finding import Found, Signals, fitted_contact, paper_contact
+from reconstruct.on_support import on_it, recognised, stated
 from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.unbroken import Piece, cycles, found_cycles, free_air_seen
 
@@ -175,7 +176,7 @@ def read_earlier(recording: Recording, delay_s: float) -> Recording:
 @dataclass(frozen=True)
 class _Found:
     """What one pass finds. unused: (start, end, reason) samples of contacts that are no palpations. cut:
-    (start, end) of those that were cut into cycles."""
+    (start, end) of those that were cut into cycles. supported: with the support, as recognised."""
 
     signals: Signals
     free_air: np.ndarray
@@ -184,6 +185,7 @@ class _Found:
     unused: tuple[tuple[int, int, str], ...]
     threshold_n: float
     cut: tuple[tuple[int, int], ...]
+    supported: tuple[Segment, ...]
 
 
 def _tabled(
@@ -205,6 +207,7 @@ def _tabled(
         free_air=found.free_air[late],
         trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
         others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
+        supported=found.supported,
         noise_n=signals.noise_n,
         delay_s=delay_s,
         delay_error_s=delay_error_s,
@@ -285,6 +288,8 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
     cut_apart: list[Piece] = []
     cut_up: list[tuple[int, int]] = []
     touches = runs(touching)
+    said = any(s.kind in ON_SUPPORT for s in recording.segments)
+    known = {} if said or given.known_base else recognised(signals, boundary, touches)
     for a, b in touches:
         if given.unbroken:
             pieces = cycles(signals, a, b, _ABOVE * float(spread[a:b].min()))
@@ -292,9 +297,10 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
                 cut_apart += pieces
                 cut_up.append((a, b))
                 continue
-        reason = _on_support(recording, a, b) or _unusable(
-            signals, boundary, a, b, max(high, least_peak), options.least_duration_s
-        )
+        reason = stated(recording, a, b)
+        if not reason and (a, b) in known:
+            reason = f"is with the support ({known[a, b]})"
+        reason = reason or _unusable(signals, boundary, a, b, max(high, least_peak), options.least_duration_s)
         contact = None
         if not reason:
             contact = (paper_contact if method == "paper" else fitted_contact)(signals, a, b)
@@ -321,16 +327,9 @@ def _found(filtered: Filtered, given: _Given) -> _Found:
             f"{len(contacts)} usable palpations among {len(touches)} contacts of phase II{why}; at least "
             f"{options.least_palpations} are needed: {hint}"
         )
-    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up))
-
-
-def _on_support(recording: Recording, a: int, b: int) -> str:
-    """Why the contact of samples [a, b), stated to be with the support, is no palpation; '' elsewhere."""
-    middle = float(recording.t[(a + b - 1) // 2])
-    for each in recording.segments:
-        if each.kind in ON_SUPPORT and each.start_s <= middle <= each.end_s:
-            return f"is stated to be {each.kind}"
-    return ""
+    t = recording.t
+    supported = tuple(Segment(kind, float(t[a]), float(t[b - 1])) for (a, b), kind in known.items())
+    return _Found(signals, free_air, boundary, tuple(contacts), tuple(unused), high, tuple(cut_up), supported)
 
 
 def _unusable(
@@ -345,8 +344,4 @@ def _unusable(
         return f"peaks at {top:.3f} N, below {least_peak_n:.3g} N"
     if a == 0:
         return "has no approach: the recording starts in contact"
-    radius = signals.recording.tip_radius_m
-    gap = float(boundary.height(signals.position[a:b]).min()) - radius
-    if gap < max(3 * boundary.flatness_m, 1e-4):
-        return f"is on the support (the tip comes within {gap * 1e3:.2f} mm of it)"
-    return ""
+    return on_it(signals, boundary, a, b)

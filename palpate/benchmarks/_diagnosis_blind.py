@@ -58,7 +58,8 @@ def _judged(case: Case, work: Path, fast: bool, prepared: str) -> Task:
 def _of(case: Case, without: str) -> dict[str, Any]:
     """What the work on a case depends on, which is not what is asked."""
     return {"number": case.number, "seed": case.seed, "effects": dict(case.effects), "kind": case.kind,
-            "tested": list(case.tested), "without": without}  # fmt: skip
+            "tested": list(case.tested), "without": without,
+            **({"protocol": case.protocol} if case.protocol else {})}  # fmt: skip
 
 
 def _task(stage: str, label: str, content: dict[str, Any], work: Path, needs: tuple[str, ...]) -> Task:
@@ -142,7 +143,10 @@ def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
             raise NotSolved(f"the laboratory would have to solve touches ({label}): run with --solve")
 
     drawn = case.nuisances
-    made = explored(drawn, case.effects, sizes=True, cache=_touches(work), progress=refuse)
+    made = explored(
+        drawn, case.effects, sizes=True, complete=case.protocol == "complete", cache=_touches(work),
+        progress=refuse,
+    )  # fmt: skip
     truth = {**made.simulation.truth, "nuisances": drawn.table()}
     name = made.recording.object_name
     write_sealed(

@@ -60,10 +60,22 @@ FINITE = "finite_strain"
 SEEDS = {"development": 0, "calibration": 60_000, "evaluation": 70_000}
 """First seeds. Rules may be chosen on the first; the second are fitted to and not looked at; the third is
 opened once a release, and docs/diagnosis-benchmark.md has a line for every opening."""
-POOLS = {"quick": (0, 3), "medium": (0, 1, 2, 3, 4, 5), "full": tuple(range(len(FAMILIES)))}
+POOLS = {
+    "quick": (0, 3),
+    "protocol": (0, 1, 2, 3, 4, 5),
+    "medium": (0, 1, 2, 3, 4, 5),
+    "full": tuple(range(len(FAMILIES))),
+}
 """Objects of `scenes.variety` that the cases of a size choose from, each solved once as it is, ..."""
-NEO_HOOKEAN = {"quick": (), "medium": (0, 2), "full": (0, 1, 2, 3)}
+NEO_HOOKEAN = {"quick": (), "protocol": (), "medium": (0, 2), "full": (0, 1, 2, 3)}
 """... and those that are solved once more as neo-Hookean solids."""
+PROTOCOLS = ("ordinary", "complete")
+"""How the cases of size `protocol` are explored, each case both ways: traced and pressed; and then the bare
+support pressed, the tool waved, the base traced once more (`palpate simulate --protocol complete`)."""
+HIDDEN = ("tool_compliance", "surface_offset")
+"""What a surface and a modulus that are fitted to the same presses hide."""
+ALIKE = ("time_delay", "backlash", "viscoelasticity")
+"""Effects that bend loops much alike."""
 FEWER_PRESSES = 14
 """At most so many presses where the solid remembers them."""
 
@@ -73,7 +85,8 @@ class Case:
     """One question: `tested` names what is asked for (empty: nothing is wrong), `effects` all that acts.
 
     `effects` is `tested` and, on a neo-Hookean object, finite strain, which belongs in the answer but is no
-    question. without: left out of the library. number: of the object. All nuisances follow from the seed.
+    question. without: left out of the library. number: of the object. protocol: of PROTOCOLS, where that is
+    the question. All nuisances follow from the seed.
     """
 
     kind: str
@@ -82,12 +95,14 @@ class Case:
     tested: tuple[str, ...] = ()
     effects: dict[str, float] = field(default_factory=dict)
     without: str = ""
+    protocol: str = ""
 
     @property
     def recording(self) -> str:
         """A file name for what is recorded."""
         effects = "+".join(f"{k}={v:g}" for k, v in self.effects.items()) or "none"
-        return f"{self.family}-{self.number}-{effects}-{self.seed}"
+        name = f"{self.family}-{self.number}-{effects}-{self.seed}"
+        return f"{name}-{self.protocol}" if self.protocol else name
 
     @property
     def key(self) -> str:
@@ -109,6 +124,8 @@ class Case:
             drawn = replace(drawn, tool_mass_kg=0.0)
         if any(name in REMEMBERING for name in self.effects):
             drawn = replace(drawn, presses=min(drawn.presses, FEWER_PRESSES))
+        if self.protocol:
+            drawn = replace(drawn, ends_in_contact=False)
         return drawn
 
     @property
@@ -127,7 +144,8 @@ class Case:
 def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
     """All cases of a size, shuffled, so that a run that stops early is a fair sample of it.
 
-    quick: a few instrument effects. medium: controls, every cheap effect at four strengths, left out, absent,
+    quick: a few instrument effects. protocol: what presses alone hide or mix up, and controls, explored in
+    two ways. medium: controls, every cheap effect at four strengths, left out, absent,
     pairs; every cheap effect on two neo-Hookean objects; solid effects on linear ones. full: more controls
     and strengths, all families, solid effects on neo-Hookean objects. families: of shapes, by default all of
     the size's pool. Raises OptionError for a family that no shape of the pool has.
@@ -139,6 +157,8 @@ def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
         raise OptionError(f"no object of the {size} size is a {asked}: there are {known}")
     if size == "quick":
         return _round(pool, seed, controls=2, named=CHEAP[:6], strengths=(1.0,))
+    if size == "protocol":
+        return _both_ways(pool, seed)
     many = size == "full"
     strengths = (0.25, 0.5, 1.0, 2.0, 4.0, 8.0) if many else (0.5, 1.0, 2.0, 4.0)
     found = _round(pool, seed, controls=150 if many else 36, named=CHEAP, strengths=strengths)
@@ -152,6 +172,20 @@ def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
                         neo_hookean=many)  # fmt: skip
     order = np.random.default_rng(1).permutation(len(found))
     return [found[i] for i in order]
+
+
+def _both_ways(pool: Sequence[int], seed: int) -> list[Case]:
+    """Each case explored by each protocol, side by side."""
+    wanted = [(name, s) for s in (0.5, 1.0, 2.0) * 2 for name in HIDDEN]
+    wanted += [(name, s) for s in (0.5, 1.0, 2.0, 4.0) for name in ALIKE]
+    wanted += [("", 0.0)] * 12
+    found = []
+    for number, (name, strength) in enumerate(wanted, start=seed + 8000):
+        kind, tested = ("single", (name,)) if name else ("control", ())
+        where = _one_of(pool, number)
+        effects = {name: strength} if name else {}
+        found += [Case(kind, where, number, tested, effects, protocol=way) for way in PROTOCOLS]
+    return found
 
 
 def _of_families(numbers: Sequence[int], families: Sequence[str] | None) -> tuple[int, ...]:

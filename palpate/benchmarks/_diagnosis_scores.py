@@ -4,11 +4,13 @@ coverage."""
 from __future__ import annotations
 
 from collections import Counter, defaultdict
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from palpate.benchmarks._diagnosis_cases import ALIKE
 from palpate.benchmarks._rates import wilson
 
 FAMILIES = {"plasticity": ("mullins_softening",)}
@@ -91,6 +93,8 @@ class _Tally:
         elif size is not None and size["rms_after_best_scale_n"] > verdict.get("noise_n", np.inf):
             self.rates["finite strain named where it exceeds the noise"].append(FINITE in verdict["effects"])
         hit = getattr(self, "_" + kind.replace("-", "_"))(item, answer)
+        if case.get("protocol"):
+            self._by_protocol(case["protocol"], tested, answer)
         label = "+".join(tested) or "nothing"
         label = f"({label})" if excluded or kind == "absent" else label
         self.confusion[(label, answer.first)] += 1
@@ -106,6 +110,18 @@ class _Tally:
             item["verdict"].get("bic") not in (None, "none", *item["case"]["beside"])
         )
         return not answer.detected
+
+    def _by_protocol(self, protocol: str, tested: Sequence[str], answer: Answer) -> None:
+        if not tested:
+            if answer.first != "failed":
+                self.rates[f"{protocol} protocol: false alarms"].append(answer.detected)
+        elif tested[0] in ALIKE:
+            others = set(ALIKE) - set(tested)
+            apart = tested[0] in answer.named and not others & {*answer.named, *answer.candidates}
+            self.rates[f"{protocol} protocol: delay, play and viscoelasticity told apart"].append(apart)
+        else:
+            words = tested[0].replace("_", " ")
+            self.rates[f"{protocol} protocol: {words} found"].append(tested[0] in answer.named)
 
     def _single(self, item: dict[str, Any], answer: Answer) -> bool:
         verdict, (name,) = item["verdict"], item["case"]["tested"]

@@ -20,6 +20,9 @@ TARGETS = {
     "truth in the candidate set (where detected)": "at least 95 %",
     "left out of the library: unknown or ambiguous": "at least 80 %",
     "absent effect: unknown, ambiguous or its declared family": "at least 80 %",
+    "complete protocol: tool compliance found": "at least 5 of 6",
+    "complete protocol: surface offset found": "at least 5 of 6",
+    "complete protocol: delay, play and viscoelasticity told apart": "at least 9 of 10",
     "pair: both named": "at least 70 %",
     "pair: the dominant one named": "at least 90 %",
 }

@@ -1,11 +1,12 @@
 """The blind benchmark: sealed recordings of the virtual laboratory, verdicts first, truths opened after.
 
-Sizes: quick (for CI), medium, full. Everything that is no question is drawn by each case's seed
-(scenes.variety). A graph of tasks, done by processes here or by a Dask cluster: touches are solved once an
-object, every case is simulated with its truth sealed and reconstructed, then diagnosed, and its verdict
-written to the work folder, before the truth is opened; a run that was interrupted goes on where it stopped.
-Rates carry Wilson's 95 % intervals. Baselines on the same recordings: the best in-sample fit by BIC, and for
-the gap a regression of the residual on place, depth, rate and history.
+Sizes: quick (for CI), protocol (what presses alone hide, explored in two ways), medium, full. Everything that
+is no question is drawn by each case's seed (scenes.variety). A graph of tasks, done by processes here or by a
+Dask cluster: touches are solved once an object, every case is simulated with its truth sealed and
+reconstructed, then diagnosed, and its verdict written to the work folder, before the truth is opened; a run
+that was interrupted goes on where it stopped. Rates carry Wilson's 95 % intervals. Baselines on the same
+recordings: the best in-sample fit by BIC, and for the gap a regression of the residual on place, depth, rate
+and history.
 """
 
 from __future__ import annotations
@@ -20,7 +21,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from palpate.benchmarks._diagnosis_blind import opened_case, tasks_of, unfinished, verdict_path
-from palpate.benchmarks._diagnosis_cases import SEEDS, Case, cases
+from palpate.benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from palpate.benchmarks._diagnosis_scores import summarise
 from palpate.benchmarks._diagnosis_tables import pictures, show
 from palpate.benchmarks.timing import table
@@ -33,7 +34,7 @@ SUMMARY = "blind diagnosis of sealed recordings: detection, names, false alarms,
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Size, work folder, seed."""
-    parser.add_argument("--size", choices=("quick", "medium", "full"), default="quick", help="how many cases")
+    parser.add_argument("--size", choices=tuple(POOLS), default="quick", help="how many cases")
     parser.add_argument(
         "--work", default="bench-diagnose", help="folder of recordings, models and verdicts (resumed)"
     )

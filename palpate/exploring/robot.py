@@ -22,9 +22,10 @@ from mechanics.options import option
 from mechanics.progress import Progress, silent
 from palpate.exploring.explorer import Suggestion
 from palpate.exploring.rows import Instrument, Segment
+from scenes.laboratory.beside import on_the_support, waving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.frame import quaternions
-from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
+from scenes.laboratory.hand import HandOptions, minimum_jerk
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import Simulation, simulate
@@ -42,8 +43,6 @@ class RobotOptions:
     speed_error: float = option(0.15, "of the speed, as a share of it")
 
 
-RIGID_N = 4.0
-"""Greatest force of a press on the bare support."""
 JOIN_S = 0.25
 """In free air, over which a touch's way is joined to where the last one ended."""
 
@@ -140,12 +139,17 @@ class LaboratoryRobot:
     def _without_object(self, kind: str) -> Segment:
         """Three presses on the bare support, or waving and turning in the air, as they are read."""
         rng, options = np.random.default_rng([self.seed, len(kind), len(self._touches)]), self.options
-        way, push, turn = _on_the_support(options.tip_radius_m) if kind == "rigid" else _waving(rng)
-        reach = float(np.linalg.norm(self._surface.vertices[:, :2], axis=1).max())
-        top = float(self._surface.vertices[:, 2].max())
-        way = way + ([1.4 * reach, 0.0, 0.0] if kind == "rigid" else [0.0, 0.0, top + 0.06])
-        force = np.column_stack([np.zeros((len(push), 2)), push])
-        readings = Readings(np.arange(len(way)) / RATE_HZ, way, force, turn, np.ones(len(way), dtype=bool))
+        if kind == "rigid":
+            height, push = on_the_support()
+            reach = float(np.linalg.norm(self._surface.vertices[:, :2], axis=1).max())
+            way = [1.4 * reach, 0, options.tip_radius_m] + np.outer(1e-3 * height, [0, 0, 1])
+            force, turn = np.outer(push, [0, 0, 1]), np.zeros_like(way)
+        else:
+            aside, turn = waving(rng)
+            way = [0, 0, float(self._surface.vertices[:, 2].max()) + 0.06] + 1e-3 * aside
+            force = np.zeros_like(way)
+        axes, all_of_it = Rotation.from_rotvec(turn).as_matrix(), np.ones(len(way), dtype=bool)
+        readings = Readings(np.arange(len(way)) / RATE_HZ, way, force, axes, all_of_it)
         known = {} if self.last is None else dict(self.last.truth["parameters"])
         for name in self.effects:
             read = effect(name).on_readings
@@ -221,27 +225,6 @@ class LaboratoryRobot:
             direction=way / np.linalg.norm(way),
             side=np.zeros(3),
         )
-
-
-def _on_the_support(tip_radius_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """((n, 3) m, (n,) N along the support's normal, (n, 3, 3)) of three presses, from the air to the air."""
-    above, still = 0.03, np.zeros(int(0.3 * RATE_HZ))
-    down = above * (1 - minimum_jerk(int(0.4 * RATE_HZ)))
-    held = 0.5 * RIGID_N * (1 - np.cos(2 * np.pi * np.arange(int(0.8 * RATE_HZ)) / (0.8 * RATE_HZ)))
-    height = np.concatenate([above + still, *[np.r_[down, 0 * held, down[::-1]]] * 3, above + still])
-    push = np.concatenate([still, *[np.r_[0 * down, held, 0 * down]] * 3, still])
-    way = np.column_stack([np.zeros((len(height), 2)), tip_radius_m + height])
-    return way, push, np.broadcast_to(np.eye(3), (len(way), 3, 3))
-
-
-def _waving(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """The same of three seconds in the air: to and fro by some centimetres, turning by some 20 degrees."""
-    count = int(3 * RATE_HZ)
-    fade = np.sin(np.pi * np.arange(count) / count)[:, None] ** 0.5
-    way = fade * 0.015 * np.column_stack([band_noise(count, RATE_HZ, 0.4, 2.5, rng) for _ in range(3)])
-    turn = np.column_stack([band_noise(count, RATE_HZ, 0.3, 1.5, rng) for _ in range(3)])
-    axes = Rotation.from_rotvec(fade * np.radians(20) * turn).as_matrix()
-    return way, np.zeros(count), axes
 
 
 def _first_hit(surface: trimesh.Trimesh, start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, int] | None:

@@ -91,6 +91,8 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
     load = np.abs(sight.net[: count * size].reshape(count, size, 3).mean(axis=1))
     # what presses mostly along an axis may slide on something flat and hard across it: the traced support
     held = (load > _ALONG * np.linalg.norm(load, axis=1, keepdims=True)) & (load > _FELT * sight.spread_n)
+    # a robot presses the bare support straight down: nothing moves across
+    held |= _stated_rigid(sight)[: count * size : size, None]
     resolution = max(float(np.median(least[:3])), 1e-6)
     fastest = _fastest(sight, count, size)
     worst: tuple[float, int, int, list[int]] | None = None
@@ -139,6 +141,15 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         (begin, end),
         names,
     )
+
+
+def _stated_rigid(sight: Sight) -> np.ndarray:
+    """(n,) bool: where the recording says that something rigid is pressed."""
+    stated = np.zeros(len(sight.t), dtype=bool)
+    for each in sight.recording.segments:
+        if each.kind == "rigid":
+            stated |= (sight.recording.t >= each.start_s) & (sight.recording.t <= each.end_s)
+    return stated
 
 
 def _fastest(sight: Sight, count: int, size: int) -> np.ndarray:

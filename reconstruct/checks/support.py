@@ -9,6 +9,7 @@ import numpy as np
 from mechanics.robust import spread_about_zero, weighted_median
 from reconstruct.checks.base import Finding
 from reconstruct.contacts import Exploration
+from reconstruct.on_support import supported
 
 _BELOW = 6.0
 _SCALE = 1.35
@@ -36,10 +37,11 @@ def _below(exploration: Exploration) -> Iterator[Finding]:
     height = boundary.height(exploration.position) - radius
     height[: boundary.interval[1]] = 0.0
     least = max(_BELOW * boundary.flatness_m, 0.1 * radius, 10 * (recording.position_resolution_m or 0.0))
-    below = height < -least
+    # a tool that yields is pressed below what is rigid, and a base traced once more is where it has gone
+    below = (height < -least) & ~supported(exploration.presses, recording.t)
     if not below.any():
         return
-    deepest = int(np.argmin(height))
+    deepest = int(np.argmin(np.where(below, height, 0.0)))
     away = np.flatnonzero(~below)
     before, after = away[away < deepest], away[away > deepest]
     a = int(before[-1]) if len(before) else 0

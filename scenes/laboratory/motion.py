@@ -7,7 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
 
+from scenes.laboratory.beside import on_the_support, straying, waving
 from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
 from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
 from scenes.laboratory.presses import Touch
@@ -25,8 +27,8 @@ class Motion:
 
     touch: (n,) number of the touch, -1 elsewhere. leg: (n,) leg of that touch; s: (n,) mm along it
     (negative: above the surface). stray: (n, 3) mm sideways of the touch's path since first touch.
-    trace_force: (n, 3) N of phase I.
-    phase: (start, end) s of phase I.
+    trace_force: (n, 3) N of phase I, and of what is done on the support after the touches.
+    phase: (start, end) s of phase I. beside: (kind, start, end) s of what is done after the touches.
     """
 
     position: np.ndarray
@@ -37,6 +39,7 @@ class Motion:
     stray: np.ndarray
     trace_force: np.ndarray
     phase: tuple[float, float]
+    beside: tuple[tuple[str, float, float], ...] = ()
 
     @property
     def t(self) -> np.ndarray:
@@ -51,8 +54,12 @@ def motion(
     hand: HandOptions,
     radius: float,
     rng: np.random.Generator,
+    again: Trace | None = None,
 ) -> Motion:
-    """String phase I and all touches together, with reaches around the object between them."""
+    """String phase I and all touches together, with reaches around the object between them.
+
+    again: after them three presses on the bare support, waving in the air, and the base traced once more, so.
+    """
     surface = Surface(phantom.vertices * 1e3, phantom.faces)
     middle = np.array([0.0, 0.0, 0.5e3 * phantom.height_m])
     clear = np.linalg.norm(surface.vertices - middle, axis=1).max() + radius + 8.0
@@ -73,10 +80,55 @@ def motion(
         here = part["position"][-1]
     rest = _reach(here, here + [0, 0, 25.0], middle, clear, radius, hand, rng)
     parts.append(_still(rest))
+    count += len(rest)
+    done: list[_Done] = [] if again is None else _beside(surface, again, hand, radius, rng)
+    beside, forces, turns = [], [(0, traced.force)], []
+    here = rest[-1]
+    for each in done:
+        reach = _reach(here, each.position[0], middle, clear, radius, hand, rng)
+        parts += [_still(reach), _still(each.position)]
+        start = count + len(reach)
+        count = start + len(each.position)
+        beside.append((each.kind, start / RATE_HZ, (count - 1) / RATE_HZ))
+        forces.append((start, each.force))
+        turns.append((start, each.turn))
+        here = each.position[-1]
     whole = {key: np.concatenate([part[key] for part in parts]) for key in parts[0]}
     trace_force = np.zeros_like(whole["position"])
-    trace_force[: len(traced.force)] = traced.force
-    return Motion(axis=_axes(axes, len(trace_force)), trace_force=trace_force, phase=phase, **whole)
+    for start, force in forces:
+        trace_force[start : start + len(force)] = force
+    axis = _axes(axes, len(trace_force))
+    for start, turn in turns:
+        rows = slice(start, start + len(turn))
+        axis[rows] = Rotation.from_rotvec(turn).apply(axis[rows])
+    return Motion(axis=axis, trace_force=trace_force, phase=phase, beside=tuple(beside), **whole)
+
+
+@dataclass(frozen=True)
+class _Done:
+    """kind of segment; position (n, 3) mm, force (n, 3) N, turn (n, 3) rotation vectors of the tool."""
+
+    kind: str
+    position: np.ndarray
+    force: np.ndarray
+    turn: np.ndarray
+
+
+def _beside(
+    surface: Surface, again: Trace, hand: HandOptions, radius: float, rng: np.random.Generator
+) -> list[_Done]:
+    """Presses on the support beside the object, waving above it, the base once more."""
+    reach = float(np.linalg.norm(surface.vertices[:, :2], axis=1).max())
+    height, push = on_the_support()
+    sideways = straying(len(height), hand, rng) + [1.4 * reach + 2 * radius, 0.0]
+    pressed = np.column_stack([sideways, radius + height])
+    aside, turn = waving(rng)
+    waved = [0, 0, surface.vertices[:, 2].max() + 60.0] + aside
+    return [
+        _Done("rigid", pressed, np.outer(push, [0, 0, 1]), np.zeros_like(pressed)),
+        _Done("free", waved, np.zeros_like(waved), turn),
+        _Done("retrace", again.position, again.force, np.zeros_like(again.position)),
+    ]
 
 
 def _still(position: np.ndarray) -> dict[str, np.ndarray]:

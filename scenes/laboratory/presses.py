@@ -21,7 +21,8 @@ from scenes.phantoms import Phantom
 class Protocol:
     """How much a person explores: numbers of sites and of further touches, depths in mm.
 
-    thickness: no press is deeper than this share of the object's height.
+    thickness: no press is deeper than this share of the object's height. complete: the bare support is
+    pressed, the tool waved and the base traced once more after the touches.
     """
 
     sites: int
@@ -31,6 +32,7 @@ class Protocol:
     least_depth: float
     greatest_depth: float
     thickness: float = 0.2
+    complete: bool = False
 
 
 PROTOCOLS = {
@@ -39,8 +41,10 @@ PROTOCOLS = {
     "ordinary": Protocol(24, 9, 4, 3, 2.5, 8.0),
     "dense": Protocol(46, 18, 8, 6, 1.5, 9.0),
     "deep": Protocol(14, 4, 2, 1, 10.5, 12.0, 0.25),
+    "complete": Protocol(24, 9, 4, 3, 2.5, 8.0, complete=True),
 }
-"""Named protocols; `brief` to `dense` differ in the number of touches, `deep` passes 10 mm at every place."""
+"""Named protocols; `brief` to `dense` differ in the number of touches, `deep` passes 10 mm at every place,
+`complete` is `ordinary` and what tells the instrument and a move of the object."""
 
 RIM_MM, FLOOR_MM = 9.0, 13.0
 """Rims are not touched within this distance, and sites lie at least this high above the support."""

@@ -13,6 +13,7 @@ import numpy as np
 from mechanics.options import option
 from mechanics.progress import Progress
 from mechanics.recording import Recording
+from mechanics.segments import Segment
 from scenes.laboratory.curves import Solving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.effects.solid import scaled
@@ -54,11 +55,13 @@ class SimulateOptions:
 class Staging:
     """What may be laid down about an exploration instead of being left to numbers and seeds.
 
-    touches: instead of a press set. frame: (rotation (3, 3), shift (3,) m) from the object's frame to the
-    device's. instrument: what the readings go through before any effect; no effect of its own.
+    touches: instead of a press set. complete: what `--protocol complete` does after the touches. frame:
+    (rotation (3, 3), shift (3,) m) from the object's frame to the device's. instrument: what the readings go
+    through before any effect; no effect of its own.
     """
 
     touches: tuple[Touch, ...] | None = None
+    complete: bool = False
     frame: tuple[np.ndarray, np.ndarray] | None = None
     instrument: Callable[[Readings], Readings] | None = None
 
@@ -121,7 +124,10 @@ class Session:
         """The same hand's way every time."""
         rng = self._rng("trace")
         traced = trace(self.phantom, self.hand, radius, self.modulus, rng)
-        return motion(self.phantom, self.touches, traced, self.hand, radius, self._rng("motion"))
+        again = None
+        if self.staging.complete or PROTOCOLS[self.options.protocol].complete:
+            again = trace(self.phantom, self.hand, radius, self.modulus, self._rng("retrace"))
+        return motion(self.phantom, self.touches, traced, self.hand, radius, self._rng("motion"), again)
 
     def run(
         self, present: Sequence[str], regions: bool = True, moved: np.ndarray | None = None
@@ -211,6 +217,7 @@ class Session:
             tip_radius_m=options.tip_radius_m,
             quaternion=quaternions(readings.axes),
             boundary_phase=(round(self.way.phase[0], 2), round(self.way.phase[1], 2)),
+            segments=tuple(Segment(kind, round(a, 2), round(b, 2)) for kind, a, b in self.way.beside),
             force_noise_std_n=options.force_noise_std_n,
             position_resolution_m=step,
             object_name=self.phantom.name,

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording, read_recording
+from mechanics.segments import Segment
 from scenes.laboratory.hand import HandOptions, cohort_hand
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.presses import Touch
@@ -62,11 +63,14 @@ def explored(
     *,
     it: Thing | None = None,
     sizes: bool = False,
+    complete: bool = False,
     workers: int | None = 1,
     cache: Path | None = None,
     progress: Progress = silent,
 ) -> Varied:
-    """The same, with nothing written. cache: where solved touches are kept, by default the user's."""
+    """The same, with nothing written. complete: by that protocol, whose parts are stated where phase I is.
+    cache: where solved touches are kept, by default the user's.
+    """
     it = it or thing(draw.number)
     options = SimulateOptions(
         young_modulus_pa=draw.young_modulus_pa,
@@ -76,6 +80,7 @@ def explored(
     )
     staging = Staging(
         touches=tuple(touches(it, draw)),
+        complete=complete,
         frame=frame(draw),
         instrument=lambda readings: weighed(readings, draw),
     )
@@ -92,11 +97,21 @@ def explored(
         phase_s=simulation.motion.phase,
         rng=np.random.default_rng([19, draw.seed]),
         tip_radius_m=it.tip_radius_m,
+        segments=_stated(simulation.motion, draw),
         object_name=object_name(draw),
         poisson_ratio=it.phantom.poisson_ratio if stated else None,
         truth=truth,
     )
     return Varied(draw, it, recording, simulation)
+
+
+def _stated(way: Motion, draw: Draw) -> tuple[Segment, ...]:
+    """What is written down of what was done beside the presses."""
+    if not draw.boundary_phase_stated:
+        return ()
+    return tuple(
+        Segment(kind, round(a + draw.clock_s, 2), round(b + draw.clock_s, 2)) for kind, a, b in way.beside
+    )
 
 
 def touches(it: Thing, draw: Draw) -> list[Touch]:
