@@ -90,7 +90,7 @@ def rigid_of(recording: Recording, presses: Presses, normal: np.ndarray) -> Rigi
         across, along = tangents(normal)
         push = rows.force @ normal
         flat = [own, own * (place @ across)[:, None], own * (place @ along)[:, None]]
-        found, error, off = _fitted(np.column_stack([push, *flat]), place @ normal)
+        found, error, off = _fitted(np.column_stack([-push, *flat]), place @ normal)
         tilt = found[1:].reshape(3, -1)[1:, widest]
         normal = normal - tilt[0] * across - tilt[1] * along
         normal = normal / np.linalg.norm(normal)

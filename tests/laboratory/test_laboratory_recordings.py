@@ -15,6 +15,7 @@ from palpate.commands.simulate import effects_from
 from scenes.laboratory.effects import REGISTRY, UNNAMED
 from scenes.laboratory.effects.contact import relaxed
 from scenes.laboratory.sealing import opened
+from scenes.laboratory.session import Staging
 from scenes.laboratory.simulate import SimulateOptions, simulate
 from scenes.laboratory.truth import size_of
 from scenes.phantoms import phantom
@@ -168,3 +169,28 @@ def test_bad_requests_say_what_is_allowed(springs, tmp_path: Path, capsys) -> No
     assert "--truth" in capsys.readouterr().err
     with pytest.raises(OptionError, match="strength"):
         _run({"time_delay": -1})
+
+
+def test_a_complete_exploration_ends_with_what_tells_the_instrument(springs) -> None:
+    """Up to the last touch it is the same; then rigid, free and a second round are stated where they are."""
+    plain = simulate(phantom("cylinder"), {"tool_compliance": 1}, SimulateOptions(protocol="sparse"), seed=3)
+    staging = Staging(complete=True)
+    made = simulate(
+        phantom("cylinder"), {"tool_compliance": 1}, SimulateOptions(protocol="sparse"), seed=3,
+        staging=staging,
+    )  # fmt: skip
+    n = len(plain.recording.t)
+    assert np.array_equal(made.clean_n[:n], plain.clean_n)
+    assert [s.kind for s in made.recording.segments] == ["rigid", "free", "retrace"]
+    rows = {
+        s.kind: (made.recording.t >= s.start_s) & (made.recording.t <= s.end_s)
+        for s in made.recording.segments
+    }
+    force, height = np.linalg.norm(made.clean_n, axis=1), made.readings.position[:, 2]
+    assert force[rows["rigid"]].max() == pytest.approx(4.0, rel=0.01)
+    # 1200 N/m give by 3.3 mm under 4 N: the reading lies below the support
+    assert height[rows["rigid"]].min() == pytest.approx(0.005 - 4.0 / 1200, abs=1e-4)
+    assert force[rows["free"]].max() == 0
+    foot = made.readings.position[rows["retrace"] & (force > 0.2)]
+    turn = np.unique(np.floor(18 * (np.arctan2(foot[:, 1], foot[:, 0]) / np.pi)))
+    assert len(turn) >= 36

@@ -1,0 +1,108 @@
+"""A base that is traced twice tells how far the object moved in between."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
+
+from diagnose.forward import build_forward
+from diagnose.instrument_offsets import InstrumentOffsets, with_move
+from diagnose.retraced import Move, move_of
+from diagnose.touches import touches_of
+from mechanics.recording import Recording
+
+UP = np.array([0.15, -0.1, 0.98]) / np.linalg.norm([0.15, -0.1, 0.98])
+CENTRE = np.array([0.3, -0.2, 0.1])
+
+
+def _round(rng: np.random.Generator, lobes: float) -> np.ndarray:
+    """(n, 3) m once and a tenth round a base: a circle, or one with two lobes; a hand leans in and out."""
+    angle = rng.uniform(0, 2 * np.pi) + np.linspace(0, 2.2 * np.pi, 9000)
+    lean = gaussian_filter1d(rng.normal(size=len(angle)), 150)
+    reach = 0.04 * (1 + lobes * np.cos(2 * angle)) + 3e-4 * lean / lean.std()
+    flat = Rotation.align_vectors([UP], [[0, 0, 1.0]])[0]
+    return flat.apply(np.column_stack([reach * np.cos(angle), reach * np.sin(angle), 0.005 + 0 * angle]))
+
+
+def _twice(seed: int, shift: np.ndarray, turn: np.ndarray, lobes: float) -> Move | None:
+    """The move told by two tracings, the second moved by a shift and a turn about CENTRE."""
+    rng = np.random.default_rng(seed)
+    first = CENTRE + _round(rng, lobes)
+    again = CENTRE + shift + Rotation.from_rotvec(turn).apply(_round(rng, lobes))
+    position = np.round(np.vstack([first, again]) / 3e-5) * 3e-5
+    force = rng.normal(0, 0.012, position.shape) + 0.7 * UP
+    t = np.arange(len(position)) * 1e-3
+    recording = Recording(t=t, position=position, force_on_tool=force, sample_rate_hz=1e3, tip_radius_m=5e-3)
+    spans = {"trace": (0.0, t[len(first)]), "retrace": (t[len(first)], np.inf)}
+
+    def within(kind: str, at: np.ndarray) -> np.ndarray:
+        a, b = spans.get(kind, (np.inf, np.inf))
+        return (at >= a) & (at < b)
+
+    return move_of(recording, SimpleNamespace(within=within, noise=SimpleNamespace(raw_n=0.012)), UP, CENTRE)
+
+
+def test_a_shift_and_a_turn_are_read_off_the_two_tracings():
+    """Within their own errors, for small and large moves, of a base that is not round."""
+    rng = np.random.default_rng(2)
+    off = []
+    for seed, size in enumerate([0.5e-3, 1.5e-3, 4e-3] * 4):
+        shift, turn = size * rng.normal(size=3), 15 * size * rng.normal(size=3)
+        found = _twice(seed, shift, turn, 0.25)
+        sd = np.sqrt(np.diag(found.error))
+        assert sd[:3].max() < 0.6e-3
+        off += [(found.shift - shift) / sd[:3], (found.turn - turn) / sd[3:]]
+    assert 0.4 < np.sqrt(np.mean(np.square(off))) < 2
+
+
+def test_what_has_not_moved_is_seldom_said_to_have():
+    """Of forty objects, round and not, none reaches four standard errors at places all over them."""
+    rng = np.random.default_rng(3)
+    normal = rng.normal(size=(20, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    for seed in range(40):
+        found = _twice(100 + seed, np.zeros(3), np.zeros(3), 0.0 if seed % 2 else 0.25)
+        along, error = found.along(CENTRE + 0.04 * normal, normal)
+        assert (along**2).mean() < 4**2 * np.trace(error) / len(along)
+
+
+def test_a_round_base_tells_its_shift_whatever_it_turned_by():
+    found = _twice(5, np.array([2e-3, -1e-3, 1e-3]), np.zeros(3), 0.0)
+    assert np.abs(found.shift - [2e-3, -1e-3, 1e-3]).max() < 0.3e-3
+    assert np.sqrt(found.error[5, 5]) < 0.3
+
+
+def test_one_tracing_tells_no_move():
+    rng = np.random.default_rng(0)
+    position = _round(rng, 0.1)
+    recording = Recording(
+        t=np.arange(len(position)) * 1e-3, position=position, force_on_tool=position * 0 + 0.7 * UP,
+        sample_rate_hz=1e3, tip_radius_m=5e-3,
+    )  # fmt: skip
+    table = SimpleNamespace(
+        within=lambda kind, at: np.full(len(at), kind == "trace"), noise=SimpleNamespace(raw_n=0.012)
+    )
+    assert move_of(recording, table, UP, CENTRE) is None
+
+
+@pytest.mark.parametrize("shift, named", [(1.5e-3, True), (5e-6, False)])
+def test_a_move_that_is_felt_is_named_with_what_it_hides(bench, shift, named):
+    """The gap before is what the surface would miss by if it stood where its base was traced."""
+    recording, model = bench.record()
+    forward = build_forward(touches_of(bench.table(recording)), model)
+    nothing = InstrumentOffsets((), {}, np.zeros_like(forward.touches.local_force), ())
+    up = np.array([0.0, 0.0, shift])
+    move = Move(up, np.zeros(3), np.zeros(3), np.diag([1e-9, 1e-9, 1e-14, 1e-6, 1e-6, 1e-6]))
+    found = with_move(nothing, forward, move, set())
+    assert found.names == (("surface_offset",) if named else ())
+    assert with_move(nothing, forward, move, {"surface_offset"}).names == ()
+    if named:
+        # pressed on a top that has risen, the base's word has less force than is felt
+        on_top = (forward.touches.normal[:, 2] > 0.9)[forward.touches.press] & forward.touches.counted
+        assert found.residual[on_top, 0].mean() > 0.05
+        low, high = np.array(found.intervals["surface_offset"]["shift_m"])
+        assert (low <= up).all() and (up <= high).all()
