@@ -90,14 +90,11 @@ def find_instrument_offsets(
     if rigid is None or SPRING.name in excluded or rigid.compliance <= Z * rigid.error:
         return offsets
     t = forward.touches
-    settings = forward.ideal(forward.model.material.young_modulus_pa)
-    read = np.nan_to_num(forward.predict(settings))
     stiffness = 1 / rigid.compliance
+    change = _yielding(forward, rigid.compliance)
+    if _size(forward, change) < t.noise.raw_n:
+        return offsets  # too little to matter
     forward.touches = dataclasses.replace(t, position=t.position + t.force / stiffness)
-    change = np.nan_to_num(forward.predict(settings)) - read
-    if np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) < t.noise.raw_n:
-        forward.touches = t  # too little to matter
-        return offsets
     error = np.hypot(rigid.error, SPRING_SHARE * rigid.compliance)
     low, high = (1 / max(rigid.compliance + s * 1.96 * error, 1e-9) for s in (1, -1))
     yields = f"on the rigid support the tip's reading gives by {1e3 * rigid.compliance:.3f} mm a newton"
@@ -108,6 +105,44 @@ def find_instrument_offsets(
         (*offsets.reasons, yields),
         {**offsets.intervals, SPRING.name: {"stiffness_n_per_m": [float(low), float(high)]}},
     )
+
+
+def ruled_out(forward: Forward, rigid: Rigid | None, move: Move | None) -> frozenset[str]:
+    """What the support shows not to be there: a spring or a move that is too small to matter even if it is
+    `Z` standard errors greater than it was read."""
+    gone = set()
+    if rigid is not None and np.isfinite(rigid.error):
+        most = max(rigid.compliance, 0.0) + Z * rigid.error
+        if _size(forward, _yielding(forward, most)) < forward.touches.noise.raw_n:
+            gone.add(SPRING.name)
+    if move is not None:
+        t = forward.touches
+        along, error = move.along(t.point, t.normal)
+        most = np.abs(along) + MOVED_Z * np.sqrt(np.diag(error))
+        if _size(forward, _moved(forward, most)) < t.noise.raw_n:
+            gone.add(OFFSET.name)
+    return frozenset(gone)
+
+
+def _yielding(forward: Forward, compliance: float) -> np.ndarray:
+    """(n, 3) N: what the ideal model says more where a spring of m/N has been taken off the readings."""
+    t, settings = forward.touches, forward.ideal(forward.model.material.young_modulus_pa)
+    read = np.nan_to_num(forward.predict(settings))
+    corrected = dataclasses.replace(t, position=t.position + compliance * t.force)
+    return np.nan_to_num(dataclasses.replace(forward, touches=corrected).predict(settings)) - read
+
+
+def _moved(forward: Forward, along: np.ndarray) -> np.ndarray:
+    """(n, 3) N: what the ideal model says more than where its places are along (p,) m farther in."""
+    settings = forward.ideal(forward.model.material.young_modulus_pa)
+    here = np.nan_to_num(forward.predict(settings))
+    settings.onset = settings.onset - along
+    return here - np.nan_to_num(forward.predict(settings))
+
+
+def _size(forward: Forward, change: np.ndarray) -> float:
+    """N rms over contact samples."""
+    return float(np.sqrt((change[forward.touches.counted] ** 2).sum(axis=1).mean()))
 
 
 def with_move(
@@ -124,11 +159,8 @@ def with_move(
     along, error = move.along(t.point, t.normal)
     if (along**2).mean() <= MOVED_Z**2 * np.trace(error) / len(along):
         return offsets
-    settings = forward.ideal(forward.model.material.young_modulus_pa)
-    here = np.nan_to_num(forward.predict(settings))
-    settings.onset = settings.onset - along
-    change = here - np.nan_to_num(forward.predict(settings))
-    if np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) < t.noise.raw_n:
+    change = _moved(forward, along)
+    if _size(forward, change) < t.noise.raw_n:
         return offsets  # too little to matter
     sd = np.sqrt(np.diag(move.error))
     words = (

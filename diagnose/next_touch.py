@@ -1,8 +1,9 @@
-"""The press that would best tell two explanations apart: every candidate press is predicted under both.
+"""What would best tell two explanations apart: every candidate press is predicted under both.
 
 Candidates: the places already pressed, straight or dragged sideways, three depths, three speeds, a short or a
 long hold, once or twice in a row. A press is worth the whitened distance between the two predictions, after
-first touch, stiffness of the place and the other nuisances have had their say.
+first touch, stiffness of the place and the other nuisances have had their say. Beside them stand three
+presses on the bare support, where only a tool yields, and the base traced once more, which has moved or not.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from diagnose.forward import Forward
 from diagnose.judging import Candidate
 from diagnose.result import NextTouch
 from diagnose.whiten import NuisanceOptions, Whitener
+from mechanics.effects.settings import Settings
 from mechanics.leads import leads
 from mechanics.presses import Presses
 
@@ -28,6 +30,10 @@ DRAG_M = 1.5e-3
 DEEPEST_M = 0.009
 CLEARANCE_M = 2e-3
 STEP_S = 0.01
+RIGID_N, RIGID_M = 4.0, 5e-5
+"""Force of a press on the support, and how far readings on something rigid scatter."""
+RETRACED_M = 3e-4
+"""By how much an outline that is traced twice is off, over a stretch."""
 
 
 @dataclass(frozen=True)
@@ -72,6 +78,13 @@ def next_touch(
             best = (float(worth[press]), size, plan, press)
     assert best is not None
     worth, size, plan, press = best
+    again, rigid = _retrace(forward, first, second), _rigid(forward, first, second)
+    # a surface that is fitted to the presses themselves moves along with them: none of them tells a move
+    hidden = forward.model.presses.recording == forward.touches.recording
+    if again is not None and (again.sigmas**2 > worth or (hidden and again.sigmas > 1)):
+        return again
+    if rigid is not None and rigid.sigmas**2 > worth:
+        return rigid
     t = forward.touches
     direction = -t.normal[press]
     depth = _depth(t, plan)
@@ -92,6 +105,61 @@ def next_touch(
         why=_why(plan, first[0], second[0], size, np.sqrt(worth)),
         difference_n=size,
         sigmas=float(np.sqrt(worth)),
+    )
+
+
+def _rigid(forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]) -> NextTouch | None:
+    """Three presses on the bare support, which only a tool that yields gives way to; None where neither
+    does."""
+    one, other = (_meant(forward, c).tool_compliance for _, c in (first, second))
+    gives = RIGID_N * abs(one - other)
+    why = (
+        f"pressing the bare support three times with some {RIGID_N:g} N parts {_both(first, second)} most: a "
+        f"tool that yields reads {1e3 * gives:.2f} mm of travel there, where nothing else does"
+    )
+    return _on_the_support(forward, first, second, "rigid", gives / RIGID_M, why) if gives > 0 else None
+
+
+def _retrace(
+    forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]
+) -> NextTouch | None:
+    """The base traced once more, which has moved or has not; None where neither says that it has."""
+    one, other = (_meant(forward, c).onset for _, c in (first, second))
+    moved = float(np.sqrt(((one - other) ** 2).mean()))
+    why = (
+        f"tracing the base once more, now, parts {_both(first, second)} most: an object that moved is "
+        f"{1e3 * moved:.1f} mm from where it was traced first"
+    )
+    return _on_the_support(forward, first, second, "retrace", moved / RETRACED_M, why) if moved > 0 else None
+
+
+def _meant(forward: Forward, candidate: Candidate) -> Settings:
+    """What a candidate's effects set, its first touches aside."""
+    return settings_of(forward, candidate.found.effects, candidate.found.values)
+
+
+def _both(first: tuple[str, Candidate], second: tuple[str, Candidate]) -> str:
+    return f"{first[0].replace('_', ' ')} from {second[0].replace('_', ' ')}"
+
+
+def _on_the_support(
+    forward: Forward,
+    first: tuple[str, Candidate],
+    second: tuple[str, Candidate],
+    kind: str,
+    sigmas: float,
+    why: str,
+) -> NextTouch:
+    """Beside the object: a third of its reach off its foot to press, at the foot to trace."""
+    support = forward.model.support
+    out = forward.model.mesh.points - support.point
+    out = out - (out @ support.normal)[:, None] * support.normal
+    middle = out.mean(axis=0)
+    rim = out[np.argmax(((out - middle) ** 2).sum(axis=1))] - middle
+    x, y, z = map(float, support.point + middle + (1.4 if kind == "rigid" else 1.0) * rim)
+    a, b, c = map(float, -support.normal)
+    return NextTouch(
+        x, y, z, (a, b, c), 0.0, SPEEDS[1], HOLDS[0], (first[0], second[0]), why, 0.0, sigmas, kind
     )
 
 

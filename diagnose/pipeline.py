@@ -12,7 +12,7 @@ from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets, read_sideways, with_move
+from diagnose.instrument_offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
 from diagnose.judging import AttributionOptions, Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
@@ -84,10 +84,12 @@ def diagnose(
     allowed = effects(without=excluded)
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, excluded)
-    if model.presses.recording == presses.recording:
-        # a surface of another recording's presses leaves the move to be felt
-        move = move_of(recording, presses, model.support.normal, touches.point.mean(axis=0))
-        offsets = with_move(offsets, forward, move, excluded)
+    # a surface of another recording's presses leaves a move to be felt
+    own = model.presses.recording == presses.recording
+    centre = touches.point.mean(axis=0)
+    move = move_of(recording, presses, model.support.normal, centre) if own else None
+    offsets = with_move(offsets, forward, move, excluded)
+    settled = {*offsets.names, *ruled_out(forward, rigid, move)}
     site_sd = site_stiffness_sd(touches, model, nuisance)
     if touches.sites != presses.sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
@@ -97,7 +99,7 @@ def diagnose(
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
     left_out = {e.name for e in effects() if e.costly and options.fast}
-    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (*left_out, *offsets.names)]
+    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (left_out | settled)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)

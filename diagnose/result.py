@@ -60,9 +60,11 @@ class EffectEntry:
 
 @dataclass(frozen=True)
 class NextTouch:
-    """The press that would best separate `separates`.
+    """What would best separate `separates`: a "press" of the object, or what is done beside it, "rigid"
+    presses of the bare support or the base traced once more ("retrace").
 
-    difference_n: rms by which their predictions differ there; sigmas: the same over noise and our own errors.
+    difference_n: rms by which predictions of a press differ; sigmas: by how many times noise and our own
+    errors what is told apart differs.
     """
 
     x: float
@@ -76,6 +78,7 @@ class NextTouch:
     why: str
     difference_n: float = 0.0
     sigmas: float = 0.0
+    kind: str = "press"
 
 
 @dataclass(frozen=True)
@@ -136,11 +139,16 @@ class Diagnosis:
                 f"{self.gap_closed:.0%} closed (95 % interval {low:.0%} to {high:.0%})"
             )
         lines += [f"  {reason}" for reason in self.reasons]
-        if self.next_touch is not None and self.candidates:
+        if self.next_touch is not None and self.unsettled:
             lines.append(f"next touch: {self.next_touch.why}")
         if self.left_out:
             lines.append(f"--fast left out: {', '.join(self.left_out)}")
         return lines
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether the verdict leaves something open: rivals, or a remainder."""
+        return bool(self.candidates) or "unknown" in self.kind
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
@@ -187,6 +195,7 @@ class Diagnosis:
                 "why": self.next_touch.why,
                 "difference_n": self.next_touch.difference_n,
                 "sigmas": self.next_touch.sigmas,
+                "kind": self.next_touch.kind,
             },
             "errors_n": dict(self.errors_n),
             "held_out": {k: {"gap_before_n": a, "gap_after_n": b} for k, (a, b) in self.held_out_n.items()},

@@ -76,7 +76,7 @@ def _what_next(result: Diagnosis, model: Model, recording: Path | str) -> str:
         )
     if not said:
         said.append(f"feel it: `palpate touch {model.path or 'MODEL'}`")
-    if result.next_touch is not None and result.candidates:
+    if result.next_touch is not None and result.unsettled:
         said.append("touch once more where it says below, which would settle what is open")
     return "What to do next: " + "; ".join(said) + "."
 
@@ -110,15 +110,20 @@ def _next_touch(page: Page, result: Diagnosis) -> None:
     touch = result.next_touch
     if touch is None:
         return
-    page.heading("To be sure: touch here next" if result.candidates else "If you touch it once more")
+    page.heading("To be sure: touch here next" if result.unsettled else "If you touch it once more")
+    hangs = "" if result.unsettled else " Nothing hangs on it: the answer above stands without."
+    if touch.kind != "press":
+        page.paragraph(
+            f"To tell {' from '.join(n.replace('_', ' ') for n in touch.separates)}: {touch.why}.{hangs}"
+        )
+        return
     x, y, z = (1e3 * v for v in (touch.x, touch.y, touch.z))
     direction = ", ".join(f"{d:.2f}" for d in touch.direction)
     hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
     page.paragraph(
         f"To tell {' from '.join(n.replace('_', ' ') for n in touch.separates)}, press at ({x:.0f}, {y:.0f}, "
         f"{z:.0f}) mm in the direction ({direction}), {touch.depth_m * 1e3:.1f} mm deep at "
-        f"{touch.speed_m_per_s * 1e3:.0f} mm/s{hold}: {touch.why}."
-        + ("" if result.candidates else " Nothing hangs on it: the answer above stands without.")
+        f"{touch.speed_m_per_s * 1e3:.0f} mm/s{hold}: {touch.why}.{hangs}"
     )
 
 

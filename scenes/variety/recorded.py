@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -64,12 +64,13 @@ def explored(
     it: Thing | None = None,
     sizes: bool = False,
     complete: bool = False,
+    more: Sequence[Touch] = (),
     workers: int | None = 1,
     cache: Path | None = None,
     progress: Progress = silent,
 ) -> Varied:
     """The same, with nothing written. complete: by that protocol, whose parts are stated where phase I is.
-    cache: where solved touches are kept, by default the user's.
+    more: touches after those that are drawn. cache: where solved touches are kept, by default the user's.
     """
     it = it or thing(draw.number)
     options = SimulateOptions(
@@ -79,7 +80,7 @@ def explored(
         position_resolution_m=draw.resolution_m,
     )
     staging = Staging(
-        touches=tuple(touches(it, draw)),
+        touches=(*touches(it, draw), *more),
         complete=complete,
         frame=frame(draw),
         instrument=lambda readings: weighed(readings, draw),

@@ -10,9 +10,15 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 from diagnose.forward import build_forward
-from diagnose.instrument_offsets import InstrumentOffsets, with_move
+from diagnose.instrument_offsets import InstrumentOffsets, ruled_out, with_move
+from diagnose.judging import AttributionOptions, Search
+from diagnose.next_touch import next_touch
+from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.retraced import Move, move_of
+from diagnose.rigid import Rigid
 from diagnose.touches import touches_of
+from diagnose.whiten import NuisanceOptions
+from mechanics.effects.registry import effect
 from mechanics.recording import Recording
 
 UP = np.array([0.15, -0.1, 0.98]) / np.linalg.norm([0.15, -0.1, 0.98])
@@ -106,3 +112,40 @@ def test_a_move_that_is_felt_is_named_with_what_it_hides(bench, shift, named):
         assert found.residual[on_top, 0].mean() > 0.05
         low, high = np.array(found.intervals["surface_offset"]["shift_m"])
         assert (low <= up).all() and (up <= high).all()
+
+
+def test_what_the_support_shows_not_to_be_there_is_ruled_out(bench):
+    """Only where it would not matter even by several standard errors."""
+    recording, model = bench.record()
+    forward = build_forward(touches_of(bench.table(recording)), model)
+
+    def rigid(error: float) -> Rigid:
+        return Rigid(0.0, error, 1e-6, 10.0)
+
+    def move(error: float) -> Move:
+        return Move(np.zeros(3), np.zeros(3), np.zeros(3), error**2 * np.eye(6))
+
+    assert ruled_out(forward, rigid(1e-7), None) == {"tool_compliance"}
+    assert ruled_out(forward, rigid(1e-4), None) == set()
+    assert ruled_out(forward, None, move(1e-6)) == {"surface_offset"}
+    assert ruled_out(forward, None, move(1e-3)) == set()
+    assert ruled_out(forward, None, None) == set()
+
+
+@pytest.mark.parametrize("name, kind", [("tool_compliance", "rigid"), ("surface_offset", "retrace")])
+def test_what_only_the_support_tells_is_asked_of_it(bench, name, kind):
+    """A yielding tool and a moved object are parted from a tip's radius on the table, not by a press."""
+    there = {
+        "tool_compliance": lambda t, x, f: (x - f / 300.0, f),
+        "surface_offset": lambda t, x, f: (x + [0.002, 0.0, 0.003], f),
+    }
+    recording, model = bench.record(there[name])
+    result = diagnose(recording, model, DiagnoseOptions(fast=True, bootstrap=100))
+    search = Search(
+        result.forward, model.material.young_modulus_pa, nuisance=NuisanceOptions(),
+        options=AttributionOptions(), site_sd=None, finite_strain=effect("finite_strain"),
+    )  # fmt: skip
+    pair = [(n, search.judge([search.finite_strain, effect(n)])) for n in (name, "tip_radius")]
+    touch = next_touch(result.forward, *pair, NuisanceOptions())
+    assert (touch.kind, touch.separates) == (kind, (name, "tip_radius"))
+    assert touch.sigmas > 3
