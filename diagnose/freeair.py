@@ -14,6 +14,8 @@ from mechanics.samples import runs
 
 BLOCK_S = 0.25
 MIN_BLOCKS = 8
+STRETCHES = 8
+"""Of time, left out in turn for standard errors: what wanders is no bias and no drift."""
 
 
 @dataclass(frozen=True)
@@ -79,6 +81,8 @@ def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
     rate_fit = clock @ means / (clock @ clock)
     left = means - means.mean(axis=0) - np.outer(clock, rate_fit)
     noise = max(float(np.sqrt((left**2).sum() / (3 * (len(times) - 2)))), noise_n / np.sqrt(size))
+    lines = np.array([_line(times[kept], means[kept], times.mean()) for kept in _all_but_one(len(times))])
+    level_se, rate_se = _scatter(lines)
     mass, mass_se = _mass(recording, force - carried, free, noise_n)
     return FreeAir(
         t=times,
@@ -86,13 +90,31 @@ def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
         noise_n=noise,
         seconds=float(free.sum() / rate),
         bias_n=means.mean(axis=0),
-        bias_se_n=noise / np.sqrt(len(times)),
+        bias_se_n=max(noise / np.sqrt(len(times)), level_se),
         rate_n_per_s=rate_fit,
-        rate_se_n_per_s=noise / np.sqrt(clock @ clock),
+        rate_se_n_per_s=max(noise / np.sqrt(clock @ clock), rate_se),
         mass_kg=mass,
         mass_se_kg=mass_se,
         turning=turning,
     )
+
+
+def _all_but_one(blocks: int) -> list[np.ndarray]:
+    """Indices without each stretch of time."""
+    stretches = np.array_split(np.arange(blocks), STRETCHES)
+    return [np.concatenate([r for j, r in enumerate(stretches) if j != k]) for k in range(STRETCHES)]
+
+
+def _line(t: np.ndarray, values: np.ndarray, about: float) -> np.ndarray:
+    """(2, 3) level at a time and slope of the straight line through values (b, 3)."""
+    columns = np.column_stack([np.ones(len(t)), t - about])
+    return np.linalg.lstsq(columns, values, rcond=None)[0]
+
+
+def _scatter(lines: np.ndarray) -> tuple[float, float]:
+    """Jackknife standard errors of level and slope, of the axis that scatters most; lines: (s, 2, 3)."""
+    spread = np.sqrt((len(lines) - 1) * lines.var(axis=0)).max(axis=1)
+    return float(spread[0]), float(spread[1])
 
 
 LEAST_TURN = 0.02

@@ -226,22 +226,25 @@ class Search:
 
 
 SIDEWAYS_SHARE = 0.3
-"""Sideways misfit, of the predicted sideways force, from which sticking is in doubt (13 % where it holds)."""
+"""Sideways shortfall, of the predicted sideways force, from which sticking is in doubt."""
 
 
 def sideways_off(forward: Forward, candidate: Candidate) -> float:
-    """Share by which a fit misses the sideways force where that is large and felt; else 0.
+    """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.
 
-    The nuisances trust the stick to a quarter only, press by press, so a fit may let that force go wrong.
+    The nuisances trust the stick to a quarter only, press by press, so a fit may let that force go wrong. A
+    tip that slips drags less than one that sticks, never more: more is a normal that is not the surface's.
     """
     t = forward.touches
     if not t.local_force[t.counted, 1:].any():
         return 0.0  # a machine of one axis reads none
     residual = candidate.residual[t.counted, 1:]
     predicted = t.local_force[t.counted, 1:] - residual
-    missed, force = (float(np.sqrt((x**2).sum(axis=1).mean())) for x in (residual, predicted))
-    # points without a time are not thinned: their noise is none of the miss
-    missed = float(np.sqrt(max(missed**2 - 2 * t.noise_n**2, 0.0)))
+    size = np.linalg.norm(predicted, axis=1)
+    short = np.clip(-(residual * predicted).sum(axis=1) / np.maximum(size, 1e-12), 0.0, None)
+    missed, force = float(np.sqrt((short**2).mean())), float(np.sqrt((size**2).mean()))
+    # noise falls short half of the time; points without a time are not thinned
+    missed = float(np.sqrt(max(missed**2 - 0.5 * t.noise_n**2, 0.0)))
     if missed < np.sqrt(2) * t.noise.raw_n or missed < SIDEWAYS_SHARE * force:
         return 0.0
     return missed / force

@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
+from diagnose.first_touch import REACH_M, reached
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
 from diagnose.instrument_offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
@@ -73,7 +74,10 @@ def diagnose(
     progress("touches", 0.02)
     presses = presses_on(recording, model)
     model = with_tip_of(model, presses)
-    touches = touches_of(presses)
+    # a surface of another recording's presses may be passed because the object moved
+    own = model.presses.recording == presses.recording
+    met = reached(presses) if own else np.ones(len(presses), dtype=bool)
+    touches = touches_of(presses.of(met))
     free = free_air_of(recording, presses)
     lap("touches")
     progress("sites", 0.05)
@@ -84,14 +88,12 @@ def diagnose(
     allowed = effects(without=excluded)
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, excluded)
-    # a surface of another recording's presses leaves a move to be felt
-    own = model.presses.recording == presses.recording
     centre = touches.point.mean(axis=0)
     move = move_of(recording, presses, model.support.normal, centre) if own else None
     offsets = with_move(offsets, forward, move, excluded)
     settled = {*offsets.names, *ruled_out(forward, rigid, move)}
     site_sd = site_stiffness_sd(touches, model, nuisance)
-    if touches.sites != presses.sites:
+    if touches.sites != presses.of(met).sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
         site_sd = np.full(len(touches), nuisance.press_stiffness)
     search = Search(
@@ -108,6 +110,9 @@ def diagnose(
     seen = read_sideways(rigid) & frozenset(e.name for e in tried)
     if rigid is not None and seen:
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
+    if not met.all():
+        lost = f"presses not weighed, as the surface passes them by over {1e3 * REACH_M:g} mm: {(~met).sum()}"
+        offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, lost))
     found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
     evidence = Evidence(

@@ -62,8 +62,8 @@ class Whitener:
         site_sd: np.ndarray | None = None,
         onset_sd: np.ndarray | None = None,
     ) -> None:
-        """site_sd: (p,) share by which each press's stiffness may be off. onset_sd: (p,) m, of each first
-        touch. By default the options'."""
+        """site_sd: (p,) share by which each press's stiffness may be off; by default the options'. onset_sd:
+        (p,) m, of each first touch; by default the options' and what the table states of each."""
         self.touches = forward.touches
         self.variance = self.touches.noise_n**2 + options.floor_n**2
         before = np.nan_to_num(forward.predict(settings))
@@ -71,7 +71,8 @@ class Whitener:
         self.louder = np.sqrt(1 + share**2 / self.variance)
         self.blocks: list[Block] = []
         presses = len(self.touches)
-        self.onset_sd = np.full(presses, options.onset_m) if onset_sd is None else onset_sd
+        stated = np.hypot(options.onset_m, self.touches.onset_error_m)
+        self.onset_sd = stated if onset_sd is None else onset_sd
         columns = nuisance_columns(forward, settings, before, options, site_sd, self.onset_sd)
         self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]
         site = options.site_stiffness if site_sd is None else site_sd

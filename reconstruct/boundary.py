@@ -19,6 +19,7 @@ _LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves 
 _LEAST_PIECE = 2.0  # tip radii; less tells no plane
 _FLAT = 0.1  # tip radii off the plane
 _MOMENT_S = 0.05  # a contact that is shorter is no press
+_BREAK_S = 2.5  # longer than a tracing is broken off
 _THINNED = 5  # samples
 _FOOT = 0.4  # tip radii: a wider gap in a tracing is open, a wider leap parts its strokes; off it is the air
 _STEP_M = 0.0005
@@ -151,8 +152,9 @@ def _coplanar(
     """First and last of the contacts around `start` that lie in one plane with it, none left out between.
 
     The plane is fitted anew with each contact that is tried: one straight side of a foot alone tells no
-    plane. A contact of a moment, as of a tip that bounces, ends nothing; nor does one that stays within a
-    tip's radius of the plane and slides nowhere, as of a tip that is lifted along the object's wall.
+    plane. A contact of a moment, as of a tip that bounces, ends nothing; nor does one that slides nowhere and
+    stays within a tip's radius of the plane, as of a tip that is lifted along the object's wall, or comes so
+    soon that it may be the swing of a heavy tool while the tracing is broken off.
     """
     lasting = [k for k, (a, b) in enumerate(found) if k == start or t[b - 1] - t[a] > _MOMENT_S]
     at = lasting.index(start)
@@ -167,6 +169,11 @@ def _coplanar(
         centre, normal, _ = fit_plane(np.concatenate(of))
         return max(float(np.median(np.abs((piece - centre) @ normal))) for piece in pieces)
 
+    def apart(k: int, other: int) -> float:
+        """s between two contacts."""
+        early, late = found[lasting[min(k, other)]], found[lasting[max(k, other)]]
+        return float(t[late[0]] - t[early[1] - 1])
+
     pieces = [thinned(at)]
     for step in (1, -1):
         tried = at
@@ -175,10 +182,9 @@ def _coplanar(
             together = [*pieces, own]
             if off(together, together) <= _FLAT * tip_radius_m:
                 pieces, low, high = together, min(low, tried), max(high, tried)
-            elif (
-                _travel(position[slice(*found[lasting[tried]])]) > _LEAST_PIECE * tip_radius_m
-                or off([own], pieces) > tip_radius_m
-            ):
+            elif _travel(position[slice(*found[lasting[tried]])]) > _LEAST_PIECE * tip_radius_m:
+                break
+            elif apart(tried, high if step > 0 else low) > _BREAK_S and off([own], pieces) > tip_radius_m:
                 break
     return lasting[low], lasting[high]
 

@@ -16,6 +16,7 @@ _SLID = 2.0
 """Tip radii: what stays within is pressed, what goes farther slides."""
 _ALONG = 0.8
 """Share of its force that a press on the support has along its normal: the object's foot pushes sideways."""
+_NEAR_S = 0.2
 _BINS, _ROUND = 36, 0.9
 """Directions around the base, and the share of them that a tracing has to pass."""
 
@@ -64,5 +65,10 @@ def recognised(
 
 
 def supported(presses: Presses, t: np.ndarray) -> np.ndarray:
-    """(n,) bool: where the table says that the support was touched after the tracing."""
-    return np.logical_or.reduce([presses.within(kind, t) for kind in ON_SUPPORT])
+    """(n,) bool: where the table says that the support was touched after the tracing, and just before and
+    after, as a force is felt later than a tip is down."""
+    near = np.zeros(len(t), dtype=bool)
+    for each in presses.segments:
+        if each.kind in ON_SUPPORT:
+            near |= (t > each.start_s - _NEAR_S) & (t < each.end_s + _NEAR_S)
+    return near

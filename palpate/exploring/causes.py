@@ -25,7 +25,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.first_touch import REACH_M, first_touches
+from diagnose.first_touch import first_touches, reached
 from diagnose.fit import Fit, fit, settings_of
 from diagnose.forward import Forward
 from diagnose.freeair import free_air_of
@@ -273,8 +273,7 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     if e.solved is None or e.presses_placed is None or e.fit is None or e.surface is None:
         return None
     placed = e.presses_placed
-    passed = np.einsum("pi,pi->p", placed.centre - placed.point, placed.normal) - placed.tip_radius_m
-    placed = placed.of(np.abs(passed) < REACH_M)
+    placed = placed.of(reached(placed))
     if len(placed) < LEAST_PRESSES:
         return None
     touches = touches_of(placed)
