@@ -54,3 +54,23 @@ def test_the_tracing_of_the_base_is_no_bias(stated):
     free = free_air_of(recording, explore(recording).presses)
     assert np.abs(free.bias_n).max() < 0.005
     assert np.abs(free.rate_n_per_s).max() * np.ptp(recording.t) < 0.01
+
+
+def test_what_wanders_is_no_drift_and_what_drifts_is(bench):
+    """A force in free air that goes to and fro ends elsewhere than it began, as a zero that drifts does."""
+    recording, model = bench.record()
+    t = recording.t
+    free = []
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        knots = np.linspace(t[0], t[-1], 9)
+        walk = np.column_stack([np.interp(t, knots, rng.normal(size=9)) for _ in range(3)])
+        wandering = dataclasses.replace(recording, force_on_tool=recording.force_on_tool + 0.05 * walk)
+        free.append(free_air_of(wandering, bench.table(wandering)))
+    assert max(np.abs(f.rate_n_per_s).max() / f.rate_se_n_per_s for f in free) < 6
+    drifting = dataclasses.replace(
+        recording, force_on_tool=recording.force_on_tool + np.outer(t, [0.002, 0.0, 0.0])
+    )
+    seen = free_air_of(drifting, bench.table(drifting))
+    assert seen.rate_n_per_s[0] == pytest.approx(0.002, rel=0.05)
+    assert np.abs(seen.rate_n_per_s).max() > 6 * seen.rate_se_n_per_s

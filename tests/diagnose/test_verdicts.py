@@ -230,3 +230,32 @@ def test_the_demo_says_which_simulation_is_diagnosed_and_its_json_has_the_verdic
     found = demo.diagnosis_json(result)
     assert found["verdict"]["effects"] == ["time_delay"] and found["gap_after_n"] < found["gap_before_n"]
     assert demo.diagnosis_json(None) is None
+
+
+def test_a_swing_that_was_taken_for_a_press_is_not_weighed(bench):
+    """Presses that the surface passes by centimetres were none, or it is wrong there: the answer stands
+    without them, and says so."""
+    recording, model = bench.record()
+    presses = model.presses
+    away = presses.centre.copy()
+    away[3] += 0.03 * presses.normal[3]
+    swung = model.replaced(presses=dataclasses.replace(presses, centre=away))
+    result = diagnose(recording, swung, FAST)
+    assert result.kind == "none" and "by over 2.4 mm: 1" in " ".join(result.reasons)
+    assert result.gap_before_n < 1.5 * result.noise_n
+    # of another recording's presses the same may be an object that moved
+    other = swung.replaced(presses=dataclasses.replace(swung.presses, recording="another"))
+    assert "not weighed" not in " ".join(diagnose(recording, other, FAST).reasons)
+
+
+@pytest.mark.parametrize("factor, slips", [(0.35, True), (2.2, False)])
+def test_only_a_tip_that_drags_less_may_slip(bench, factor, slips):
+    """More sideways force than sticking gives is a surface that leans otherwise."""
+
+    def sideways(t, x, f):
+        return x, f * [1.0, factor, 1.0]
+
+    recording, model = bench.record(sideways)
+    result = diagnose(recording, model, dataclasses.replace(FAST, without="force_gain"))
+    words = " ".join(result.reasons)
+    assert ("the tip may slip" in words) == slips

@@ -60,6 +60,20 @@ def test_a_lift_along_the_objects_wall_parts_no_tracing_and_presses_end_it():
     assert find_interval(t, path, touching > 0, None, 0.005) == (0, 6220)
 
 
+def test_a_swing_while_the_tracing_is_broken_off_ends_it_as_little():
+    """A heavy tool that is lifted far off reads a touch; what is traced soon after is the same base."""
+    half = [(a, 0.005, True) for a in np.linspace(0, np.pi, 3000)]
+    swing = [(np.pi, 0.02, False)] * 300 + [(np.pi, 0.02, True)] * 90 + [(np.pi, 0.02, False)] * 300
+    rest = [(a, 0.005, True) for a in np.linspace(np.pi, 2 * np.pi, 3000)]
+    rows = [*half, *swing, *rest]
+    for k in range(3):
+        rows += [(k, 0.02, False)] * 500 + [(k, 0.02 + 0.00001 * i, True) for i in range(400)]
+    angle, height, touching = np.array(rows).T
+    path = np.column_stack([0.045 * np.cos(angle), 0.045 * np.sin(angle), height])
+    t = np.arange(len(path)) / 1000
+    assert find_interval(t, path, touching > 0, None, 0.005) == (0, 6690)
+
+
 def test_contact_that_outlasts_the_stated_phase_belongs_to_it():
     recording, _ = explore_cylinder()
     start, end = recording.boundary_phase
