@@ -41,12 +41,19 @@ NEW_S = 0.1
 """A press that begins so much later than the last one known is new."""
 TRUSTED = 3.0
 """Touches by which a surface's own word of its uncertainty counts beside those that tested it."""
+BESIDE = {
+    "rigid": "press the bare support three times, with 3 to 5 N: what yields there is the tool",
+    "free": "wave and turn the tool in the air for three seconds: its weight and what it reads of nothing",
+    "retrace": "slide once more around the object's foot: whether it, or the device, moved meanwhile",
+}
+"""What a complete exploration does beside pressing the object, in this order, and why."""
 
 
 @dataclass(frozen=True)
 class Suggestion:
     """What to do next. kind: 'trace', 'press', 'rigid' (press the bare support three times), 'free' (wave and
-    turn the tool in the air) or 'stop'; the rest holds for a press; device frame, SI units.
+    turn the tool in the air), 'retrace' (trace the base once more) or 'stop'; the rest holds for a press;
+    device frame, SI units.
 
     point: (3,) where the surface is expected; normal: (3,) outward there. Come from outside along -normal,
     begin clearance_m above, go on until the force rises, then depth_m deeper at speed_m_per_s, hold hold_s,
@@ -303,6 +310,14 @@ class Explorer:
 
     def suggest(self) -> Suggestion:
         """The touch that tells the most a second, or the word to stop, each with its reason."""
+        found = self._of_the_object()
+        left = [kind for kind in BESIDE if kind not in self._kinds]
+        if found.kind != "stop" or not self.goals.complete or self._base is None or not left:
+            return found
+        return Suggestion(left[0], BESIDE[left[0]], seconds=RIGID_S)
+
+    def _of_the_object(self) -> Suggestion:
+        """The same, of what tells the object."""
         if not any(s.kind == "trace" for s in self.segments):
             return Suggestion("trace", "the base's outline is not known: slide once around the object's foot")
         if self._air_hides and "free" not in self._kinds:

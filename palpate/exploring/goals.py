@@ -26,6 +26,12 @@ class GoalOptions:
     cause_at: float | None = option(
         None, "how surely one cause alone must be left, or none (0.95)", flag="--cause-at"
     )
+    complete: bool = option(
+        False,
+        "at the end, press the bare support, wave, and trace the base once more: what tells the instrument "
+        "from the object, and whether it moved",
+        flag="--complete",
+    )
     most: int = option(40, "never more presses than these, nor tracings", flag="--most")
 
     def __post_init__(self) -> None:

@@ -12,7 +12,6 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.model import Model
-from mechanics.segments import ON_SUPPORT
 from palpate.exploring.explorer import Explorer, State, Suggestion
 from palpate.exploring.ghost import Ghost
 from palpate.exploring.rows import Segment
@@ -26,6 +25,8 @@ AIR_S = 0.3
 """In the air for so long, a segment has ended."""
 LEAST_S = 0.05
 """A shorter contact is a brush."""
+WAVED_S = 3.0
+"""So long in the air, where it was asked for, is waving."""
 ON_IT = 1.2
 """Tip radii above the support, a tip's centre is on it."""
 WHAT = {
@@ -33,6 +34,7 @@ WHAT = {
     "trace": "slide around the foot",
     "rigid": "press the bare support",
     "free": "wave in the air",
+    "retrace": "slide around the foot once more",
 }
 """What to do, by kind of suggestion; a press has its depth."""
 
@@ -48,7 +50,8 @@ class Guide:
     ) -> None:
         self.explorer = explorer
         self._servo, self._worker, self._path = servo, worker, path
-        self._tracing, self._support = BaseTracing(model), model.support
+        self._model, self._support = model, model.support
+        self._tracing = BaseTracing(model)
         self._next = int(servo.arrays.ring_head[0])
         self._rows: list[np.ndarray] = []
         self._first: int | None = None
@@ -86,9 +89,13 @@ class Guide:
         if len(touching):
             self._first = int(rows["tick"][touching[0]]) if self._first is None else self._first
             self._last_touch = int(rows["tick"][touching[-1]])
+        rate = self._servo.options.rate_hz
+        if self._suggestion.kind == "free" and self._first is None:
+            if sum(map(len, self._rows)) > WAVED_S * rate:
+                self._take_in()
+            return
         if self._first is None or self._last_touch is None:
             return
-        rate = self._servo.options.rate_hz
         if (int(rows["tick"][-1]) - self._last_touch) < AIR_S * rate:
             return
         lasted = (self._last_touch - self._first) / rate
@@ -101,7 +108,7 @@ class Guide:
     @property
     def _still_tracing(self) -> bool:
         """Whether the base was not all gone round yet, or not so that it was understood."""
-        return self._suggestion.kind == "trace"
+        return self._suggestion.kind in ("trace", "retrace")
 
     def _take_in(self) -> None:
         rows, self._rows = np.concatenate(self._rows), []
@@ -120,14 +127,18 @@ class Guide:
         self.explorer.bring_up_to_date()
         self.explorer.save(self._path)
         self._state, self._suggestion = self.explorer.state, self.explorer.suggest()
+        if self._suggestion.kind == "retrace":
+            self._tracing = BaseTracing(self._model)
 
     def _kind(self, rows: np.ndarray) -> str:
         asked = self._suggestion.kind
         touched = np.linalg.norm(rows["rendered"], axis=1) > TOUCHING_N
         height = self._support.height(rows["tip"][touched])
-        if asked in ON_SUPPORT and height.size and height.max() < ON_IT * self._servo.tip_radius_m:
+        if asked == "rigid" and height.size and height.max() < ON_IT * self._servo.tip_radius_m:
             return asked
-        return "trace" if self._still_tracing else "press"
+        if asked == "free" and not touched.any():
+            return asked
+        return asked if self._still_tracing else "press"
 
     def lines(self) -> list[str]:
         """For the panel: what to do, and what is known."""
@@ -141,7 +152,7 @@ class Guide:
                 f"{high / 1e3:.1f}), surface within {1e3 * state.surface_error_m:.1f} mm"
             )
         what = WHAT.get(s.kind, "")
-        if s.kind == "trace":
+        if self._still_tracing:
             what += f" ({100 * self._tracing.share:.0f} % traced)"
         if s.kind == "press":
             what = f"press at the ghost, {1e3 * s.depth_m:.0f} mm deep"

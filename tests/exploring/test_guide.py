@@ -113,6 +113,28 @@ def test_a_press_that_was_asked_for_on_the_bare_support_is_none_of_the_object(gu
     assert [s.kind for s in explorer.segments] == ["trace", "press", "press", "rigid"]
 
 
+def test_what_completes_an_exploration_is_waved_and_traced_as_it_is_asked_for(guided):
+    """Three seconds in the air are waving; the second tracing begins anew, and ends when all of it is done."""
+    guide, servo, explorer, tracing = guided
+    tracing.done = True
+    _frames(guide, servo, (0.2, 0.0), (0.5, 0.7), (0.4, 0.0))
+    wanted = ["free", "retrace", "stop"]
+    explorer.suggest = lambda: Suggestion(wanted.pop(0), "why")
+    _frames(guide, servo, (0.2, 0.0), (0.5, 2.0), (0.4, 0.0))
+    assert guide.suggestion.kind == "free"
+    _frames(guide, servo, (2.8, 0.0))
+    assert len(explorer.segments) == 2
+    tracing.done = False
+    _frames(guide, servo, (0.4, 0.0))
+    assert guide.suggestion.kind == "retrace" and "once more (50 % traced)" in guide.lines()[0]
+    _frames(guide, servo, (0.5, 0.7), (0.6, 0.0))
+    assert [s.kind for s in explorer.segments] == ["trace", "press", "free"]
+    tracing.done = True
+    _frames(guide, servo, (0.5, 0.7), (0.6, 0.0))
+    assert [s.kind for s in explorer.segments] == ["trace", "press", "free", "retrace"]
+    assert guide.suggestion.kind == "stop"
+
+
 def test_the_ghost_stands_a_tips_radius_above_the_place(guided):
     guide, servo, explorer, tracing = guided
     tracing.done = True
