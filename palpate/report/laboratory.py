@@ -144,7 +144,7 @@ def _path(ax, result: Simulation) -> None:
     air = motion.touch < 0
     ax.plot(*motion.position[:, [0, 2]].T, color="#b8c0cc", lw=0.4)
     traced = air & (np.linalg.norm(motion.trace_force, axis=1) > 0)
-    ax.plot(*motion.position[traced][:, [0, 2]].T, ".", color="#8e44ad", ms=1, label="phase I")
+    ax.plot(*motion.position[traced][:, [0, 2]].T, ".", color="#8e44ad", ms=1, label="on the support")
     pressed = (motion.touch >= 0) & ((motion.s > 0) | (motion.leg == SIDEWAYS))
     ax.plot(*motion.position[pressed][:, [0, 2]].T, ".", color="#c0392b", ms=1, label="in contact")
     ax.set(xlabel="x [mm]", ylabel="z [mm]", title="path of the tip, seen along y", aspect="equal")
@@ -157,6 +157,11 @@ def _time(ax, result: Simulation) -> None:
     if result.ideal_n is not None:
         difference = np.linalg.norm(result.clean_n - result.ideal_n, axis=1)
         ax.plot(t, difference, color="#c0392b", lw=0.6, label="change of the force")
+    parts = [("trace", *result.motion.phase), *result.motion.beside]
+    for k, (kind, start, end) in enumerate(parts):
+        ax.axvspan(start, end, color="#8e44ad" if k % 2 == 0 else "#16a085", alpha=0.12, lw=0)
+        ax.text((start + end) / 2, 0.98, kind, transform=ax.get_xaxis_transform(), ha="center", va="top",
+                fontsize=8, rotation=90)  # fmt: skip
     ax.set(xlabel="time [s]", ylabel="|force| [N]", title="force in time")
     ax.legend(fontsize=8)
 
