@@ -109,15 +109,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     work = arguments.work or cache_folder() / "variety"
     seeds = range(arguments.first, arguments.first + arguments.count)
     chosen = [s for s in seeds if not arguments.solved_only or solved(draw(s).number)]
-    judged = arguments.diagnose
-    version, answers = program_key((*ROOMS, "diagnose") if judged else ROOMS), []
+    keys, answers = (program_key(ROOMS), program_key((*ROOMS, "diagnose"))), []
     with progress_bar("explorations") as progress, workers_of_ours(arguments.workers) as pool:
-        waiting = [pool.submit(answered, s, work, version, arguments.effect, judged) for s in chosen]
+        waiting = [pool.submit(answered, s, work, keys, arguments.effect, arguments.diagnose) for s in chosen]
         for done, future in enumerate(as_completed(waiting)):
             answers.append(future.result())
             progress("explorations", (done + 1) / len(waiting))
     answers.sort(key=lambda a: a["seed"])
-    return {"program": version, "explorations": answers, **report(answers)}
+    return {"program": keys[arguments.diagnose], "explorations": answers, **report(answers)}
 
 
 def program_key(rooms: Sequence[str]) -> str:
@@ -130,18 +129,22 @@ def program_key(rooms: Sequence[str]) -> str:
 
 
 def answered(
-    seed: int, work: Path, version: str, effect: str | None = None, judged: bool = False
+    seed: int, work: Path, keys: tuple[str, str], effect: str | None = None, judged: bool = False
 ) -> dict[str, Any]:
-    """The answer to one draw, read where the same program gave it to the same recording. judged: diagnosed
-    as well."""
+    """The answer to one draw, read where the same program gave it to the same recording; one that was
+    diagnosed as well serves both. keys: of the program without the diagnosis and with it. judged: diagnose.
+    """
     folder = work / "recordings"
     folder.mkdir(parents=True, exist_ok=True)
     effects = {effect: 1.0} if effect else {}
     varied = record(draw(seed), folder, effects)
-    path = work / "answers" / f"{varied.recording.name}-{varied.recording.content[:12]}-{version}.json"
-    if path.is_file():
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        return found
+    name = f"{varied.recording.name}-{varied.recording.content[:12]}"
+    plain, diagnosed = (work / "answers" / f"{name}-{key}.json" for key in keys)
+    path = diagnosed if judged else plain
+    for known in (diagnosed, path):
+        if known.is_file():
+            found: dict[str, Any] = json.loads(known.read_text(encoding="utf-8"))
+            return found
     answer = {"seed": seed, "truth": _truth(varied), **_reconstructed(varied, judged)}
     if "refused" in answer:
         answer["remedies"] = _tried(draw(seed), answer["refused"], work / "mended", effects)
