@@ -228,7 +228,7 @@ def find_boundary(
     if face is None and abs(winding) < 0.8 * 2 * np.pi:
         raise ContactError(
             f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least "
-            "288 are needed: trace the whole base"
+            "288 are needed: trace the whole base, or say when it was ([recording] boundary_phase)"
         )
     sideways = []
     for stroke in smoothed:
