@@ -9,7 +9,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from scipy.stats import chi2
 
+from mechanics.effects.registry import effect, effects
 from palpate.benchmarks._diagnosis_cases import ALIKE
 from palpate.benchmarks._rates import wilson
 
@@ -18,6 +20,11 @@ FAMILIES = {"plasticity": ("mullins_softening",)}
 SIZES_IN_NOISE = (0.0, 0.5, 1.0, 2.0, 4.0, 8.0, 1e9)
 """Edges of the detection curve: the effect's own force (best factor taken off) over the vector noise."""
 FINITE = "finite_strain"
+NAMES = frozenset(e.name for e in effects())
+
+
+DISCOVERY = 0.05
+"""Rate of false discoveries that the second baseline controls."""
 
 
 @dataclass(frozen=True)
@@ -55,6 +62,19 @@ def answer_of(item: dict[str, Any]) -> Answer:
     else:
         first = "unknown" if "unknown" in kind or candidates else "none"
     return Answer(kind, named, candidates, first)
+
+
+def discovered(verdict: dict[str, Any]) -> list[str]:
+    """Effects that a search with controlled false discovery would name, the most evident first.
+
+    As LISDD (arXiv 2606.23215) selects terms, as far as that applies: each effect of the first step by the
+    chance of its held-out gain in log likelihood (Wilks), all of them by Benjamini and Hochberg (1995).
+    """
+    gains = {n: max(gain, 0.0) for n, (gain, _) in verdict.get("scores", {}).items() if n in NAMES}
+    chance = {n: float(chi2.sf(2 * g, max(1, len(effect(n).parameters)))) for n, g in gains.items()}
+    ranked = sorted(chance, key=lambda n: chance[n])
+    below = [k for k, n in enumerate(ranked, 1) if chance[n] <= DISCOVERY * k / len(ranked)]
+    return sorted(ranked[: max(below, default=0)], key=lambda n: -gains[n])
 
 
 class _Tally:
@@ -109,6 +129,8 @@ class _Tally:
         self.rates["BIC baseline: false alarms (controls)"].append(
             item["verdict"].get("bic") not in (None, "none", *item["case"]["beside"])
         )
+        found = [n for n in discovered(item["verdict"]) if n not in item["case"]["beside"]]
+        self.rates["controlled false discovery (5 %) baseline: false alarms (controls)"].append(bool(found))
         return not answer.detected
 
     def _by_protocol(self, protocol: str, tested: Sequence[str], answer: Answer) -> None:
@@ -155,6 +177,8 @@ class _Tally:
             self.rates["truth in the candidate set (where detected)"].append(either)
             self.sets.append(len(set(answer.named) | set(answer.candidates)))
         self.rates["BIC baseline: first place"].append(verdict.get("bic") == name)
+        first = next((n for n in discovered(verdict) if n not in item["case"]["beside"]), None)
+        self.rates["controlled false discovery (5 %) baseline: first place"].append(first == name)
         if name in answer.named:
             self._parameters(item, name)
         if hit and verdict.get("gap_closed") is not None:

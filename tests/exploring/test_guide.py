@@ -114,7 +114,7 @@ def test_a_press_that_was_asked_for_on_the_bare_support_is_none_of_the_object(gu
 
 
 def test_what_completes_an_exploration_is_waved_and_traced_as_it_is_asked_for(guided):
-    """Three seconds in the air are waving; the second tracing begins anew, and ends when all of it is done."""
+    """Three seconds in the air are waving; the second tracing begins anew, and ends when it is whole."""
     guide, servo, explorer, tracing = guided
     tracing.done = True
     _frames(guide, servo, (0.2, 0.0), (0.5, 0.7), (0.4, 0.0))

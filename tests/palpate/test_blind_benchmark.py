@@ -9,8 +9,8 @@ import pytest
 
 from mechanics.errors import OptionError
 from palpate.benchmarks._diagnosis_blind import tasks_of, unfinished
-from palpate.benchmarks._diagnosis_cases import FINITE, SEEDS, WEIGHT, Case, cases
-from palpate.benchmarks._diagnosis_scores import answer_of, summarise
+from palpate.benchmarks._diagnosis_cases import ALIKE, FINITE, HIDDEN, SEEDS, WEIGHT, Case, cases
+from palpate.benchmarks._diagnosis_scores import answer_of, discovered, summarise
 from palpate.tasks.graph import Graph
 
 KNOWN = {"quick": 8, "medium": 142, "full": 640}
@@ -84,3 +84,31 @@ def test_a_control_without_an_answer_is_a_miss_and_no_evidence_of_silence() -> N
     summary = summarise([{"key": "one", "case": case, "verdict": verdict, "truth": {}}])
     assert "false alarms (controls)" not in summary["rates"] and len(summary["misses"]) == 1
     assert summary["rates"]["no answer: the reconstruction or the diagnosis refused"]["hits"] == 1
+
+
+def test_a_search_with_controlled_false_discovery_names_what_chance_would_not():
+    """The second baseline: by gains in log likelihood and numbers of parameters, the most evident first."""
+    scores = {
+        "time_delay": [300.0, 0.9],
+        "backlash": [12.0, 0.1],
+        "adhesion": [0.4, 0.0],
+        "inclusion": [3.0, 0],
+    }
+    assert discovered({"scores": scores}) == ["time_delay", "backlash"]
+    assert discovered({"scores": {"time_delay": [0.5, 0.9], "inclusion": [2.0, 0.1]}}) == []
+    # a lump has five numbers to fit by: what would tell one cause tells no lump
+    assert discovered({"scores": {"inclusion": [4.0, 0.5]}}) == []
+    assert discovered({"scores": {"time_delay": [4.0, 0.5]}}) == ["time_delay"]
+    assert discovered({}) == []
+
+
+def test_cases_of_the_protocols_differ_in_how_they_are_explored_alone():
+    """The same draw, effect and object, both ways, in an order of their own."""
+    found = cases("protocol", None, 500)
+    pairs = {}
+    for case in found:
+        pairs.setdefault(case.seed, []).append(case)
+    assert all(sorted(c.protocol for c in pair) == ["complete", "ordinary"] for pair in pairs.values())
+    assert all(a.nuisances == b.nuisances and a.effects == b.effects for a, b in pairs.values())
+    assert len({c.key for c in found}) == len(found) == 72
+    assert {c.tested[0] for c in found if c.tested} == {*HIDDEN, *ALIKE}
