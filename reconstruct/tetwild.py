@@ -55,8 +55,8 @@ def tetrahedralize(
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
     and comes out better in half the time. energy: the optimisation stops at this AMIPS energy (3 is ideal).
-    threads: None takes OMP_NUM_THREADS, without it all cores. timeout_s: for the second try, with one thread;
-    the first has a third of it. Raises MeshError where nothing comes back.
+    threads: None takes OMP_NUM_THREADS, without it all cores. timeout_s: for the second try, with one thread
+    and simplified; the first has a third of it. Raises MeshError where nothing comes back.
     """
     check_count(vertices, triangles, edge_m)
     if threads is None:
@@ -64,15 +64,16 @@ def tetrahedralize(
     diagonal = float(np.linalg.norm(np.ptp(vertices, axis=0)))
     with temporary_folder("mesh-") as folder:
         done = None
-        # now and then its threads wait for each other for ever; one thread alone does not
-        for count, limit_s in ((threads, timeout_s / 3), (1, timeout_s)):
+        # now and then its threads wait for each other for ever, or it refines a drawing for ever that it was
+        # not let simplify (seen: an L of 617 points); one thread on a simplified one does neither
+        for count, merges, limit_s in ((threads, simplify, timeout_s / 3), (1, True, timeout_s)):
             np.savez(
                 folder / "surface.npz",
                 vertices=np.asarray(vertices, dtype=np.float64),
                 triangles=np.asarray(triangles, dtype=np.int32),
                 edge_length_abs=edge_m,
                 epsilon=envelope_m / diagonal,
-                simplify=simplify,
+                simplify=merges,
                 stop_energy=energy,
                 num_opt_iter=passes,
                 num_threads=count,
