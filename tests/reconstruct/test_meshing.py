@@ -233,7 +233,8 @@ def test_a_mesh_that_the_support_flattens_is_made_again(surface, monkeypatch):
 
     monkeypatch.setattr(meshing_module, "relaxed", flattened_at_first)
     assert (mesh_surface(surface, MeshingOptions(mesh_size_m=0.015)).mesh.volumes > 0).all()
-    assert len(made) == 2
+    # a third only where the second, which is never twice the same, has a tetrahedron beyond its bound
+    assert len(made) in (2, 3)
 
 
 def test_a_drop_beside_the_object_is_left_out_and_half_of_it_refused():
