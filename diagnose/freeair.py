@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.jackknife import all_but_one, covariance
 from mechanics.kinematics import acceleration
 from mechanics.presses import Presses
 from mechanics.recording import Recording
@@ -81,8 +82,8 @@ def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
     rate_fit = clock @ means / (clock @ clock)
     left = means - means.mean(axis=0) - np.outer(clock, rate_fit)
     noise = max(float(np.sqrt((left**2).sum() / (3 * (len(times) - 2)))), noise_n / np.sqrt(size))
-    lines = np.array([_line(times[kept], means[kept], times.mean()) for kept in _all_but_one(len(times))])
-    level_se, rate_se = _scatter(lines)
+    parts = all_but_one(len(times), STRETCHES)
+    level_se, rate_se = _scatter(np.array([_line(times[p], means[p], times.mean()) for p in parts]))
     mass, mass_se = _mass(recording, force - carried, free, noise_n)
     return FreeAir(
         t=times,
@@ -99,12 +100,6 @@ def free_air_of(recording: Recording, presses: Presses) -> FreeAir | None:
     )
 
 
-def _all_but_one(blocks: int) -> list[np.ndarray]:
-    """Indices without each stretch of time."""
-    stretches = np.array_split(np.arange(blocks), STRETCHES)
-    return [np.concatenate([r for j, r in enumerate(stretches) if j != k]) for k in range(STRETCHES)]
-
-
 def _line(t: np.ndarray, values: np.ndarray, about: float) -> np.ndarray:
     """(2, 3) level at a time and slope of the straight line through values (b, 3)."""
     columns = np.column_stack([np.ones(len(t)), t - about])
@@ -112,8 +107,8 @@ def _line(t: np.ndarray, values: np.ndarray, about: float) -> np.ndarray:
 
 
 def _scatter(lines: np.ndarray) -> tuple[float, float]:
-    """Jackknife standard errors of level and slope, of the axis that scatters most; lines: (s, 2, 3)."""
-    spread = np.sqrt((len(lines) - 1) * lines.var(axis=0)).max(axis=1)
+    """Standard errors of level and slope, of the axis that scatters most; lines: (s, 2, 3)."""
+    spread = np.sqrt(np.diag(covariance(lines.reshape(len(lines), 6)))).reshape(2, 3).max(axis=1)
     return float(spread[0]), float(spread[1])
 
 

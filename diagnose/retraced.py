@@ -12,6 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 from scipy.spatial.transform import Rotation
 
+from diagnose.jackknife import all_but_one, covariance
 from diagnose.rigid import KINDS, on_support
 from mechanics.frames import tangents
 from mechanics.presses import Presses
@@ -61,20 +62,12 @@ def move_of(recording: Recording, presses: Presses, normal: np.ndarray, centre: 
     axes = np.vstack([*tangents(normal), normal])
     first, again = first @ axes.T, again @ axes.T
     found = _carried(first, again)
-    each = [_carried(a, b, found) for a, b in (*_left_out(first, again), *_left_out(again, first, True))]
-    left = np.array(each).reshape(2, GROUPS, 6)
-    left = left - left.mean(axis=1, keepdims=True)
-    error = (GROUPS - 1) / GROUPS * np.einsum("kgi,kgj->ij", left, left)
+    without_first = [_carried(first[p], again, found) for p in all_but_one(len(first), GROUPS)]
+    without_again = [_carried(first, again[p], found) for p in all_but_one(len(again), GROUPS)]
+    error = covariance(np.array(without_first)) + covariance(np.array(without_again))
     both = np.kron(np.eye(2), axes.T)
     shift, turn = (both @ found).reshape(2, 3)
     return Move(shift, turn, centre, both @ error @ both.T)
-
-
-def _left_out(cut: np.ndarray, whole: np.ndarray, swap: bool = False) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Pairs of tracings with one stretch of `cut` left out."""
-    rows = np.array_split(np.arange(len(cut)), GROUPS)
-    parts = [np.delete(cut, row, axis=0) for row in rows]
-    return [(whole, part) if swap else (part, whole) for part in parts]
 
 
 def _carried(first: np.ndarray, again: np.ndarray, start: np.ndarray | None = None) -> np.ndarray:

@@ -16,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.jackknife import all_but_one, covariance
 from mechanics.frames import tangents
 from mechanics.presses import Presses
 from mechanics.recording import Recording
@@ -147,8 +148,7 @@ def _fitted(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float,
         if (again == kept).all() or again.sum() < LEAST_BLOCKS:
             break
         kept = again
-    rows = np.array_split(np.flatnonzero(kept), GROUPS)
-    left = [np.concatenate([r for j, r in enumerate(rows) if j != k]) for k in range(GROUPS)]
-    each = np.array([np.linalg.lstsq(columns[r], target[r], rcond=None)[0][0] for r in left])
-    error = np.sqrt((GROUPS - 1) / GROUPS * ((each - each.mean()) ** 2).sum())
-    return found, float(error), scale
+    rows = np.flatnonzero(kept)
+    left = [rows[part] for part in all_but_one(len(rows), GROUPS)]
+    each = np.array([np.linalg.lstsq(columns[r], target[r], rcond=None)[0][:1] for r in left])
+    return found, float(np.sqrt(covariance(each)[0, 0])), scale

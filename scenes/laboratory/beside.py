@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
+from scenes.laboratory.hand import band_noise, minimum_jerk
 from scenes.laboratory.tracing import RATE_HZ
 
 RIGID_N = 4.0
@@ -26,13 +26,6 @@ def on_the_support() -> tuple[np.ndarray, np.ndarray]:
     height = [ABOVE_MM + still, *[np.r_[down, 0 * held, down[::-1]]] * 3, ABOVE_MM + still]
     push = [still, *[np.r_[0 * down, held, 0 * down]] * 3, still]
     return np.concatenate(height), np.concatenate(push)
-
-
-def straying(count: int, hand: HandOptions, rng: np.random.Generator) -> np.ndarray:
-    """(count, 2) mm sideways, of a hand that presses straight down."""
-    slow = [1e3 * hand.wander_m * band_noise(count, RATE_HZ, 0.2, 2.5, rng) for _ in range(2)]
-    fast = [1e3 * hand.tremor_m * band_noise(count, RATE_HZ, 7, 11, rng) for _ in range(2)]
-    return np.column_stack(slow) + np.column_stack(fast)
 
 
 def waving(rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

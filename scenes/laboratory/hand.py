@@ -67,3 +67,10 @@ def band_noise(
     values = np.fft.irfft(spectrum, size)
     spread = values.std()
     return values[:count] / (spread if spread > 0 else 1.0)
+
+
+def straying(count: int, rate_hz: float, hand: HandOptions, rng: np.random.Generator) -> np.ndarray:
+    """(count, 2) mm by which a hand strays slowly and trembles across its way."""
+    slow = [1e3 * hand.wander_m * band_noise(count, rate_hz, 0.2, 2.5, rng) for _ in range(2)]
+    fast = [1e3 * hand.tremor_m * band_noise(count, rate_hz, 7, 11, rng) for _ in range(2)]
+    return np.column_stack(slow) + np.column_stack(fast)

@@ -9,8 +9,8 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from scenes.laboratory.beside import on_the_support, straying, waving
-from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk
+from scenes.laboratory.beside import on_the_support, waving
+from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk, straying
 from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.surface import Surface
@@ -120,7 +120,7 @@ def _beside(
     """Presses on the support beside the object, waving above it, the base once more."""
     reach = float(np.linalg.norm(surface.vertices[:, :2], axis=1).max())
     height, push = on_the_support()
-    sideways = straying(len(height), hand, rng) + [1.4 * reach + 2 * radius, 0.0]
+    sideways = straying(len(height), RATE_HZ, hand, rng) + [1.4 * reach + 2 * radius, 0.0]
     pressed = np.column_stack([sideways, radius + height])
     aside, turn = waving(rng)
     waved = [0, 0, surface.vertices[:, 2].max() + 60.0] + aside
@@ -223,10 +223,8 @@ def _stray(
     """Sideways straying since first touch (zero there and in the air)."""
     n = len(along)
     across = np.linalg.svd(touch.normal[None])[2][1:]
-    slow = np.stack([1e3 * hand.wander_m * band_noise(n, RATE_HZ, 0.2, 2.5, rng) for _ in range(2)])
-    fast = np.stack([1e3 * hand.tremor_m * band_noise(n, RATE_HZ, 7, 11, rng) for _ in range(2)])
+    values = straying(n, RATE_HZ, hand, rng)
     first = int(np.argmax((along > 0) & (leg == WAY_IN)))
-    values = (slow + fast).T
     values = values - values[first]
     # it fades in from the place of first touch, and out again in the air
     since = np.clip((np.arange(n) - first) / 60.0, 0.0, 1.0)
