@@ -21,7 +21,7 @@ import numpy as np
 from mechanics.errors import ModelError
 from mechanics.frames import tangents
 from mechanics.samples import delayed
-from mechanics.segments import Segment
+from mechanics.segments import Segment, within
 
 CANNOT_TELL = {
     "slide": ("modulus", "1D law", "first touch"),
@@ -159,11 +159,7 @@ class Presses:
 
     def within(self, kind: str, t: np.ndarray) -> np.ndarray:
         """Bool for each time: whether it lies in a segment of that kind."""
-        inside = np.zeros(len(t), dtype=bool)
-        for segment in self.segments:
-            if segment.kind == kind:
-                inside |= (t >= segment.start_s) & (t <= segment.end_s)
-        return inside
+        return within(self.segments, kind, t)
 
     def touching(self, t: np.ndarray, margin_s: float = MARGIN_S) -> np.ndarray:
         """Bool for each time: a contact sample, from first touch to loss of touch and `margin_s` around."""

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+
+import numpy as np
 
 KINDS = ("trace", "press", "free", "rigid", "retrace", "slide", "cycle", "points")
 """Kinds of segments: the base's outline, a press, free air, presses on something rigid, the outline once
@@ -21,3 +24,12 @@ class Segment:
     kind: str
     start_s: float
     end_s: float
+
+
+def within(segments: Iterable[Segment], kind: str, t: np.ndarray) -> np.ndarray:
+    """(n,) bool for each time (n,) s: whether it lies in a segment of that kind."""
+    inside = np.zeros(len(t), dtype=bool)
+    for segment in segments:
+        if segment.kind == kind:
+            inside |= (t >= segment.start_s) & (t <= segment.end_s)
+    return inside

@@ -12,6 +12,7 @@ from scipy.ndimage import label, maximum, median_filter
 
 from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
+from mechanics.segments import within
 from reconstruct.checks.base import Finding, decades_of_tail, p_words, sure
 from reconstruct.checks.sight import CHANNELS, Sight
 
@@ -92,7 +93,8 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
     # what presses mostly along an axis may slide on something flat and hard across it: the traced support
     held = (load > _ALONG * np.linalg.norm(load, axis=1, keepdims=True)) & (load > _FELT * sight.spread_n)
     # a robot presses the bare support straight down: nothing moves across
-    held |= _stated_rigid(sight)[: count * size : size, None]
+    rigid = within(sight.recording.segments, "rigid", sight.recording.t)
+    held |= rigid[: count * size : size, None]
     resolution = max(float(np.median(least[:3])), 1e-6)
     fastest = _fastest(sight, count, size)
     worst: tuple[float, int, int, list[int]] | None = None
@@ -141,15 +143,6 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         (begin, end),
         names,
     )
-
-
-def _stated_rigid(sight: Sight) -> np.ndarray:
-    """(n,) bool: where the recording says that something rigid is pressed."""
-    stated = np.zeros(len(sight.t), dtype=bool)
-    for each in sight.recording.segments:
-        if each.kind == "rigid":
-            stated |= (sight.recording.t >= each.start_s) & (sight.recording.t <= each.end_s)
-    return stated
 
 
 def _fastest(sight: Sight, count: int, size: int) -> np.ndarray:
