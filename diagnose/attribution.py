@@ -115,7 +115,7 @@ def attribute(
             if _of_one(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
                 scores[effect.name] = search.score([effect], candidate, current)
-        best = _best_law(list(scores.values()), best)
+        best = _best_law(search, [s for s in scores.values() if _of_one(s.effect, [best.effect])], best)
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
@@ -156,12 +156,22 @@ def _likeliest(passing: Sequence[Score]) -> Score:
     return max((s for s in passing if s.log_odds > best - AS_LIKELY), key=lambda s: s.gain)
 
 
-def _best_law(scores: Sequence[Score], best: Score) -> Score:
-    """Of the laws of the best one's phenomenon that with the most evidence: gain less what parameters cost by
-    BIC, an observation a group of presses."""
+def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
+    """Of the laws of the best one's phenomenon that with the most evidence: held-out log likelihood, where
+    nuisances are weighed as they are at its fit and finite strain is free to stay away, less what parameters
+    cost by BIC, an observation a group of presses."""
+    if not others:
+        return best
+    there = search.reweighed(best.candidate.found)
     each = 0.5 * np.log(len(best.per_group))
-    laws = [best, *(s for s in scores if _of_one(s.effect, [best.effect]))]
-    return max(laws, key=lambda s: s.gain - each * len(s.effect.parameters))
+
+    def price(score: Score) -> float:
+        rest = [e for e in score.candidate.found.effects if e is not search.finite_strain]
+        sets = (rest, [search.finite_strain, *rest])
+        held = min(there.judge(s, like=score.candidate).held.sum() for s in sets)
+        return float(held) + each * len(score.effect.parameters)
+
+    return min((best, *others), key=price)
 
 
 def _with_hidden_strain(

@@ -22,6 +22,7 @@ from diagnose.sureness import FINITE_STRAIN, SHAPE, odds, sureness
 from diagnose.validation import held_out_by_refit
 from diagnose.verdict import Answer, Evidence, answer_of
 from diagnose.where import locate
+from diagnose.widening import widened
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect
 
@@ -177,6 +178,7 @@ def _entries(
     for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
         entries.append(EffectEntry(rest.name, rest.domain, SHAPE, left, 0.0, None, {}))
+    entries = [dataclasses.replace(e, intervals=widened(e.name, e.parameters, e.intervals)) for e in entries]
     place = {n: i for i, n in enumerate(answer.names)}
     entries.sort(key=lambda e: (place.get(e.name, 99), -e.probability, -e.gain))
     return tuple(entries)

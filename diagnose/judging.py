@@ -177,7 +177,7 @@ class Search:
             own = [near.of(effect.name)] if known else self.starts.get(effect.name) or effect.starts()
             starts = [np.concatenate([s, o]) for s in starts for o in own]
         found = self._best(list(effects), starts, near.onset)
-        held, plain = held_out(found)
+        held, plain = held_out(found, Descent(self.forward, self.whitener, found.effects, None))
         candidate = Candidate(found, held, plain, self.dof)
         self._cache[key] = candidate
         return candidate
@@ -202,11 +202,14 @@ class Search:
         """Compare a candidate with the one that lacks `added`."""
         extra = len(new.found.values) - len(old.found.values)
         over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
-        per_group = old.held - new.held
+        fitted = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
+        # predicted with what the other places alone would have added: a lump under one place is none
+        told = (fitted.sum() - fitted) / over > extra
+        per_group = np.where(told, old.held - new.held, 0.0)
         gain = float(per_group.sum())
         if all(e.scope.between_places for e in added):
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
-            per_group = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
+            per_group = fitted
             gain = old.found.loss - new.found.loss - 4.0 * extra
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
@@ -214,13 +217,14 @@ class Search:
         noise = 3 * t.noise_n**2
         least = self.smallest_n**2
         samples = self.whitener.counts()
-        share = float(share_closed(old.plain, new.plain, samples, noise, least))
-        closes = lower_closure(old.plain, new.plain, samples, noise, least)
+        plain = np.where(told, new.plain, old.plain)
+        share = float(share_closed(old.plain, plain, samples, noise, least))
+        closes = lower_closure(old.plain, plain, samples, noise, least)
         return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect. first: nothing else is named yet."""
-        if score.effect.only_first and not first:
+        if score.effect.by_first_touches and not first:
             return False
         return score.probability > self.options.sure
 

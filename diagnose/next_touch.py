@@ -80,7 +80,7 @@ def next_touch(
     worth, size, plan, press = best
     again, rigid = _retrace(forward, first, second), _rigid(forward, first, second)
     # a surface that is fitted to the presses themselves moves along with them: none of them tells a move
-    hidden = forward.model.presses.recording == forward.touches.recording
+    hidden = forward.model.fitted_to(forward.touches)
     if again is not None and (again.sigmas**2 > worth or (hidden and again.sigmas > 1)):
         return again
     if rigid is not None and rigid.sigmas**2 > worth:

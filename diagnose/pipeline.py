@@ -75,7 +75,7 @@ def diagnose(
     presses = presses_on(recording, model)
     model = with_tip_of(model, presses)
     # a surface of another recording's presses may be passed because the object moved
-    own = model.presses.recording == presses.recording
+    own = model.fitted_to(presses)
     met = reached(presses) if own else np.ones(len(presses), dtype=bool)
     touches = touches_of(presses.of(met))
     free = free_air_of(recording, presses)
@@ -101,7 +101,8 @@ def diagnose(
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
     left_out = {e.name for e in effects() if e.costly and options.fast}
-    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (left_out | settled)]
+    hidden = {e.name for e in effects() if e.by_first_touches and own}
+    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (left_out | settled | hidden)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)
@@ -121,7 +122,9 @@ def diagnose(
     )  # fmt: skip
     result = conclude(evidence, lap)
     progress("done", 1.0)
-    return dataclasses.replace(result, seconds=seconds, left_out=tuple(sorted(left_out | untold)))
+    return dataclasses.replace(
+        result, seconds=seconds, left_out=tuple(sorted(left_out | untold | hidden - settled))
+    )
 
 
 def with_tip_of(model: Model, presses: Presses) -> Model:

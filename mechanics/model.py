@@ -189,6 +189,10 @@ class Model:
             )
         return ratio
 
+    def fitted_to(self, presses: Presses) -> bool:
+        """Whether its surface was fitted to these presses, and moves along with where they first met it."""
+        return self.presses.recording == presses.recording
+
     def replaced(self, **changes: Any) -> Model:
         """A copy with some fields changed."""
         return dataclasses.replace(self, **changes)

@@ -102,8 +102,8 @@ class Effect:
     few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
     shape_rival: what a wrong shape may be taken for. any_form: it can take the form of others that differ
     from place to place, so it is no rival of one of them that gains more. slips: it caps the sideways force,
-    where a fit that trusts the stick may go wrong. only_first: first touches that another effect moved speak
-    for nothing.
+    where a fit that trusts the stick may go wrong. by_first_touches: it shows by them alone, and not where
+    another effect moved them or the surface was fitted to them.
     hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
     stands_for_strain: once it is named, finite strain may have been taken for it. costly: a quick diagnosis
     leaves it out.
@@ -141,7 +141,7 @@ class Effect:
     shape_rival: bool = False
     any_form: bool = False
     slips: bool = False
-    only_first: bool = False
+    by_first_touches: bool = False
     hides_strain: bool = False
     stands_for_strain: bool = False
     costly: bool = False

@@ -35,5 +35,5 @@ EFFECT = Effect(
     },
     change=_change,
     # a delay or a play has already moved the first touches that the surface was fitted to
-    only_first=True,
+    by_first_touches=True,
 )

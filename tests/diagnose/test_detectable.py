@@ -12,6 +12,7 @@ from diagnose.judging import AttributionOptions, Search
 from diagnose.touches import touches_of
 from diagnose.whiten import NuisanceOptions
 from mechanics.effects.registry import effect
+from mechanics.model import Model
 
 
 @pytest.fixture(scope="module")
@@ -53,5 +54,14 @@ def test_a_spring_in_the_tool_hides_behind_modulus_and_first_touch_as_a_delay_do
 
 
 def test_an_effect_that_starts_from_nothing_has_a_limit_as_well(judged):
-    limits = detectable(*judged, [effect("force_gain"), effect("surface_offset")])
+    limits = detectable(*judged, [effect("force_gain"), effect("modulus_gradient")])
     assert all(1e-4 < limit < 1.0 for limit in limits.values())
+
+
+def test_a_move_shows_by_first_touches_only_where_the_surface_stayed(judged, monkeypatch):
+    """Fitted to the same presses, the surface moves along with them."""
+    search, base = judged
+    move = effect("surface_offset")
+    assert detectable(search, base, [move]) == {"surface_offset": np.inf}
+    monkeypatch.setattr(Model, "fitted_to", lambda self, presses: False)
+    assert detectable(search, base, [move])["surface_offset"] < 1.0

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from diagnose.fit import Descent, fit
 from diagnose.forward import build_forward
 from diagnose.intervals import covariance, parameter_intervals
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import AttributionOptions, Candidate, Score, Search
+from diagnose.leave_one_out import held_out
 from diagnose.shape import repeat_scatter
 from diagnose.touches import touches_of
 from diagnose.validation import deepest, held_out_by_refit, neighbours
@@ -59,6 +63,88 @@ def test_what_no_noise_tells_is_added(late):
     formal = np.sqrt(covariance(found, 1.0, search.dof)[1, 1])
     expected = 2 * 1.96 * np.hypot(formal, DELAY.systematic[0])
     assert high - low == pytest.approx(expected, rel=0.2)
+
+
+def test_what_one_place_alone_speaks_for_closes_nothing(late):
+    """The other places would not have added it, so they do not predict it: as a lump under one place."""
+    search, plain, _ = late
+    old = Candidate(plain, 0.5 * plain.gram[:, 0, 0], plain.raw[:, 0, 0].copy(), search.dof)
+
+    def better_at(sites) -> Score:
+        gram, lower = plain.gram.copy(), old.plain.copy()
+        gram[sites, 0, 0] *= 0.2
+        lower[sites] *= 0.2
+        found = dataclasses.replace(plain, gram=gram)
+        return search.score([DELAY], Candidate(found, 0.5 * gram[:, 0, 0], lower, search.dof), old)
+
+    assert better_at([1]).share == better_at([1]).gain == 0.0
+    assert better_at([1, 3, 5]).share > 0.05
+
+
+class Twins:
+    """Two parameters of which only the sum is felt, but for a square of their difference: as two branches of
+    a memory at one time. Each of four groups is one row; the last place is unlike the others."""
+
+    low, high, centre = np.full(3, -50.0), np.full(3, 50.0), np.zeros(3)
+    measured = np.array([[1.0, 0.0, 0.0], [1.1, 0.0, 0.0], [0.9, 0.0, 0.0], [1.4, 0.0, 0.0]])
+    weight = np.array([1.0, 1.01, 0.99, 1.02])
+    whitener = SimpleNamespace(raw_gram=lambda x: np.einsum("gci,gcj->gij", x, x))
+
+    def predicted(self, v):
+        felt = v[0] + v[1] + v[2] + self.weight * 1e-3 * (v[1] - v[2]) + 5.0 * (v[1] - v[2]) ** 2
+        return np.stack([felt, 0 * felt, 0 * felt], axis=1)
+
+    def residual(self, v, onset):
+        return self.measured - self.predicted(v)
+
+    def group_loss(self, residual, onset):
+        return 0.5 * (residual**2).sum(axis=1) * 1e4
+
+    def found(self):
+        v = np.array([0.9, 0.1, 0.1])
+        columns = np.stack(
+            [(self.predicted(v + h) - self.predicted(v)) / 1e-7 for h in 1e-7 * np.eye(3)], axis=2
+        )
+        gram = 1e4 * self.whitener.raw_gram(
+            np.concatenate([self.residual(v, None)[:, :, None], columns], axis=2)
+        )
+        none = np.zeros(3)
+        return SimpleNamespace(
+            values=v,
+            residual=self.residual(v, None),
+            jacobian=columns,
+            gram=gram,
+            prior=none,
+            pull=none,
+            onset=None,
+        )
+
+
+def test_a_loose_parameter_is_held_out_where_the_other_places_would_have_it():
+    """The linear answer for the places that are left throws it far, where they would lose most themselves."""
+    twins = Twins()
+    found = twins.found()
+    held, plain = held_out(found, twins)
+    each = np.array([mean_of_others(twins.measured[:, 0], g) for g in range(4)])
+    fair = 0.5e4 * (twins.measured[:, 0] - each) ** 2
+    assert held.sum() == pytest.approx(fair.sum(), rel=0.2)
+    assert np.isfinite(plain).all()
+
+
+def mean_of_others(values, g):
+    return np.delete(values, g).mean()
+
+
+def test_a_parameter_that_no_motion_shows_is_left_where_it_is(late):
+    """Its column is zero, which was a singular matrix."""
+    search, plain, _ = late
+    slip = effect("friction_slip")
+    found = fit(search.forward, search.whitener, [slip], modulus=MODULUS)
+    blind = found.gram.copy()
+    blind[:, 2:, :] = blind[:, :, 2:] = 0.0
+    found = dataclasses.replace(found, gram=blind)
+    loss, gaps = held_out(found, Descent(search.forward, search.whitener, found.effects, None))
+    assert np.isfinite(loss).all() and np.isfinite(gaps).all()
 
 
 def test_places_not_fitted_are_predicted_by_the_right_effect(late):

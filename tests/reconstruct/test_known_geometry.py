@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from argparse import Namespace
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +10,6 @@ import trimesh
 from flat_ground import MODULUS_PA, TIP_M, raster
 
 import palpate as pp
-from diagnose.leave_one_out import held_out
-from mechanics.effects.registry import effect
 from mechanics.errors import ContactError, OptionError, SurfaceError
 from mechanics.press_sites import sites_of
 from palpate import cli
@@ -80,22 +77,6 @@ def test_touches_at_one_place_leave_nothing_out_and_crash_nothing():
         site=np.zeros(4, dtype=int),
     )
     assert implicit_held_out(evidence, Seen.of(evidence)) == np.inf
-
-
-def test_a_parameter_that_no_motion_shows_is_left_where_it_is():
-    """Purely normal presses: friction's column is zero, which was a singular matrix."""
-    slip = effect("friction_slip")
-    size = 2 + len(slip.parameters)
-    gram = np.zeros((4, size, size))
-    gram[:, :2, :2] = [[2.0, 1.0], [1.0, 3.0]]
-    values = np.array([0.0, *(p.ideal if np.isfinite(p.ideal) else 1.0 for p in slip.parameters)])
-    values[1:] = [
-        np.clip(v, p.low + 0.1, p.high - 0.1) for v, p in zip(values[1:], slip.parameters, strict=True)
-    ]
-    zeros = np.zeros(size - 1)
-    fit = SimpleNamespace(gram=gram, raw=gram.copy(), effects=(slip,), values=values, prior=zeros, pull=zeros)
-    loss, plain = held_out(fit)
-    assert np.isfinite(loss).all() and np.isfinite(plain).all()
 
 
 def test_one_line_for_units_open_meshes_unregistered_shapes_and_points(tmp_path, ground, capsys):
