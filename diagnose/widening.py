@@ -35,7 +35,8 @@ def widened(name: str, parameters: Mapping[str, Any], intervals: Mapping[str, An
     wider = {}
     for key, (low, high) in intervals.items():
         value = np.asarray(parameters[key], float)
-        allowed = keys.get(key) or Key()
+        stated = keys.get(key)
+        allowed = stated if isinstance(stated, Key) else Key()
         wider[key] = [
             np.clip(value + factor * (np.asarray(end, float) - value), allowed.low, allowed.high).tolist()
             for end in (low, high)

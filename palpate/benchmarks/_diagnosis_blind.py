@@ -164,6 +164,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
     """Diagnose; the truth stays shut. Errors are a verdict too. The answer is written."""
     from diagnose.baselines import best_by_bic, regressed_gap
     from diagnose.pipeline import DiagnoseOptions, diagnose
+    from diagnose.widening import factors
     from mechanics.model import read_model
     from mechanics.recording import read_recording
 
@@ -189,6 +190,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
             "intervals": {e["name"]: e.get("parameters_ci95", {}) for e in data["effects"]},
             "closed_by": {e["name"]: e["gap_closed"] for e in data["effects"]},
             "probability": {e["name"]: e["probability"] for e in data["effects"]},
+            "widening": dict(factors()),
             "detectable_n": {e["name"]: e["detectable_n"] for e in data["effects"]},
             "scores": {n: [s.evidence, s.closure] for n, s in result.attribution.scores.items()},
             "bic": best_by_bic(result.attribution),

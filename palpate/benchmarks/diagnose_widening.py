@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.widening import FILE, factors
+from diagnose.widening import FILE
 from mechanics.errors import OptionError
 from palpate.benchmarks._diagnosis_blind import opened_case, verdict_path
 from palpate.benchmarks._diagnosis_cases import cases
@@ -48,8 +48,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             raise OptionError(f"--work {given}: FOLDER:SEED, such as work/calibration:60000")
         for case in cases(arguments.size, None, int(seed)):
             if verdict_path(case, Path(folder)).exists():
-                for name, far in distances(opened_case(case, Path(folder))):
-                    found[name].append(far * factors().get(name, factors()["all"]))
+                opened = opened_case(case, Path(folder))
+                used = opened["verdict"].get("widening", {"all": 1.0})
+                for name, far in distances(opened):
+                    found[name].append(far * used.get(name, used["all"]))
     if not found:
         raise OptionError(f"{arguments.work}: no judged cases there; run `palpate bench diagnose` first")
     chosen = chosen_factors(found)
