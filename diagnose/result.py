@@ -87,7 +87,8 @@ class Diagnosis:
 
     errors_n: our own errors, N rms: sensor, repeatability, shape, numerical. reasons: the verdict in words.
     held_out_n: gap (before, after), N, at the places of the deepest and of the fastest presses, fitted to the
-    rest.
+    rest. left_out: effects that were not tried, as such presses cannot show them or a quick diagnosis does
+    without.
     """
 
     noise_n: float
@@ -142,7 +143,8 @@ class Diagnosis:
         if self.next_touch is not None and self.unsettled:
             lines.append(f"next touch: {self.next_touch.why}")
         if self.left_out:
-            lines.append(f"--fast left out: {', '.join(self.left_out)}")
+            names = ", ".join(n.replace("_", " ") for n in self.left_out)
+            lines.append(f"not tried (these presses cannot show it, or --fast leaves it out): {names}")
         return lines
 
     @property

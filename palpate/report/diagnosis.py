@@ -194,7 +194,8 @@ def _tried(page: Page, result: Diagnosis) -> None:
         pairs = (spoken((a, b)) for a, b, _ in result.confusable[:6])
         page.paragraph("With these touches the following look alike: " + "; ".join(pairs) + ".")
     if result.left_out:
-        page.paragraph(f"The fast setting did not try: {spoken(result.left_out)}.")
+        words = "Not tried, as such touches cannot show it or the fast setting leaves it out"
+        page.paragraph(f"{words}: {spoken(result.left_out)}.")
 
 
 def _follows(page: Page, result: Diagnosis) -> None:
