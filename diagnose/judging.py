@@ -210,7 +210,7 @@ class Search:
         if all(e.scope.between_places for e in added):
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = fitted
-            gain = old.found.loss - new.found.loss - 4.0 * extra
+            gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
