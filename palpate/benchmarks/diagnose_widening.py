@@ -18,6 +18,7 @@ import numpy as np
 
 from diagnose.widening import FILE
 from mechanics.errors import OptionError
+from mechanics.files import atomic_file
 from palpate.benchmarks._diagnosis_blind import opened_case, verdict_path
 from palpate.benchmarks._diagnosis_cases import cases
 from palpate.benchmarks.timing import table
@@ -63,7 +64,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         whence = f"# palpate bench diagnose-widening --size {arguments.size}, seeds " + ", ".join(
             given.rpartition(":")[2] for given in arguments.work
         )
-        Path(arguments.write).write_text(f"{whence}\n[factor]\n{lines}\n")
+        with atomic_file(Path(arguments.write)) as temporary:
+            temporary.write_text(f"{whence}\n[factor]\n{lines}\n", encoding="utf-8")
     return {"factors": chosen, "values": {n: len(v) for n, v in found.items()}}
 
 
