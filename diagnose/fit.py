@@ -169,7 +169,11 @@ class Descent:
             return float("inf")
         quadratic = self.whitener.gram(self.effective(residual, onset)[:, :, None])[:, 0, 0]
         total = quadratic.sum() if self.weights is None else self.weights @ quadratic
-        return float(0.5 * (total + self.prior @ (values - self.centre) ** 2))
+        return float(0.5 * total + self.pulled(values))
+
+    def pulled(self, values: np.ndarray) -> float:
+        """The prior's part of the loss."""
+        return float(0.5 * (self.prior @ (values - self.centre) ** 2))
 
     def jacobian(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
         """(n, 3, k) of the prediction, by forward differences."""

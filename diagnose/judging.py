@@ -176,15 +176,14 @@ class Search:
             known = effect.name in near.names
             own = [near.of(effect.name)] if known else self.starts.get(effect.name) or effect.starts()
             starts = [np.concatenate([s, o]) for s in starts for o in own]
-        found = self._best(list(effects), starts, near.onset)
-        held, plain = held_out(found, Descent(self.forward, self.whitener, found.effects, None))
+        descent = Descent(self.forward, self.whitener, tuple(effects), None)
+        found = self._best(descent, starts, near.onset)
+        held, plain = held_out(found, descent)
         candidate = Candidate(found, held, plain, self.dof)
         self._cache[key] = candidate
         return candidate
 
-    def _best(self, order: list[Effect], starts: list[np.ndarray], onset: np.ndarray) -> Fit:
-        descent = Descent(self.forward, self.whitener, tuple(order), None)
-
+    def _best(self, descent: Descent, starts: list[np.ndarray], onset: np.ndarray) -> Fit:
         def best(onset: np.ndarray, most: int) -> Fit:
             scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
             return min(

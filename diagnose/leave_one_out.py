@@ -23,18 +23,18 @@ def held_out(found: Fit, descent: Descent) -> tuple[np.ndarray, np.ndarray]:
     other groups' plain residual, so that a gap is never one that a modulus would close.
     """
     here = descent.group_loss(found.residual, found.onset)
-    pulled = _pulled(found, found.values, descent)
+    total, pulled = found.gram.sum(axis=0), descent.pulled(found.values)
     whitened, plain = np.empty(len(here)), np.empty(len(here))
     for g in range(len(here)):
         residual, loss = found.residual, here
         others = pulled + here.sum() - here[g]
         for damping in DAMPINGS:
-            values = _without(found, g, damping, descent)
+            values = _chosen(found, total - found.gram[g], damping, descent)
             there = descent.residual(values, found.onset)
             if not np.isfinite(there).all():
                 continue
             loss_there = descent.group_loss(there, found.onset)
-            if _pulled(found, values, descent) + loss_there.sum() - loss_there[g] <= others:
+            if descent.pulled(values) + loss_there.sum() - loss_there[g] <= others:
                 residual, loss = there, loss_there
                 break
         # the loss of all is told where first touches stood in the descent, not at their likeliest place
@@ -46,10 +46,9 @@ def held_out(found: Fit, descent: Descent) -> tuple[np.ndarray, np.ndarray]:
     return whitened, plain
 
 
-def _without(found: Fit, g: int, damping: float, descent: Descent) -> np.ndarray:
-    """(k,) values that the groups but g would choose, by one step."""
+def _chosen(found: Fit, rest: np.ndarray, damping: float, descent: Descent) -> np.ndarray:
+    """(k,) values that groups with the inner products `rest` would choose, by one step."""
     values, low, high = found.values.copy(), descent.low, descent.high
-    rest = found.gram.sum(axis=0) - found.gram[g]
     gradient = rest[1:, 0] - found.pull
     outward = ((values <= low + 1e-9) & (gradient <= 0)) | ((values >= high - 1e-9) & (gradient >= 0))
     free = ~outward
@@ -58,11 +57,6 @@ def _without(found: Fit, g: int, damping: float, descent: Descent) -> np.ndarray
     hessian = hessian + damping * np.diag(np.maximum(np.diag(hessian), 1e-12))
     values[free] += np.linalg.solve(hessian, gradient[free])
     return np.clip(values, low, high)
-
-
-def _pulled(found: Fit, values: np.ndarray, descent: Descent) -> float:
-    """What the prior makes of values."""
-    return float(0.5 * (found.prior @ (values - descent.centre) ** 2))
 
 
 def levelled(found: Fit) -> np.ndarray:

@@ -85,7 +85,7 @@ class Twins:
     """Two parameters of which only the sum is felt, but for a square of their difference: as two branches of
     a memory at one time. Each of four groups is one row; the last place is unlike the others."""
 
-    low, high, centre = np.full(3, -50.0), np.full(3, 50.0), np.zeros(3)
+    low, high = np.full(3, -50.0), np.full(3, 50.0)
     measured = np.array([[1.0, 0.0, 0.0], [1.1, 0.0, 0.0], [0.9, 0.0, 0.0], [1.4, 0.0, 0.0]])
     weight = np.array([1.0, 1.01, 0.99, 1.02])
     whitener = SimpleNamespace(raw_gram=lambda x: np.einsum("gci,gcj->gij", x, x))
@@ -96,6 +96,9 @@ class Twins:
 
     def residual(self, v, onset):
         return self.measured - self.predicted(v)
+
+    def pulled(self, v):
+        return 0.0
 
     def group_loss(self, residual, onset):
         return 0.5 * (residual**2).sum(axis=1) * 1e4
