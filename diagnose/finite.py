@@ -17,9 +17,9 @@ EXPONENT = 2.4
 def predicted_size(forward: Forward, found: Fit) -> float:
     """N rms over contact samples: what finite strain is expected to change in these presses."""
     t = forward.touches
-    depth = np.clip(t.travel[:, 0] + found.onset[t.press], 0, None) / forward.tip_radius
+    depth = np.clip(t.travel[:, 0] + found.likeliest[t.press], 0, None) / forward.tip_radius
     force = np.linalg.norm(
-        forward.predict(settings_of(forward, found.effects, found.values, found.onset)), axis=1
+        forward.predict(settings_of(forward, found.effects, found.values, found.likeliest)), axis=1
     )
     change = COEFFICIENT * depth**EXPONENT * force
     return float(np.sqrt((change[t.counted] ** 2).mean()))

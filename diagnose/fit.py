@@ -15,9 +15,8 @@ from mechanics.effects.settings import Settings
 
 MODULUS_STEP = 0.01
 
-MOST_PLAINLY = 1.5
-"""A first touch is not moved where the press then misses plainly by this much more: a drag that no law here
-follows would move it."""
+SHIFTS_M = (-1.2e-3, -6e-4, -3e-4, -1.5e-4, -7e-5, 7e-5, 1.5e-4, 3e-4, 6e-4, 1.2e-3)
+"""Of a site's first touches, tried together once a descent has come to rest."""
 
 
 @dataclass(frozen=True)
@@ -28,7 +27,8 @@ class Fit:
     included. residual: (n, 3) N, measured less predicted. jacobian: (n, 3, k) of the prediction by the
     values.
     gram, raw: (g, 1 + k, 1 + k) inner products of [residual, jacobian], whitened and plain. onset: (p,) m,
-    first touches as moved, at their likeliest place for the plain residual.
+    first touches as the descent moved them. likeliest: (p,) m, the same where each press's
+    plain misfit is least, for residual and raw.
     """
 
     effects: tuple[Effect, ...]
@@ -41,6 +41,7 @@ class Fit:
     prior: np.ndarray
     pull: np.ndarray
     onset: np.ndarray
+    likeliest: np.ndarray
 
     @property
     def modulus(self) -> float:
@@ -212,45 +213,54 @@ class Descent:
                 break
         return onset, residual
 
+    def sought(
+        self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """First touches of each site moved together to wherever its loss is least; (onset, residual).
+
+        Press by press a step ends in the next hollow, and which one that is would be taken for an effect.
+        """
+        t, best = self.forward.touches, self.group_loss(residual, onset)
+        begun = onset
+        for shift in SHIFTS_M:
+            tried = np.clip(begun + shift, -2.5e-3, 2.5e-3)
+            there = np.nan_to_num(self.residual(values, tried), nan=1e3)
+            loss = self.group_loss(there, tried)
+            better = (loss < best)[t.site]
+            onset = np.where(better, tried, onset)
+            residual = np.where(better[t.press][:, None], there, residual)
+            best = np.minimum(best, loss)
+        return onset, residual
+
     def likeliest_touches(
         self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray, rounds: int = 3
     ) -> tuple[np.ndarray, np.ndarray]:
-        """First touches at their most likely place, press by press; (onset, residual).
+        """First touches at their most likely place for the plain misfit, press by press; (onset, residual).
 
         The whitened loss hardly changes along an early touch on a soft place, so a descent leaves a press
         anywhere there; the plain gap would show it as a misfit.
         """
         press = self.forward.touches.press
         for _ in range(rounds):
-            target = self.refined(values, residual, onset)
+            target = self.refined(values, residual, onset, plainly=True)
             tried = np.nan_to_num(self.residual(values, target), nan=1e3)
             better = self.press_cost(tried, target) < self.press_cost(residual, onset)
-            better &= self.plain_cost(tried) < MOST_PLAINLY * self.plain_cost(residual)
             onset = np.where(better, target, onset)
             residual = np.where(better[press][:, None], tried, residual)
         return onset, residual
 
-    def plain_cost(self, residual: np.ndarray) -> np.ndarray:
-        """(p,) N^2, plain sum of squares of every press."""
+    def press_cost(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
+        """(p,) plain misfit of every press, and the price of its shift."""
         t = self.forward.touches
         each = np.where(t.counted, (residual**2).sum(axis=1), 0.0)
-        return np.bincount(t.press, weights=each, minlength=len(t))
+        missed = np.bincount(t.press, weights=each, minlength=len(t)) / self.whitener.variance
+        return missed + (onset / self.whitener.onset_sd) ** 2
 
-    def press_cost(self, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
-        """(p,) misfit of every press beside the likeliest factor on its force, and the price of its shift."""
-        t = self.forward.touches
-        keep = t.counted[:, None]
-        r, f = np.where(keep, residual, 0.0), np.where(keep, t.local_force - residual, 0.0)
-
-        def sums(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-            each = (a * b).sum(axis=1)
-            return np.bincount(t.press, weights=each, minlength=len(t)) / self.whitener.variance
-
-        ff = sums(f, f) + 1 / self.whitener.stiffness_sd**2
-        return sums(r, r) - sums(r, f) ** 2 / ff + (onset / self.whitener.onset_sd) ** 2
-
-    def refined(self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray) -> np.ndarray:
-        """One Gauss-Newton move of every first touch, beside a free factor on its press's force."""
+    def refined(
+        self, values: np.ndarray, residual: np.ndarray, onset: np.ndarray, *, plainly: bool = False
+    ) -> np.ndarray:
+        """One Gauss-Newton move of every first touch, beside a free factor on its press's force; plainly,
+        without it."""
         t = self.forward.touches
         h = 2e-5
         predicted = t.local_force - residual
@@ -266,7 +276,7 @@ class Descent:
 
         ss = sums(slope, slope) + 1 / self.whitener.onset_sd**2
         ff = sums(force, force) + 1 / self.whitener.stiffness_sd**2
-        sf = sums(slope, force)
+        sf = np.zeros(p) if plainly else sums(slope, force)
         rs = sums(slope, residual) - onset / self.whitener.onset_sd**2
         rf = sums(force, residual)
         move = (ff * rs - sf * rf) / np.maximum(ss * ff - sf * sf, 1e-12)
@@ -277,7 +287,7 @@ class Descent:
         values = np.clip(values, self.low, self.high)
         residual = self.residual(values, onset)
         loss = self.loss(values, residual, onset)
-        damping = 1e-4
+        damping, sought = 1e-4, False
         for _ in range(iterations):
             before = loss
             onset, residual = self.touched(values, residual, onset)
@@ -300,14 +310,18 @@ class Descent:
                     break
                 damping = max(damping * 10, 1e-3)
             if before - loss < 0.05 + 1e-5 * loss:
-                break
+                if sought:
+                    break
+                sought = True
+                onset, residual = self.sought(values, residual, onset)
+                loss = self.loss(values, residual, onset)
         jacobian = self.jacobian(values, residual, onset)
         shown = np.concatenate([self.effective(residual, onset)[:, :, None], jacobian], axis=2)
-        onset, residual = self.likeliest_touches(values, residual, onset)
+        likeliest, residual = self.likeliest_touches(values, residual, onset)
         plain = np.concatenate([residual[:, :, None], jacobian], axis=2)
         return Fit(
             self.effects, values, loss, residual, jacobian, self.whitener.gram(shown),
-            self.whitener.raw_gram(plain), self.prior, self.prior * (values - self.centre), onset,
+            self.whitener.raw_gram(plain), self.prior, self.prior * (values - self.centre), onset, likeliest,
         )  # fmt: skip
 
     def _moved(

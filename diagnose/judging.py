@@ -18,9 +18,6 @@ from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.effects.base import Effect
 from mechanics.options import option
 
-ANEW = 0.8
-"""A fit from unmoved first touches replaces the usual one where its loss is this much less."""
-
 
 @dataclass(frozen=True)
 class AttributionOptions:
@@ -177,25 +174,13 @@ class Search:
             own = [near.of(effect.name)] if known else self.starts.get(effect.name) or effect.starts()
             starts = [np.concatenate([s, o]) for s in starts for o in own]
         descent = Descent(self.forward, self.whitener, tuple(effects), None)
-        found = self._best(descent, starts, near.onset)
+        scored = [descent.loss(s, descent.residual(s, near.onset), near.onset) for s in starts]
+        runs = (descent.run(starts[i], near.onset, 12) for i in np.argsort(scored)[:3])
+        found = min(runs, key=lambda f: f.loss)
         held, plain = held_out(found, descent)
         candidate = Candidate(found, held, plain, self.dof)
         self._cache[key] = candidate
         return candidate
-
-    def _best(self, descent: Descent, starts: list[np.ndarray], onset: np.ndarray) -> Fit:
-        def best(onset: np.ndarray, most: int) -> Fit:
-            scored = [descent.loss(s, descent.residual(s, onset), onset) for s in starts]
-            return min(
-                (descent.run(starts[i], onset, 12) for i in np.argsort(scored)[:most]), key=lambda f: f.loss
-            )
-
-        found = best(onset, 3)
-        # first touches that an earlier fit moved to make up for what it lacked may hold a better one back
-        if found.loss > self.options.unknown_chi * self.dof / 2:
-            anew = best(np.zeros_like(onset), 2)
-            found = anew if anew.loss < ANEW * found.loss else found
-        return found
 
     def score(self, added: Sequence[Effect], new: Candidate, old: Candidate) -> Score:
         """Compare a candidate with the one that lacks `added`."""

@@ -22,7 +22,7 @@ def held_out(found: Fit, descent: Descent) -> tuple[np.ndarray, np.ndarray]:
     itself says that the other groups lose nothing by it. For the plain gap the modulus is refitted to the
     other groups' plain residual, so that a gap is never one that a modulus would close.
     """
-    here = descent.group_loss(found.residual, found.onset)
+    here = 0.5 * found.gram[:, 0, 0]
     total, pulled = found.gram.sum(axis=0), descent.pulled(found.values)
     whitened, plain = np.empty(len(here)), np.empty(len(here))
     for g in range(len(here)):
@@ -35,10 +35,9 @@ def held_out(found: Fit, descent: Descent) -> tuple[np.ndarray, np.ndarray]:
                 continue
             loss_there = descent.group_loss(there, found.onset)
             if descent.pulled(values) + loss_there.sum() - loss_there[g] <= others:
-                residual, loss = there, loss_there
+                residual, loss = descent.residual(values, found.likeliest), loss_there
                 break
-        # the loss of all is told where first touches stood in the descent, not at their likeliest place
-        whitened[g] = 0.5 * found.gram[g, 0, 0] + loss[g] - here[g]
+        whitened[g] = loss[g]
         raw = descent.whitener.raw_gram(np.stack([residual, found.jacobian[:, :, 0]], axis=2))
         rest = raw.sum(axis=0) - raw[g]
         coefficients = np.array([1.0, -rest[0, 1] / max(rest[1, 1], 1e-12)])

@@ -23,7 +23,7 @@ def misfit_of(forward: Forward, base: Fit, site_sd: np.ndarray) -> Misfit:
         return np.bincount(t.press, weights=a, minlength=len(t))
 
     power = np.maximum(sums(predicted**2), 1e-12)
-    settings = settings_of(forward, base.effects, base.values, base.onset)
+    settings = settings_of(forward, base.effects, base.values, base.likeliest)
     step = 1.0
     settings.far = settings.far.copy()
     settings.far[:, 0, 0] += step

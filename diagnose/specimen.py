@@ -306,7 +306,7 @@ def unseen_holds(bench: Bench, made: Diagnosis) -> tuple[float, float] | None:
             held = np.arange(len(t)) % _FOLDS == k
             weights = np.where([held[t.site == s].any() for s in range(t.sites)], 0.0, 1.0)
             again = Descent(forward, whitener, effects, weights).run(values, fit.onset, _ITERATIONS)
-            predicted = forward.predict(settings_of(forward, effects, again.values, again.onset))[:, 0]
+            predicted = forward.predict(settings_of(forward, effects, again.values, again.likeliest))[:, 0]
             for press in np.intersect1d(holds, np.flatnonzero(held)):
                 own, rest = way & (t.press == press), hold & (t.press == press)
                 f = predicted[own]

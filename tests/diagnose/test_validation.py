@@ -120,6 +120,7 @@ class Twins:
             prior=none,
             pull=none,
             onset=None,
+            likeliest=None,
         )
 
 
@@ -180,14 +181,14 @@ def test_folds_hold_every_site_once_and_neighbours_together(late):
 def test_a_first_touch_left_aside_is_found_again_press_by_press(late):
     search, _, found = late
     descent = Descent(search.forward, search.whitener, found.effects, None)
-    aside = found.onset.copy()
+    aside = found.likeliest.copy()
     aside[[3, 15]] += 3e-4
     residual = descent.residual(found.values, aside)
     onset, better = descent.likeliest_touches(found.values, residual, aside)
     t = search.forward.touches
     moved = np.isin(t.press, [3, 15]) & t.counted
     assert (residual[moved] ** 2).mean() > 3 * (better[moved] ** 2).mean()
-    np.testing.assert_allclose(onset, found.onset, atol=6e-5)
+    np.testing.assert_allclose(onset, found.likeliest, atol=2e-5)
 
 
 def test_repeats_that_disagree_are_told(late):
