@@ -11,27 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.confidence_set import confidence_p
-from diagnose.judging import Candidate, Score, Search, sideways_off
+from diagnose.judging import Candidate, Score, Search
 from mechanics.effects.base import Effect, Scope
 from mechanics.progress import Progress, silent
-
-REEXAMINED = 4
-"""The strongest effects of a step that are weighed once more before they are turned down."""
-
-OUT_OF_SET = 0.1
-"""An effect with a smaller p value is not in the model confidence set of 90 %."""
-
-AS_LIKELY = np.log(10)
-"""Log odds by which one effect must be likelier than another, or the two are not told apart by them."""
-
-HIDDEN_LEAST = 10.0
-"""What may hide finite strain gains this much alone before it is tried with it as well."""
-
-REFINED_WORSE = 35.0
-"""A law that is solved anew at its fit may fit worse than its linear answer by this log likelihood."""
-
-LINEAR_UNLESS = -8.0
-"""Real solids strain finitely: the linear law is taken only where it fits better by this log likelihood."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +54,7 @@ def attribute(
     fs = search.finite_strain
     ideal, deep = search.judge([]), search.judge([fs])
     _, strain_gain = _with_strain(search, [])
-    base = deep if strain_gain > LINEAR_UNLESS else ideal
+    base = deep if strain_gain > -search.options.beyond_doubt else ideal
     current = base
     chosen: list[str] = []
     steps: list[dict[str, Score]] = []
@@ -91,15 +73,14 @@ def attribute(
         if not scores:
             break
         first = not chosen
-        for score in sorted(scores.values(), key=lambda s: -s.gain)[:REEXAMINED]:
+        for score in list(scores.values()):
             if score.may_be and not search.passes(score, first=first):
                 scores[score.name] = _reexamined(search, score, current)
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
-        off = sideways_off(search.forward, current)
-        if off:
-            passing = _not_blind_to_slip(search, passing, off)
+        if search.sideways_off(current):
+            passing = _not_blind_to_slip(search, passing)
         known = [scores[n] for n in sorted(seen) if n in scores]
         passing = [s for s in known if s.size_n > search.smallest_n] or passing
         if not passing:
@@ -110,7 +91,7 @@ def attribute(
             search.renew(pair.found)
             current, strain_gain = _with_strain(search, pair.found.effects)
             break
-        best = _likeliest(passing)
+        best = _likeliest(passing, search.options.beyond_doubt)
         for effect in effects:
             if _of_one(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
@@ -149,11 +130,11 @@ def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
     )
 
 
-def _likeliest(passing: Sequence[Score]) -> Score:
+def _likeliest(passing: Sequence[Score], beyond_doubt: float) -> Score:
     """The score that gains most of those as likely to be there as any; a fit that does not carry over is
     not."""
     best = max(s.log_odds for s in passing)
-    return max((s for s in passing if s.log_odds > best - AS_LIKELY), key=lambda s: s.gain)
+    return max((s for s in passing if s.log_odds > best - beyond_doubt), key=lambda s: s.gain)
 
 
 def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
@@ -180,11 +161,6 @@ def _with_hidden_strain(
     """The candidate, or with finite strain beside it where each may have hidden the other."""
     if not effect.hides_strain or search.finite_strain in current.found.effects:
         return candidate
-    if (
-        current.found.loss - candidate.found.loss
-        < HIDDEN_LEAST * search.forward.touches.noise.variance_inflation
-    ):
-        return candidate
     both = search.judge([search.finite_strain, *candidate.found.effects], like=candidate)
     return both if both.found.loss < candidate.found.loss else candidate
 
@@ -200,36 +176,26 @@ def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Ca
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
         score = search.score([one, two], candidate, current)
-        if candidate.chi < 0.5 * current.chi and search.passes(score):
+        if search.passes(score):
             found.append(candidate)
     return min(found, key=lambda c: c.found.loss, default=None)
 
 
-def _not_blind_to_slip(search: Search, passing: list[Score], off: float) -> list[Score]:
-    """What may be named while the sideways force is off by a share: of effects that differ from place to
-    place only those that mend it, or a sliding tip is taken for a soft place."""
-    return [
-        s
-        for s in passing
-        if not s.effect.scope.between_places or sideways_off(search.forward, s.candidate) < 0.7 * off
-    ]
+def _not_blind_to_slip(search: Search, passing: list[Score]) -> list[Score]:
+    """What may be named while the sideways force is off: of effects that differ from place to place only
+    those that mend it, or a sliding tip is taken for a soft place."""
+    return [s for s in passing if not s.effect.scope.between_places or not search.sideways_off(s.candidate)]
 
 
 def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
-    """The set with an effect's law made exact at its fit, twice; as it was where that fits worse or its law
-    is exact already."""
-    if effect.refine is None or effect.forget is None:
+    """The set with an effect's law made exact at its fit, twice; as it was where its law is exact already."""
+    if effect.refine is None:
         return current
-    first = current
     for _ in range(2):
         effect.refine(search.forward, current.found.of(effect.name))
         search.renew(current.found)
         current = search.judge(current.found.effects, like=current)
-    if current.found.loss < first.found.loss + REFINED_WORSE:
-        return current
-    effect.forget(search.forward)
-    search.renew(first.found)
-    return first
+    return current
 
 
 def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
@@ -252,7 +218,7 @@ def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, 
     each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
     # the site that speaks loudest, for or against, may be one that slipped
     gain = (each.sum() - each.max() - each.min()) / over
-    return (deep if gain > LINEAR_UNLESS else without), float(gain)
+    return (deep if gain > -search.options.beyond_doubt else without), float(gain)
 
 
 def _without_idle(
@@ -267,7 +233,7 @@ def _without_idle(
             continue
         without = search.judge([e for e in current.found.effects if e.name != name])
         effect = next(e for e in current.found.effects if e.name == name)
-        if effect.slips and sideways_off(search.forward, without):
+        if effect.slips and search.sideways_off(without):
             continue
         score = search.score([effect], current, without)
         if not score.may_be:
@@ -302,8 +268,8 @@ def _rivals(
                 continue
             if score.effect.any_form and first.effect.scope.between_places and score.gain < first.gain:
                 continue
-            as_likely = score.log_odds > first.log_odds - AS_LIKELY
-            if as_likely or (p[score.name] > OUT_OF_SET and search.passes(score)):
+            as_likely = score.log_odds > first.log_odds - search.options.beyond_doubt
+            if as_likely or (p[score.name] > search.options.doubt and search.passes(score)):
                 found.setdefault(score.name, first.log_odds - score.log_odds)
     return tuple(sorted(found, key=lambda n: found[n]))
 

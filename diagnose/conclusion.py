@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.attribution import LINEAR_UNLESS, Attribution
+from diagnose.attribution import Attribution
 from diagnose.confusable import alike
 from diagnose.detectable import detectable
 from diagnose.gaps import closed_share, gap
@@ -161,7 +161,7 @@ def _entries(
             )
         )
     strain = search.finite_strain
-    if found.finite_strain_gain > LINEAR_UNLESS or strain.name in answer.names:
+    if found.finite_strain_gain > -search.options.beyond_doubt or strain.name in answer.names:
         deep = found.deep
         closed, interval = closed_share(gaps.before, deep.plain, counts, noise, added, rng, draws)
         probability = FINITE_STRAIN if strain.name in answer.names else 0.1

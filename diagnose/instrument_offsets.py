@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
-from diagnose.judging import Candidate
+from diagnose.judging import AttributionOptions, Candidate
 from diagnose.result import EffectEntry
 from diagnose.retraced import Move
 from diagnose.rigid import Rigid
@@ -29,15 +29,8 @@ from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
-Z = 6.0
-SIDEWAYS_Z = 4.0
-MOVED_Z = 4.0
-SPRING_SHARE = 0.005
-"""Of a spring's compliance, beyond scatter: what a turning tool's weight adds to the force on the support."""
-LEAST_BIAS_N = 0.008
-LEAST_MASS_KG = 0.003
-MASS_SHARE = 0.03
-"""Of the mass, beyond noise: what smoothing does to it (six known ones came out 1 to 5 % large)."""
+Z = 5.0
+"""Standard errors beyond which what is read is no chance, and within which it may be."""
 
 
 @dataclass(frozen=True)
@@ -83,19 +76,26 @@ class InstrumentOffsets:
 
 
 def find_instrument_offsets(
-    forward: Forward, free: FreeAir | None, rigid: Rigid | None, excluded: set[str]
+    forward: Forward,
+    free: FreeAir | None,
+    rigid: Rigid | None,
+    excluded: set[str],
+    smallest: float = AttributionOptions.smallest,
 ) -> InstrumentOffsets:
-    """Decide what free air and the support tell; take it off forces and positions of forward.touches."""
-    offsets = _free_air_offsets(forward, free, excluded)
+    """Decide what free air and the support tell; take it off forces and positions of forward.touches.
+
+    smallest: change of the forces that matters, rms over contact samples, of the noise of a force 3-vector.
+    """
+    offsets = _free_air_offsets(forward, free, excluded, smallest)
     if rigid is None or SPRING.name in excluded or rigid.compliance <= Z * rigid.error:
         return offsets
     t = forward.touches
     stiffness = 1 / rigid.compliance
     change = _yielding(forward, rigid.compliance)
-    if _size(forward, change) < t.noise.raw_n:
-        return offsets  # too little to matter
+    if not _matters(forward, change, smallest):
+        return offsets
     forward.touches = dataclasses.replace(t, position=t.position + t.force / stiffness)
-    error = np.hypot(rigid.error, SPRING_SHARE * rigid.compliance)
+    error = np.hypot(rigid.error, SPRING.systematic_share[0] * rigid.compliance)
     low, high = (1 / max(rigid.compliance + s * 1.96 * error, 1e-9) for s in (1, -1))
     yields = f"on the rigid support the tip's reading gives by {1e3 * rigid.compliance:.3f} mm a newton"
     return InstrumentOffsets(
@@ -107,19 +107,24 @@ def find_instrument_offsets(
     )
 
 
-def ruled_out(forward: Forward, rigid: Rigid | None, move: Move | None) -> frozenset[str]:
+def ruled_out(
+    forward: Forward,
+    rigid: Rigid | None,
+    move: Move | None,
+    smallest: float = AttributionOptions.smallest,
+) -> frozenset[str]:
     """What the support shows not to be there: a spring or a move that is too small to matter even if it is
     `Z` standard errors greater than it was read."""
     gone = set()
     if rigid is not None and np.isfinite(rigid.error):
         most = max(rigid.compliance, 0.0) + Z * rigid.error
-        if _size(forward, _yielding(forward, most)) < forward.touches.noise.raw_n:
+        if not _matters(forward, _yielding(forward, most), smallest):
             gone.add(SPRING.name)
     if move is not None:
         t = forward.touches
         along, error = move.along(t.point, t.normal)
-        most = np.abs(along) + MOVED_Z * np.sqrt(np.diag(error))
-        if _size(forward, _moved(forward, most)) < t.noise.raw_n:
+        most = np.abs(along) + Z * np.sqrt(np.diag(error))
+        if not _matters(forward, _moved(forward, most), smallest):
             gone.add(OFFSET.name)
     return frozenset(gone)
 
@@ -140,13 +145,18 @@ def _moved(forward: Forward, along: np.ndarray) -> np.ndarray:
     return here - np.nan_to_num(forward.predict(settings))
 
 
-def _size(forward: Forward, change: np.ndarray) -> float:
-    """N rms over contact samples."""
-    return float(np.sqrt((change[forward.touches.counted] ** 2).sum(axis=1).mean()))
+def _matters(forward: Forward, change: np.ndarray, smallest: float) -> bool:
+    """Whether a change (n, 3) N of the forces is felt, rms over contact samples, against their noise."""
+    t = forward.touches
+    return bool(np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) > smallest * t.vector_noise_n)
 
 
 def with_move(
-    offsets: InstrumentOffsets, forward: Forward, move: Move | None, excluded: set[str]
+    offsets: InstrumentOffsets,
+    forward: Forward,
+    move: Move | None,
+    excluded: set[str],
+    smallest: float = AttributionOptions.smallest,
 ) -> InstrumentOffsets:
     """The offsets, and the object's move where its base was traced twice and it shows.
 
@@ -157,11 +167,11 @@ def with_move(
         return offsets
     t = forward.touches
     along, error = move.along(t.point, t.normal)
-    if (along**2).mean() <= MOVED_Z**2 * np.trace(error) / len(along):
+    if (along**2).mean() <= Z**2 * np.trace(error) / len(along):
         return offsets
     change = _moved(forward, along)
-    if _size(forward, change) < t.noise.raw_n:
-        return offsets  # too little to matter
+    if not _matters(forward, change, smallest):
+        return offsets
     sd = np.sqrt(np.diag(move.error))
     words = (
         f"the base traced once more lies {1e3 * np.linalg.norm(move.shift):.1f} mm and "
@@ -187,33 +197,34 @@ def with_move(
 
 def read_sideways(rigid: Rigid | None) -> frozenset[str]:
     """What the support shows to be there, but does not tell wholly: a force that is read into other axes."""
-    return frozenset({GAIN.name} if rigid is not None and rigid.sideways_z > SIDEWAYS_Z else ())
+    return frozenset({GAIN.name} if rigid is not None and rigid.sideways_z > Z else ())
 
 
-def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]) -> InstrumentOffsets:
+def _free_air_offsets(
+    forward: Forward, free: FreeAir | None, excluded: set[str], smallest: float
+) -> InstrumentOffsets:
     t = forward.touches
     nothing = np.zeros_like(t.local_force)
     if free is None:
         return InstrumentOffsets((), {}, nothing, ())
     duration = np.ptp(t.t) + 1e-9
+    middle = free.t.mean()
     parts: dict[str, np.ndarray] = {}
     parameters: dict[str, dict] = {}
     reasons: dict[str, str] = {}
     level, level_se = free.bias_n.copy(), free.bias_se_n
     drift = np.abs(free.rate_n_per_s).max()
-    if drift > Z * free.rate_se_n_per_s and drift * duration / np.sqrt(12) > LEAST_BIAS_N / 2:
+    wandered = (t.t[:, None] - middle) * free.rate_n_per_s
+    if drift > Z * free.rate_se_n_per_s and _matters(forward, wandered, smallest):
         if DRIFT.name not in excluded:
             # a drifting zero was zero when the recording began
             parts[DRIFT.name] = t.t[:, None] * free.rate_n_per_s
             parameters[DRIFT.name] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
             reasons[DRIFT.name] = f"in free air the force drifts by {drift * duration:.3f} N over the presses"
-            middle = free.t.mean()
             level = level - middle * free.rate_n_per_s
             level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
     turning = free.turning
-    if turning is not None and np.linalg.norm(turning.tool_n) <= max(
-        Z * turning.se_n, LEAST_MASS_KG * STANDARD_GRAVITY
-    ):
+    if turning is not None and np.linalg.norm(turning.tool_n) <= Z * turning.se_n:
         turning = None  # too little to be told
     if turning is not None and INERTIA.name not in excluded and t.quaternion is not None:
         # a tare took the weight off as it lay in the tool at first; it stays where the tool turns
@@ -231,7 +242,8 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         reasons[INERTIA.name] = (
             f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared"
         )
-    heavy = abs(free.mass_kg) > Z * free.mass_se_kg and abs(free.mass_kg) > LEAST_MASS_KG
+    heavy = abs(free.mass_kg) > Z * free.mass_se_kg
+    heavy &= _matters(forward, free.mass_kg * forward.acceleration, smallest)
     if heavy and turning is None and INERTIA.name not in excluded:
         weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
@@ -255,12 +267,10 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
         parameters[INERTIA.name] = {"mass_kg": max(free.mass_kg, 0.0), "tared": True}
         level = np.zeros(3)
         reasons[INERTIA.name] = "in free air the force wanders as the weight of a tool does that turns unseen"
-    if (
-        np.abs(level).max() > Z * level_se
-        and np.linalg.norm(level) > LEAST_BIAS_N
-        and BIAS.name not in excluded
-    ):
-        parts[BIAS.name] = np.broadcast_to(level, t.local_force.shape).copy()
+    constant = np.broadcast_to(level, t.local_force.shape).copy()
+    told = np.abs(level).max() > Z * level_se and BIAS.name not in excluded
+    if told and _matters(forward, constant, smallest):
+        parts[BIAS.name] = constant
         parameters[BIAS.name] = {"bias_n": level.tolist()}
         reasons[BIAS.name] = f"in free air the force reads {np.linalg.norm(level):.3f} N"
     if not parts:
@@ -274,7 +284,7 @@ def _free_air_offsets(forward: Forward, free: FreeAir | None, excluded: set[str]
     error = {
         "bias_n": level_se,
         "rate_n_per_s": free.rate_se_n_per_s,
-        "mass_kg": np.hypot(mass_se, MASS_SHARE * abs(mass_kg)),
+        "mass_kg": np.hypot(mass_se, INERTIA.systematic_share[0] * abs(mass_kg)),
     }
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}

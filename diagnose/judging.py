@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
+from scipy.special import expit, logit
 
 from diagnose.first_touch import first_touches
 from diagnose.fit import Descent, Fit, fit, settings_of
@@ -24,6 +24,10 @@ class AttributionOptions:
     """When an effect is named; see docs/diagnosis.md."""
 
     sure: float = option(0.5, "probability from which an effect is named")
+    doubt: float = option(
+        0.1,
+        "chance that is too small to count: of odds, of a model confidence set, of what resamplings close",
+    )
     smallest: float = option(
         0.5, "smallest gap that matters, rms over contact samples, of the noise of a force 3-vector"
     )
@@ -33,6 +37,11 @@ class AttributionOptions:
     )
     most: int = option(3, "effects in one answer, at most")
     unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
+
+    @property
+    def beyond_doubt(self) -> float:
+        """Log odds beyond which one of two is taken for certain."""
+        return float(logit(1 - self.doubt))
 
 
 @dataclass(frozen=True)
@@ -203,7 +212,7 @@ class Search:
         samples = self.whitener.counts()
         plain = np.where(told, new.plain, old.plain)
         share = float(share_closed(old.plain, plain, samples, noise, least))
-        closes = lower_closure(old.plain, plain, samples, noise, least)
+        closes = lower_closure(old.plain, plain, samples, noise, least, self.options.doubt)
         return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
@@ -212,27 +221,23 @@ class Search:
             return False
         return score.probability > self.options.sure
 
+    def sideways_off(self, candidate: Candidate) -> float:
+        """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.
 
-SIDEWAYS_SHARE = 0.3
-"""Sideways shortfall, of the predicted sideways force, from which sticking is in doubt."""
-
-
-def sideways_off(forward: Forward, candidate: Candidate) -> float:
-    """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.
-
-    The nuisances trust the stick to a quarter only, press by press, so a fit may let that force go wrong. A
-    tip that slips drags less than one that sticks, never more: more is a normal that is not the surface's.
-    """
-    t = forward.touches
-    if not t.local_force[t.counted, 1:].any():
-        return 0.0  # a machine of one axis reads none
-    residual = candidate.residual[t.counted, 1:]
-    predicted = t.local_force[t.counted, 1:] - residual
-    size = np.linalg.norm(predicted, axis=1)
-    short = np.clip(-(residual * predicted).sum(axis=1) / np.maximum(size, 1e-12), 0.0, None)
-    missed, force = float(np.sqrt((short**2).mean())), float(np.sqrt((size**2).mean()))
-    # noise falls short half of the time; points without a time are not thinned
-    missed = float(np.sqrt(max(missed**2 - 0.5 * t.noise_n**2, 0.0)))
-    if missed < np.sqrt(2) * t.noise.raw_n or missed < SIDEWAYS_SHARE * force:
-        return 0.0
-    return missed / force
+        The nuisances trust the stick to a share only, press by press, so a fit may let that force go wrong.
+        A tip that slips drags less than one that sticks, never more: more is a normal that is not the
+        surface's.
+        """
+        t = self.forward.touches
+        if not t.local_force[t.counted, 1:].any():
+            return 0.0  # a machine of one axis reads none
+        residual = candidate.residual[t.counted, 1:]
+        predicted = t.local_force[t.counted, 1:] - residual
+        size = np.linalg.norm(predicted, axis=1)
+        short = np.clip(-(residual * predicted).sum(axis=1) / np.maximum(size, 1e-12), 0.0, None)
+        missed, force = float(np.sqrt((short**2).mean())), float(np.sqrt((size**2).mean()))
+        # noise falls short half of the time; points without a time are not thinned
+        missed = float(np.sqrt(max(missed**2 - 0.5 * t.noise_n**2, 0.0)))
+        if missed < np.sqrt(2) * t.noise.raw_n or missed < self.nuisance.stick * force:
+            return 0.0
+        return missed / force

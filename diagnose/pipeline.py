@@ -87,11 +87,11 @@ def diagnose(
     excluded = {n.strip() for n in options.without.split(",") if n.strip()} | untold
     allowed = effects(without=excluded)
     rigid = rigid_of(recording, presses, model.support.normal)
-    offsets = find_instrument_offsets(forward, free, rigid, excluded)
+    offsets = find_instrument_offsets(forward, free, rigid, excluded, rules.smallest)
     centre = touches.point.mean(axis=0)
     move = move_of(recording, presses, model.support.normal, centre) if own else None
-    offsets = with_move(offsets, forward, move, excluded)
-    settled = {*offsets.names, *ruled_out(forward, rigid, move)}
+    offsets = with_move(offsets, forward, move, excluded, rules.smallest)
+    settled = {*offsets.names, *ruled_out(forward, rigid, move, rules.smallest)}
     site_sd = site_stiffness_sd(touches, model, nuisance)
     if touches.sites != presses.of(met).sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by

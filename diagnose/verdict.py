@@ -11,26 +11,10 @@ from diagnose.finite import predicted_size
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir
 from diagnose.instrument_offsets import InstrumentOffsets
-from diagnose.judging import Search, sideways_off
+from diagnose.judging import Search
 from diagnose.shape import heterogeneity, site_factors
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
-
-FINITE_STRAIN_LEAST = 0.7
-"""Finite strain is named where it must be larger than this share of the noise ..."""
-FINITE_STRAIN_GAIN = 2.0
-"""... and the neo-Hookean law fits better than the linear one by this log likelihood."""
-DOUBTED_STRAIN_GAIN = 20.0
-"""The same where something is left that no law explains: it may bend the presses as finite strain does."""
-FINITE_STRAIN_BEYOND_SCALE = 0.65
-"""Share of its size that another modulus cannot take up; by it the asserted effects are put in order."""
-SHAPE_FELT = 0.6
-"""Sites that differ by more than their shape may are a cause where that is this share of the noise."""
-LUMP_CLOSES = 0.1
-"""Share of the held-out gap that a lump closes, or its rival is the shape."""
-RIVALS_OF_SHAPE = 2
-"""At most, of those that gain more than SHAPE_RIVAL_GAIN."""
-SHAPE_RIVAL_GAIN = 10.0
 
 
 @dataclass(frozen=True)
@@ -121,7 +105,7 @@ def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[boo
 
 def _slipping(evidence: Evidence, answer: Answer) -> None:
     """Sticking is only trusted to a quarter, press by press, so a fit may let the sideways force go wrong."""
-    off = sideways_off(evidence.forward, evidence.found.final)
+    off = evidence.search.sideways_off(evidence.found.final)
     slips = [e.name for e in effects() if e.slips]
     if off and not set(slips) & set(answer.names):
         answer.candidates[:0] = slips
@@ -134,16 +118,12 @@ def _finite_strain(evidence: Evidence, answer: Answer) -> None:
     if strain.name in evidence.excluded:
         return
     size_n = predicted_size(evidence.forward, found.base.found)
-    if size_n <= FINITE_STRAIN_LEAST * evidence.noise_n:
+    if size_n <= evidence.search.smallest_n:
         return
-    if found.finite_strain_gain > (DOUBTED_STRAIN_GAIN if answer.remainder else FINITE_STRAIN_GAIN):
+    if found.finite_strain_gain > evidence.search.options.beyond_doubt:
         sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
-        beyond = FINITE_STRAIN_BEYOND_SCALE * size_n
-        names = answer.names
-        names.insert(
-            next((i for i, n in enumerate(names) if sizes.get(n, np.inf) < beyond), len(names)),
-            strain.name,
-        )
+        place = (i for i, n in enumerate(answer.names) if sizes.get(n, np.inf) < size_n)
+        answer.names.insert(next(place, len(answer.names)), strain.name)
         answer.reasons.append(
             f"the presses are deep enough that small-strain elasticity is off by about {size_n:.3f} N"
         )
@@ -158,7 +138,7 @@ def _unconfirmed_lump(evidence: Evidence, answer: Answer) -> None:
     found = evidence.found
     for scores, name in zip(found.steps, found.picked, strict=False):
         lives_in_few = name in scores and scores[name].effect.few_places
-        if lives_in_few and name in found.chosen and scores[name].share < LUMP_CLOSES:
+        if lives_in_few and name in found.chosen and scores[name].closes <= 0:
             answer.candidates += _rest()
             answer.reasons.append(
                 "places that were not fitted do not confirm the lump: the shape may be wrong there instead"
@@ -173,15 +153,17 @@ def _shape(evidence: Evidence, answer: Answer) -> None:
     per_site = np.array([evidence.site_sd[t.site == s].mean() for s in range(t.sites)])
     gain, spread = heterogeneity(factor, error, per_site)
     felt_n = spread * t.force_rms_n
-    if gain <= evidence.shape_gain or felt_n <= SHAPE_FELT * evidence.noise_n:
+    if gain <= evidence.shape_gain or felt_n <= evidence.search.smallest_n:
         return
     allowed = [n for n in _rest() if n not in evidence.excluded]
     if not any(effect(n).few_places for n in found.chosen):
         if allowed and not answer.remainder:
             answer.names += allowed
             ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
-            rivals = [s.name for s in ranked if s.effect.shape_rival and s.gain > SHAPE_RIVAL_GAIN]
-            answer.candidates += rivals[:RIVALS_OF_SHAPE]
+            doubt = evidence.search.options.doubt
+            answer.candidates += [
+                s.name for s in ranked if s.effect.shape_rival and s.may_be and found.standing[s.name] > doubt
+            ]
         answer.reasons.append(
             f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"
         )

@@ -98,7 +98,7 @@ class Effect:
     correct(recording, keys): the recording without it; None: it cannot be taken off.
     read_as: place among the corrections of a reading; what the instrument does last is taken off first.
     candidates(): start vectors, where the parameters' own are not enough. seek(scene, misfit): start vectors
-    found from the data. refine(scene, values): makes its law exact near a fit; forget(scene) undoes that.
+    found from the data. refine(scene, values): makes its law exact near a fit.
     few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
     shape_rival: what a wrong shape may be taken for. any_form: it can take the form of others that differ
     from place to place, so it is no rival of one of them that gains more. slips: it caps the sideways force,
@@ -136,7 +136,6 @@ class Effect:
     candidates: Callable[[], list[np.ndarray]] | None = None
     seek: Callable[[Scene, Misfit], list[np.ndarray]] | None = None
     refine: Callable[[Scene, np.ndarray], None] | None = None
-    forget: Callable[[Scene], None] | None = None
     few_places: bool = False
     shape_rival: bool = False
     any_form: bool = False

@@ -161,7 +161,6 @@ EFFECT = Effect(
     apply=_apply,
     seek=_seek,
     refine=_refine,
-    forget=lambda scene: scene.places.stages.pop(_SCALE, None),
     few_places=True,
     shape_rival=True,
     # a large soft ball and a small hard one look alike, and first order pulls the place towards the tip

@@ -31,5 +31,7 @@ EFFECT = Effect(
     correct=_correct,
     read_as=-1,
     hides_strain=True,
+    # what a turning tool's weight adds to the force on the support
+    systematic_share=(0.005,),
     stands_for_strain=True,
 )

@@ -55,4 +55,6 @@ EFFECT = Effect(
     change=_change,
     correct=_correct,
     read_as=WEIGHED,
+    # what smoothing does to a mass: six known ones came out 1 to 5 % large
+    systematic_share=(0.03, 0.0),
 )

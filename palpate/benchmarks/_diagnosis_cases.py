@@ -167,6 +167,9 @@ def cases(size: str, families: Sequence[str] | None, seed: int) -> list[Case]:
         levels = (1.0, 2.0, 4.0) if many else (1.0 + i % 2,)
         found += _round((number,), seed + 3000 + 500 * i, controls=12 if many else 3, named=CHEAP,
                         strengths=levels, base={FINITE: 1.0})  # fmt: skip
+        found += _round((number,), seed + 9500 + 100 * i, controls=0 if many else 9, named=(), strengths=(),
+                        base={FINITE: 1.0})  # fmt: skip
+    found += _round(pool, seed + 9000, controls=0 if many else 90, named=(), strengths=())
     for i in range(4 if many else 2):
         found += _solid(pool, finite, seed + 6000 + 500 * i, (0.5, 1.0, 2.0) if many else (1.0,),
                         neo_hookean=many)  # fmt: skip

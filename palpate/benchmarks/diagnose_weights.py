@@ -1,25 +1,28 @@
 """How evidence and closure weigh in naming an effect: fitted to judged cases, beside the weights in use.
 
-Of every case that was judged blind: each effect of the first step with its evidence (log10 of the gain in log
+Of every case that was judged blind: each effect of a step with its evidence (log10 of the gain in log
 likelihood of held-out places) and its closure (share of the held-out gap). What is there is told from what is
-not by a logistic regression with a ridge; a control's effects are all false, of a case with effects only the
-true ones count, where the fit found them at all (evidence above 10, something closed).
+not by a logistic regression with a ridge. Where nothing that is there is left to be named, all effects are
+false: a control's, and those of the steps after all true ones were picked. Else only the true ones count,
+where the fit found them at all (evidence above 10, something closed); after a wrong pick nothing does.
 """
 
 from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
+from itertools import zip_longest
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from scipy.optimize import minimize
 
-from diagnose.naming import WEIGHTS
+from diagnose.naming import FILE, WEIGHTS
+from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
-from palpate.benchmarks._diagnosis_blind import opened_case, verdict_path
-from palpate.benchmarks._diagnosis_cases import SEEDS, cases
+from mechanics.files import atomic_file
+from palpate.benchmarks._diagnosis_blind import opened_cases
 from palpate.benchmarks.timing import table
 
 SUMMARY = "weights of evidence and closure in naming an effect, fitted to judged cases"
@@ -30,33 +33,36 @@ FOUND = 10.0
 """Gain in log likelihood below which a fit has not found an effect."""
 
 
+KEYS = ("offset", "evidence", "closure")
 BORDER = 4.0
 """Log odds within which a row is shown."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
-    parser.add_argument("--work", required=True, help="work folder of `palpate bench diagnose`")
+    parser.add_argument(
+        "--work", nargs="+", required=True, metavar="FOLDER:SEED",
+        help="work folders of `palpate bench diagnose` and the first seed of each",
+    )  # fmt: skip
     parser.add_argument("--size", choices=("quick", "medium", "full"), default="medium", help="of its cases")
-    parser.add_argument("--cases", choices=tuple(SEEDS), default="development", help="whose seeds")
+    parser.add_argument("--write", metavar="TOML", help=f"write them there (the program reads {FILE.name})")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Fit, and tell what lies next to the border."""
-    work = Path(arguments.work)
-    judged = [
-        c for c in cases(arguments.size, None, SEEDS[arguments.cases]) if verdict_path(c, work).exists()
-    ]
-    rows = [row for case in judged for row in rows_of(opened_case(case, work))]
+    opened = [item for _, item in opened_cases(arguments.work, arguments.size)]
+    rows = [row for item in opened for row in rows_of(item)]
     if len({there for *_, there in rows}) < 2:
-        raise OptionError(f"{work}: no judged controls and effects there; run `palpate bench diagnose` first")
+        raise OptionError(
+            f"{arguments.work}: no judged controls and effects there; run `palpate bench diagnose` first"
+        )
     x = np.array([row[2] for row in rows])
     there = np.array([row[3] for row in rows])
     fitted = weights(x, there)
     used = (WEIGHTS.offset, WEIGHTS.evidence, WEIGHTS.closure)
     print(table(["", "offset", "evidence", "closure"], [
         [name, *(f"{v:.2f}" for v in w)] for name, w in (("fitted", fitted), ("in use", used))]))  # fmt: skip
-    odds = x @ np.asarray(used)[1:] + used[0]
+    odds = x @ fitted[1:] + fitted[0]
     border = sorted(np.flatnonzero(np.abs(odds) < BORDER), key=lambda i: -odds[i])
     lines = [
         [f"{odds[i]:.1f}", "yes" if there[i] else "no", rows[i][1], f"{x[i, 0]:.2f}", f"{x[i, 1]:.2f}"]
@@ -64,8 +70,14 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         for i in border
     ]
     print(table(["log odds", "there", "effect", "log10 gain", "closure", "case"], lines))
+    if arguments.write:
+        seeds = ", ".join(given.rpartition(":")[2] for given in arguments.work)
+        whence = f"# palpate bench diagnose-weights --size {arguments.size}, seeds {seeds}"
+        values = "\n".join(f"{n} = {v:.2f}" for n, v in zip(KEYS, fitted, strict=True))
+        with atomic_file(Path(arguments.write)) as temporary:
+            temporary.write_text(f"{whence}\n[weights]\n{values}\n", encoding="utf-8")
     return {
-        "cases": len(judged),
+        "cases": len(opened),
         "rows": len(rows),
         "there": int(there.sum()),
         "fitted": fitted.tolist(),
@@ -77,13 +89,25 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def rows_of(opened: dict[str, Any]) -> list[tuple[str, str, tuple[float, float], bool]]:
     """(case, effect, (log10 evidence, closure), whether it is there) of one judged case."""
-    asked = set(opened["case"]["tested"])
-    found = []
-    for name, (gain, closes) in opened["verdict"].get("scores", {}).items():
-        x = (float(np.log10(max(gain, 1.0))), float(np.clip(closes, -1, 1)))
-        if not asked or (name in asked and gain > FOUND and closes > 0):
-            found.append((opened["key"], name, x, name in asked))
+    verdict, found = opened["verdict"], []
+    left = {_phenomenon(name) for name in opened["case"]["tested"]}
+    steps = [verdict.get("scores", {}), *verdict.get("later_scores", ())]
+    for scores, pick in zip_longest(steps, verdict.get("picked", ())):
+        for name, (gain, closes) in (scores or {}).items():
+            x = (float(np.log10(max(gain, 1.0))), float(np.clip(closes, -1, 1)))
+            there = _phenomenon(name) in left
+            if not left or (there and gain > FOUND and closes > 0):
+                found.append((opened["key"], name, x, there))
+        if pick is None or _phenomenon(pick) not in left:
+            break
+        left.discard(_phenomenon(pick))
     return found
+
+
+def _phenomenon(name: str) -> str:
+    """What an effect is a law of; its own name where it is the only law, or no effect of the library."""
+    known = {e.name: e.phenomenon for e in effects()}
+    return known.get(name) or name
 
 
 def weights(x: np.ndarray, there: np.ndarray, ridge: Sequence[float] = RIDGE) -> np.ndarray:

@@ -19,8 +19,7 @@ import numpy as np
 from diagnose.widening import FILE
 from mechanics.errors import OptionError
 from mechanics.files import atomic_file
-from palpate.benchmarks._diagnosis_blind import opened_case, verdict_path
-from palpate.benchmarks._diagnosis_cases import cases
+from palpate.benchmarks._diagnosis_blind import opened_cases
 from palpate.benchmarks.timing import table
 
 SUMMARY = "factors by which parameters' intervals are widened, from judged cases of known truth"
@@ -43,16 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Fit, show, and write where that is asked for."""
     found: dict[str, list[float]] = defaultdict(list)
-    for given in arguments.work:
-        folder, _, seed = given.rpartition(":")
-        if not folder or not seed.isdigit():
-            raise OptionError(f"--work {given}: FOLDER:SEED, such as work/calibration:60000")
-        for case in cases(arguments.size, None, int(seed)):
-            if verdict_path(case, Path(folder)).exists():
-                opened = opened_case(case, Path(folder))
-                used = opened["verdict"].get("widening", {"all": 1.0})
-                for name, far in distances(opened):
-                    found[name].append(far * used.get(name, used["all"]))
+    for _, opened in opened_cases(arguments.work, arguments.size):
+        used = opened["verdict"].get("widening", {"all": 1.0})
+        for name, far in distances(opened):
+            found[name].append(far * used.get(name, used["all"]))
     if not found:
         raise OptionError(f"{arguments.work}: no judged cases there; run `palpate bench diagnose` first")
     chosen = chosen_factors(found)

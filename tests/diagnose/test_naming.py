@@ -8,7 +8,6 @@ import pytest
 from diagnose.attribution import _with_strain
 from diagnose.judging import AttributionOptions, Score, Search
 from diagnose.naming import lower_closure
-from diagnose.verdict import FINITE_STRAIN_GAIN
 from mechanics.effects.registry import effect
 
 
@@ -63,16 +62,16 @@ def test_a_gap_smaller_than_what_matters_is_not_closed_by_less():
     noise = 1e-4
     before = counts * (noise + 0.02 * noise)
     after = counts * noise
-    assert lower_closure(before, after, counts, noise, least=0.25 * noise) == pytest.approx(0.08)
-    assert lower_closure(before, after, counts, noise, least=0.001 * noise) == pytest.approx(1.0)
+    assert lower_closure(before, after, counts, noise, 0.25 * noise, doubt=0.1) == pytest.approx(0.08)
+    assert lower_closure(before, after, counts, noise, 0.001 * noise, doubt=0.1) == pytest.approx(1.0)
 
 
 def test_the_closure_counts_on_what_most_places_say():
     """One place that grows much worse weighs more than nine that grow better."""
     counts = np.full(10, 50)
     before = np.full(10, 2.0)
-    assert lower_closure(before, np.full(10, 0.5), counts, 0.0, 1e-3) == pytest.approx(0.75)
-    assert lower_closure(before, np.array([0.5] * 9 + [10.0]), counts, 0.0, 1e-3) < 0.0
+    assert lower_closure(before, np.full(10, 0.5), counts, 0.0, 1e-3, doubt=0.1) == pytest.approx(0.75)
+    assert lower_closure(before, np.array([0.5] * 9 + [10.0]), counts, 0.0, 1e-3, doubt=0.1) < 0.0
 
 
 @pytest.mark.parametrize(("loud", "named"), [(-300.0, True), (300.0, False)])
@@ -90,4 +89,4 @@ def test_one_loud_site_does_not_decide_on_finite_strain(search, loud, named):
     search.finite_strain = effect("finite_strain")
     search.forward = SimpleNamespace(touches=SimpleNamespace(noise=SimpleNamespace(variance_inflation=1.0)))
     _, gain = _with_strain(search, [])
-    assert (gain > FINITE_STRAIN_GAIN) == named
+    assert (gain > AttributionOptions().beyond_doubt) == named

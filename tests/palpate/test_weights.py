@@ -25,3 +25,20 @@ def test_a_case_counts_what_is_false_in_controls_and_what_was_found_in_others():
     assert [(name, there) for _, name, _, there in rows_of(asked)] == [("backlash", True)]
     missed = {**asked, "verdict": {"scores": {"backlash": [5.0, 0.9]}}}
     assert rows_of(missed) == []
+
+
+def test_what_is_weighed_after_all_that_is_there_was_picked_is_false():
+    first = {"scores": {"viscoelasticity": [2000.0, 0.5]}}
+    later = {"later_scores": [{"adhesion": [40.0, 0.1]}, {"backlash": [9.0, 0.1]}]}
+
+    def told(*picked):
+        verdict = {**first, **later, "picked": list(picked)}
+        rows = rows_of({"key": "b", "case": {"tested": ["viscoelasticity"]}, "verdict": verdict})
+        return [(name, there) for _, name, _, there in rows]
+
+    found, false = ("viscoelasticity", True), ("adhesion", False)
+    assert told("viscoelasticity") == [found, false]
+    # another law of the same phenomenon is no wrong pick; after a wrong one nothing counts
+    assert told("power_law_relaxation") == [found, false]
+    assert told("viscoelasticity", "adhesion") == [found, false]
+    assert told("time_delay", "adhesion") == [found]
