@@ -15,12 +15,13 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.deciding import AttributionOptions
 from diagnose.fit import Fit, bounds_of
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
 from diagnose.instrument_offsets import InstrumentOffsets, find_instrument_offsets
 from diagnose.intervals import covariance
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import Search
 from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd
 from diagnose.touches import touches_of

@@ -12,10 +12,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from diagnose.deciding import AttributionOptions
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir, matrices
 from diagnose.gaps import closed_share, gap
-from diagnose.judging import AttributionOptions, Candidate
+from diagnose.judging import Candidate
 from diagnose.result import EffectEntry
 from diagnose.retraced import Move
 from diagnose.rigid import Rigid
@@ -29,8 +30,7 @@ from mechanics.effects.tool_compliance import EFFECT as SPRING
 from mechanics.effects.tool_gravity_inertia import EFFECT as INERTIA
 from mechanics.effects.tool_gravity_inertia import STANDARD_GRAVITY
 
-Z = 5.0
-"""Standard errors beyond which what is read is no chance, and within which it may be."""
+RULES = AttributionOptions()
 
 
 @dataclass(frozen=True)
@@ -80,19 +80,16 @@ def find_instrument_offsets(
     free: FreeAir | None,
     rigid: Rigid | None,
     excluded: set[str],
-    smallest: float = AttributionOptions.smallest,
+    rules: AttributionOptions = RULES,
 ) -> InstrumentOffsets:
-    """Decide what free air and the support tell; take it off forces and positions of forward.touches.
-
-    smallest: change of the forces that matters, rms over contact samples, of the noise of a force 3-vector.
-    """
-    offsets = _free_air_offsets(forward, free, excluded, smallest)
-    if rigid is None or SPRING.name in excluded or rigid.compliance <= Z * rigid.error:
+    """Decide what free air and the support tell; take it off forces and positions of forward.touches."""
+    offsets = _free_air_offsets(forward, free, excluded, rules)
+    if rigid is None or SPRING.name in excluded or rigid.compliance <= rules.z * rigid.error:
         return offsets
     t = forward.touches
     stiffness = 1 / rigid.compliance
     change = _yielding(forward, rigid.compliance)
-    if not _matters(forward, change, smallest):
+    if not _matters(forward, change, rules):
         return offsets
     forward.touches = dataclasses.replace(t, position=t.position + t.force / stiffness)
     error = np.hypot(rigid.error, SPRING.systematic_share[0] * rigid.compliance)
@@ -111,20 +108,20 @@ def ruled_out(
     forward: Forward,
     rigid: Rigid | None,
     move: Move | None,
-    smallest: float = AttributionOptions.smallest,
+    rules: AttributionOptions = RULES,
 ) -> frozenset[str]:
     """What the support shows not to be there: a spring or a move that is too small to matter even if it is
-    `Z` standard errors greater than it was read."""
+    `rules.z` standard errors greater than it was read."""
     gone = set()
     if rigid is not None and np.isfinite(rigid.error):
-        most = max(rigid.compliance, 0.0) + Z * rigid.error
-        if not _matters(forward, _yielding(forward, most), smallest):
+        most = max(rigid.compliance, 0.0) + rules.z * rigid.error
+        if not _matters(forward, _yielding(forward, most), rules):
             gone.add(SPRING.name)
     if move is not None:
         t = forward.touches
         along, error = move.along(t.point, t.normal)
-        most = np.abs(along) + Z * np.sqrt(np.diag(error))
-        if not _matters(forward, _moved(forward, most), smallest):
+        most = np.abs(along) + rules.z * np.sqrt(np.diag(error))
+        if not _matters(forward, _moved(forward, most), rules):
             gone.add(OFFSET.name)
     return frozenset(gone)
 
@@ -145,10 +142,10 @@ def _moved(forward: Forward, along: np.ndarray) -> np.ndarray:
     return here - np.nan_to_num(forward.predict(settings))
 
 
-def _matters(forward: Forward, change: np.ndarray, smallest: float) -> bool:
+def _matters(forward: Forward, change: np.ndarray, rules: AttributionOptions) -> bool:
     """Whether a change (n, 3) N of the forces is felt, rms over contact samples, against their noise."""
     t = forward.touches
-    return bool(np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) > smallest * t.vector_noise_n)
+    return bool(np.sqrt((change[t.counted] ** 2).sum(axis=1).mean()) > rules.smallest * t.vector_noise_n)
 
 
 def with_move(
@@ -156,7 +153,7 @@ def with_move(
     forward: Forward,
     move: Move | None,
     excluded: set[str],
-    smallest: float = AttributionOptions.smallest,
+    rules: AttributionOptions = RULES,
 ) -> InstrumentOffsets:
     """The offsets, and the object's move where its base was traced twice and it shows.
 
@@ -167,10 +164,10 @@ def with_move(
         return offsets
     t = forward.touches
     along, error = move.along(t.point, t.normal)
-    if (along**2).mean() <= Z**2 * np.trace(error) / len(along):
+    if (along**2).mean() <= rules.z**2 * np.trace(error) / len(along):
         return offsets
     change = _moved(forward, along)
-    if not _matters(forward, change, smallest):
+    if not _matters(forward, change, rules):
         return offsets
     sd = np.sqrt(np.diag(move.error))
     words = (
@@ -195,13 +192,13 @@ def with_move(
     )
 
 
-def read_sideways(rigid: Rigid | None) -> frozenset[str]:
+def read_sideways(rigid: Rigid | None, rules: AttributionOptions = RULES) -> frozenset[str]:
     """What the support shows to be there, but does not tell wholly: a force that is read into other axes."""
-    return frozenset({GAIN.name} if rigid is not None and rigid.sideways_z > Z else ())
+    return frozenset({GAIN.name} if rigid is not None and rigid.sideways_z > rules.z else ())
 
 
 def _free_air_offsets(
-    forward: Forward, free: FreeAir | None, excluded: set[str], smallest: float
+    forward: Forward, free: FreeAir | None, excluded: set[str], rules: AttributionOptions
 ) -> InstrumentOffsets:
     t = forward.touches
     nothing = np.zeros_like(t.local_force)
@@ -215,7 +212,7 @@ def _free_air_offsets(
     level, level_se = free.bias_n.copy(), free.bias_se_n
     drift = np.abs(free.rate_n_per_s).max()
     wandered = (t.t[:, None] - middle) * free.rate_n_per_s
-    if drift > Z * free.rate_se_n_per_s and _matters(forward, wandered, smallest):
+    if drift > rules.z * free.rate_se_n_per_s and _matters(forward, wandered, rules):
         if DRIFT.name not in excluded:
             # a drifting zero was zero when the recording began
             parts[DRIFT.name] = t.t[:, None] * free.rate_n_per_s
@@ -224,7 +221,7 @@ def _free_air_offsets(
             level = level - middle * free.rate_n_per_s
             level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
     turning = free.turning
-    if turning is not None and np.linalg.norm(turning.tool_n) <= Z * turning.se_n:
+    if turning is not None and np.linalg.norm(turning.tool_n) <= rules.z * turning.se_n:
         turning = None  # too little to be told
     if turning is not None and INERTIA.name not in excluded and t.quaternion is not None:
         # a tare took the weight off as it lay in the tool at first; it stays where the tool turns
@@ -242,8 +239,8 @@ def _free_air_offsets(
         reasons[INERTIA.name] = (
             f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared"
         )
-    heavy = abs(free.mass_kg) > Z * free.mass_se_kg
-    heavy &= _matters(forward, free.mass_kg * forward.acceleration, smallest)
+    heavy = abs(free.mass_kg) > rules.z * free.mass_se_kg
+    heavy &= _matters(forward, free.mass_kg * forward.acceleration, rules)
     if heavy and turning is None and INERTIA.name not in excluded:
         weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
@@ -268,8 +265,8 @@ def _free_air_offsets(
         level = np.zeros(3)
         reasons[INERTIA.name] = "in free air the force wanders as the weight of a tool does that turns unseen"
     constant = np.broadcast_to(level, t.local_force.shape).copy()
-    told = np.abs(level).max() > Z * level_se and BIAS.name not in excluded
-    if told and _matters(forward, constant, smallest):
+    told = np.abs(level).max() > rules.z * level_se and BIAS.name not in excluded
+    if told and _matters(forward, constant, rules):
         parts[BIAS.name] = constant
         parameters[BIAS.name] = {"bias_n": level.tolist()}
         reasons[BIAS.name] = f"in free air the force reads {np.linalg.norm(level):.3f} N"

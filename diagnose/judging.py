@@ -7,8 +7,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit, logit
+from scipy.special import expit
 
+from diagnose.deciding import AttributionOptions
 from diagnose.first_touch import first_touches
 from diagnose.fit import Descent, Fit, fit, settings_of
 from diagnose.forward import Forward
@@ -16,32 +17,6 @@ from diagnose.leave_one_out import held_out, levelled
 from diagnose.naming import WEIGHTS, lower_closure, share_closed
 from diagnose.whiten import NuisanceOptions, Whitener
 from mechanics.effects.base import Effect
-from mechanics.options import option
-
-
-@dataclass(frozen=True)
-class AttributionOptions:
-    """When an effect is named; see docs/diagnosis.md."""
-
-    sure: float = option(0.5, "probability from which an effect is named")
-    doubt: float = option(
-        0.1,
-        "chance that is too small to count: of odds, of a model confidence set, of what resamplings close",
-    )
-    smallest: float = option(
-        0.5, "smallest gap that matters, rms over contact samples, of the noise of a force 3-vector"
-    )
-    least_of_first: float = option(
-        0.25,
-        "least size of a further effect, of the first's: no law is exact, what it leaves is no effect",
-    )
-    most: int = option(3, "effects in one answer, at most")
-    unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
-
-    @property
-    def beyond_doubt(self) -> float:
-        """Log odds beyond which one of two is taken for certain."""
-        return float(logit(1 - self.doubt))
 
 
 @dataclass(frozen=True)
@@ -58,6 +33,14 @@ class Candidate:
     def residual(self) -> np.ndarray:
         """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
         return levelled(self.found)
+
+    @property
+    def fitted_plain(self) -> np.ndarray:
+        """(g,) N^2, sums of squares of the places as fitted, with the modulus of the plain fit."""
+        raw = self.found.raw
+        total = raw.sum(axis=0)
+        level = total[0, 1] / max(total[1, 1], 1e-12)
+        return raw[:, 0, 0] - 2 * level * raw[:, 0, 1] + level**2 * raw[:, 1, 1]
 
     @property
     def chi(self) -> float:
@@ -77,7 +60,8 @@ class Score:
 
     added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
     per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
-    share: of the old held-out excess over the noise. closes: the same, at least, over resampled sites.
+    share: of the old held-out excess over the noise (of a lump, of the fitted one). closes: the same, at
+    least, over resampled sites.
     """
 
     added: tuple[Effect, ...]
@@ -204,15 +188,18 @@ class Search:
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
+        # a lump under one place is told by that place: what it closes there counts, as its evidence does
+        lump = all(e.few_places for e in added)
+        was, left = (old.fitted_plain, new.fitted_plain) if lump else (old.plain, new.plain)
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
         noise = 3 * t.noise_n**2
         least = self.smallest_n**2
         samples = self.whitener.counts()
-        plain = np.where(told, new.plain, old.plain)
-        share = float(share_closed(old.plain, plain, samples, noise, least))
-        closes = lower_closure(old.plain, plain, samples, noise, least, self.options.doubt)
+        left = left if lump else np.where(told, left, was)
+        share = float(share_closed(was, left, samples, noise, least))
+        closes = lower_closure(was, left, samples, noise, least, self.options.doubt)
         return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
 
     def passes(self, score: Score, *, first: bool = True) -> bool:

@@ -10,11 +10,12 @@ import numpy as np
 
 from diagnose.attribution import attribute
 from diagnose.conclusion import conclude
+from diagnose.deciding import AttributionOptions
 from diagnose.first_touch import REACH_M, reached
 from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
 from diagnose.instrument_offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import Search
 from diagnose.misfit import misfit_of
 from diagnose.result import Diagnosis
 from diagnose.retraced import move_of
@@ -42,9 +43,6 @@ class DiagnoseOptions:
     )
     without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
     bootstrap: int = option(400, "resamplings of sites for intervals")
-    shape_gain: float = option(
-        12.0, "gain in log likelihood from which sites differ by more than their shape may"
-    )
     seed: int = option(0, "seed of flips and resamplings")
 
 
@@ -87,11 +85,11 @@ def diagnose(
     excluded = {n.strip() for n in options.without.split(",") if n.strip()} | untold
     allowed = effects(without=excluded)
     rigid = rigid_of(recording, presses, model.support.normal)
-    offsets = find_instrument_offsets(forward, free, rigid, excluded, rules.smallest)
+    offsets = find_instrument_offsets(forward, free, rigid, excluded, rules)
     centre = touches.point.mean(axis=0)
     move = move_of(recording, presses, model.support.normal, centre) if own else None
-    offsets = with_move(offsets, forward, move, excluded, rules.smallest)
-    settled = {*offsets.names, *ruled_out(forward, rigid, move, rules.smallest)}
+    offsets = with_move(offsets, forward, move, excluded, rules)
+    settled = {*offsets.names, *ruled_out(forward, rigid, move, rules)}
     site_sd = site_stiffness_sd(touches, model, nuisance)
     if touches.sites != presses.of(met).sites:
         # repeats of one place share whatever is wrong with it: they differ by what repeats differ by
@@ -108,7 +106,7 @@ def diagnose(
     misfit = misfit_of(forward, base.found, site_sd)
     search.starts = {e.name: e.seek(forward, misfit) for e in tried if e.seek is not None}
     lap("baseline")
-    seen = read_sideways(rigid) & frozenset(e.name for e in tried)
+    seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
     if rigid is not None and seen:
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
     if not met.all():
@@ -117,7 +115,7 @@ def diagnose(
     found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     lap("effects")
     evidence = Evidence(
-        forward, search, found, free, offsets, site_sd, frozenset(excluded), options.shape_gain,
+        forward, search, found, free, offsets, site_sd, frozenset(excluded),
         options.bootstrap, options.seed, refit=not options.fast,
     )  # fmt: skip
     result = conclude(evidence, lap)

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from scipy.integrate import trapezoid
 
+from diagnose.deciding import AttributionOptions
 from diagnose.fit import Descent, settings_of
-from diagnose.judging import AttributionOptions
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.result import Diagnosis
 from diagnose.touches import LEAST_PRESSES

@@ -28,7 +28,6 @@ class Evidence:
     instrument_offsets: InstrumentOffsets
     site_sd: np.ndarray
     excluded: frozenset[str]
-    shape_gain: float
     bootstrap: int
     seed: int
     refit: bool
@@ -153,7 +152,7 @@ def _shape(evidence: Evidence, answer: Answer) -> None:
     per_site = np.array([evidence.site_sd[t.site == s].mean() for s in range(t.sites)])
     gain, spread = heterogeneity(factor, error, per_site)
     felt_n = spread * t.force_rms_n
-    if gain <= evidence.shape_gain or felt_n <= evidence.search.smallest_n:
+    if gain <= evidence.search.options.shape_gain or felt_n <= evidence.search.smallest_n:
         return
     allowed = [n for n in _rest() if n not in evidence.excluded]
     if not any(effect(n).few_places for n in found.chosen):

@@ -37,7 +37,7 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "compare": ("palpate.comparison:CompareOptions",),
     "diagnose": (
         "diagnose.pipeline:DiagnoseOptions",
-        "diagnose.judging:AttributionOptions",
+        "diagnose.deciding:AttributionOptions",
         "diagnose.whiten:NuisanceOptions",
     ),
     "changes": ("reconstruct.known_shape:GeometryOptions",),

@@ -101,7 +101,7 @@ def diagnose(
     fast: fewer effects, one in an answer. options: see `pp.options("diagnose")`. Raises DiagnosisError where
     the data cannot carry it.
     """
-    from diagnose.judging import AttributionOptions
+    from diagnose.deciding import AttributionOptions
     from diagnose.pipeline import DiagnoseOptions
     from diagnose.pipeline import diagnose as diagnosed
     from diagnose.whiten import NuisanceOptions

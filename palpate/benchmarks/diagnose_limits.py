@@ -88,9 +88,10 @@ def _support(recording: Recording, model: Model) -> dict[str, float]:
 
 def _limits(recording: Recording, model: Model) -> dict[str, float]:
     """{effect: N} of what the diagnosis searches for."""
+    from diagnose.deciding import AttributionOptions
     from diagnose.detectable import detectable
     from diagnose.forward import build_forward
-    from diagnose.judging import AttributionOptions, Search
+    from diagnose.judging import Search
     from diagnose.misfit import misfit_of
     from diagnose.shape import site_stiffness_sd
     from diagnose.touches import touches_of

@@ -25,12 +25,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.deciding import AttributionOptions
 from diagnose.first_touch import first_touches, reached
 from diagnose.fit import Fit, fit, settings_of
 from diagnose.forward import Forward
 from diagnose.freeair import free_air_of
 from diagnose.instrument_offsets import find_instrument_offsets
-from diagnose.judging import AttributionOptions
 from diagnose.pipeline import untold_effects
 from diagnose.rigid import rigid_of
 from diagnose.shape import site_stiffness_sd

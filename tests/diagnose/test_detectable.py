@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnose.deciding import AttributionOptions
 from diagnose.detectable import SEEN, detectable
 from diagnose.fit import settings_of
 from diagnose.forward import build_forward
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import Search
 from diagnose.touches import touches_of
 from diagnose.whiten import NuisanceOptions
 from mechanics.effects.registry import effect

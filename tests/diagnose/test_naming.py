@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from diagnose.attribution import _with_strain
-from diagnose.judging import AttributionOptions, Score, Search
+from diagnose.deciding import AttributionOptions
+from diagnose.judging import Score, Search
 from diagnose.naming import lower_closure
 from mechanics.effects.registry import effect
 

@@ -9,9 +9,10 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from diagnose.deciding import AttributionOptions
 from diagnose.forward import build_forward
 from diagnose.instrument_offsets import InstrumentOffsets, ruled_out, with_move
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import Search
 from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.retraced import Move, move_of

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from diagnose.attribution import attribute
+from diagnose.deciding import AttributionOptions
 from diagnose.forward import build_forward
 from diagnose.instrument_offsets import find_instrument_offsets, read_sideways
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import Search
 from diagnose.rigid import Rigid, rigid_of
 from diagnose.touches import touches_of
 from diagnose.whiten import NuisanceOptions

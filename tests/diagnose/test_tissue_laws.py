@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from diagnose.attribution import _best_law, _of_one
+from diagnose.deciding import AttributionOptions
 from diagnose.forward import build_forward
-from diagnose.judging import AttributionOptions, Search
+from diagnose.judging import Search
 from diagnose.touches import touches_of
 from diagnose.whiten import NuisanceOptions
 from mechanics.effects.registry import effect, effects

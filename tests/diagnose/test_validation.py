@@ -8,10 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.deciding import AttributionOptions
 from diagnose.fit import Descent, fit
 from diagnose.forward import build_forward
 from diagnose.intervals import covariance, parameter_intervals
-from diagnose.judging import AttributionOptions, Candidate, Score, Search
+from diagnose.judging import Candidate, Score, Search
 from diagnose.leave_one_out import held_out
 from diagnose.shape import repeat_scatter
 from diagnose.touches import touches_of
