@@ -206,7 +206,7 @@ class Search:
         """Whether a score names its effect. first: nothing else is named yet."""
         if score.effect.by_first_touches and not first:
             return False
-        return score.probability > self.options.sure
+        return score.closure > 0 and score.probability > self.options.sure
 
     def sideways_off(self, candidate: Candidate) -> float:
         """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.

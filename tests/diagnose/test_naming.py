@@ -43,8 +43,8 @@ def test_evidence_alone_does_not_name_what_closes_nothing(search):
     """A law that misses by little misses everywhere: evidence grows with the force over the noise."""
     everywhere = [12.0, 8.0, 20.0, 16.0] * 10
     assert search.passes(score("strain_stiffening", everywhere))
-    assert not search.passes(score("strain_stiffening", everywhere, closes=0.1))
-    assert not search.passes(score("strain_stiffening", everywhere, closes=-0.5))
+    assert not search.passes(score("strain_stiffening", everywhere, closes=0.0))
+    assert not search.passes(score("strain_stiffening", [1e3 * gain for gain in everywhere], closes=-0.5))
 
 
 def test_a_closed_gap_without_evidence_names_nothing(search):
