@@ -256,8 +256,8 @@ def _rivals(
     sets: list[dict[str, float]],
     chosen: list[str],
 ) -> tuple[str, ...]:
-    """Effects as likely to be there as the one picked in the same step, or that would be named themselves and
-    that the sites do not tell from it; the likeliest first."""
+    """Effects that would be named themselves and that the sites do not tell from the one picked in the same
+    step; the likeliest first."""
     found: dict[str, float] = {}
     for (scores, name), p in zip(picked, sets, strict=False):
         if name not in chosen:
@@ -268,8 +268,7 @@ def _rivals(
                 continue
             if score.effect.any_form and first.effect.scope.between_places and score.gain < first.gain:
                 continue
-            as_likely = score.log_odds > first.log_odds - search.options.beyond_doubt
-            if as_likely or (p[score.name] > search.options.doubt and search.passes(score)):
+            if p[score.name] > search.options.doubt and search.passes(score):
                 found.setdefault(score.name, first.log_odds - score.log_odds)
     return tuple(sorted(found, key=lambda n: found[n]))
 

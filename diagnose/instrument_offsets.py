@@ -211,11 +211,11 @@ def _free_air_offsets(
     reasons: dict[str, str] = {}
     level, level_se = free.bias_n.copy(), free.bias_se_n
     drift = np.abs(free.rate_n_per_s).max()
-    wandered = (t.t[:, None] - middle) * free.rate_n_per_s
-    if drift > rules.z * free.rate_se_n_per_s and _matters(forward, wandered, rules):
+    # a drifting zero was zero when the recording began
+    drifted = t.t[:, None] * free.rate_n_per_s
+    if drift > rules.z * free.rate_se_n_per_s and _matters(forward, drifted, rules):
         if DRIFT.name not in excluded:
-            # a drifting zero was zero when the recording began
-            parts[DRIFT.name] = t.t[:, None] * free.rate_n_per_s
+            parts[DRIFT.name] = drifted
             parameters[DRIFT.name] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
             reasons[DRIFT.name] = f"in free air the force drifts by {drift * duration:.3f} N over the presses"
             level = level - middle * free.rate_n_per_s
