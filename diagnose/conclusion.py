@@ -18,6 +18,7 @@ from diagnose.never_worse import never_worse
 from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry, NextTouch
 from diagnose.shape import repeat_scatter
+from diagnose.stated import stated_gap
 from diagnose.sureness import FINITE_STRAIN, SHAPE, odds, sureness
 from diagnose.validation import held_out_by_refit
 from diagnose.verdict import Answer, Evidence, answer_of
@@ -70,7 +71,10 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
         kind=answer.kind,
         effects=tuple(answer.names),
         candidates=tuple(dict.fromkeys(answer.candidates)),
-        where=locate(forward, residual_before, evidence.free, evidence.site_sd, seed=evidence.seed),
+        where=locate(
+            forward, residual_before, evidence.free, evidence.site_sd, stated_gap(evidence, answer),
+            seed=evidence.seed,
+        ),
         entries=_entries(evidence, answer, gaps, counts, sure, rng),
         young_modulus_pa=found.final.found.modulus,
         next_touch=_next(evidence.search, found, answer.candidates),
@@ -83,7 +87,7 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
         free_air=evidence.free,
         residual_before=residual_before,
         residual_after=found.final.residual,
-    )
+    )  # fmt: skip
     lap("verdict")
     return result
 

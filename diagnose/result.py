@@ -168,6 +168,7 @@ class Diagnosis:
             "where": {
                 "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
                 "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
+                "bins": self.where.bins,
             },
             "effects": [
                 {

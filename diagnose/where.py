@@ -10,6 +10,7 @@ from scipy.stats import chi2
 
 from diagnose.forward import Forward
 from diagnose.freeair import FreeAir
+from mechanics.gap_bins import gap_by_bin
 from mechanics.presses import HOLDING, LOADING, UNLOADING, Presses
 
 AXES = ("depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air")
@@ -29,6 +30,8 @@ class Axis:
 class Where:
     """axes: in the contract's order. worst: (x, y, z, rmse_n) of the sites, worst first. site_rmse: (s,) N.
 
+    bins: N rms of the gap that the verdict states (mechanics.gap_bins); beside `press_n` each press's
+    `press_s`, s of its first touch, and `site`.
     curves: name -> (x, mean over sites, its error) of the normal residual along depth, rate and time, for
     pictures.
     """
@@ -36,6 +39,7 @@ class Where:
     axes: tuple[Axis, ...]
     worst: tuple[tuple[float, float, float, float], ...]
     site_rmse: np.ndarray
+    bins: dict[str, list[float]]
     curves: dict[str, tuple[np.ndarray, np.ndarray, np.ndarray]]
 
     @property
@@ -49,9 +53,16 @@ class Where:
 
 
 def locate(
-    forward: Forward, residual: np.ndarray, free: FreeAir | None, site_sd: np.ndarray, *, seed: int = 0
+    forward: Forward,
+    residual: np.ndarray,
+    free: FreeAir | None,
+    site_sd: np.ndarray,
+    stated: np.ndarray,
+    *,
+    seed: int = 0,
 ) -> Where:
-    """residual: (n, 3) N, measured less the ideal model's force, local frames. site_sd: (p,) shape prior."""
+    """residual: (n, 3) N, measured less the ideal model's force, local frames. site_sd: (p,) shape prior.
+    stated: (n,) N^2, the verdict's own gap (diagnose.stated)."""
     t = forward.touches
     contrasts = _contrasts(t, residual)
     p_values = family_wise(contrasts, t.site, seed)
@@ -68,7 +79,13 @@ def locate(
     worst = tuple(
         (float(x), float(y), float(z), float(rmse[s])) for s in order for x, y, z in [t.site_point[s]]
     )
-    return Where(axes, worst, rmse, _curves(t, residual))
+    return Where(axes, worst, rmse, _bins(t, stated), _curves(t, residual))
+
+
+def _bins(t: Presses, stated: np.ndarray) -> dict[str, list[float]]:
+    rows = t.counted
+    bins = gap_by_bin(stated[rows], t.press[rows], len(t), t.travel[rows, 0], t.phase[rows], t.t[rows])
+    return {"press_s": t.onset_s.round(3).tolist(), "site": t.site.tolist(), **bins}
 
 
 def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:

@@ -200,6 +200,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
             ],
             "bic": best_by_bic(result.attribution),
             "regression_gap_n": regressed_gap(result.forward, result.residual_before),
+            "where": data["where"],
             "seconds": sum(data["seconds"].values()),
         }  # fmt: skip
     with atomic_file(verdict_path(this, at)) as temporary:

@@ -13,6 +13,7 @@ from scipy.stats import chi2
 
 from mechanics.effects.registry import effect, effects
 from palpate.benchmarks._diagnosis_cases import ALIKE
+from palpate.benchmarks._diagnosis_where import Located, localisation, located
 from palpate.benchmarks._rates import wilson
 
 FAMILIES = {"plasticity": ("mullins_softening",)}
@@ -256,6 +257,7 @@ def summarise(done: list[dict[str, Any]]) -> dict[str, Any]:
         "mean_candidates": float(np.mean(tally.sets)) if tally.sets else None,
         "calibration": calibration(tally.calibration),
         "median_seconds": _median(tally.seconds),
+        "localisation": localisation([bins for bins in map(_located, done) if bins is not None]),
         "misses": tally.misses,
     }  # fmt: skip
 
@@ -278,6 +280,15 @@ def size_in_limits(item: dict[str, Any], name: str) -> float:
     about = item["truth"].get("sizes", {}).get(name, {})
     limit = item["verdict"].get("detectable_n", {}).get(name)
     return float(about.get("rms_after_best_scale_n", np.nan)) / limit if limit else float("nan")
+
+
+def _located(item: dict[str, Any]) -> Located | None:
+    """The case's bins where an effect that is asked for can be told: it is at least twice what can be seen,
+    or twice the noise where the library does not have it and states no limit."""
+    case = item["case"]
+    gone = case["kind"] == "absent" or bool(case["without"])
+    told = [size_in_limits(item, n) >= 2 or (gone and size_in_noise(item, n) >= 2) for n in case["tested"]]
+    return located(item) if any(told) else None
 
 
 def _median(values: list[float]) -> float | None:

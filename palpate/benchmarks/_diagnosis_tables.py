@@ -28,6 +28,9 @@ TARGETS = {
 }
 
 
+_WHERE = {"there": "half the noise or more", "most": "and half of the largest bin's"}
+
+
 def _percent(value: dict[str, Any]) -> str:
     p, low, high = value["rate_and_interval"]
     return f"{p:.0%} ({low:.0%} to {high:.0%})" if value["of"] else "-"
@@ -59,6 +62,11 @@ def show(summary: dict[str, Any]) -> None:
         rows.append([f"expected calibration error ({stated['cases']} probabilities)", "",
                      f"{stated['expected_error']:.3f}", "at most 0.05"])  # fmt: skip
     print(table(["what", "counts", "rate (95 %)", "target"], rows))
+    head = ["where the gap is", "cases", "bins: right/said/true/all", "F1 (95 %)", "F1 of every bin"]
+    print(table(head, [
+        [f"{kind}, {_WHERE[word]}", str(v["cases"]), "{right}/{said}/{true}/{bins}".format(**v),
+         "{:.2f} ({:.2f} to {:.2f})".format(v["f1"], *v["f1_ci95"]), f"{v['f1_of_every_bin']:.2f}"]
+        for kind, each in summary["localisation"].items() for word, v in each.items()]))  # fmt: skip
     print(table(["effect's force over noise", "cases", "detected", "named first", "in the set"], [
         [f"{b['from']:g} to {b['to']:g}" if b["to"] < 1e8 else f"above {b['from']:g}",
          str(b["detected"]["of"]), *(_percent(b[k]) for k in ("detected", "named_first", "in_set"))]

@@ -3,12 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from mechanics.gap_bins import gap_by_bin
+from mechanics.presses import HOLDING, LOADING, OUTSIDE, UNLOADING
 from scenes.laboratory.effects import Readings, effect
+from scenes.laboratory.force import elastic_force
 from scenes.laboratory.motion import Motion
+from scenes.laboratory.paths import SIDEWAYS, WAY_OUT
 from scenes.laboratory.tracing import RATE_HZ
 
 if TYPE_CHECKING:
@@ -27,7 +32,8 @@ def truth_of(
 
     clean: (n, 3) N, the force of `whole` without noise. Effects smaller than the noise are not listed.
     """
-    mask = contact_samples(session.way)
+    way = session.way
+    mask = contact_samples(way)
     noise = session.options.force_noise_std_n
     truth: dict[str, Any] = {
         "young_modulus_pa": float(session.modulus),
@@ -59,19 +65,60 @@ def truth_of(
         gone = [n for n in present if effect(n).needs_finite] if name == "finite_strain" else []
         with_it = session.run([n for n in present if n not in gone])[1] if gone else clean
         rest = [other for other in present if other != name and other not in gone]
-        readings, without = session.run(rest, regions=name != "regions")
-        moved = 1e3 * (whole.position - readings.position) @ session.rotation
-        if np.abs(moved).max() > 1e-6:
-            # what the ideal object would answer where the instrument says that the tip is
-            _, without = session.run(rest, moved=moved)
+        without = _answered(session, rest, whole, regions=name != "regions")
         label = "inclusion" if name == "regions" else name
         truth["sizes"][label] = size_of(with_it[mask], without[mask])
+    if names:
+        truth["where"] = _where(session, present, clean, whole, way)
     session.run(present)
     ranked = sorted(truth["sizes"], key=lambda n: -truth["sizes"][n]["rms_n"])
     truth["effects"] = [name for name in ranked if truth["sizes"][name]["rms_n"] > noise]
     if truth["effects"]:
         truth["dominant_effect"] = truth["effects"][0]
     return truth
+
+
+def _answered(session: Session, rest: Sequence[str], whole: Readings, *, regions: bool) -> np.ndarray:
+    """(n, 3) N, device frame: the force with the effects `rest` alone, where the instrument says that the tip
+    is."""
+    readings, force = session.run(rest, regions=regions)
+    moved = 1e3 * (whole.position - readings.position) @ session.rotation
+    if np.abs(moved).max() > 1e-6:
+        _, force = session.run(rest, regions=regions, moved=moved)
+    return force
+
+
+def _where(
+    session: Session, present: Sequence[str], clean: np.ndarray, whole: Readings, way: Motion
+) -> dict[str, Any]:
+    """N rms of the gap in bins (mechanics.gap_bins) and, beside `press_n`, when each touch was: `press_s`,
+    (first, last) s of the laboratory's clock.
+
+    The gap: what was read less what the ideal object would answer, that force's best factor (another modulus)
+    taken off. What is read in free air too is in both, as it acts on every sample.
+    """
+    aired = [name for name in present if _reads_in_air(whole, name, session)]
+    gap = clean - _answered(session, aired, whole, regions=False)
+    elastic = elastic_force(session.way, session.forces((), False), session.modulus) @ session.rotation.T
+    rows = np.flatnonzero(contact_samples(way) & (way.touch >= 0))
+    gap, elastic = gap[rows], elastic[rows]
+    gap -= (gap * elastic).sum() / max((elastic**2).sum(), 1e-300) * elastic
+    touch, t = way.touch[rows], way.t[rows]
+    deepest = np.array([each.depth for each in session.touches])[touch]
+    depth = np.where(way.leg[rows] == SIDEWAYS, deepest, way.s[rows])
+    phase = np.where(way.leg[rows] == WAY_OUT, UNLOADING, LOADING)
+    phase[depth >= 0.9 * deepest] = HOLDING
+    phase[depth <= 0] = OUTSIDE
+    spans = [t[touch == k][[0, -1]].round(3).tolist() for k in range(len(session.touches))]
+    square = (gap**2).sum(axis=1)
+    return {"press_s": spans, **gap_by_bin(square, touch, len(session.touches), depth, phase, t)}
+
+
+def _reads_in_air(whole: Readings, name: str, session: Session) -> bool:
+    """Whether the instrument reads a force of this effect where nothing is touched."""
+    read = effect(name).on_readings
+    untouched = replace(whole, force=np.zeros_like(whole.force))
+    return read is not None and bool(read(untouched, session.parameters[name]).force.any())
 
 
 def contact_samples(way: Motion) -> np.ndarray:

@@ -16,6 +16,7 @@ from diagnose.next_touch import next_touch
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.validation import held_out_by_refit
 from diagnose.whiten import NuisanceOptions
+from mechanics.gap_bins import gap_by_bin
 from palpate.commands import demo
 from palpate.report.demo import diagnosis_words
 from palpate.report.diagnosis import write_report
@@ -51,6 +52,7 @@ def delayed(bench):
 
 def test_noise_is_noise(bench):
     result = diagnose(*bench.record(), FAST)
+    assert not any(result.where.bins["press_n"])
     assert result.kind == "none" and not result.effects
     assert result.gap_before_n < 1.5 * result.noise_n
     assert result.young_modulus_pa == pytest.approx(20e3, rel=0.03)
@@ -84,6 +86,7 @@ def test_bias_is_settled_in_free_air(bench):
     np.testing.assert_allclose(result.entries[0].parameters["bias_n"], [0.05, 0.0, -0.02], atol=0.003)
     axes = {a.axis: a for a in result.where.axes}
     assert axes["free_air"].p < 0.01
+    assert not any(result.where.bins["press_n"])  # every sample has it, in the air too
 
 
 def test_a_play_whose_reading_follows_the_tip_is_no_delay(bench):
@@ -142,6 +145,34 @@ def test_without_its_name_the_delay_is_not_called_something_else_alone(bench):
     assert result.kind in ("unknown", "effect+unknown", "ambiguous")
 
 
+def test_the_stated_gap_of_a_delay_is_its_own_force_where_the_tip_moves(delayed, bench):
+    """In newtons: the force as it was read less the force in time, its best factor taken off."""
+    recording, model, result = delayed
+    bins, presses = result.where.bins, model.presses
+    rows = np.flatnonzero(presses.counted)
+    at = np.searchsorted(recording.t, presses.t[rows])
+    force = bench.record()[0].force_on_tool[at]  # the same noise
+    gap = recording.force_on_tool[at] - force
+    gap -= (gap * force).sum() / (force**2).sum() * force
+    true = gap_by_bin(
+        (gap**2).sum(axis=1), presses.press[rows], len(presses), presses.travel[rows, 0],
+        presses.phase[rows], presses.t[rows],
+    )  # fmt: skip
+    assert bins["press_n"] == pytest.approx(true["press_n"], rel=0.25, abs=0.1 * max(true["press_n"]))
+    assert bins["depth_n"] == pytest.approx(true["depth_n"], rel=0.25)
+    assert bins["phase_n"] == pytest.approx(true["phase_n"], rel=0.25)
+    assert bins["phase_n"][1] < 0.7 * min(bins["phase_n"][0], bins["phase_n"][2])
+    assert len(bins["press_s"]) == len(bins["site"]) == len(bins["press_n"]) == len(presses)
+
+
+def test_a_gap_without_a_name_is_stated_by_its_size(delayed):
+    options = DiagnoseOptions(fast=True, bootstrap=100, without="time_delay")
+    result = diagnose(*delayed[:2], options)
+    assert "unknown" in result.kind
+    excess = np.sqrt(result.gap_before_n**2 - result.noise_n**2)
+    assert 0.3 * excess < np.mean(result.where.bins["time_n"]) < 1.2 * excess
+
+
 def test_json_has_the_contract(delayed):
     data = delayed[2].as_json()
     assert {
@@ -152,6 +183,7 @@ def test_json_has_the_contract(delayed):
         "depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air",
     ]  # fmt: skip
     assert set(data["where"]["worst"][0]) == {"x", "y", "z", "rmse_n"}
+    assert set(data["where"]["bins"]) == {"press_s", "site", "press_n", "depth_n", "phase_n", "time_n"}
     first = data["effects"][0]
     assert {
         "name",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -194,3 +195,30 @@ def test_a_complete_exploration_ends_with_what_tells_the_instrument(springs) -> 
     foot = made.readings.position[rows["retrace"] & (force > 0.2)]
     turn = np.unique(np.floor(18 * (np.arctan2(foot[:, 1], foot[:, 0]) / np.pi)))
     assert len(turn) >= 36
+
+
+def test_where_the_true_gap_is_follows_what_acts(springs) -> None:
+    """Adhesion pulls while the tip leaves; a factor on every axis is the modulus's; a bias is everywhere."""
+    where = _run({"adhesion": 1}).truth["where"]
+    loading, _, unloading = where["phase_n"]
+    assert loading < 0.1 * unloading
+    same = {"matrix": (1.3 * np.eye(3)).tolist()}
+    with pytest.MonkeyPatch.context() as patch:
+        gain = replace(REGISTRY["force_gain"], parameters=lambda strength, bench: same)
+        patch.setitem(REGISTRY, "force_gain", gain)
+        factor = _run({"force_gain": 1}).truth
+    assert factor["sizes"]["force_gain"]["rms_n"] > 0.1
+    assert max(factor["where"]["press_n"]) < 1e-6
+    assert max(_run({"force_bias": 2}).truth["where"]["press_n"]) < 1e-6
+    assert "where" not in _run().truth
+
+
+def test_where_the_true_gap_is_knows_each_touch_by_its_time(springs) -> None:
+    result = _run({"time_delay": 1})
+    where, way = result.truth["where"], result.motion
+    assert len(where["press_s"]) == len(where["press_n"]) == len(result.touches)
+    for number, (start, end) in enumerate(where["press_s"]):
+        inside = way.t[(way.touch == number) & (way.s > 0)]
+        assert start < inside[0] and inside[-1] < end
+    # a late force is off where the tip moves, not where it is held
+    assert where["phase_n"][1] < min(where["phase_n"][0], where["phase_n"][2])
