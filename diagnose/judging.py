@@ -32,15 +32,12 @@ class Candidate:
     @property
     def residual(self) -> np.ndarray:
         """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
-        return levelled(self.found)
+        return levelled(self.found)[0]
 
     @property
     def fitted_plain(self) -> np.ndarray:
         """(g,) N^2, sums of squares of the places as fitted, with the modulus of the plain fit."""
-        raw = self.found.raw
-        total = raw.sum(axis=0)
-        level = total[0, 1] / max(total[1, 1], 1e-12)
-        return raw[:, 0, 0] - 2 * level * raw[:, 0, 1] + level**2 * raw[:, 1, 1]
+        return levelled(self.found)[1]
 
     @property
     def chi(self) -> float:
@@ -189,15 +186,16 @@ class Search:
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
         # a lump under one place is told by that place: what it closes there counts, as its evidence does
-        lump = all(e.few_places for e in added)
-        was, left = (old.fitted_plain, new.fitted_plain) if lump else (old.plain, new.plain)
+        if all(e.few_places for e in added):
+            was, left = old.fitted_plain, new.fitted_plain
+        else:
+            was, left = old.plain, np.where(told, new.plain, old.plain)
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
         noise = 3 * t.noise_n**2
         least = self.smallest_n**2
         samples = self.whitener.counts()
-        left = left if lump else np.where(told, left, was)
         share = float(share_closed(was, left, samples, noise, least))
         closes = lower_closure(was, left, samples, noise, least, self.options.doubt)
         return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)

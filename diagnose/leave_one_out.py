@@ -58,7 +58,10 @@ def _chosen(found: Fit, rest: np.ndarray, damping: float, descent: Descent) -> n
     return np.clip(values, low, high)
 
 
-def levelled(found: Fit) -> np.ndarray:
-    """(n, 3) N, the residual after the modulus is refitted to it plainly (linearised)."""
+def levelled(found: Fit) -> tuple[np.ndarray, np.ndarray]:
+    """((n, 3) N, (g,) N^2): the residual after the modulus is refitted to it plainly (linearised), and each
+    group's sum of squares of it."""
     raw = found.raw.sum(axis=0)
-    return found.residual - raw[0, 1] / max(raw[1, 1], 1e-12) * found.jacobian[:, :, 0]
+    level = raw[0, 1] / max(raw[1, 1], 1e-12)
+    squares = found.raw[:, 0, 0] - 2 * level * found.raw[:, 0, 1] + level**2 * found.raw[:, 1, 1]
+    return found.residual - level * found.jacobian[:, :, 0], squares

@@ -133,15 +133,13 @@ def _finite_strain(evidence: Evidence, answer: Answer) -> None:
 
 
 def _unconfirmed_lump(evidence: Evidence, answer: Answer) -> None:
-    """A lump that closes nothing where it was not fitted may be a shape that is wrong there."""
+    """A lump that closes something by one place alone may be a shape that is wrong there."""
     found = evidence.found
     for scores, name in zip(found.steps, found.picked, strict=False):
         lives_in_few = name in scores and scores[name].effect.few_places
         if lives_in_few and name in found.chosen and scores[name].closes <= 0:
             answer.candidates += _rest()
-            answer.reasons.append(
-                "places that were not fitted do not confirm the lump: the shape may be wrong there instead"
-            )
+            answer.reasons.append("one place alone tells of the lump: the shape may be wrong there instead")
 
 
 def _shape(evidence: Evidence, answer: Answer) -> None:
