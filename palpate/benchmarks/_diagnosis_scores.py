@@ -86,6 +86,7 @@ class _Tally:
         self.confusion: Counter[tuple[str, str]] = Counter()
         self.by_size: dict[int, list[tuple[bool, bool, bool]]] = defaultdict(list)
         self.by_effect: dict[tuple[str, float], list[tuple[bool, bool]]] = defaultdict(list)
+        self.seen_from: dict[tuple[str, str], list[float]] = defaultdict(list)
         self.calibration: list[tuple[float, bool]] = []
         self.misses: list[dict[str, Any]] = []
         self.closed: list[float] = []
@@ -159,6 +160,8 @@ class _Tally:
         if size >= 2:
             self.rates["detected, effect at least twice the noise"].append(answer.detected)
         seen = size_in_limits(item, name)
+        if seen > 0:
+            self.seen_from[(name, item["case"].get("protocol", ""))].append(strength / seen)
         if seen >= 2:
             self.rates["detected, effect at least twice what can be seen"].append(answer.detected)
         if seen >= 4:
@@ -246,6 +249,11 @@ def summarise(done: list[dict[str, Any]]) -> dict[str, Any]:
             {"effect": n, "strength": s, "of": len(v), "detected": sum(d for d, _ in v),
              "first": sum(h for _, h in v)}
             for (n, s), v in sorted(tally.by_effect.items())
+        ],
+        "seen_from": [
+            {"effect": n, "protocol": p, "of": len(v), "median": float(np.median(v)),
+             "least": min(v), "most": max(v)}
+            for (n, p), v in sorted(tally.seen_from.items())
         ],
         "confusion": [[a, b, n] for (a, b), n in sorted(tally.confusion.items())],
         "median_gap_closed": _median(tally.closed),

@@ -74,6 +74,9 @@ def show(summary: dict[str, Any]) -> None:
     print(table(["effect", "strength", "cases", "detected", "named first"], [
         [b["effect"], f"{b['strength']:g}", str(b["of"]), str(b["detected"]), str(b["first"])]
         for b in summary["by_effect"]]))  # fmt: skip
+    print(table(["effect", "protocol", "cases", "can be seen from strength, median", "least", "most"], [
+        [b["effect"], b["protocol"] or "ordinary", str(b["of"]),
+         *(f"{b[k]:.2g}" for k in ("median", "least", "most"))] for b in summary["seen_from"]]))  # fmt: skip
     print(table(["parameter", "cases", "median relative error", "inside its interval"], [
         [k, str(v["of"]), f"{v['median']:.2f}",
          "{}/{}".format(*summary["parameter_coverage_by_key"].get(k, (0, 0)))]

@@ -72,7 +72,10 @@ def test_a_size_counts_against_what_can_be_seen() -> None:
     truth = {"noise_rms_n": 0.01, "sizes": {"time_delay": {"rms_after_best_scale_n": 0.1}}}
     for limit, counted in ((0.02, 1), (0.06, 0)):
         seen = {**verdict, "detectable_n": {"time_delay": limit}}
-        rates = summarise([{"key": "one", "case": case, "verdict": seen, "truth": truth}])["rates"]
+        summary = summarise([{"key": "one", "case": case, "verdict": seen, "truth": truth}])
+        (told,) = summary["seen_from"]
+        assert told["median"] == pytest.approx(limit / 0.1)
+        rates = summary["rates"]
         assert rates["detected, effect at least twice the noise"]["of"] == 1
         name = "first place, effect at least 4 times what can be seen"
         assert rates.get(name, {"of": 0})["of"] == counted
