@@ -219,8 +219,10 @@ class Descent:
         """First touches of each site moved together to wherever its loss is least; (onset, residual).
 
         Press by press a step ends in the next hollow, and which one that is would be taken for an effect.
+        A site stays where another hollow gains no more than it costs to say which of them it is: that is
+        noise, and following it everywhere bends what all sites say together.
         """
-        t, best = self.forward.touches, self.group_loss(residual, onset)
+        t, best = self.forward.touches, self.group_loss(residual, onset) - np.log(1 + len(SHIFTS_M))
         begun = onset
         for shift in SHIFTS_M:
             tried = np.clip(begun + shift, -2.5e-3, 2.5e-3)

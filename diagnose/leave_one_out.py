@@ -34,8 +34,12 @@ def held_out(found: Fit, descent: Descent) -> tuple[np.ndarray, np.ndarray]:
             if not np.isfinite(there).all():
                 continue
             loss_there = descent.group_loss(there, found.onset)
-            if descent.pulled(values) + loss_there.sum() - loss_there[g] <= others:
-                residual, loss = descent.residual(values, found.likeliest), loss_there
+            if descent.pulled(values) + loss_there.sum() - loss_there[g] > others:
+                continue
+            # a law may reach to one first touch and not to the other
+            plainly = descent.residual(values, found.likeliest)
+            if np.isfinite(plainly).all():
+                residual, loss = plainly, loss_there
                 break
         whitened[g] = loss[g]
         raw = descent.whitener.raw_gram(np.stack([residual, found.jacobian[:, :, 0]], axis=2))

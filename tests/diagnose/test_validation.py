@@ -152,6 +152,33 @@ def test_a_parameter_that_no_motion_shows_is_left_where_it_is(late):
     assert np.isfinite(loss).all() and np.isfinite(gaps).all()
 
 
+def test_a_law_that_reaches_one_first_touch_only_gives_numbers_all_the_same(late):
+    """A second touch may lie where the law has no number: the place is then judged as it was fitted."""
+    search, _, found = late
+    found = dataclasses.replace(found, likeliest=found.onset + 1e-6)
+
+    class Half(Descent):
+        def residual(self, values, onset):
+            there = super().residual(values, onset)
+            return np.full_like(there, np.nan) if onset is found.likeliest else there
+
+    loss, gaps = held_out(found, Half(search.forward, search.whitener, found.effects, None))
+    assert np.isfinite(loss).all() and np.isfinite(gaps).all()
+
+
+@pytest.mark.parametrize(("aside_m", "back"), [(7e-5, False), (6e-4, True)])
+def test_a_first_touch_is_sought_where_that_gains_more_than_chance(late, aside_m, back):
+    search, _, found = late
+    descent, t = Descent(search.forward, search.whitener, found.effects, None), search.forward.touches
+    aside = found.onset + aside_m * (t.site == 4)
+    residual = descent.residual(found.values, aside)
+    rests = descent.residual(found.values, found.onset)
+    gains = descent.group_loss(residual, aside) - descent.group_loss(rests, found.onset)
+    assert (gains[4] > 5.0) == back
+    sought, _ = descent.sought(found.values, residual, aside)
+    np.testing.assert_allclose(sought, found.onset if back else aside, atol=1e-9)
+
+
 def test_places_not_fitted_are_predicted_by_the_right_effect(late):
     search, plain, found = late
     t = search.forward.touches
