@@ -220,7 +220,9 @@ class Search:
         predicted = t.local_force[t.counted, 1:] - residual
         size = np.linalg.norm(predicted, axis=1)
         short = np.clip(-(residual * predicted).sum(axis=1) / np.maximum(size, 1e-12), 0.0, None)
-        missed, force = float(np.sqrt((short**2).mean())), float(np.sqrt((size**2).mean()))
+        # what the air may have done unseen is no slip
+        known = 1 / (1 + self.whitener.air[t.counted] / t.noise_n**2)
+        missed, force = (float(np.sqrt(np.average(x**2, weights=known))) for x in (short, size))
         # noise falls short half of the time; points without a time are not thinned
         missed = float(np.sqrt(max(missed**2 - 0.5 * t.noise_n**2, 0.0)))
         if missed < np.sqrt(2) * t.noise.raw_n or missed < self.nuisance.stick * force:

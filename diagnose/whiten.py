@@ -24,7 +24,7 @@ from mechanics.presses import Presses
 FOLLOWED = "followed"
 """Column of touches whose free air was followed from before to after them: (n, 3) N, what was taken off."""
 _MODES = 2
-"""Of a Brownian bridge, that hold 76 % of its variance."""
+"""Of a Brownian bridge, that hold 76 % of its variance; the rest counts as noise."""
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,10 @@ class Block:
 
 
 class Whitener:
-    """Weighs residuals and sensitivities (n, 3, k) group by group; groups are sites with their repeats."""
+    """Weighs residuals and sensitivities (n, 3, k) group by group; groups are sites with their repeats.
+
+    air: (n,) N^2, variance of a component by free air that was followed through the touch.
+    """
 
     def __init__(
         self,
@@ -68,12 +71,14 @@ class Whitener:
         self.variance = self.touches.noise_n**2 + options.floor_n**2
         before = np.nan_to_num(forward.predict(settings))
         share = options.floor_share * np.linalg.norm(before, axis=1)
-        self.louder = np.sqrt(1 + share**2 / self.variance)
+        bridges, self.air, unbridged = _bridges(self.touches)
+        self.louder = np.sqrt(1 + (share**2 + unbridged) / self.variance)
         self.blocks: list[Block] = []
         presses = len(self.touches)
         stated = np.hypot(options.onset_m, self.touches.onset_error_m)
         self.onset_sd = stated if onset_sd is None else onset_sd
         columns = nuisance_columns(forward, settings, before, options, site_sd, self.onset_sd)
+        columns += [("press", bridge) for bridge in bridges]
         self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]
         site = options.site_stiffness if site_sd is None else site_sd
         self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
@@ -142,28 +147,32 @@ def nuisance_columns(
         ("site", np.column_stack([zero, zero, normal]) * options.tilt),
         ("press", tangential * options.stick),
         ("site", f * (bend * options.law)[:, None]),
-        *(("press", column) for column in _bridges(t)),
     ]
 
 
-def _bridges(t: Presses) -> list[np.ndarray]:
-    """(n, 3) N each: what free air that was followed straight through a touch may have done in between.
+def _bridges(t: Presses) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """((n, 3) N each, (n,) N^2, (n,) N^2): what free air that was followed straight through a touch may have
+    done in between.
 
-    A random walk from its value before to its value after, as fast as these two tell: a Brownian bridge by
-    its first modes, along each axis of the device.
+    A random walk from its value before to its value after, as fast as these two tell, or one step at any
+    time: a Brownian bridge by its first modes, along each axis of the device, its variance in each component,
+    and what of that the modes leave.
     """
-    if FOLLOWED not in t.columns:
-        return []
-    air, bumps = t.columns[FOLLOWED], np.zeros((_MODES, len(t.t)))
+    bumps, air = np.zeros((_MODES, len(t.t))), np.zeros(len(t.t))
+    followed = t.columns.get(FOLLOWED)
+    if followed is None:
+        return [], air, air
     for part in t.parts:
         if part.stop - part.start < 2:
             continue
-        walked = float(np.linalg.norm(air[part.stop - 1] - air[part.start])) / np.sqrt(3)
+        walked = float(np.linalg.norm(followed[part.stop - 1] - followed[part.start])) / np.sqrt(3)
         along = (t.t[part] - t.t[part.start]) / (t.t[part.stop - 1] - t.t[part.start])
+        air[part] = walked**2 * along * (1 - along)
         for k, bump in enumerate(bumps, start=1):
             bump[part] = walked * np.sqrt(2) / (k * np.pi) * np.sin(k * np.pi * along)
     axes = t.frame[t.press]
-    return [axes[:, :, k] * bump[:, None] for bump in bumps for k in range(3)]
+    left = np.clip(air - (bumps**2).sum(axis=0), 0.0, None)
+    return [axes[:, :, k] * bump[:, None] for bump in bumps for k in range(3)], air, left
 
 
 def _by_site(t: Presses, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
