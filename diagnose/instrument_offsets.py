@@ -35,8 +35,11 @@ RULES = AttributionOptions()
 
 @dataclass(frozen=True)
 class InstrumentOffsets:
-    """names: asserted, strongest first. residual: (n, 3) N, local: what was taken off the forces. reasons:
-    words."""
+    """names: asserted, strongest first. residual: (n, 3) N, local: what these took off the forces. reasons:
+    words.
+
+    What is sure but too small to matter is taken off as well, and put back nowhere.
+    """
 
     names: tuple[str, ...]
     parameters: dict[str, dict]
@@ -211,15 +214,13 @@ def _free_air_offsets(
     reasons: dict[str, str] = {}
     level, level_se = free.bias_n.copy(), free.bias_se_n
     drift = np.abs(free.rate_n_per_s).max()
-    # a drifting zero was zero when the recording began
-    drifted = t.t[:, None] * free.rate_n_per_s
-    if drift > rules.z * free.rate_se_n_per_s and _matters(forward, drifted, rules):
-        if DRIFT.name not in excluded:
-            parts[DRIFT.name] = drifted
-            parameters[DRIFT.name] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
-            reasons[DRIFT.name] = f"in free air the force drifts by {drift * duration:.3f} N over the presses"
-            level = level - middle * free.rate_n_per_s
-            level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
+    if drift > rules.z * free.rate_se_n_per_s and DRIFT.name not in excluded:
+        # a drifting zero was zero when the recording began
+        parts[DRIFT.name] = t.t[:, None] * free.rate_n_per_s
+        parameters[DRIFT.name] = {"rate_n_per_s": free.rate_n_per_s.tolist()}
+        reasons[DRIFT.name] = f"in free air the force drifts by {drift * duration:.3f} N over the presses"
+        level = level - middle * free.rate_n_per_s
+        level_se = float(np.hypot(level_se, middle * free.rate_se_n_per_s))
     turning = free.turning
     if turning is not None and np.linalg.norm(turning.tool_n) <= rules.z * turning.se_n:
         turning = None  # too little to be told
@@ -240,7 +241,6 @@ def _free_air_offsets(
             f"in free air the force turns with the tool: {mass * 1e3:.0f} g of tool, tared"
         )
     heavy = abs(free.mass_kg) > rules.z * free.mass_se_kg
-    heavy &= _matters(forward, free.mass_kg * forward.acceleration, rules)
     if heavy and turning is None and INERTIA.name not in excluded:
         weight = -STANDARD_GRAVITY * forward.model.support.normal
         untared = level @ weight / (weight @ weight) > 0.5 * free.mass_kg
@@ -259,20 +259,19 @@ def _free_air_offsets(
         # a tool that turns unseen: what was followed through the touches is nearer than any constant, which
         # is then no bias but the weight's own mean
         parts = {n: part for n, part in parts.items() if n == DRIFT.name}
-        parts[INERTIA.name] = nothing  # told below
+        parts[INERTIA.name] = t.free_air - sum(parts.values(), nothing)
         followed = True
         parameters[INERTIA.name] = {"mass_kg": max(free.mass_kg, 0.0), "tared": True}
         level = np.zeros(3)
         reasons[INERTIA.name] = "in free air the force wanders as the weight of a tool does that turns unseen"
-    constant = np.broadcast_to(level, t.local_force.shape).copy()
-    told = np.abs(level).max() > rules.z * level_se and BIAS.name not in excluded
-    if told and _matters(forward, constant, rules):
-        parts[BIAS.name] = constant
+    if np.abs(level).max() > rules.z * level_se and BIAS.name not in excluded:
+        parts[BIAS.name] = np.broadcast_to(level, t.local_force.shape).copy()
         parameters[BIAS.name] = {"bias_n": level.tolist()}
         reasons[BIAS.name] = f"in free air the force reads {np.linalg.norm(level):.3f} N"
-    if not parts:
-        return InstrumentOffsets((), {}, nothing, ())
-    if INERTIA.name in parts and t.free_air.any():
+    # what is sure is taken off, however little it is, lest it be taken for an effect of the presses; what
+    # matters is named
+    named = {n for n, part in parts.items() if _matters(forward, part, rules)}
+    if INERTIA.name in named and t.free_air.any():
         # what the table reads in the air, filtered as the forces are, is nearer than a mass times an
         # acceleration of thinned positions
         parts[INERTIA.name] = t.free_air - sum((p for n, p in parts.items() if n != INERTIA.name), nothing)
@@ -284,15 +283,18 @@ def _free_air_offsets(
         "mass_kg": np.hypot(mass_se, INERTIA.systematic_share[0] * abs(mass_kg)),
     }
     frame = t.frame[t.press]
-    local = {n: np.einsum("nij,nj->ni", frame, p) for n, p in parts.items()}
-    taken = sum(local.values())
+    local = {n: np.einsum("nij,nj->ni", frame, parts[n]) for n in parts if n in named}
     columns = {**t.columns, FOLLOWED: parts[INERTIA.name]} if followed else t.columns
-    forward.touches = dataclasses.replace(t, force=t.force - sum(parts.values()), columns=columns)
-    order = sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum()))
-    intervals = {
-        n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in parameters
-    }
-    return InstrumentOffsets(tuple(order), parameters, taken, tuple(reasons.values()), intervals)
+    forward.touches = dataclasses.replace(t, force=t.force - sum(parts.values(), nothing), columns=columns)
+    order = tuple(sorted(local, key=lambda n: -float((local[n][t.counted] ** 2).sum())))
+    intervals = {n: {k: _around(v, error[k]) for k, v in parameters[n].items() if k in error} for n in order}
+    return InstrumentOffsets(
+        order,
+        {n: parameters[n] for n in order},
+        sum(local.values(), nothing),
+        tuple(words for n, words in reasons.items() if n in named),
+        intervals,
+    )
 
 
 def _around(value: ArrayLike, error: ArrayLike) -> list:
