@@ -9,8 +9,11 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagnose.apply import corrected
+from diagnose.forward import build_forward
 from diagnose.freeair import free_air_of
+from diagnose.instrument_offsets import find_instrument_offsets
 from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.touches import touches_of
 from reconstruct.contacts import explore
 
 from ..reconstruct.exploration_of_cylinder import explore_cylinder
@@ -45,6 +48,23 @@ def test_it_is_named_and_taken_off(heavy):
     clean = corrected(recording, result)
     free = free_air_of(clean, model.presses)
     assert np.abs(free.bias_n).max() < 0.01 and np.linalg.norm(free.turning.tool_n) < 0.03
+
+
+@pytest.mark.parametrize(("bias_n", "named"), [(0.005, ()), (0.05, ("force_bias",))])
+def test_what_is_sure_is_taken_off_and_what_matters_is_named(bench, bias_n, named):
+    """Five millinewtons are told by half a minute of free air, and less than half of the noise."""
+    _, model = bench.record()
+    recording, _ = bench.record(lambda t, x, f: (x, f + [0.0, bias_n, 0.0]))
+    free = free_air_of(recording, model.presses)
+    assert np.linalg.norm(free.bias_n) > 5 * free.bias_se_n
+    forward = build_forward(touches_of(bench.table(recording)), model)
+    read = forward.touches.force
+    offsets = find_instrument_offsets(forward, free, None, set())
+    assert offsets.names == named
+    off = (read - forward.touches.force).mean(axis=0)
+    np.testing.assert_allclose(off, [0.0, bias_n, 0.0], atol=0.001)
+    # what is not named counts as no gap
+    assert np.allclose(offsets.residual, 0.0) == (not named)
 
 
 @pytest.mark.parametrize("stated", [True, False])
