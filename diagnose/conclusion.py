@@ -122,7 +122,8 @@ def _never_worse(evidence: Evidence, answer: Answer, gaps: Gaps, counts: np.ndar
     kept = never_worse(answer.names, gaps.before, after, counts, whitener.explained, seed=evidence.seed)
     if kept.dropped:
         answer.names = list(kept.names)
-        answer.candidates += kept.dropped
+        # where noise, first touch and shape explain what is left there is nothing that it might be
+        answer.candidates += kept.dropped if kept.unexplained else ()
         answer.remainder |= kept.unexplained
         dropped = " and ".join(n.replace("_", " ") for n in kept.dropped)
         answer.reasons.append(
