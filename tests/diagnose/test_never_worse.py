@@ -1,8 +1,11 @@
 """No verdict names what makes the held-out gap larger."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
+from diagnose.conclusion import Gaps, _never_worse
 from diagnose.never_worse import never_worse
 from diagnose.verdict import Answer
 
@@ -79,3 +82,20 @@ def test_the_words_are_the_contracts() -> None:
     assert said(("a",), ("b",), False) == "ambiguous"
     assert said(("a",), ("b",), True) == "effect+unknown"
     assert said((), ("b",), True) == "unknown"
+
+
+@pytest.mark.parametrize(("explained", "kind", "candidates"), [(0.2, "none", []), (0.05, "unknown", ["a"])])
+def test_where_nothing_is_left_to_explain_nothing_is_a_candidate(explained, kind, candidates):
+    """0.1 N^2 a sample without the effect, 0.2 with it."""
+    nothing = SimpleNamespace(found=SimpleNamespace(effects=(), names=()))
+    evidence = SimpleNamespace(
+        search=SimpleNamespace(whitener=SimpleNamespace(explained=explained)),
+        instrument_offsets=SimpleNamespace(names=()),
+        found=SimpleNamespace(final=nothing, base=nothing),
+        forward=SimpleNamespace(touches=SimpleNamespace(thinned_away=0.0)),
+        refit=False,
+        seed=0,
+    )
+    answer = Answer(["a"], [])
+    _never_worse(evidence, answer, Gaps(np.full(12, 1.0), np.full(12, 2.0), {}), np.full(12, 10))
+    assert (answer.kind, answer.names, answer.candidates) == (kind, [], candidates)
