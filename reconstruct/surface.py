@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -180,11 +181,12 @@ def _found(
     best, (vertices, triangles, deviation) = _best_drawn(tried, options.surface_spacing_m)
     error = held_out_error(best)
     if options.surface == "auto" and error > _POOR_M:
-        implicit = _implicit(
-            evidence, options, f"no shape explains the touches ({best.name}: {1e3 * error:.2f} mm)"
-        )
-        if implicit.held_out_m["implicit"] < 0.8 * error:
-            return implicit
+        why = f"no shape explains the touches ({best.name}: {1e3 * error:.2f} mm)"
+        # one that is open is no rival
+        with suppress(SurfaceError):
+            implicit = _implicit(evidence, options, why)
+            if implicit.held_out_m["implicit"] < 0.8 * error:
+                return implicit
 
     def redraw(spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
         coarse = draw(best, spacing_m)[:2]

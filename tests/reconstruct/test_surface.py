@@ -256,6 +256,22 @@ def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeyp
     assert -1e-6 < height.min() and height.max() < 0.2
 
 
+def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
+    """It was tried where no shape explains the touches, and its fault refused the recording."""
+    from reconstruct import surface as module
+
+    asked = []
+
+    def open_one(evidence, options, why):
+        asked.append(why)
+        raise SurfaceError("the implicit surface is open")
+
+    monkeypatch.setattr(module, "_POOR_M", 0.0)
+    monkeypatch.setattr(module, "_implicit", open_one)
+    surface = reconstruct_surface(touch(phantom_truth("cylinder"), 0)[0])
+    assert asked and surface.method.rstrip("+") == "cylinder"
+
+
 def test_a_first_touch_known_by_far_less_well_than_the_others_places_no_surface():
     from reconstruct.contacts import explore
     from reconstruct.surface import evidence_of
