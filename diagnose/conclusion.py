@@ -19,7 +19,7 @@ from diagnose.next_touch import next_touch
 from diagnose.result import Diagnosis, EffectEntry, NextTouch
 from diagnose.shape import repeat_scatter
 from diagnose.stated import stated_gap
-from diagnose.sureness import FINITE_STRAIN, SHAPE, odds, sureness
+from diagnose.sureness import standing, sureness
 from diagnose.validation import held_out_by_refit
 from diagnose.verdict import Answer, Evidence, answer_of
 from diagnose.where import locate
@@ -60,7 +60,6 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
         answer.reasons.append("the gap grows with what would be named on places that were not fitted")
     if not answer.names:
         closed, interval = (0.0, (0.0, 0.0)) if before_n > noise else (None, None)
-    sure = sureness(answer.remainder, closed, bool(answer.candidates))
     residual_before = found.ideal.residual + evidence.instrument_offsets.residual
     result = Diagnosis(
         noise_n=noise,
@@ -75,7 +74,7 @@ def conclude(evidence: Evidence, lap: Callable[[str], None]) -> Diagnosis:
             forward, residual_before, evidence.free, evidence.site_sd, stated_gap(evidence, answer),
             seed=evidence.seed,
         ),
-        entries=_entries(evidence, answer, gaps, counts, sure, rng),
+        entries=_entries(evidence, answer, gaps, counts, rng),
         young_modulus_pa=found.final.found.modulus,
         next_touch=_next(evidence.search, found, answer.candidates),
         errors_n=_errors(evidence),
@@ -137,7 +136,6 @@ def _entries(
     answer: Answer,
     gaps: Gaps,
     counts: np.ndarray,
-    sure: float,
     rng: np.random.Generator,
 ) -> tuple[EffectEntry, ...]:
     forward, search, found = evidence.forward, evidence.search, evidence.found
@@ -146,6 +144,11 @@ def _entries(
     draws = max(100, evidence.bootstrap // 4)
     limits = detectable(search, found.base, [s.effect for s in found.scores.values()])
     entries = []
+
+    def sure(name: str, scored: float = 1.0) -> float:
+        how = standing(name, answer.names, answer.candidates, answer.kind)
+        return sureness(name, how, 1.0 if name in answer.names else scored)
+
     for name, score in found.scores.items():
         own = score.effect
         closed, interval = closed_share(gaps.before, score.candidate.plain, counts, noise, added, rng, draws)
@@ -154,7 +157,7 @@ def _entries(
             EffectEntry(
                 name,
                 own.domain,
-                sure if name in found.chosen else odds(score),
+                sure(name, score.probability),
                 gap(score.candidate.plain, counts, added),
                 closed,
                 interval,
@@ -169,20 +172,16 @@ def _entries(
     if found.finite_strain_gain > -search.options.beyond_doubt or strain.name in answer.names:
         deep = found.deep
         closed, interval = closed_share(gaps.before, deep.plain, counts, noise, added, rng, draws)
-        probability = FINITE_STRAIN if strain.name in answer.names else 0.1
         entries.append(
             EffectEntry(
-                strain.name, strain.domain, probability, gap(deep.plain, counts, added), closed, interval, {},
-                found.finite_strain_gain,
+                strain.name, strain.domain, sure(strain.name), gap(deep.plain, counts, added), closed,
+                interval, {}, found.finite_strain_gain,
             )
         )  # fmt: skip
-    entries += [
-        dataclasses.replace(e, probability=min(e.probability, sure))
-        for e in offsets.entries(gaps.before, found.ideal, counts, noise, added, rng)
-    ]
+    entries += offsets.entries(gaps.before, found.ideal, counts, noise, added, rng, sure)
     for rest in (effect(n) for n in answer.names if effect(n).role is Role.REST):
         left = gap(found.final.plain, counts, added)
-        entries.append(EffectEntry(rest.name, rest.domain, SHAPE, left, 0.0, None, {}))
+        entries.append(EffectEntry(rest.name, rest.domain, sure(rest.name), left, 0.0, None, {}))
     entries = [dataclasses.replace(e, intervals=widened(e.name, e.parameters, e.intervals)) for e in entries]
     place = {n: i for i, n in enumerate(answer.names)}
     entries.sort(key=lambda e: (place.get(e.name, 99), -e.probability, -e.gain))

@@ -7,6 +7,7 @@ It is taken off the forces and positions, so that the search for other effects s
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -64,17 +65,18 @@ class InstrumentOffsets:
         noise: float,
         added: float,
         rng: np.random.Generator,
+        sure: Callable[[str], float],
     ) -> list[EffectEntry]:
-        """The effects' lines. before: (g,) N^2, what the ideal model misses; counts: (g,) samples."""
+        """The effects' lines. before: (g,) N^2, what the ideal model misses; counts: (g,) samples.
+        sure(name): the probability that it is there."""
         result = []
         for name in self.names:
             after = candidate.plain
             closed, interval = closed_share(before, after, counts, noise, added, rng, 100)
             left = gap(after, counts, added)
-            keys = self.parameters[name]
+            keys, own = self.parameters[name], self.intervals[name]
             domain = effect(name).domain
-            entry = EffectEntry(name, domain, 0.97, left, closed, interval, keys, 1e3, self.intervals[name])
-            result.append(entry)
+            result.append(EffectEntry(name, domain, sure(name), left, closed, interval, keys, 1e3, own))
         return result
 
 

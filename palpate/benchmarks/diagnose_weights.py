@@ -96,7 +96,7 @@ def rows_of(opened: dict[str, Any]) -> list[tuple[str, str, tuple[float, float],
         for name, (gain, closes) in (scores or {}).items():
             x = (float(np.log10(max(gain, 1.0))), float(np.clip(closes, -1, 1)))
             there = _phenomenon(name) in left
-            if not left or (there and gain > FOUND and closes > 0):
+            if np.isfinite(x).all() and (not left or (there and gain > FOUND and closes > 0)):
                 found.append((opened["key"], name, x, there))
         if pick is None or _phenomenon(pick) not in left:
             break
