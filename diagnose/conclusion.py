@@ -146,8 +146,7 @@ def _entries(
     entries = []
 
     def sure(name: str, scored: float = 1.0) -> float:
-        how = standing(name, answer.names, answer.candidates, answer.kind)
-        return sureness(name, how, 1.0 if name in answer.names else scored)
+        return sureness(name, standing(name, answer.names, answer.candidates, answer.kind), scored)
 
     for name, score in found.scores.items():
         own = score.effect

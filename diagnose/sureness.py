@@ -40,9 +40,11 @@ def counts() -> Mapping[str, Mapping[str, tuple[float, float]]]:
 
 
 def sureness(name: str, how: str, scored: float = 1.0) -> float:
-    """Probability that an effect is there which stands so. scored: by its own score, if it is not named."""
+    """Probability that an effect is there which stands so. scored: by its own score, used where it is not
+    named."""
     own = counts().get(how, {})
     pooled = [sum(c) for c in zip(*own.values(), strict=True)] or [0.0, 0.0]
     usual = (pooled[0] + 1) / (pooled[1] + 2)  # Laplace's rule of succession
     right, of = own.get(effect(name).role.name.lower(), (0.0, 0.0))
-    return min(scored * (right + PRIOR * usual) / (of + PRIOR), 1.0)
+    share = (right + PRIOR * usual) / (of + PRIOR)
+    return min(scored * share, 1.0) if how == UNNAMED else share

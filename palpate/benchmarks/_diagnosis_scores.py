@@ -88,6 +88,7 @@ class _Tally:
         self.by_effect: dict[tuple[str, float], list[tuple[bool, bool]]] = defaultdict(list)
         self.seen_from: dict[tuple[str, str], list[float]] = defaultdict(list)
         self.calibration: list[tuple[float, bool]] = []
+        self.said: list[tuple[float, bool]] = []
         self.misses: list[dict[str, Any]] = []
         self.closed: list[float] = []
         self.regressed: list[float] = []
@@ -104,11 +105,13 @@ class _Tally:
             self.seconds.append(verdict["seconds"])
         self.rates["no answer: the reconstruction or the diagnosis refused"].append(answer.first == "failed")
         excluded = case["without"]
-        self.calibration += [
-            (p, name in case["effects"])
+        asked = {
+            name: (p, name in case["effects"])
             for name, p in verdict.get("probability", {}).items()
             if name in case["effects"] or name not in case["beside"]
-        ]
+        }
+        self.calibration += asked.values()
+        self.said += [asked[n] for n in (*verdict["effects"], *verdict["candidates"]) if n in asked]
         size = item["truth"].get("sizes", {}).get(FINITE)
         if FINITE not in case["effects"]:
             self.rates["finite strain named on a linear object"].append(FINITE in verdict["effects"])
@@ -264,6 +267,7 @@ def summarise(done: list[dict[str, Any]]) -> dict[str, Any]:
         "parameter_coverage_by_key": {k: [int(sum(v)), len(v)] for k, v in _grouped(covered).items()},
         "mean_candidates": float(np.mean(tally.sets)) if tally.sets else None,
         "calibration": calibration(tally.calibration),
+        "calibration_of_said": calibration(tally.said),
         "median_seconds": _median(tally.seconds),
         "localisation": localisation([bins for bins in map(_located, done) if bins is not None]),
         "misses": tally.misses,

@@ -57,10 +57,11 @@ def show(summary: dict[str, Any]) -> None:
     ):
         value = summary[name]
         rows.append([words, "", "-" if value is None else f"{value:.2f}", target])
-    stated = summary["calibration"]
-    if stated["cases"]:
-        rows.append([f"expected calibration error ({stated['cases']} probabilities)", "",
-                     f"{stated['expected_error']:.3f}", "at most 0.05"])  # fmt: skip
+    for key, words in (("calibration", ""), ("calibration_of_said", " of names and candidates")):
+        stated = summary[key]
+        if stated["cases"]:
+            rows.append([f"expected calibration error{words} ({stated['cases']} probabilities)", "",
+                         f"{stated['expected_error']:.3f}", "at most 0.05"])  # fmt: skip
     print(table(["what", "counts", "rate (95 %)", "target"], rows))
     head = ["where the gap is", "cases", "bins: right/said/true/all", "F1 (95 %)", "F1 of every bin"]
     print(table(head, [
