@@ -317,6 +317,8 @@ class Descent:
                 sought = True
                 onset, residual = self.sought(values, residual, onset)
                 loss = self.loss(values, residual, onset)
+        # a law without a number predicts nothing there; the loss stays infinite
+        residual = np.where(np.isfinite(residual), residual, self.forward.touches.local_force)
         jacobian = self.jacobian(values, residual, onset)
         shown = np.concatenate([self.effective(residual, onset)[:, :, None], jacobian], axis=2)
         likeliest, residual = self.likeliest_touches(values, residual, onset)

@@ -166,6 +166,21 @@ def test_a_law_that_reaches_one_first_touch_only_gives_numbers_all_the_same(late
     assert np.isfinite(loss).all() and np.isfinite(gaps).all()
 
 
+def test_a_law_without_a_number_at_one_press_is_judged_by_the_others(late):
+    """It never wins, and what is said of it is numbers all the same."""
+    search, _, found = late
+    t = search.forward.touches
+
+    class Short(Descent):
+        def residual(self, values, onset):
+            return np.where((t.press == 5)[:, None], np.nan, super().residual(values, onset))
+
+    descent = Short(search.forward, search.whitener, found.effects, None)
+    short = descent.run(found.values, found.onset, 3)
+    assert short.loss == np.inf and np.isfinite(short.gram).all() and np.isfinite(short.raw).all()
+    assert all(np.isfinite(each).all() for each in held_out(short, descent))
+
+
 @pytest.mark.parametrize(("aside_m", "back"), [(7e-5, False), (6e-4, True)])
 def test_a_first_touch_is_sought_where_that_gains_more_than_chance(late, aside_m, back):
     search, _, found = late
