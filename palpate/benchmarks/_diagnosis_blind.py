@@ -5,14 +5,13 @@ verdict. Everything lies in one work folder, which all workers must see; then th
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from mechanics.errors import OptionError, PalpateError
+from mechanics.errors import PalpateError
 from mechanics.files import atomic_file
-from palpate.benchmarks._diagnosis_cases import FINITE, Case, cases
+from palpate.benchmarks._diagnosis_cases import FINITE, Case
 from palpate.tasks.graph import Task
 from palpate.tasks.record import finished
 from scenes.laboratory.specimen import VERSION
@@ -206,17 +205,6 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
     with atomic_file(verdict_path(this, at)) as temporary:
         temporary.write_text(json.dumps(answer, indent=1) + "\n", encoding="utf-8")
     return {"kind": answer["kind"], "effects": answer["effects"], "candidates": answer["candidates"]}
-
-
-def opened_cases(given: Sequence[str], size: str) -> Iterator[tuple[Case, dict[str, Any]]]:
-    """Every judged case of work folders, each with its first seed: FOLDER:SEED. Raises OptionError."""
-    for one in given:
-        folder, _, seed = one.rpartition(":")
-        if not folder or not seed.isdigit():
-            raise OptionError(f"--work {one}: FOLDER:SEED, such as work/calibration:60000")
-        for case in cases(size, None, int(seed)):
-            if verdict_path(case, Path(folder)).exists():
-                yield case, opened_case(case, Path(folder))
 
 
 def opened_case(case: Case, work: Path) -> dict[str, Any]:

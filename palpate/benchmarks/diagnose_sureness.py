@@ -10,7 +10,6 @@ from __future__ import annotations
 
 import argparse
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,8 +19,7 @@ from diagnose.naming import WEIGHTS
 from diagnose.sureness import FILE, UNNAMED, standing
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
-from mechanics.files import atomic_file
-from palpate.benchmarks._diagnosis_blind import opened_cases
+from palpate.benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from palpate.benchmarks.timing import table
 
 SUMMARY = "how often names and candidates are true, from judged cases of known truth"
@@ -29,12 +27,7 @@ SUMMARY = "how often names and candidates are true, from judged cases of known t
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
-    parser.add_argument(
-        "--work", nargs="+", required=True, metavar="FOLDER:SEED",
-        help="work folders of `palpate bench diagnose` and the first seed of each",
-    )  # fmt: skip
-    parser.add_argument("--size", choices=("quick", "medium", "full"), default="medium", help="of its cases")
-    parser.add_argument("--write", metavar="TOML", help=f"write them there (the program reads {FILE.name})")
+    add_opened_arguments(parser, FILE)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -50,14 +43,11 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     print(table(["standing", "role", "true", "of"], [
         [how, role, f"{right:.0f}", f"{of:.1f}"]
         for how, each in sorted(counts.items()) for role, (right, of) in sorted(each.items())]))  # fmt: skip
-    if arguments.write:
-        seeds = ", ".join(given.rpartition(":")[2] for given in arguments.work)
-        lines = [f"# palpate bench diagnose-sureness --size {arguments.size}, seeds {seeds}"]
-        for how, each in sorted(counts.items()):
-            lines.append(f'["{how}"]')
-            lines += [f"{role} = [{right:.0f}, {of:.1f}]" for role, (right, of) in sorted(each.items())]
-        with atomic_file(Path(arguments.write)) as temporary:
-            temporary.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    lines = []
+    for how, each in sorted(counts.items()):
+        lines.append(f'["{how}"]')
+        lines += [f"{role} = [{right:.0f}, {of:.1f}]" for role, (right, of) in sorted(each.items())]
+    write_fitted("diagnose-sureness", arguments, "\n".join(lines))
     return {how: {role: list(c) for role, c in each.items()} for how, each in counts.items()}
 
 

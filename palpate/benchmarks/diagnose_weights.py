@@ -12,7 +12,6 @@ from __future__ import annotations
 import argparse
 from collections.abc import Sequence
 from itertools import zip_longest
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,8 +20,7 @@ from scipy.optimize import minimize
 from diagnose.naming import FILE, WEIGHTS
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
-from mechanics.files import atomic_file
-from palpate.benchmarks._diagnosis_blind import opened_cases
+from palpate.benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from palpate.benchmarks.timing import table
 
 SUMMARY = "weights of evidence and closure in naming an effect, fitted to judged cases"
@@ -40,12 +38,7 @@ BORDER = 4.0
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
-    parser.add_argument(
-        "--work", nargs="+", required=True, metavar="FOLDER:SEED",
-        help="work folders of `palpate bench diagnose` and the first seed of each",
-    )  # fmt: skip
-    parser.add_argument("--size", choices=("quick", "medium", "full"), default="medium", help="of its cases")
-    parser.add_argument("--write", metavar="TOML", help=f"write them there (the program reads {FILE.name})")
+    add_opened_arguments(parser, FILE)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -70,12 +63,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         for i in border
     ]
     print(table(["log odds", "there", "effect", "log10 gain", "closure", "case"], lines))
-    if arguments.write:
-        seeds = ", ".join(given.rpartition(":")[2] for given in arguments.work)
-        whence = f"# palpate bench diagnose-weights --size {arguments.size}, seeds {seeds}"
-        values = "\n".join(f"{n} = {v:.2f}" for n, v in zip(KEYS, fitted, strict=True))
-        with atomic_file(Path(arguments.write)) as temporary:
-            temporary.write_text(f"{whence}\n[weights]\n{values}\n", encoding="utf-8")
+    values = "\n".join(f"{n} = {v:.2f}" for n, v in zip(KEYS, fitted, strict=True))
+    write_fitted("diagnose-weights", arguments, f"[weights]\n{values}")
     return {
         "cases": len(opened),
         "rows": len(rows),

@@ -11,15 +11,13 @@ from __future__ import annotations
 import argparse
 import math
 from collections import defaultdict
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from diagnose.widening import FILE
 from mechanics.errors import OptionError
-from mechanics.files import atomic_file
-from palpate.benchmarks._diagnosis_blind import opened_cases
+from palpate.benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from palpate.benchmarks.timing import table
 
 SUMMARY = "factors by which parameters' intervals are widened, from judged cases of known truth"
@@ -31,12 +29,7 @@ LEAST = 39
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
-    parser.add_argument(
-        "--work", nargs="+", required=True, metavar="FOLDER:SEED",
-        help="work folders of `palpate bench diagnose` and the first seed of each",
-    )  # fmt: skip
-    parser.add_argument("--size", choices=("quick", "medium", "full"), default="medium", help="of its cases")
-    parser.add_argument("--write", metavar="TOML", help=f"write them there (the program reads {FILE.name})")
+    add_opened_arguments(parser, FILE)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -52,13 +45,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     print(table(["effect", "values", "inside as fitted", "factor"], [
         [n, str(len(v)), f"{np.mean(np.array(v) <= 1):.2f}", f"{chosen.get(n, chosen['all']):.2f}"]
         for n, v in sorted(found.items())]))  # fmt: skip
-    if arguments.write:
-        lines = "\n".join(f"{n} = {v:.2f}" for n, v in chosen.items())
-        whence = f"# palpate bench diagnose-widening --size {arguments.size}, seeds " + ", ".join(
-            given.rpartition(":")[2] for given in arguments.work
-        )
-        with atomic_file(Path(arguments.write)) as temporary:
-            temporary.write_text(f"{whence}\n[factor]\n{lines}\n", encoding="utf-8")
+    factors = "\n".join(f"{n} = {v:.2f}" for n, v in chosen.items())
+    write_fitted("diagnose-widening", arguments, f"[factor]\n{factors}")
     return {"factors": chosen, "values": {n: len(v) for n, v in found.items()}}
 
 
