@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.result import Diagnosis
+from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
 from mechanics.model import Model

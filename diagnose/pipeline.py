@@ -8,22 +8,22 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.attribution import attribute
-from diagnose.conclusion import conclude
-from diagnose.deciding import AttributionOptions
-from diagnose.first_touch import REACH_M, reached
-from diagnose.forward import build_forward
-from diagnose.freeair import free_air_of
-from diagnose.instrument_offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
-from diagnose.judging import Search
-from diagnose.misfit import misfit_of
-from diagnose.result import Diagnosis
-from diagnose.retraced import move_of
-from diagnose.rigid import rigid_of
-from diagnose.shape import site_stiffness_sd
-from diagnose.touches import LEAST_SITES, touches_of
-from diagnose.verdict import Evidence
-from diagnose.whiten import NuisanceOptions
+from diagnose.instrument.freeair import free_air_of
+from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
+from diagnose.instrument.retraced import move_of
+from diagnose.instrument.rigid import rigid_of
+from diagnose.search.attribution import attribute
+from diagnose.search.deciding import AttributionOptions
+from diagnose.search.first_touch import REACH_M, reached
+from diagnose.search.forward import build_forward
+from diagnose.search.judging import Search
+from diagnose.search.misfit import misfit_of
+from diagnose.search.shape import site_stiffness_sd
+from diagnose.search.touches import LEAST_SITES, touches_of
+from diagnose.search.whiten import NuisanceOptions
+from diagnose.verdict.conclusion import conclude
+from diagnose.verdict.result import Diagnosis
+from diagnose.verdict.verdict import Evidence
 from mechanics.effects.base import Role, Scope
 from mechanics.effects.registry import effects
 from mechanics.model import Model

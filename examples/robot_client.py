@@ -12,8 +12,8 @@ import sys
 
 import numpy as np
 
-from palpate.exploring.explorer import Suggestion
-from palpate.exploring.robot import LaboratoryRobot
+from diagnose.explore.explorer import Suggestion
+from palpate.robot.laboratory import LaboratoryRobot
 from scenes.phantoms import phantom
 
 

@@ -13,6 +13,9 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from diagnose.explore.explorer import Explorer as Explorer
+    from diagnose.explore.rows import Instrument as Instrument
+    from diagnose.explore.rows import Segment as Segment
     from mechanics.errors import CacheError as CacheError
     from mechanics.errors import ContactError as ContactError
     from mechanics.errors import DeviceError as DeviceError
@@ -45,9 +48,6 @@ if TYPE_CHECKING:
     from palpate.api import renderer as renderer
     from palpate.api import replay as replay
     from palpate.api import simulate as simulate
-    from palpate.exploring.explorer import Explorer as Explorer
-    from palpate.exploring.rows import Instrument as Instrument
-    from palpate.exploring.rows import Segment as Segment
     from palpate.keywords import options as options
     from palpate.results.batch import Batch as Batch
     from palpate.results.calibration import Calibration as Calibration
@@ -72,8 +72,8 @@ _DOOR = {
         "read_recording read_table import_table material check load model_of reconstruct renderer replay "
         "press compare changes diagnose calibrate simulate export batch"
     ),
-    "palpate.exploring.explorer": "Explorer",
-    "palpate.exploring.rows": "Instrument Segment",
+    "diagnose.explore.explorer": "Explorer",
+    "diagnose.explore.rows": "Instrument Segment",
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.imported": "Imported",

@@ -20,7 +20,7 @@ from palpate.warm_up import warming_up
 from reconstruct.pipeline import Reconstruction
 
 if TYPE_CHECKING:
-    from diagnose.result import Diagnosis
+    from diagnose.verdict.result import Diagnosis
 
 
 @dataclass(frozen=True)

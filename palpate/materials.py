@@ -7,17 +7,17 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnose.rivals import held_out_rivals
-from diagnose.specimen import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
-from diagnose.touches import touches_of
+from diagnose.search.touches import touches_of
+from diagnose.specimen.bench import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
+from diagnose.specimen.rivals import held_out_rivals
 from mechanics.effects.finite_strain import EFFECT as FINITE
 from mechanics.effects.registry import effects
 from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
 from mechanics.effects.viscoelasticity import EFFECT as PRONY
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
+from palpate.importing.specimens import Tests
 from palpate.results.material import Material
-from palpate.specimens import Tests
 from reconstruct.external.holds import held_out_relaxation
 from reconstruct.external.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
 

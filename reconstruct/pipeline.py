@@ -20,26 +20,32 @@ from mechanics.progress import Progress, silent
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from mechanics.tetmesh import TetMesh
-from reconstruct.boundary import Boundary, BoundaryOptions
-from reconstruct.casting import CastPoints, cast
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
-from reconstruct.contacts import ContactOptions, Exploration, explore
-from reconstruct.filtered import Filtered
-from reconstruct.filtering import FilterOptions
-from reconstruct.known_base import base_of_model
-from reconstruct.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
-from reconstruct.meshing import Meshing, MeshingOptions, as_meshed, fill, uncertainty_at
-from reconstruct.modulus import ModulusFit, ModulusOptions, fit_modulus
-from reconstruct.modulus_field import FieldOptions, with_fitted_field
-from reconstruct.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
-from reconstruct.one_d import OneD, columns, fit_paper, fit_robust
-from reconstruct.points import explore_points, is_points
-from reconstruct.shape_error import compliance_covariance
-from reconstruct.slides import without_slides
-from reconstruct.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface, shape_table
-from reconstruct.uniaxial import profiles
+from reconstruct.geometry.known_base import base_of_model
+from reconstruct.geometry.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
+from reconstruct.steps.s1_filter.filtered import Filtered
+from reconstruct.steps.s1_filter.filtering import FilterOptions
+from reconstruct.steps.s2_boundary.boundary import Boundary, BoundaryOptions
+from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from reconstruct.steps.s3_contacts.points import explore_points, is_points
+from reconstruct.steps.s3_contacts.slides import without_slides
+from reconstruct.steps.s4_surface.casting import CastPoints, cast
+from reconstruct.steps.s4_surface.surface import (
+    Surface,
+    SurfaceOptions,
+    evidence_of,
+    reconstruct_surface,
+    shape_table,
+)
+from reconstruct.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill, uncertainty_at
+from reconstruct.steps.s6_one_d.one_d import OneD, columns, fit_paper, fit_robust
+from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.steps.s7_modulus.modulus_field import FieldOptions, with_fitted_field
+from reconstruct.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
+from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
 
 DEFAULT_POISSON_RATIO = 0.49
 METHODS = ("finite-tip", "paper")

@@ -6,12 +6,12 @@ from mechanics.errors import NoBaseError
 from mechanics.model import Model
 from mechanics.presses import Presses
 from mechanics.recording import Recording
-from reconstruct.casting import cast
-from reconstruct.contacts import ContactOptions, explore
-from reconstruct.known_base import base_of_model
-from reconstruct.known_shape import GeometryOptions, stated_geometry
-from reconstruct.points import explore_points, is_points
-from reconstruct.slides import without_slides
+from reconstruct.geometry.known_base import base_of_model
+from reconstruct.geometry.known_shape import GeometryOptions, stated_geometry
+from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
+from reconstruct.steps.s3_contacts.points import explore_points, is_points
+from reconstruct.steps.s3_contacts.slides import without_slides
+from reconstruct.steps.s4_surface.casting import cast
 
 _ANY = ContactOptions(least_palpations=1)
 

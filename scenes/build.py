@@ -24,10 +24,10 @@ from mechanics.progress import Progress, silent
 from mechanics.recording import read_recording, recording_files
 from mechanics.standing import Standing, standing
 from mechanics.surface_files import surface_of
-from reconstruct.meshing import MeshingOptions, mesh_surface
 from reconstruct.pipeline import DEFAULT_POISSON_RATIO, reconstruct
 from reconstruct.shapes.decimation import decimated
-from reconstruct.surface import Surface
+from reconstruct.steps.s4_surface.surface import Surface
+from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.inclusions import ball_of
 from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom

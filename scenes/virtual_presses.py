@@ -16,7 +16,7 @@ from mechanics.press_making import of_paths
 from mechanics.progress import Progress, silent
 from mechanics.sites import touch_sites
 from mechanics.touch import forces_at
-from reconstruct.one_d import columns, fit_robust
+from reconstruct.steps.s6_one_d.one_d import columns, fit_robust
 
 SITES = 32
 DEPTH_M = 0.005

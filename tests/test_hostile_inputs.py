@@ -467,9 +467,9 @@ ROBOT = {
 
 @pytest.mark.parametrize("name", ROBOT)
 def test_a_robots_hostile_line_is_answered_in_one_and_nothing_of_it_kept(name):
-    from palpate.exploring.explorer import Explorer
-    from palpate.exploring.protocol import serve
-    from palpate.exploring.rows import Instrument
+    from diagnose.explore.explorer import Explorer
+    from diagnose.explore.rows import Instrument
+    from palpate.robot.protocol import serve
 
     line, words = ROBOT[name]
     explorer, said = Explorer(Instrument(0.005)), []
@@ -732,7 +732,7 @@ def test_hostile_curves_of_a_machine_are_refused_in_one_line(tmp_path, name, rec
 
 def test_a_robot_that_misses_the_object_feels_its_way_to_the_nearest_place(monkeypatch):
     """With what the program itself installs: another library was asked for."""
-    from palpate.exploring.robot import LaboratoryRobot
+    from palpate.robot.laboratory import LaboratoryRobot
     from scenes.phantoms import phantom
 
     monkeypatch.setitem(sys.modules, "rtree", None)
@@ -792,7 +792,7 @@ def test_a_press_deeper_than_the_object_or_without_end_is_refused(monkeypatch):
 
 def test_an_object_that_would_take_millions_of_tetrahedra_is_refused():
     from mechanics.errors import MeshError
-    from reconstruct.tetwild import check_count
+    from reconstruct.steps.s5_mesh.tetwild import check_count
 
     mesh = block().mesh
     check_count(mesh.points, mesh.surface[:, :3], 0.005)
@@ -887,7 +887,7 @@ def test_a_process_that_follows_its_parent_ends_with_it():
 @pytest.mark.skipif(sys.platform != "linux", reason="elsewhere it ends by itself, after its time")
 def test_the_mesher_ends_when_its_parent_is_killed(tmp_path):
     """One that would mesh for an hour, as fTetWild does on some surfaces."""
-    from reconstruct import tetwild
+    from reconstruct.steps.s5_mesh import tetwild
 
     (tmp_path / "pytetwild.py").write_text("import time; open('begun', 'w'); time.sleep(3600)")
     words = f"[sys.executable, '-c', {tetwild._CHILD!r}, str(os.getpid()), '60']"
@@ -1028,7 +1028,7 @@ NAMED = re.compile(r"`([A-Z]+)\[((?:[^\]\\]|\\.)+)\]`|`(test_\w+)`")
 
 @pytest.mark.parametrize(("page", "least"), [("robustness.md", 120), ("safety.md", 15)])
 def test_every_row_of_the_docs_names_tests_that_exist(page, least):
-    from palpate.benchmarks._faults import FAULTS
+    from benchmarks._faults import FAULTS
 
     root, defined = Path(__file__).resolve().parents[1], set()
     for file in (root / "tests").rglob("test_*.py"):

@@ -16,15 +16,15 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from benchmarks._device_bytes import STATE, tried
+from benchmarks._mutations import MUTATIONS, OF_SAMPLES
+from benchmarks._servo_load import block_model
 from mechanics import recording as of_recording
 from mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
 from mechanics.model import SCHEMA as OF_MODEL
 from mechanics.model import read_model, write_model
 from mechanics.recording import read_recording
 from mechanics.schema import Key
-from palpate.benchmarks._device_bytes import STATE, tried
-from palpate.benchmarks._mutations import MUTATIONS, OF_SAMPLES
-from palpate.benchmarks._servo_load import block_model
 from scenes.scene import SCHEMA as OF_SCENE
 from scenes.scene import load_scene
 

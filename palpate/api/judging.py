@@ -30,8 +30,8 @@ def compare(
     model: only its geometry is used, every parameter is refitted in each fold; without one the recording is
     reconstructed. options: see `pp.options("compare")`. Raises ContactError for fewer sites than two.
     """
-    from palpate.comparison import CompareOptions
-    from palpate.comparison import compare as compared
+    from diagnose.compare.comparison import CompareOptions
+    from diagnose.compare.comparison import compare as compared
     from palpate.results.base import dressed
     from palpate.results.comparison import Comparison
     from palpate.results.model import model_of
@@ -61,8 +61,8 @@ def changes(
     with their intervals, and place by place where the two share a frame. options: of both reconstructions,
     see `pp.options("changes")`, m. Raises what `reconstruct` and `diagnose` raise.
     """
-    from palpate.before_after import Side
-    from palpate.before_after import changes as weighed
+    from diagnose.compare.before_after import Side
+    from diagnose.compare.before_after import changes as weighed
     from palpate.results.base import dressed
     from palpate.results.changes import Changes
 
@@ -101,10 +101,10 @@ def diagnose(
     fast: fewer effects, one in an answer. options: see `pp.options("diagnose")`. Raises DiagnosisError where
     the data cannot carry it.
     """
-    from diagnose.deciding import AttributionOptions
     from diagnose.pipeline import DiagnoseOptions
     from diagnose.pipeline import diagnose as diagnosed
-    from diagnose.whiten import NuisanceOptions
+    from diagnose.search.deciding import AttributionOptions
+    from diagnose.search.whiten import NuisanceOptions
     from palpate.results.base import dressed
     from palpate.results.diagnosis import Diagnosis
     from palpate.results.model import model_of

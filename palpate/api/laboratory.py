@@ -43,11 +43,11 @@ def calibrate(
     Raises OptionError unless one of rigid and modulus_pa is given, ContactError or DiagnosisError where
     presses are too few.
     """
-    from diagnose.calibrate import calibrate_on_object, calibrate_on_plate
+    from diagnose.instrument.calibrate import calibrate_on_object, calibrate_on_plate
     from palpate.results.base import dressed
     from palpate.results.calibration import Calibration
-    from reconstruct.contacts import explore
-    from reconstruct.known_shape import nowhere
+    from reconstruct.geometry.known_shape import nowhere
+    from reconstruct.steps.s3_contacts.contacts import explore
 
     taken("calibrate", options)
     if rigid == (modulus_pa is not None):
@@ -101,8 +101,8 @@ def material(
     indentations on, effects are searched for as `diagnose` does, each curve held out (docs/real-data.md).
     Raises RecordingError where a file cannot be read, ContactError where nothing is touched.
     """
+    from palpate.importing.specimens import read_tests
     from palpate.materials import material_of
-    from palpate.specimens import read_tests
 
     tests = read_tests(
         files, kind=kind, tip_radius_m=tip_radius_m, columns=dict(columns or {}), units=dict(units or {})

@@ -28,7 +28,7 @@ from palpate.arguments import (
 from palpate.demo import DemoOptions, run_demo
 
 if TYPE_CHECKING:
-    from diagnose.result import Diagnosis
+    from diagnose.verdict.result import Diagnosis
 
 SUMMARY = "the main job on the embedded example; prints the report's path"
 

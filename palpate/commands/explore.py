@@ -15,6 +15,10 @@ import sys
 
 import numpy as np
 
+from diagnose.explore.candidates import ReachOptions
+from diagnose.explore.explorer import Explorer, State, Suggestion, check_goals
+from diagnose.explore.goals import GoalOptions
+from diagnose.explore.rows import Instrument
 from mechanics.errors import OptionError
 from mechanics.options import check_ranges
 from mechanics.recording import POISSON, SAMPLES, read_recording
@@ -29,11 +33,7 @@ from palpate.arguments import (
     say,
 )
 from palpate.commands.simulate import effects_from
-from palpate.exploring.candidates import ReachOptions
-from palpate.exploring.explorer import Explorer, State, Suggestion, check_goals
-from palpate.exploring.goals import GoalOptions
-from palpate.exploring.robot import RobotOptions
-from palpate.exploring.rows import Instrument
+from palpate.robot.laboratory import RobotOptions
 
 SUMMARY = "where to touch next, and when to stop"
 
@@ -135,7 +135,7 @@ def _explorer(
 
 def _window(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
     from palpate.commands import touch
-    from palpate.exploring.guide import Guide
+    from palpate.window.guide import Guide
     from palpate.window.session import TouchSession
 
     parser = argparse.ArgumentParser()
@@ -162,7 +162,7 @@ def _window(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptio
 
 
 def _robot(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
-    from palpate.exploring.protocol import serve
+    from palpate.robot.protocol import serve
 
     if not (arguments.rate > 0 and arguments.tip_radius > 0):
         raise OptionError("--rate and --tip-radius must be greater than 0")
@@ -179,7 +179,7 @@ def _robot(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOption
 
 
 def _phantom(arguments: argparse.Namespace, goals: GoalOptions, reach: ReachOptions) -> int:
-    from palpate.exploring.robot import LaboratoryRobot
+    from palpate.robot.laboratory import LaboratoryRobot
     from scenes.laboratory.session import SimulateOptions
     from scenes.phantoms import phantom
 

@@ -14,7 +14,7 @@ import argparse
 from palpate import api
 from palpate.arguments import add_input, add_json, add_seed, emit_json, finite, say
 from palpate.commands.import_ import pairs
-from palpate.specimens import KINDS
+from palpate.importing.specimens import KINDS
 
 SUMMARY = "the material of a specimen from a machine's curves"
 

@@ -51,7 +51,7 @@ from scenes.exploration import ExplorationOptions, explore
 from scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from palpate.exploring.guide import Guide
+    from palpate.window.guide import Guide
 
 SUMMARY = "feel a model or scene at 1 kHz"
 DEFAULT_SCENE = "demo"

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from palpate.before_after import Changes
+from diagnose.compare.before_after import Changes
 from palpate.report.page import Page
 from palpate.report.quantities import Quantity
 from palpate.report.view3d import Colouring, View, thing_of, usual_colourings

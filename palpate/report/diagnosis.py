@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnose.apply import improved
-from diagnose.result import Diagnosis
+from diagnose.verdict.result import Diagnosis
 from mechanics.model import Model
 from mechanics.recording import Recording
 from palpate.report.diagnosis_figures import (

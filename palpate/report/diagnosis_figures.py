@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial.distance import cdist
 
-from diagnose.result import Diagnosis
+from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
 from mechanics.model import Model

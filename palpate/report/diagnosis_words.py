@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.result import Diagnosis
+from diagnose.verdict.result import Diagnosis
 from mechanics.effects.registry import effect
 
 AXIS_WORDS = {

@@ -11,10 +11,10 @@ from scipy.spatial import cKDTree
 
 from mechanics.model import Model
 from palpate.report.object3d import draw_object, view_axes
-from reconstruct.contacts import Exploration
-from reconstruct.modulus_paper import nearest_nodes
 from reconstruct.pipeline import Reconstruction
-from reconstruct.uniaxial import profiles
+from reconstruct.steps.s3_contacts.contacts import Exploration
+from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
 from render.felt import felt_surface
 
 FORCE_COLOUR, TOUCH_COLOUR, PEAK_COLOUR, PHASE_COLOUR = "#457b9d", "#1d3557", "#c1121f", "#f1e3cf"

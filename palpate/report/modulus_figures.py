@@ -15,7 +15,7 @@ from mechanics.model import Model
 from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, spread
 from palpate.report.object3d import draw_object
 from palpate.report.quantities import KELVIN_VOIGT, MODULUS, Quantity
-from reconstruct.modulus import ModulusFit
+from reconstruct.steps.s7_modulus.modulus import ModulusFit
 from render.felt import felt_surface
 
 SIDE = 0.3  # |n . support normal| below this: a press on the side

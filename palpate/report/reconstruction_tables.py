@@ -13,10 +13,10 @@ from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.sites import patch_compliance, patch_width
 from mechanics.solver import Solver
 from palpate.report.modulus_figures import column
-from reconstruct.modulus_paper import nearest_nodes
-from reconstruct.one_d import OneD, fit_paper, fit_robust
 from reconstruct.pipeline import Reconstruction
-from reconstruct.uniaxial import profiles
+from reconstruct.steps.s6_one_d.one_d import OneD, fit_paper, fit_robust
+from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
 
 PAPER_TABLE = (
     ("paper #1", "cylinder radius 0.040 height 0.080", 29.0, 28.73),

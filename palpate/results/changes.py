@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate import before_after as room
+from diagnose.compare import before_after as room
 from palpate.results.base import Result
 
 if TYPE_CHECKING:
@@ -23,7 +23,7 @@ class Changes(Result, room.Changes):
     """Two recordings of one object: the moduli (Pa), their ratio and difference with 95 % intervals, and
     which effect explains it.
 
-    Every field is that of `palpate.before_after.Changes`. `plot`: both moduli, and each shared place's
+    Every field is that of `before_after.Changes`. `plot`: both moduli, and each shared place's
     ratio. `show`: the first object, coloured at shared places by the ratio.
     """
 

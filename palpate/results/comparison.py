@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from palpate import comparison as room
+from diagnose.compare import comparison as room
 from palpate.results.base import Result
 from palpate.results.recording import Recording
 
@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 class Comparison(Result, room.Comparison):
     """Held-out rms force errors, N: rmse_n, relative_rmse by model; press_rmse_n model -> (p,); regions.
 
-    Every field is that of `palpate.comparison.Comparison`. `plot`: the error of every held-out press. `show`:
+    Every field is that of `comparison.Comparison`. `plot`: the error of every held-out press. `show`:
     the object, each press coloured by the FEM's error.
     """
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnose import result as room
+from diagnose.verdict.verdict import result as room
 from palpate.results.base import Result
 from palpate.results.model import Model, model_of
 from palpate.results.recording import Recording, recording_of
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 class Diagnosis(Result, room.Diagnosis):
     """The sim-to-real gap: where, which effect, how far it shrinks; gaps in N rms over held-out samples.
 
-    Every field is that of `diagnose.result.Diagnosis`: kind, effects, candidates, gap_before_n, gap_after_n,
+    Every field is that of `result.Diagnosis`: kind, effects, candidates, gap_before_n, gap_after_n,
     entries (one an effect, with parameters), where, next_touch. recording, model: what was diagnosed. `plot`:
     what each effect would take away. `show`: the object coloured by the gap, with the next touch as an arrow.
     """

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
-    from diagnose.result import Diagnosis
+    from diagnose.verdict.result import Diagnosis
 
 FLOORS = {
     "relaxation": ("spring",),

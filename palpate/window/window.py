@@ -18,11 +18,11 @@ import vtk
 
 from devices.channel import PoseChannel
 from mechanics.files import PNG, atomic_file
-from palpate.exploring.ghost import GhostTip
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
 from palpate.window.frames import Frame
 from palpate.window.game import Game
+from palpate.window.ghost import GhostTip
 from palpate.window.keys import help_text
 from palpate.window.orbit import Orbit
 from palpate.window.pace import Pace
@@ -36,7 +36,7 @@ from scenes.phantoms import Region
 from scenes.scene import Scene
 
 if TYPE_CHECKING:
-    from palpate.exploring.guide import Guide
+    from palpate.window.guide import Guide
 
 PERIOD_MS = 16
 SIZE = (1280, 800)

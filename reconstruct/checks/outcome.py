@@ -9,7 +9,7 @@ import numpy as np
 
 from mechanics.presses import Presses
 from reconstruct.checks.base import Finding
-from reconstruct.modulus import ModulusFit
+from reconstruct.steps.s7_modulus.modulus import ModulusFit
 
 LEAST_PA, MOST_PA = 500.0, 5e6
 _MISFIT = 0.5

@@ -21,10 +21,10 @@ from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
-from reconstruct.contacts import Exploration, explore
-from reconstruct.filtered import Filtered
-from reconstruct.filtering import FilterOptions
-from reconstruct.known_shape import GeometryOptions, stated_geometry
+from reconstruct.geometry.known_shape import GeometryOptions, stated_geometry
+from reconstruct.steps.s1_filter.filtered import Filtered
+from reconstruct.steps.s1_filter.filtering import FilterOptions
+from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)

@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.delay import Delay
-from reconstruct.filtered import Filtered, filtered_of
-from reconstruct.filtering import FilterOptions, white_noise_std
+from reconstruct.steps.s1_filter.delay import Delay
+from reconstruct.steps.s1_filter.filtered import Filtered, filtered_of
+from reconstruct.steps.s1_filter.filtering import FilterOptions, white_noise_std
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples

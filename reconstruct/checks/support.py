@@ -8,8 +8,8 @@ import numpy as np
 
 from mechanics.robust import spread_about_zero, weighted_median
 from reconstruct.checks.base import Finding
-from reconstruct.contacts import Exploration
-from reconstruct.on_support import supported
+from reconstruct.steps.s3_contacts.contacts import Exploration
+from reconstruct.steps.s3_contacts.on_support import supported
 
 _BELOW = 6.0
 _SCALE = 1.35

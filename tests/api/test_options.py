@@ -31,7 +31,7 @@ def rooms(monkeypatch):
 
     for name in (
         "reconstruct.pipeline.reconstruct_fully",
-        "palpate.comparison.compare",
+        "diagnose.compare.comparison.compare",
         "diagnose.pipeline.diagnose",
         "scenes.laboratory.simulate.simulate",
     ):

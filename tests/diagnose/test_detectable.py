@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.deciding import AttributionOptions
-from diagnose.detectable import SEEN, detectable
-from diagnose.fit import settings_of
-from diagnose.forward import build_forward
-from diagnose.judging import Search
-from diagnose.touches import touches_of
-from diagnose.whiten import NuisanceOptions
+from diagnose.search.deciding import AttributionOptions
+from diagnose.search.detectable import SEEN, detectable
+from diagnose.search.fit import settings_of
+from diagnose.search.forward import build_forward
+from diagnose.search.judging import Search
+from diagnose.search.touches import touches_of
+from diagnose.search.whiten import NuisanceOptions
 from mechanics.effects.registry import effect
 from mechanics.model import Model
 

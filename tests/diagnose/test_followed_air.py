@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.deciding import AttributionOptions
-from diagnose.forward import build_forward
-from diagnose.judging import Search
-from diagnose.touches import touches_of
-from diagnose.whiten import FOLLOWED, NuisanceOptions, Whitener
+from diagnose.search.deciding import AttributionOptions
+from diagnose.search.forward import build_forward
+from diagnose.search.judging import Search
+from diagnose.search.touches import touches_of
+from diagnose.search.whiten import FOLLOWED, NuisanceOptions, Whitener
 from mechanics.effects.registry import effect
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from diagnose.gaps import closed_share, gap
+from diagnose.search.gaps import closed_share, gap
 
 
 def test_the_share_is_that_of_the_excess_over_the_noise() -> None:

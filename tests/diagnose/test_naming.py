@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.attribution import _with_strain
-from diagnose.deciding import AttributionOptions
-from diagnose.judging import Score, Search
-from diagnose.naming import lower_closure
+from diagnose.search.attribution import _with_strain
+from diagnose.search.deciding import AttributionOptions
+from diagnose.search.judging import Score, Search
+from diagnose.search.naming import lower_closure
 from mechanics.effects.registry import effect
 
 

@@ -8,9 +8,9 @@ from argparse import Namespace
 import numpy as np
 import pytest
 
+from benchmarks.diagnose_real import FOLDERS, SETS, _row
+from benchmarks.tissue_laws import pieces_of
 from mechanics.effects.registry import effect
-from palpate.benchmarks.diagnose_real import FOLDERS, SETS, _row
-from palpate.benchmarks.tissue_laws import pieces_of
 
 
 def rows(measured_data, name: str, **options):

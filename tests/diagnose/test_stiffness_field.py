@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.forward import build_forward
-from diagnose.touches import touches_of
+from diagnose.search.forward import build_forward
+from diagnose.search.touches import touches_of
 from mechanics.effects.registry import effect
 from mechanics.far_field import _far, _sampler, _unit_loads, energy_fields
 from mechanics.field_response import far_of, shares_in_elements

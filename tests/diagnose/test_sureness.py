@@ -4,9 +4,19 @@ from __future__ import annotations
 
 import pytest
 
-from diagnose import sureness as module
-from diagnose.sureness import ALONE, BOTH, CANDIDATE, REMAINDER, RIVALLED, UNNAMED, counts, standing, sureness
-from palpate.benchmarks.diagnose_sureness import stood
+from diagnose.verdict.sureness import (
+    ALONE,
+    BOTH,
+    CANDIDATE,
+    REMAINDER,
+    RIVALLED,
+    UNNAMED,
+    counts,
+    standing,
+    sureness,
+)
+from diagnose.verdict.verdict import sureness as module
+from tools.diagnose_sureness import stood
 
 
 @pytest.mark.parametrize(

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.attribution import _best_law, _of_one
-from diagnose.deciding import AttributionOptions
-from diagnose.forward import build_forward
-from diagnose.judging import Search
-from diagnose.touches import touches_of
-from diagnose.whiten import NuisanceOptions
+from diagnose.search.attribution import _best_law, _of_one
+from diagnose.search.deciding import AttributionOptions
+from diagnose.search.forward import build_forward
+from diagnose.search.judging import Search
+from diagnose.search.touches import touches_of
+from diagnose.search.whiten import NuisanceOptions
 from mechanics.effects.registry import effect, effects
 
 RADIUS, SHARE, DIFFUSIVITY = 0.005, 0.4, 4e-5

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose import widening
-from diagnose.widening import factors, widened
-from palpate.benchmarks.diagnose_widening import chosen_factors, distances
+from diagnose.verdict.verdict import widening
+from diagnose.verdict.widening import factors, widened
+from tools.diagnose_widening import chosen_factors, distances
 
 
 def test_ends_move_away_from_the_value_and_stay_within_what_the_key_allows(monkeypatch):

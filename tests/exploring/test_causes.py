@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from palpate.exploring.causes import NONE, SIZES, Causes, Weighing, judge
-from palpate.exploring.explorer import cause_standing
-from palpate.exploring.parting import missing
+from diagnose.explore.causes import NONE, SIZES, Causes, Weighing, judge
+from diagnose.explore.explorer import cause_standing
+from diagnose.explore.parting import missing
 
 CAUSES, FORMS, OWN, READINGS, LOOKS = 6, 2, 3, 30, 20
 

@@ -7,12 +7,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from diagnose.explore.candidates import after_touch, modulus_after
+from diagnose.explore.explorer import Explorer
+from diagnose.explore.goals import GoalOptions, Standing, surface_error
+from diagnose.explore.rows import Instrument, Segment, together
 from mechanics.errors import OptionError, RecordingError
-from palpate.exploring.candidates import after_touch, modulus_after
-from palpate.exploring.explorer import Explorer
-from palpate.exploring.goals import GoalOptions, Standing, surface_error
-from palpate.exploring.protocol import segment_of, serve
-from palpate.exploring.rows import Instrument, Segment, together
+from palpate.robot.protocol import segment_of, serve
 
 from ..reconstruct.exploration_of_cylinder import explore_cylinder
 
@@ -161,7 +161,7 @@ def test_the_robots_example_runs_against_the_laboratory(tmp_path):
 
 
 def test_a_place_that_was_asked_for_and_not_reached_is_not_asked_for_again():
-    from palpate.exploring.candidates import _not_in_vain
+    from diagnose.explore.candidates import _not_in_vain
 
     vertices = np.column_stack([np.linspace(0, 0.1, 11), np.zeros(11), np.zeros(11)])
     rows = np.arange(11)

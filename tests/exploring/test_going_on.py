@@ -5,10 +5,10 @@ import dataclasses
 import numpy as np
 import pytest
 
+from diagnose.explore.rows import Instrument, Segment, apart, together
 from mechanics.errors import RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.segments import Segment as Stretch
-from palpate.exploring.rows import Instrument, Segment, apart, together
 
 
 def _rows(kind, n=400, at=0.0):

@@ -5,10 +5,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from palpate.exploring import guide as module
-from palpate.exploring.explorer import Suggestion
-from palpate.exploring.guide import Guide
+from diagnose.explore.explorer import Suggestion
 from palpate.servo.layout import ROW
+from palpate.window import guide as module
+from palpate.window.guide import Guide
 
 RATE = 1000.0
 

@@ -6,11 +6,11 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.first_touch import REACH_M
+from diagnose.explore.causes import NONE, causes_of
+from diagnose.explore.explorer import Explorer
+from diagnose.explore.goals import GoalOptions
+from diagnose.search.first_touch import REACH_M
 from mechanics.recording import read_recording
-from palpate.exploring.causes import NONE, causes_of
-from palpate.exploring.explorer import Explorer
-from palpate.exploring.goals import GoalOptions
 
 
 @pytest.mark.slow

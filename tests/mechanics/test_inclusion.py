@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from benchmarks.nodule import felt
 from mechanics.compliance import condense
 from mechanics.errors import MeshError
 from mechanics.inclusion import Region
 from mechanics.moduli import inclusion_ratio, share_inside
 from mechanics.pardiso import available
 from mechanics.solver import Solver
-from palpate.benchmarks.nodule import felt
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -64,7 +64,7 @@ def test_a_changed_callee_and_a_changed_number_are_seen(copy: Path, tmp_path: Pa
 
 @pytest.mark.parametrize(
     "module",
-    ["mechanics.dent", "render.support", "devices.safety", "diagnose.kernel", "scenes.laboratory.laws"]
+    ["mechanics.dent", "render.support", "devices.safety", "diagnose.search.kernel", "scenes.laboratory.laws"]
     + ["palpate.servo.clock"],
 )
 @pytest.mark.parametrize("first", ["", "import numba; "])

@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.compare.before_after import Side, changes
 from mechanics.box_mesh import box_mesh
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.press_making import of_places
 from palpate import cli
-from palpate.before_after import Side, changes
 from palpate.results.base import dressed
 from palpate.results.changes import Changes
 

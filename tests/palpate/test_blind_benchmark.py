@@ -7,10 +7,10 @@ from pathlib import Path
 
 import pytest
 
+from benchmarks._diagnosis_blind import tasks_of, unfinished
+from benchmarks._diagnosis_cases import ALIKE, FINITE, HIDDEN, SEEDS, WEIGHT, Case, cases
+from benchmarks._diagnosis_scores import answer_of, discovered, summarise
 from mechanics.errors import OptionError
-from palpate.benchmarks._diagnosis_blind import tasks_of, unfinished
-from palpate.benchmarks._diagnosis_cases import ALIKE, FINITE, HIDDEN, SEEDS, WEIGHT, Case, cases
-from palpate.benchmarks._diagnosis_scores import answer_of, discovered, summarise
 from palpate.tasks.graph import Graph
 
 KNOWN = {"quick": 8, "medium": 250, "full": 640}

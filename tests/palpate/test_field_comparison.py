@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from benchmarks._tissue import tissue
+from diagnose.compare.comparison import HOMOGENEOUS, RIVALS, CompareOptions, as_touched, compare_presses
 from mechanics.press_making import of_paths
-from palpate.benchmarks._tissue import tissue
-from palpate.comparison import HOMOGENEOUS, RIVALS, CompareOptions, as_touched, compare_presses
-from reconstruct.modulus_field import asked_for, fit_field
+from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 
 UP = np.array([0.0, 0.0, 1.0])
 

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from palpate.benchmarks import _interrupts
-from palpate.benchmarks._small_disk import SmallDisk
+from benchmarks import _interrupts
+from benchmarks._small_disk import SmallDisk
 from palpate.cli import parser_of
 from palpate.importing.tables import SUFFIXES
 

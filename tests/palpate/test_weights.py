@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from palpate.benchmarks.diagnose_weights import rows_of, weights
+from tools.diagnose_weights import rows_of, weights
 
 
 def test_the_fit_tells_apart_what_evidence_or_closure_alone_do_not():

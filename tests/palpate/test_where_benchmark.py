@@ -7,9 +7,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from palpate.benchmarks._diagnosis_cases import Case
-from palpate.benchmarks._diagnosis_scores import summarise
-from palpate.benchmarks._diagnosis_where import KINDS, localisation, located
+from benchmarks._diagnosis_cases import Case
+from benchmarks._diagnosis_scores import summarise
+from benchmarks._diagnosis_where import KINDS, localisation, located
 
 CLOCK_S = 7.0
 

@@ -7,7 +7,7 @@ import pytest
 from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 from mechanics.errors import ContactError
-from reconstruct.boundary import (
+from reconstruct.steps.s2_boundary.boundary import (
     BoundaryOptions,
     farthest_points,
     find_boundary,
@@ -15,7 +15,7 @@ from reconstruct.boundary import (
     fit_plane,
     in_its_plane,
 )
-from reconstruct.contacts import explore
+from reconstruct.steps.s3_contacts.contacts import explore
 
 
 @pytest.mark.parametrize("clockwise", [False, True])

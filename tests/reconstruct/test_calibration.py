@@ -11,13 +11,13 @@ from flat_contact import recorded
 from flat_ground import MODULUS_PA, TIP_M, raster
 
 import palpate as pp
-from diagnose.calibrate import STIFFEST, calibrate_on_plate, instrument_of
+from diagnose.instrument.calibrate import STIFFEST, calibrate_on_plate, instrument_of
 from mechanics.calibration import Calibration, read_calibration, write_calibration
 from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.samples import delayed
-from reconstruct.contacts import explore
-from reconstruct.known_shape import nowhere
+from reconstruct.geometry.known_shape import nowhere
+from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording
 
 

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import explore_cylinder
 
+from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
-from palpate.benchmarks._faults import FAULTS
 from reconstruct.checks.base import Finding, decades_of_tail
 from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened

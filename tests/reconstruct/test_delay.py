@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
-from reconstruct.contacts import ContactOptions, explore, read_earlier
+from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore, read_earlier
 
 
 @pytest.fixture(scope="module")

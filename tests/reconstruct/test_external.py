@@ -137,7 +137,7 @@ def test_a_hold_is_told_by_its_own_ramp_whatever_the_depth_law(form):
 
 @pytest.mark.slow
 def test_unseen_holds_of_beef_are_told_by_two_numbers(measured):
-    from palpate.benchmarks.tissue_laws import unseen_holds
+    from benchmarks.tissue_laws import unseen_holds
 
     folder = measured / "meat_indentation_relaxation" / "csv"
     told = unseen_holds(sorted(folder.glob("230331_[RF]*.csv"))[:16])

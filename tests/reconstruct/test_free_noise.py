@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from reconstruct.filtered import hysteresis
-from reconstruct.filtering import low_pass, low_pass_at
-from reconstruct.free_noise import crowd_scale, least_contrast, moving_spread
+from reconstruct.steps.s1_filter.filtered import hysteresis
+from reconstruct.steps.s1_filter.filtering import low_pass, low_pass_at
+from reconstruct.steps.s1_filter.free_noise import crowd_scale, least_contrast, moving_spread
 
 RATE, CUTOFF = 1000.0, 25.0
 

@@ -5,8 +5,8 @@ import pytest
 
 from mechanics.recording import read_recording
 from palpate.report.modulus_figures import height_trends
-from reconstruct.modulus_paper import PaperOptions
 from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
+from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 
 pytestmark = pytest.mark.slow
 NAMES = ("silicone-1-cylinder", "silicone-2-block", "silicone-3-halfsphere")

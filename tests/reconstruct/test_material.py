@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from diagnose.rivals import held_out_rivals
-from diagnose.specimen import Curve, Similarity, approach_of, bench_of
-from diagnose.touches import touches_of
+from diagnose.search.touches import touches_of
+from diagnose.specimen.bench import Curve, Similarity, approach_of, bench_of
+from diagnose.specimen.rivals import held_out_rivals
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError, OptionError, RecordingError
 from palpate import cli

@@ -9,15 +9,15 @@ import pytest
 import trimesh
 from scipy.spatial import Delaunay
 
-import reconstruct.meshing as meshing_module
+import reconstruct.steps.s5_mesh.meshing as meshing_module
+from benchmarks._surface_truth import phantom_truth, touch
 from mechanics.errors import MeshError, SurfaceError
-from palpate.benchmarks._surface_truth import phantom_truth, touch
-from reconstruct.meshing import MeshingOptions, _held, mesh_surface
-from reconstruct.relaxation import radius_edge_ratio, relaxed
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.voxels import labels, voxel_surface
-from reconstruct.surface import Surface, SurfaceOptions, reconstruct_surface
-from reconstruct.tetwild import tetrahedralize
+from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
+from reconstruct.steps.s5_mesh.meshing import MeshingOptions, _held, mesh_surface
+from reconstruct.steps.s5_mesh.relaxation import radius_edge_ratio, relaxed
+from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +52,7 @@ def test_the_mesh_fills_the_surface(surface, meshing):
 
 def test_radius_edge_ratio_of_regular_tetrahedra():
     from mechanics.tetmesh import TetMesh
-    from reconstruct.meshing import quality
+    from reconstruct.steps.s5_mesh.meshing import quality
 
     corner = np.array([[1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]], dtype=float)
     cell = np.array([[0, 1, 3, 2]])

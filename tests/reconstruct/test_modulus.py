@@ -13,9 +13,9 @@ from mechanics.sites import TouchSites, touch_sites
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import touch_forces
-from reconstruct.modulus import ModulusOptions, between_sites, combine, fit_modulus
-from reconstruct.press_fit import fit_law, press_data
-from reconstruct.shape_error import compliance_covariance
+from reconstruct.steps.s7_modulus.modulus import ModulusOptions, between_sites, combine, fit_modulus
+from reconstruct.steps.s7_modulus.press_fit import fit_law, press_data
+from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
 
 E, NU, TIP = 20e3, 0.45, 0.005
 NOISE = 0.012

@@ -8,7 +8,7 @@ from mechanics.errors import ContactError
 from mechanics.press_making import of_paths
 from mechanics.presses import Presses
 from mechanics.solver import Solver
-from reconstruct.modulus_paper import (
+from reconstruct.steps.s7_modulus.modulus_paper import (
     PaperOptions,
     base_reactions,
     fit_paper_modulus,

@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.recording import Recording
 from mechanics.segments import Segment
 from reconstruct.checks.support import support
-from reconstruct.contacts import explore
+from reconstruct.steps.s3_contacts.contacts import explore
 
 
 def _with_more(recording: Recording, position: np.ndarray, force: np.ndarray) -> Recording:

@@ -5,7 +5,7 @@ import pytest
 
 from mechanics.press_making import of_paths
 from mechanics.presses import Presses
-from reconstruct.one_d import fit_paper, fit_robust
+from reconstruct.steps.s6_one_d.one_d import fit_paper, fit_robust
 
 RATE = 800.0
 Profile = tuple[np.ndarray, np.ndarray, np.ndarray]

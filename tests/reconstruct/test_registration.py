@@ -14,9 +14,9 @@ from mechanics.box_mesh import box_mesh
 from mechanics.presses import Presses
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.tetmesh import vertex_normals
-from reconstruct.registration import Body, Registration, Touched, register
-from reconstruct.shape_error import PoseError, compliance_covariance
-from reconstruct.slides import sliding
+from reconstruct.geometry.registration import Body, Registration, Touched, register
+from reconstruct.steps.s3_contacts.slides import sliding
+from reconstruct.steps.s7_modulus.shape_error import PoseError, compliance_covariance
 
 TIP_M = 0.004
 

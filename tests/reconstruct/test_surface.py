@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import explore_cylinder
 
+from benchmarks._surface_truth import OWN, phantom_truth, touch
+from benchmarks.surface import deviation
 from mechanics.errors import SurfaceError
-from palpate.benchmarks._surface_truth import OWN, phantom_truth, touch
-from palpate.benchmarks.surface import deviation
 from reconstruct.shapes.evidence import Evidence
-from reconstruct.surface import SurfaceOptions, reconstruct_surface
+from reconstruct.steps.s4_surface.surface import SurfaceOptions, reconstruct_surface
 
 MEAN_M, P95_M, VOLUME = 0.0012, 0.003, 0.04
 
@@ -76,7 +76,7 @@ def test_an_outline_that_no_point_sees_whole():
 
 @pytest.mark.slow
 def test_every_known_shape_within_the_targets():
-    from palpate.benchmarks.surface import truths
+    from benchmarks.surface import truths
 
     for name, make in truths().items():
         _, error = reconstructed(make(), seed=3)
@@ -178,8 +178,8 @@ def test_touches_on_the_support_alone_are_refused():
 
 def test_the_labelled_recordings_meet_the_targets(shared_recordings):
     from mechanics.recording import read_recording
-    from reconstruct.contacts import explore
-    from reconstruct.surface import evidence_of
+    from reconstruct.steps.s3_contacts.contacts import explore
+    from reconstruct.steps.s4_surface.surface import evidence_of
 
     stems = {
         "silicone-1-cylinder": "cylinder",
@@ -226,7 +226,7 @@ def test_a_top_touched_at_one_place_does_not_take_the_slope_of_its_noise():
 
 def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_walls():
     from reconstruct.shapes.prism import Prism
-    from reconstruct.surface import direction_score, try_shapes
+    from reconstruct.steps.s4_surface.surface import direction_score, try_shapes
 
     truth = phantom_truth("bowl")
     evidence, _ = touch(truth, 0)
@@ -239,7 +239,7 @@ def test_the_directions_of_the_first_forces_speak_against_a_top_below_touched_wa
 
 def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeypatch):
     """A field beside a block once ended 1.8 m below the support."""
-    from reconstruct import surface as module
+    from reconstruct.steps.s4_surface import surface as module
 
     evidence, _ = touch(phantom_truth("cylinder"), 0)
     honest, tried = module.draw, []
@@ -258,7 +258,7 @@ def test_a_shape_that_runs_away_where_nothing_was_touched_is_passed_over(monkeyp
 
 def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
     """It was tried where no shape explains the touches, and its fault refused the recording."""
-    from reconstruct import surface as module
+    from reconstruct.steps.s4_surface import surface as module
 
     asked = []
 
@@ -273,8 +273,8 @@ def test_an_implicit_surface_that_is_open_is_no_rival(monkeypatch):
 
 
 def test_a_first_touch_known_by_far_less_well_than_the_others_places_no_surface():
-    from reconstruct.contacts import explore
-    from reconstruct.surface import evidence_of
+    from reconstruct.steps.s3_contacts.contacts import explore
+    from reconstruct.steps.s4_surface.surface import evidence_of
 
     found = explore(explore_cylinder(noise=0.01)[0])
     error = found.presses.onset_error_m.copy()

@@ -9,7 +9,7 @@ from exploration_of_cylinder import TILTED, TIP, Frame, explore_cylinder
 from scipy.spatial.transform import Rotation
 
 from mechanics.recording import Recording
-from reconstruct.contacts import explore
+from reconstruct.steps.s3_contacts.contacts import explore
 
 STEEP = Frame(
     Rotation.from_euler("xyz", [30, 0, -110], degrees=True).as_matrix(), np.array([-0.2, 0.31, 0.5])

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 import reconstruct
+from benchmarks.variety import REMEDIES
 from mechanics.recording import read_recording
-from palpate.benchmarks.variety import REMEDIES
 from scenes.laboratory.effects import Readings
 from scenes.laboratory.frame import axes_of
 from scenes.variety.draws import ORIENTATIONS, RATES_HZ, TRACINGS, draw

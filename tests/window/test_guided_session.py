@@ -10,12 +10,12 @@ import pytest
 
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
+from diagnose.explore.explorer import Explorer
+from diagnose.explore.goals import GoalOptions
+from diagnose.explore.rows import Instrument
 from mechanics.model import Model
 from mechanics.recording import read_recording
-from palpate.exploring.explorer import Explorer
-from palpate.exploring.goals import GoalOptions
-from palpate.exploring.guide import Guide
-from palpate.exploring.rows import Instrument
+from palpate.window.guide import Guide
 from palpate.window.session import TouchSession
 from palpate.window.window import TouchWindow
 from reconstruct.pipeline import reconstruct

@@ -1,0 +1,244 @@
+"""Where the tip can go next, and what each touch is expected to tell for each second it takes.
+
+Two uncertainties are predicted forward: the surface's standard deviation (a touch takes away what it shares
+with its surroundings, by the correlation length of shape errors), and the modulus's (presses are replicates
+with a part that neighbours share and a part of their own). The worth of a touch is how much it brings the
+goals that are still missed nearer, in logarithms, a second. A shallow press tells little of the modulus: an
+error of first touch is a greater share of its depth.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.explore.goals import Standing, surface_error, vertex_areas
+from diagnose.explore.parting import Parting
+from mechanics.options import option
+from mechanics.tetmesh import vertex_normals
+from reconstruct.steps.s2_boundary.boundary import Boundary, farthest_points
+from reconstruct.steps.s4_surface.surface import Surface
+from reconstruct.steps.s7_modulus.shape_error import CORRELATION_M
+
+SPACING_M = 0.008
+"""Between places that are weighed."""
+TOUCH_ERROR_M = 0.0002
+"""Of one first touch."""
+PLACE_ERROR = 0.05
+"""Of a press's modulus, relative: what shape and law do to a place, which neighbours share."""
+LIGHT_M = 0.0025
+"""Depth of a touch that only asks where the surface is."""
+
+
+@dataclass(frozen=True)
+class ReachOptions:
+    """What the hand or the robot may do."""
+
+    deepest_m: float = option(0.006, "never press deeper", unit="m", flag="--deepest")
+    deepest_share: float = option(
+        0.18, "nor deeper than this share of the material under the tip", low=0.01, high=0.9
+    )
+    strongest_n: float = option(
+        5.0, "nor with more force, as far as that can be told", unit="N", flag="--strongest", low=0.01
+    )
+    press_speed_m_per_s: float = option(0.02, "speed of a press", unit="m/s")
+    air_speed_m_per_s: float = option(0.12, "speed through the air", unit="m/s")
+    hold_s: float = option(0.2, "how long a press is held", unit="s")
+    clearance_m: float = option(0.012, "height above the surface where a press begins", unit="m")
+    between_s: float = option(0.5, "what it takes to begin another touch", unit="s")
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A touch that could be made: surface point (3,), outward unit normal (3,), depth m, seconds it takes,
+    worth a second, and which goal gains most; how it is pressed, and what causes that would part."""
+
+    point: np.ndarray
+    normal: np.ndarray
+    depth_m: float
+    seconds: float
+    worth: float
+    for_goal: str
+    speed_m_per_s: float = 0.02
+    hold_s: float = 0.2
+    parting: Parting | None = None
+
+
+def places(surface: Surface, tip_radius_m: float) -> np.ndarray:
+    """Indices of vertices that the tip reaches: off the support by a tip's radius and a half, not hanging
+    over, spread evenly."""
+    up, origin = surface.support_normal, surface.support_point
+    normals = vertex_normals(surface.vertices, surface.triangles)
+    height = (surface.vertices - origin) @ up
+    centre = height + tip_radius_m * (normals @ up)
+    reachable = np.flatnonzero(
+        (height > 1.5 * tip_radius_m) & (centre > tip_radius_m) & (normals @ up > -0.2)
+    )
+    if not len(reachable):
+        reachable = np.flatnonzero(height > 0.5 * height.max())
+    return reachable[farthest_points(surface.vertices[reachable], SPACING_M)]
+
+
+def weighed(
+    surface: Surface,
+    standing: list[Standing],
+    touched: np.ndarray,
+    depths_m: np.ndarray,
+    here: np.ndarray,
+    modulus_sd: float,
+    modulus_bias: float,
+    modulus_pa: float,
+    tip_radius_m: float,
+    reach: ReachOptions,
+    partings: Sequence[Parting] = (),
+    asked: np.ndarray | None = None,
+) -> list[Candidate]:
+    """All touches, the best first. touched: (k, 3) m, places pressed so far, depths_m (k,); here: (3,) m,
+    where the tip is. asked: (a, 3) m, places that were suggested: where one was not reached, so as not to ask
+    in vain again, no place nearby counts as new.
+
+    modulus_sd: of its logarithm, of which modulus_bias no touch takes away. modulus_pa: nan where unknown.
+    partings: what each way of pressing would tell of causes, at the places pressed so far.
+    """
+    rows = _not_in_vain(surface.vertices, places(surface, tip_radius_m), touched, asked)
+    normals = vertex_normals(surface.vertices, surface.triangles)
+    area = vertex_areas(surface.vertices, surface.triangles)
+    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
+    missing = {s.name: s for s in standing if s.missing > 0}
+    own = surface_error(surface.uncertainty_m[free], area[free])
+    made = []
+    for row in rows:
+        point, normal = surface.vertices[row], normals[row]
+        deepest = press_depth(surface, point, modulus_pa, tip_radius_m, reach)
+        gain = 0.0
+        if "surface" in missing:
+            after = after_touch(surface.vertices, surface.uncertainty_m, row)
+            gain = float(np.log(own / surface_error(after[free], area[free])))
+        for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), partings, reach):
+            gains = {"surface": gain}
+            if "modulus" in missing:
+                sd = modulus_after(touched, depths_m, point, way.depth_m, modulus_sd, modulus_bias)
+                gains["modulus"] = (
+                    missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
+                )
+            if "cause" in missing:
+                gains["cause"] = UNTOLD if way.parting is None else way.parting.near(point)
+            seconds = (
+                float(np.linalg.norm(point - here)) / reach.air_speed_m_per_s
+                + 2 * reach.clearance_m / reach.air_speed_m_per_s
+                + 2 * way.depth_m / way.speed_m_per_s
+                + way.hold_s
+                + reach.between_s
+            )
+            best = max(gains, key=lambda g: gains[g])
+            made.append(
+                Candidate(
+                    point, normal, way.depth_m, seconds, sum(gains.values()) / seconds, best,
+                    way.speed_m_per_s, way.hold_s, way.parting,
+                )
+            )  # fmt: skip
+    return sorted(made, key=lambda c: -c.worth)
+
+
+UNTOLD = 1e-3
+"""Log evidence of a press whose worth for the cause is not known: any is better than none."""
+
+
+@dataclass(frozen=True)
+class _Way:
+    depth_m: float
+    speed_m_per_s: float
+    hold_s: float
+    parting: Parting | None = None
+
+
+def _ways(deepest: float, deep: bool, partings: Sequence[Parting], reach: ReachOptions) -> list[_Way]:
+    """How a place may be pressed: as usual, or by a plan that parts causes."""
+    usual = _Way(deepest if deep else min(deepest, LIGHT_M), reach.press_speed_m_per_s, reach.hold_s)
+    return [
+        usual,
+        *(_Way(min(p.depth_m, deepest), p.plan.speed, p.plan.hold, p) for p in partings),
+    ]
+
+
+def _not_in_vain(
+    vertices: np.ndarray, rows: np.ndarray, touched: np.ndarray, asked: np.ndarray | None
+) -> np.ndarray:
+    """Those of `rows` that do not lie where a suggestion was made and nothing near it was touched."""
+    if asked is None or not len(asked) or not len(touched):
+        return rows
+    away = np.linalg.norm(asked[:, None] - touched[None], axis=2).min(axis=1)
+    vain = asked[away > SPACING_M]
+    if not len(vain):
+        return rows
+    near = np.linalg.norm(vertices[rows][:, None] - vain[None], axis=2).min(axis=1) < SPACING_M
+    return rows[~near] if not near.all() else rows
+
+
+def after_touch(vertices: np.ndarray, deviation_m: np.ndarray, row: int) -> np.ndarray:
+    """(n,) m: the surface's standard deviation once vertex `row` was touched."""
+    variance = np.asarray(deviation_m, dtype=float) ** 2
+    squared = ((vertices - vertices[row]) ** 2).sum(axis=1)
+    shared = np.exp(-squared / CORRELATION_M**2)  # the square of exp(-r^2 / (2 L^2))
+    told = variance[row] / (variance[row] + TOUCH_ERROR_M**2)
+    return np.sqrt(variance * (1 - shared * told))
+
+
+def modulus_after(
+    touched: np.ndarray, depths_m: np.ndarray, point: np.ndarray, depth_m: float, sd: float, bias: float
+) -> float:
+    """Standard deviation of log E with one more press, `depth_m` deep at `point`; `bias` is what presses do
+    not lessen."""
+    rest = max(sd**2 - bias**2, 0.0)
+    after = _mean_variance(np.vstack([touched, point]), np.append(depths_m, depth_m))
+    return float(np.sqrt(bias**2 + rest * after / _mean_variance(touched, depths_m)))
+
+
+def _mean_variance(points: np.ndarray, depths_m: np.ndarray) -> float:
+    """Of the best weighted mean of the log moduli of presses at points (k, 3), depths_m (k,) deep.
+
+    F ~ d^1.5, so an error of first touch moves a press's modulus by 1.5 of its share of the depth.
+    """
+    squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
+    own = 1.5 * TOUCH_ERROR_M / np.maximum(depths_m, TOUCH_ERROR_M)
+    covariance = PLACE_ERROR**2 * np.exp(-squared / (2 * CORRELATION_M**2)) + np.diag(own**2)
+    return float(1 / np.linalg.solve(covariance, np.ones(len(points))).sum())
+
+
+def press_depth(
+    surface: Surface, point: np.ndarray, modulus_pa: float, tip_radius_m: float, reach: ReachOptions
+) -> float:
+    """m: as deep as is allowed there; the force is that of a half-space (Hertz)."""
+    thick = float((point - surface.support_point) @ surface.support_normal)
+    span = float(np.ptp(surface.vertices, axis=0).min())
+    depth = min(reach.deepest_m, reach.deepest_share * max(min(thick, span), 0.005))
+    if np.isfinite(modulus_pa):
+        stiff = 4 / 3 * modulus_pa / (1 - 0.49**2) * np.sqrt(tip_radius_m)
+        depth = min(depth, (reach.strongest_n / stiff) ** (2 / 3))
+    return float(depth)
+
+
+def first_places(
+    boundary: Boundary, tip_radius_m: float, height_m: float | None
+) -> list[tuple[np.ndarray, np.ndarray]]:
+    """(point, outward normal) of touches before there is a surface: the top from above, then the sides.
+
+    height_m: of the top where it was touched already, else None: from above until something is felt.
+    """
+    up = boundary.support_normal
+    middle = boundary.outline.mean(axis=0)
+    wide = float(np.linalg.norm(boundary.outline - middle, axis=1).mean())
+    top = middle + (height_m if height_m is not None else wide) * up
+    made = [(top, up)]
+    if height_m is None:
+        return made
+    # three sides, half way up, and three places on the top between middle and rim
+    for k in range(3):
+        rim = boundary.outline[(k * len(boundary.outline)) // 3]
+        outward = rim - middle
+        outward = outward / np.linalg.norm(outward)
+        made.append((rim + max(0.5 * height_m, 2 * tip_radius_m) * up, outward))
+        made.append((middle + 0.55 * (rim - middle) + height_m * up, up))
+    return made

@@ -1,0 +1,1 @@
+"""The instrument's own share, told by free air, the rigid support, a second tracing, a known object."""

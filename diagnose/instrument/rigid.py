@@ -1,0 +1,154 @@
+"""The rigid support: what yields there, or reads sideways there, is the instrument.
+
+While the base is traced (or something rigid is pressed) the tip's centre lies in a plane, a tip radius above
+the support. A spring between position sensor and tip puts the reading off that plane by the force over its
+stiffness, so a plane fitted to readings with the force as one more column tells the spring before any press
+is looked at. Segments of one kind share a plane's height; its tilt is the support's.
+
+Sideways the support answers with friction, against the motion, and the object's foot pushes across it: both
+turn with the way around the base. What is left along fixed directions, in proportion to the force along the
+support's normal, is that force read into other axes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.instrument.jackknife import all_but_one, covariance
+from mechanics.frames import tangents
+from mechanics.presses import Presses
+from mechanics.recording import Recording
+from mechanics.samples import runs
+
+KINDS = ("trace", "rigid", "retrace")
+BLOCK_S = 0.05
+"""Readings are averaged over this long: no hand presses faster, and steps of an encoder average out."""
+LEAST_BLOCKS = 30
+GROUPS = 10
+"""Stretches of time that are left out in turn for the standard error."""
+PRESSING = 5.0
+"""Of a sample's noise: a force along the support's normal from which the tip touches it."""
+OUTLIER = 3.0
+"""Robust standard deviations: farther off the plane the tip rides on the object's foot or has lifted."""
+TILT = 0.01
+"""rad, by which the support's normal may be off: as much of its force looks sideways."""
+
+
+@dataclass(frozen=True)
+class Rigid:
+    """compliance, error: m/N along the support's normal and its standard error. off_m: what is left off the
+    plane, robust standard deviation. seconds: of contact that were used. sideways, sideways_error: (2,)
+    shares of the normal force that are read along the support's tangents, and their standard errors."""
+
+    compliance: float
+    error: float
+    off_m: float
+    seconds: float
+    sideways: tuple[float, float] = (0.0, 0.0)
+    sideways_error: tuple[float, float] = (np.inf, np.inf)
+
+    @property
+    def sideways_z(self) -> float:
+        """Standard errors by which the sideways shares differ from none, the normal's own among them."""
+        spread = np.hypot(self.sideways_error, TILT)
+        return float(np.linalg.norm(np.asarray(self.sideways) / spread))
+
+    @property
+    def words(self) -> str:
+        """What is read sideways, for a reason."""
+        share = float(np.linalg.norm(self.sideways))
+        return f"on the rigid support {share:.0%} of the force along its normal is read sideways"
+
+
+@dataclass(frozen=True)
+class OnSupport:
+    """Means over blocks in which the support is touched. kind: (b,) of KINDS; place: (b, 3) m; force: (b, 3)
+    N, on the tool; way: (b, 3), a unit vector."""
+
+    kind: np.ndarray
+    place: np.ndarray
+    force: np.ndarray
+    way: np.ndarray
+
+
+def rigid_of(recording: Recording, presses: Presses, normal: np.ndarray) -> Rigid | None:
+    """Read the instrument off its contact with the support; normal (3,): about the support's, outward.
+
+    Each kind of contact has a plane of its own: the frame may have moved in between. None where the support
+    was touched for too short a time to tell.
+    """
+    rows = on_support(recording, presses, normal)
+    if rows is None:
+        return None
+    kinds, kind = np.unique(rows.kind, return_inverse=True)
+    own = np.eye(len(kinds))[kind]
+    mean = (own.T @ rows.place) / own.sum(axis=0)[:, None]
+    place = rows.place - mean[kind]
+    widest = int(np.argmax(own.T @ (place**2).sum(axis=1)))
+    for _ in range(2):  # the plane's own normal, whatever the model's support was made from
+        across, along = tangents(normal)
+        push = rows.force @ normal
+        flat = [own, own * (place @ across)[:, None], own * (place @ along)[:, None]]
+        found, error, off = _fitted(np.column_stack([-push, *flat]), place @ normal)
+        tilt = found[1:].reshape(3, -1)[1:, widest]
+        normal = normal - tilt[0] * across - tilt[1] * along
+        normal = normal / np.linalg.norm(normal)
+    push = (rows.force @ normal)[:, None]
+    axes = np.stack(tangents(normal), axis=1)
+    columns = np.hstack([push, push * (rows.way @ axes), np.ones_like(push)])
+    sideways = [_fitted(columns, rows.force @ axis) for axis in axes.T]
+    return Rigid(
+        compliance=float(found[0]),
+        error=error,
+        off_m=off,
+        seconds=len(push) * BLOCK_S,
+        sideways=(float(sideways[0][0][0]), float(sideways[1][0][0])),
+        sideways_error=(sideways[0][1], sideways[1][1]),
+    )
+
+
+def on_support(recording: Recording, presses: Presses, normal: np.ndarray) -> OnSupport | None:
+    """Where the support was touched; normal (3,): about its own, outward. None where that is too little."""
+    size = max(1, round(BLOCK_S * recording.sample_rate_hz))
+    found = []
+    for number, kind in enumerate(KINDS):
+        for a, b in runs(presses.within(kind, recording.t)):
+            blocks = (b - a) // size
+            if blocks < 2:
+                continue
+            part = slice(a, a + blocks * size)
+            place, force = (
+                x[part].reshape(blocks, size, 3).mean(axis=1)
+                for x in (recording.position, recording.force_on_tool)
+            )
+            way = np.gradient(place, axis=0)
+            way /= np.maximum(np.linalg.norm(way, axis=1), 1e-12)[:, None]
+            found.append(np.hstack([np.full((blocks, 1), number), place, force, way]))
+    if not found:
+        return None
+    rows = np.vstack(found)
+    rows = rows[rows[:, 4:7] @ normal > PRESSING * presses.noise.raw_n]
+    if len(rows) < LEAST_BLOCKS:
+        return None
+    return OnSupport(rows[:, 0].astype(int), rows[:, 1:4], rows[:, 4:7], rows[:, 7:])
+
+
+def _fitted(columns: np.ndarray, target: np.ndarray) -> tuple[np.ndarray, float, float]:
+    """(coefficients (k,), standard error of the first by stretches left out, robust scatter of the rest) of
+    least squares without outliers. columns: (n, k); target: (n,)."""
+    kept = np.ones(len(target), dtype=bool)
+    found, scale = np.zeros(columns.shape[1]), 0.0
+    for _ in range(20):
+        found = np.linalg.lstsq(columns[kept], target[kept], rcond=None)[0]
+        off = np.abs(target - columns @ found)
+        scale = 1.4826 * float(np.median(off[kept])) + 1e-9
+        again = off < OUTLIER * scale
+        if (again == kept).all() or again.sum() < LEAST_BLOCKS:
+            break
+        kept = again
+    rows = np.flatnonzero(kept)
+    left = [rows[part] for part in all_but_one(len(rows), GROUPS)]
+    each = np.array([np.linalg.lstsq(columns[r], target[r], rcond=None)[0][:1] for r in left])
+    return found, float(np.sqrt(covariance(each)[0, 0])), scale

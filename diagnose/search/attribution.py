@@ -1,0 +1,283 @@
+"""Which effect: added one at a time, two at a time in time where one does not help, and taken off again where
+idle."""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.search.confidence_set import confidence_p
+from diagnose.search.judging import Candidate, Score, Search
+from mechanics.effects.base import Effect, Scope
+from mechanics.progress import Progress, silent
+
+
+@dataclass(frozen=True)
+class Attribution:
+    """The search's outcome.
+
+    base: what effects were added to (finite strain in it where the data prefer it). ideal: linear elasticity
+    alone; deep: neo-Hookean alone. scores: of every single effect on the base. chosen: names, strongest
+    first. rivals: names not told apart from a chosen one. final: the chosen set. steps, picked: what each
+    step looked like and what it took. finite_strain_gain: log likelihood, in the final set. standing: p value
+    by which each effect, and 'none', is in the first step's model confidence set.
+    """
+
+    base: Candidate
+    ideal: Candidate
+    deep: Candidate
+    scores: dict[str, Score]
+    chosen: tuple[str, ...]
+    rivals: tuple[str, ...]
+    final: Candidate
+    steps: tuple[dict[str, Score], ...]
+    picked: tuple[str, ...]
+    finite_strain_gain: float
+    standing: dict[str, float]
+
+
+def attribute(
+    search: Search,
+    effects: Sequence[Effect],
+    *,
+    seen: frozenset[str] = frozenset(),
+    progress: Progress = silent,
+) -> Attribution:
+    """Forward selection with backward check of effects to be tried; rivals of the first are declared.
+
+    seen: names that are known to be there from elsewhere: they are taken first, and stay.
+    """
+    fs = search.finite_strain
+    ideal, deep = search.judge([]), search.judge([fs])
+    _, strain_gain = _with_strain(search, [])
+    base = deep if strain_gain > -search.options.beyond_doubt else ideal
+    current = base
+    chosen: list[str] = []
+    steps: list[dict[str, Score]] = []
+    for step in range(search.options.most):
+        scores: dict[str, Score] = {}
+        for i, effect in enumerate(effects):
+            if effect.name in current.found.names or _of_one(effect, current.found.effects):
+                continue
+            if _of_one(effect, effects[:i]):
+                continue  # of the laws of one phenomenon the first stands for all until it is picked
+            progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
+            candidate = search.judge([*current.found.effects, effect], like=current)
+            if not chosen:
+                candidate = _with_hidden_strain(search, effect, candidate, current)
+            scores[effect.name] = search.score([effect], candidate, current)
+        if not scores:
+            break
+        first = not chosen
+        for score in list(scores.values()):
+            if score.may_be and not search.passes(score, first=first):
+                scores[score.name] = _reexamined(search, score, current)
+        steps.append(scores)
+        least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
+        passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
+        if search.sideways_off(current):
+            passing = _not_blind_to_slip(search, passing)
+        known = [scores[n] for n in sorted(seen) if n in scores]
+        passing = [s for s in known if s.size_n > search.smallest_n] or passing
+        if not passing:
+            pair = None if step + 2 > search.options.most else _paired(search, effects, current)
+            if pair is None:
+                break
+            chosen += [n for n in pair.found.names if n not in current.found.names]
+            search.renew(pair.found)
+            current, strain_gain = _with_strain(search, pair.found.effects)
+            break
+        best = _likeliest(passing, search.options.beyond_doubt)
+        for effect in effects:
+            if _of_one(effect, [best.effect]) and effect.name not in scores:
+                candidate = search.judge([*current.found.effects, effect], like=current)
+                scores[effect.name] = search.score([effect], candidate, current)
+        best = _best_law(search, [s for s in scores.values() if _of_one(s.effect, [best.effect])], best)
+        chosen.append(best.name)
+        search.renew(best.candidate.found)
+        current, strain_gain = _with_strain(search, best.candidate.found.effects)
+    picked = list(zip(steps, chosen, strict=False))
+    current, chosen = _without_idle(search, chosen, current, seen)
+    for effect in current.found.effects:
+        current = _refined(search, effect, current)
+    sets = [standing(scores) for scores in steps]
+    asked = [n for n in chosen if n not in seen]
+    rivals = tuple(n for n in _rivals(search, picked, sets, asked) if n not in seen)
+    order = _strongest_first(search, current, chosen)
+    return Attribution(
+        base,
+        ideal,
+        deep,
+        steps[0],
+        tuple(order),
+        rivals,
+        current,
+        tuple(steps),
+        tuple(name for _, name in picked),
+        float(strain_gain),
+        sets[0],
+    )
+
+
+def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
+    """Whether one of the others is another law of the same phenomenon."""
+    return bool(effect.phenomenon) and any(
+        o.phenomenon == effect.phenomenon and o.name != effect.name for o in others
+    )
+
+
+def _likeliest(passing: Sequence[Score], beyond_doubt: float) -> Score:
+    """The score that gains most of those as likely to be there as any; a fit that does not carry over is
+    not."""
+    best = max(s.log_odds for s in passing)
+    return max((s for s in passing if s.log_odds > best - beyond_doubt), key=lambda s: s.gain)
+
+
+def _best_law(search: Search, others: Sequence[Score], best: Score) -> Score:
+    """Of the laws of the best one's phenomenon that with the most evidence: held-out log likelihood, where
+    nuisances are weighed as they are at its fit and finite strain is free to stay away, less what parameters
+    cost by BIC, an observation a group of presses."""
+    if not others:
+        return best
+    there = search.reweighed(best.candidate.found)
+    each = 0.5 * np.log(len(best.per_group))
+
+    def price(score: Score) -> float:
+        rest = [e for e in score.candidate.found.effects if e is not search.finite_strain]
+        sets = (rest, [search.finite_strain, *rest])
+        held = min(there.judge(s, like=score.candidate).held.sum() for s in sets)
+        return float(held) + each * len(score.effect.parameters)
+
+    return min((best, *others), key=price)
+
+
+def _with_hidden_strain(
+    search: Search, effect: Effect, candidate: Candidate, current: Candidate
+) -> Candidate:
+    """The candidate, or with finite strain beside it where each may have hidden the other."""
+    if not effect.hides_strain or search.finite_strain in current.found.effects:
+        return candidate
+    both = search.judge([search.finite_strain, *candidate.found.effects], like=candidate)
+    return both if both.found.loss < candidate.found.loss else candidate
+
+
+def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Candidate | None:
+    """Two effects in time that close the gap only together: memory and delay bend loops opposite ways."""
+    if current.chi < search.options.unknown_chi:
+        return None
+    able = [e for e in effects if e.scope is Scope.TIME and e.name not in current.found.names]
+    # of the laws of one phenomenon the first stands for all
+    able = list({e.phenomenon or e.name: e for e in reversed(able)}.values())
+    found = []
+    for one, two in itertools.combinations(able, 2):
+        candidate = search.judge([*current.found.effects, one, two], like=current)
+        score = search.score([one, two], candidate, current)
+        if search.passes(score):
+            found.append(candidate)
+    return min(found, key=lambda c: c.found.loss, default=None)
+
+
+def _not_blind_to_slip(search: Search, passing: list[Score]) -> list[Score]:
+    """What may be named while the sideways force is off: of effects that differ from place to place only
+    those that mend it, or a sliding tip is taken for a soft place."""
+    return [s for s in passing if not s.effect.scope.between_places or not search.sideways_off(s.candidate)]
+
+
+def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
+    """The set with an effect's law made exact at its fit, twice; as it was where its law is exact already."""
+    if effect.refine is None:
+        return current
+    for _ in range(2):
+        effect.refine(search.forward, current.found.of(effect.name))
+        search.renew(current.found)
+        current = search.judge(current.found.effects, like=current)
+    return current
+
+
+def _reexamined(search: Search, score: Score, current: Candidate) -> Score:
+    """The score with size and plain gap as they are where nuisances are weighed at the new fit.
+
+    Where an effect changes the force much, first touches and stiffnesses of the old fit had made up for it.
+    """
+    there = search.reweighed(score.candidate.found)
+    old = there.judge(current.found.effects, like=current)
+    new = there.judge(score.candidate.found.effects, like=score.candidate)
+    again = there.score(score.added, new, old)
+    return dataclasses.replace(again, gain=score.gain, per_group=score.per_group)
+
+
+def _with_strain(search: Search, effects: Sequence[Effect]) -> tuple[Candidate, float]:
+    """The set with or without finite strain, whichever fits better, and the gain of having it."""
+    rest = [e for e in effects if e is not search.finite_strain]
+    without, deep = search.judge(rest), search.judge([search.finite_strain, *rest])
+    over = max(1.0, min(without.chi, deep.chi)) * search.forward.touches.noise.variance_inflation
+    each = 0.5 * (without.found.gram[:, 0, 0] - deep.found.gram[:, 0, 0])
+    # the site that speaks loudest, for or against, may be one that slipped
+    gain = (each.sum() - each.max() - each.min()) / over
+    return (deep if gain > -search.options.beyond_doubt else without), float(gain)
+
+
+def _without_idle(
+    search: Search, chosen: list[str], current: Candidate, seen: frozenset[str]
+) -> tuple[Candidate, list[str]]:
+    """Drop effects that later ones made idle."""
+    chosen = list(chosen)
+    for name in list(chosen):
+        if len(chosen) < 2:
+            break
+        if name in seen:
+            continue
+        without = search.judge([e for e in current.found.effects if e.name != name])
+        effect = next(e for e in current.found.effects if e.name == name)
+        if effect.slips and search.sideways_off(without):
+            continue
+        score = search.score([effect], current, without)
+        if not score.may_be:
+            chosen.remove(name)
+            current = without
+    return current, chosen
+
+
+def standing(scores: dict[str, Score]) -> dict[str, float]:
+    """p value of each effect of a step, and of 'none', in the model confidence set over sites."""
+    names = [*scores, "none"]
+    losses = np.array([-s.per_group for s in scores.values()])
+    losses = np.vstack([losses, np.zeros(losses.shape[1])])
+    return dict(zip(names, confidence_p(losses, np.random.default_rng(0)), strict=True))
+
+
+def _rivals(
+    search: Search,
+    picked: list[tuple[dict[str, Score], str]],
+    sets: list[dict[str, float]],
+    chosen: list[str],
+) -> tuple[str, ...]:
+    """Effects that would be named themselves and that the sites do not tell from the one picked in the same
+    step; the likeliest first."""
+    found: dict[str, float] = {}
+    for (scores, name), p in zip(picked, sets, strict=False):
+        if name not in chosen:
+            continue
+        first = scores[name]
+        for score in scores.values():
+            if score.name in chosen or _of_one(score.effect, first.added):
+                continue
+            if score.effect.any_form and first.effect.scope.between_places and score.gain < first.gain:
+                continue
+            if p[score.name] > search.options.doubt and search.passes(score):
+                found.setdefault(score.name, first.log_odds - score.log_odds)
+    return tuple(sorted(found, key=lambda n: found[n]))
+
+
+def _strongest_first(search: Search, final: Candidate, chosen: list[str]) -> list[str]:
+    if len(chosen) < 2:
+        return list(chosen)
+    loss = {}
+    for name in chosen:
+        rest = [e for e in final.found.effects if e.name != name]
+        loss[name] = search.judge(rest).found.loss
+    return sorted(chosen, key=lambda n: -loss[n])

@@ -1,0 +1,51 @@
+"""Where each press first met the surface, before anything is fitted: a search over shifts."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from diagnose.search.forward import Forward
+from diagnose.search.whiten import Whitener
+from mechanics.presses import Presses
+
+REACH_M = 2.4e-3
+"""Most by which a first touch is moved."""
+
+
+def reached(presses: Presses) -> np.ndarray:
+    """(p,) bool: presses that met the surface that was fitted to them, or can be moved there. The others lie
+    on a shape that the surface has not got, or are no presses: a heavy tool that was swung."""
+    passed = np.einsum("pi,pi->p", presses.centre - presses.point, presses.normal) - presses.tip_radius_m
+    return np.abs(passed) < REACH_M
+
+
+def first_touches(forward: Forward, whitener: Whitener, modulus: float) -> np.ndarray:
+    """(p,) m, how much earlier each press met the surface than its model says: a search over shifts.
+
+    Each press alone, with a free factor on its force, so that neither modulus nor shape decides it.
+    """
+    t = forward.touches
+    shifts = np.linspace(-REACH_M, REACH_M, 25)
+    cost = np.empty((len(shifts), len(t)))
+    measured = np.where(t.counted, t.local_force[:, 0], 0.0)
+    for i, shift in enumerate(shifts):
+        settings = forward.ideal(modulus)
+        settings.onset = settings.onset + shift
+        predicted = np.where(t.counted, forward.predict(settings)[:, 0], 0.0)
+
+        def sums(a: np.ndarray) -> np.ndarray:
+            return np.bincount(t.press, weights=a, minlength=len(t))
+
+        pp, pf, ff = sums(predicted**2), sums(predicted * measured), sums(measured**2)
+        factor = np.clip(pf / np.maximum(pp, 1e-12), 0.5, 2.0)
+        error = ff - 2 * factor * pf + factor**2 * pp
+        cost[i] = (
+            error / (sums(t.counted.astype(float)) * whitener.variance) * 50
+            + (shift / (2 * whitener.onset_sd)) ** 2
+        )
+    best = np.argmin(cost, axis=0)
+    inner = np.clip(best, 1, len(shifts) - 2)
+    rows = np.arange(len(t))
+    left, mid, right = cost[inner - 1, rows], cost[inner, rows], cost[inner + 1, rows]
+    curve = np.maximum(left - 2 * mid + right, 1e-12)
+    return shifts[inner] + np.clip(0.5 * (left - right) / curve, -0.5, 0.5) * (shifts[1] - shifts[0])

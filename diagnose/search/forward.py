@@ -1,0 +1,154 @@
+"""The forward model of a whole recording: settings (ideal until an effect changes them) to every press's
+force.
+
+The chain, in the order in which nature and instrument act: surface and handle -> tip path -> contact with the
+elastic object -> what follows the path (softening, memory, adhesion) -> what the force sensor reads.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.search import kernel
+from diagnose.search.touches import place_of
+from mechanics.dent import effective_radius
+from mechanics.effects.path import new_memory, path_numbers
+from mechanics.effects.settings import Settings
+from mechanics.kinematics import acceleration
+from mechanics.model import Model
+from mechanics.places import Places, solve_places
+from mechanics.presses import Presses
+
+KEPT = 8
+"""Integrated touches that are kept."""
+
+
+@dataclass
+class Forward:
+    """Presses with the mechanics of their places; `predict(settings)` is the forward model.
+
+    What effects see of it: mechanics.effects.settings.Scene.
+    """
+
+    touches: Presses
+    places: Places
+
+    def __post_init__(self) -> None:
+        self._kept: dict[int, np.ndarray] = {}
+        self.acceleration = _acceleration(self.touches)
+
+    @property
+    def model(self) -> Model:
+        """The model that is compared with."""
+        return self.places.model
+
+    @property
+    def tip_radius(self) -> float:
+        """m, as stated."""
+        return self.touches.tip_radius_m
+
+    @property
+    def start(self) -> np.ndarray:
+        """(p + 1,) rows of each press."""
+        return self.touches.starts
+
+    @property
+    def t(self) -> np.ndarray:
+        """(n,) s."""
+        return self.touches.t
+
+    @property
+    def press(self) -> np.ndarray:
+        """(n,) the press of each sample."""
+        return self.touches.press
+
+    @property
+    def lead(self) -> np.ndarray:
+        """(n, 3) side of the tip in a play that the reading follows (mechanics.leads)."""
+        return self.touches.columns["lead"]
+
+    @property
+    def quaternion(self) -> np.ndarray | None:
+        """(n, 4) tool to device, scalar first, where it is recorded."""
+        return self.touches.quaternion
+
+    def ideal(self, modulus: float) -> Settings:
+        """Settings of the ideal model."""
+        p = len(self.touches)
+        return Settings(
+            modulus=modulus,
+            nu=self.model.material.poisson_ratio,
+            far=self.places.far,
+            dent_ratio=np.ones(p),
+            onset=np.zeros(p),
+            stiffness=np.ones(p),
+        )
+
+    def predict(self, s: Settings) -> np.ndarray:
+        """(n, 3) N on the tool, local frames."""
+        t = self.touches
+        y = t.travel.copy()
+        y[:, 0] += s.onset[t.press]
+        for move in s.moves:
+            y = move(y)
+        f = self._elastic(s, y)
+        if s.touch.numbers:
+            self._follow(s, y, f)
+        return self._read(s, f) if s.readings else f
+
+    def _elastic(self, s: Settings, y: np.ndarray) -> np.ndarray:
+        """(n, 3) N, the touch's own force along the path y; the last few are kept.
+
+        Force goes with the modulus where the spring of the tool is measured in it, so another modulus,
+        memory, delay or reading of the same touch costs no new integration.
+        """
+        t = self.touches
+        table = np.array(s.touch.law_of_dent(s.nu).table)
+        usual = self.model.material.young_modulus_pa
+        compliance = float(s.tool_compliance * s.modulus / usual)
+        arrays = (y, s.far, s.stiffness, s.dent_ratio, table)
+        tip = self.tip_radius * s.touch.tip_ratio
+        key = hash((tip, s.nu, compliance, s.touch.friction, *(a.tobytes() for a in arrays)))
+        f = self._kept.get(key)
+        if f is None:
+            radius = effective_radius(tip, self.places.curvature)
+            radius = np.ascontiguousarray(np.broadcast_to(radius, (len(t),)))
+            f = np.zeros_like(y)
+            modulus = usual * s.stiffness
+            far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)
+            kernel.integrate(
+                t.starts, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, compliance, mu, f
+            )
+            if len(self._kept) >= KEPT:
+                self._kept.pop(next(iter(self._kept)))
+            self._kept[key] = f
+        return f * (s.modulus / usual)
+
+    def _follow(self, s: Settings, y: np.ndarray, f: np.ndarray) -> None:
+        """The laws along the path, on f in place. Thinned samples are means over a step."""
+        t, path = self.touches, path_numbers(s.touch)
+        averaged = kernel.SUB_PLACES if t.block > 1 else 1
+        kernel.follow(
+            t.starts, t.t, np.ascontiguousarray(y[:, 0]), place_of(t), np.zeros(t.sites), path.numbers,
+            path.reach_m[0], averaged, new_memory(path, 1)[0], f,
+        )  # fmt: skip
+
+    def _read(self, s: Settings, f: np.ndarray) -> np.ndarray:
+        """(n, 3) N, what the instrument makes of the force; local frames."""
+        frame = self.touches.frame[self.touches.press]
+        device = np.einsum("nji,nj->ni", frame, f)
+        for _, reading in sorted(s.readings, key=lambda each: each[0]):
+            device = reading(device)
+        return np.einsum("nij,nj->ni", frame, device)
+
+
+def build_forward(touches: Presses, model: Model) -> Forward:
+    """Solve the far field at every press's place (one factorisation, three solves a place)."""
+    return Forward(touches, solve_places(model, touches.point, touches.normal, touches.frame))
+
+
+def _acceleration(t: Presses) -> np.ndarray:
+    """(n, 3) m/s^2, device frame, press by press from the thinned positions."""
+    return np.concatenate([acceleration(t.t[part], t.position[part]) for part in t.parts])

@@ -1,0 +1,230 @@
+"""Weighing: a set of effects fitted, judged on sites that it has not seen, and scored against another set."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import expit
+
+from diagnose.search.deciding import AttributionOptions
+from diagnose.search.first_touch import first_touches
+from diagnose.search.fit import Descent, Fit, fit, settings_of
+from diagnose.search.forward import Forward
+from diagnose.search.leave_one_out import held_out, levelled
+from diagnose.search.naming import WEIGHTS, lower_closure, share_closed
+from diagnose.search.whiten import NuisanceOptions, Whitener
+from mechanics.effects.base import Effect
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
+    base."""
+
+    found: Fit
+    held: np.ndarray
+    plain: np.ndarray
+    dof: float
+
+    @property
+    def residual(self) -> np.ndarray:
+        """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
+        return levelled(self.found)[0]
+
+    @property
+    def fitted_plain(self) -> np.ndarray:
+        """(g,) N^2, sums of squares of the places as fitted, with the modulus of the plain fit."""
+        return levelled(self.found)[1]
+
+    @property
+    def chi(self) -> float:
+        """Whitened mean square per component: about 1 where the noise model holds."""
+        return float(self.found.gram[:, 0, 0].sum() / self.dof)
+
+    def chi_but_for_one(self, counts: np.ndarray) -> tuple[float, int]:
+        """(chi without the site that misses most, that site); counts: (g,) samples of each site."""
+        each = self.found.gram[:, 0, 0]
+        worst = int(np.argmax(each / counts))
+        return float((each.sum() - each[worst]) / (3.0 * (counts.sum() - counts[worst]))), worst
+
+
+@dataclass(frozen=True)
+class Score:
+    """How much better a candidate is than what it was added to.
+
+    added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
+    per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
+    share: of the old held-out excess over the noise (of a lump, of the fitted one). closes: the same, at
+    least, over resampled sites.
+    """
+
+    added: tuple[Effect, ...]
+    gain: float
+    size_n: float
+    share: float
+    closes: float
+    per_group: np.ndarray
+    candidate: Candidate
+
+    @property
+    def effect(self) -> Effect:
+        """The effect that is scored; the first of a pair."""
+        return self.added[0]
+
+    @property
+    def name(self) -> str:
+        """Its name; of a pair both."""
+        return "+".join(e.name for e in self.added)
+
+    @property
+    def evidence(self) -> float:
+        """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
+        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
+        if self.effect.few_places:
+            return self.gain - float(np.log(len(self.per_group)))
+        return self.gain - max(float(self.per_group.max()), 0.0)
+
+    @property
+    def closure(self) -> float:
+        """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
+        places, as it is."""
+        return self.share if self.effect.few_places else self.closes
+
+    @property
+    def log_odds(self) -> float:
+        """That it is there, rather than an error of our own law."""
+        return WEIGHTS.log_odds(self.evidence, self.closure)
+
+    @property
+    def probability(self) -> float:
+        """The same as a probability."""
+        return float(expit(self.log_odds))
+
+    @property
+    def may_be(self) -> bool:
+        """Whether it would be as likely as not if it closed the whole gap."""
+        return WEIGHTS.log_odds(self.evidence, 1.0) > 0
+
+
+class Search:
+    """Holds what all fits share: forward model, whitener, options, and a cache of fits by names.
+
+    starts: start vectors by effect that were sought in the data, in place of the effect's own.
+    """
+
+    def __init__(
+        self,
+        forward: Forward,
+        modulus: float,
+        *,
+        nuisance: NuisanceOptions,
+        options: AttributionOptions,
+        site_sd: np.ndarray | None,
+        finite_strain: Effect,
+    ) -> None:
+        self.forward, self.options, self.nuisance, self.site_sd = forward, options, nuisance, site_sd
+        whitener = Whitener(forward, forward.ideal(modulus), nuisance, site_sd)
+        onset = first_touches(forward, whitener, modulus)
+        rough = fit(forward, whitener, [finite_strain], modulus=modulus, onset=onset)
+        self.finite_strain = finite_strain
+        self.starts: dict[str, list[np.ndarray]] = {}
+        self.renew(rough)
+
+    @property
+    def smallest_n(self) -> float:
+        """N rms of a 3-vector: the smallest gap that matters."""
+        return self.options.smallest * self.forward.touches.vector_noise_n
+
+    def renew(self, found: Fit) -> None:
+        """Weigh from now on with the nuisances as they are at a fit; earlier judgements are forgotten."""
+        settings = settings_of(self.forward, found.effects, found.values, found.onset)
+        self.whitener = Whitener(self.forward, settings, self.nuisance, self.site_sd)
+        self.dof = 3.0 * float(self.whitener.counts().sum())
+        self._near = found
+        self._cache: dict[tuple[str, ...], Candidate] = {}
+
+    def reweighed(self, found: Fit) -> Search:
+        """The same search, weighing with the nuisances as they are at a fit."""
+        other = copy.copy(self)
+        other.renew(found)
+        return other
+
+    def judge(self, effects: Sequence[Effect], like: Candidate | None = None) -> Candidate:
+        """Fit a set and judge it on held-out groups; starts from `like`, or from what was last settled on."""
+        key = tuple(sorted(e.name for e in effects))
+        if key in self._cache:
+            return self._cache[key]
+        near = self._near if like is None else like.found
+        starts = [np.array([near.values[0]])]
+        for effect in effects:
+            known = effect.name in near.names
+            own = [near.of(effect.name)] if known else self.starts.get(effect.name) or effect.starts()
+            starts = [np.concatenate([s, o]) for s in starts for o in own]
+        descent = Descent(self.forward, self.whitener, tuple(effects), None)
+        scored = [descent.loss(s, descent.residual(s, near.onset), near.onset) for s in starts]
+        runs = (descent.run(starts[i], near.onset, 12) for i in np.argsort(scored)[:3])
+        found = min(runs, key=lambda f: f.loss)
+        held, plain = held_out(found, descent)
+        candidate = Candidate(found, held, plain, self.dof)
+        self._cache[key] = candidate
+        return candidate
+
+    def score(self, added: Sequence[Effect], new: Candidate, old: Candidate) -> Score:
+        """Compare a candidate with the one that lacks `added`."""
+        extra = len(new.found.values) - len(old.found.values)
+        over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
+        fitted = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
+        # predicted with what the other places alone would have added: a lump under one place is none
+        told = (fitted.sum() - fitted) / over > extra
+        per_group = np.where(told, old.held - new.held, 0.0)
+        gain = float(per_group.sum())
+        if all(e.scope.between_places for e in added):
+            # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
+            per_group = fitted
+            gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
+        # a lump under one place is told by that place: what it closes there counts, as its evidence does
+        if all(e.few_places for e in added):
+            was, left = old.fitted_plain, new.fitted_plain
+        else:
+            was, left = old.plain, np.where(told, new.plain, old.plain)
+        t = self.forward.touches
+        before, after = old.residual[t.counted], new.residual[t.counted]
+        size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))
+        noise = 3 * t.noise_n**2
+        least = self.smallest_n**2
+        samples = self.whitener.counts()
+        share = float(share_closed(was, left, samples, noise, least))
+        closes = lower_closure(was, left, samples, noise, least, self.options.doubt)
+        return Score(tuple(added), float(gain / over), size, share, closes, per_group / over, new)
+
+    def passes(self, score: Score, *, first: bool = True) -> bool:
+        """Whether a score names its effect. first: nothing else is named yet."""
+        if score.effect.by_first_touches and not first:
+            return False
+        return score.closure > 0 and score.probability > self.options.sure
+
+    def sideways_off(self, candidate: Candidate) -> float:
+        """Share by which the sideways force falls short of a fit's where that is large and felt; else 0.
+
+        The nuisances trust the stick to a share only, press by press, so a fit may let that force go wrong.
+        A tip that slips drags less than one that sticks, never more: more is a normal that is not the
+        surface's.
+        """
+        t = self.forward.touches
+        if not t.local_force[t.counted, 1:].any():
+            return 0.0  # a machine of one axis reads none
+        residual = candidate.residual[t.counted, 1:]
+        predicted = t.local_force[t.counted, 1:] - residual
+        size = np.linalg.norm(predicted, axis=1)
+        short = np.clip(-(residual * predicted).sum(axis=1) / np.maximum(size, 1e-12), 0.0, None)
+        # what the air may have done unseen is no slip
+        known = 1 / (1 + self.whitener.air[t.counted] / t.noise_n**2)
+        missed, force = (float(np.sqrt(np.average(x**2, weights=known))) for x in (short, size))
+        # noise falls short half of the time; points without a time are not thinned
+        missed = float(np.sqrt(max(missed**2 - 0.5 * t.noise_n**2, 0.0)))
+        if missed < np.sqrt(2) * t.noise.raw_n or missed < self.nuisance.stick * force:
+            return 0.0
+        return missed / force

@@ -1,0 +1,193 @@
+"""The noise of a comparison: sensor noise, and what our own model gets wrong from press to press and site to
+site.
+
+A residual is weighed against the covariance S + N N^T of its site. S is diagonal: sensor noise, and errors
+that no name covers, some in proportion to the force, so that a stiff object that is pressed with thousands of
+times the noise is not held to a law exact to a thousandth. N holds one column a nuisance: how the force would
+change for a plausible error of first touch, of the site's stiffness (shape, mesh), of its normal, of the
+stick, of the dent law. So effects in time are judged within presses and effects in space between them,
+against what an error of shape could do. Woodbury keeps it to small matrices.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.linalg import cho_factor, solve_triangular
+
+from diagnose.search.forward import Forward
+from mechanics.effects.settings import Settings
+from mechanics.options import option
+from mechanics.presses import Presses
+
+FOLLOWED = "followed"
+"""Column of touches whose free air was followed from before to after them: (n, 3) N, what was taken off."""
+_MODES = 2
+"""Of a Brownian bridge, that hold 76 % of its variance; the rest counts as noise."""
+
+
+@dataclass(frozen=True)
+class NuisanceOptions:
+    """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
+
+    onset_m: float = option(0.2e-3, "error of first touch, each press", unit="m")
+    site_stiffness: float = option(0.03, "share by which a site's stiffness may be wrong (shape, mesh)")
+    press_stiffness: float = option(0.01, "share by which repeats at a site may differ")
+    tilt: float = option(0.03, "error of a site's normal", unit="rad")
+    stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
+    law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
+    floor_share: float = option(0.01, "error of the model that no name covers, share of a sample's force")
+    floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")
+
+
+@dataclass
+class Block:
+    """One group's rows (flat indices of counted samples), the factor L of I + N^T N / sigma^2, and L^-1 N^T,
+    N the nuisances over how much louder than sigma their rows are."""
+
+    rows: np.ndarray
+    factor: tuple
+    halved: np.ndarray
+
+
+class Whitener:
+    """Weighs residuals and sensitivities (n, 3, k) group by group; groups are sites with their repeats.
+
+    air: (n,) N^2, variance of a component by free air that was followed through the touch.
+    """
+
+    def __init__(
+        self,
+        forward: Forward,
+        settings: Settings,
+        options: NuisanceOptions,
+        site_sd: np.ndarray | None = None,
+        onset_sd: np.ndarray | None = None,
+    ) -> None:
+        """site_sd: (p,) share by which each press's stiffness may be off; by default the options'. onset_sd:
+        (p,) m, of each first touch; by default the options' and what the table states of each."""
+        self.touches = forward.touches
+        self.variance = self.touches.noise_n**2 + options.floor_n**2
+        before = np.nan_to_num(forward.predict(settings))
+        share = options.floor_share * np.linalg.norm(before, axis=1)
+        bridges, self.air, unbridged = _bridges(self.touches)
+        self.louder = np.sqrt(1 + (share**2 + unbridged) / self.variance)
+        self.blocks: list[Block] = []
+        presses = len(self.touches)
+        stated = np.hypot(options.onset_m, self.touches.onset_error_m)
+        self.onset_sd = stated if onset_sd is None else onset_sd
+        columns = nuisance_columns(forward, settings, before, options, site_sd, self.onset_sd)
+        columns += [("press", bridge) for bridge in bridges]
+        self.onset_column = columns[0][1] / self.onset_sd[self.touches.press][:, None]
+        site = options.site_stiffness if site_sd is None else site_sd
+        self.stiffness_sd = np.hypot(site, options.press_stiffness) * np.ones(presses)
+        brought = 0.0
+        for rows, matrix in _by_site(self.touches, columns):
+            brought += float((matrix**2).sum() + 3 * self.variance * (self.louder[rows] ** 2).sum())
+            matrix /= np.repeat(self.louder[rows], 3)[:, None]
+            small = np.eye(matrix.shape[1]) + matrix.T @ matrix / self.variance
+            factor = cho_factor(small, lower=True)
+            halved = solve_triangular(factor[0], matrix.T, lower=True)
+            self.blocks.append(Block(rows, factor, halved))
+        self.explained = brought / float(self.counts().sum())
+        """N^2, the mean square of a sample's 3-vector that noise and nuisances bring about."""
+
+    @property
+    def groups(self) -> int:
+        """How many groups."""
+        return len(self.blocks)
+
+    def gram(self, x: np.ndarray) -> np.ndarray:
+        """(g, k, k) whitened inner products of the columns of x (n, 3, k) in each group."""
+        k = x.shape[2]
+        out = np.empty((self.groups, k, k))
+        for i, block in enumerate(self.blocks):
+            part = (x[block.rows] / self.louder[block.rows][:, None, None]).reshape(-1, k)
+            side = block.halved @ part
+            out[i] = (part.T @ part - side.T @ side / self.variance) / self.variance
+        return out
+
+    def raw_gram(self, x: np.ndarray) -> np.ndarray:
+        """(g, k, k) plain inner products, N^2 where x is in N: for gaps."""
+        k = x.shape[2]
+        return np.array([x[b.rows].reshape(-1, k).T @ x[b.rows].reshape(-1, k) for b in self.blocks])
+
+    def counts(self) -> np.ndarray:
+        """(g,) thinned contact samples of each group."""
+        return np.array([len(b.rows) for b in self.blocks])
+
+
+def nuisance_columns(
+    forward: Forward,
+    settings: Settings,
+    before: np.ndarray,
+    options: NuisanceOptions,
+    site_sd: np.ndarray | None,
+    onset_sd: np.ndarray,
+) -> list[tuple[str, np.ndarray]]:
+    """('press' or 'site', (n, 3)) pairs: the change of force for one standard deviation of each nuisance.
+    before: (n, 3) N, what is predicted."""
+    t, f = forward.touches, before
+    moved = forward.ideal(settings.modulus)
+    moved.__dict__.update(settings.__dict__)
+    small = 2e-5
+    moved.onset = settings.onset + small
+    site_sd = np.full(len(t), options.site_stiffness) if site_sd is None else site_sd
+    deepest = np.maximum(t.deepest[t.press], 1e-4)
+    bend = np.clip(t.travel[:, 0], 0, None) / deepest - 0.7
+    normal = f[:, 0]
+    zero = np.zeros_like(normal)
+    tangential = np.column_stack([zero, f[:, 1], f[:, 2]])
+    return [
+        ("press", (np.nan_to_num(forward.predict(moved)) - f) * (onset_sd / small)[t.press][:, None]),
+        ("site", f * site_sd[t.press][:, None]),
+        ("press", f * options.press_stiffness),
+        ("site", np.column_stack([zero, normal, zero]) * options.tilt),
+        ("site", np.column_stack([zero, zero, normal]) * options.tilt),
+        ("press", tangential * options.stick),
+        ("site", f * (bend * options.law)[:, None]),
+    ]
+
+
+def _bridges(t: Presses) -> tuple[list[np.ndarray], np.ndarray, np.ndarray]:
+    """((n, 3) N each, (n,) N^2, (n,) N^2): what free air that was followed straight through a touch may have
+    done in between.
+
+    A random walk from its value before to its value after, as fast as these two tell, or one step at any
+    time: a Brownian bridge by its first modes, along each axis of the device, its variance in each component,
+    and what of that the modes leave.
+    """
+    bumps, air = np.zeros((_MODES, len(t.t))), np.zeros(len(t.t))
+    followed = t.columns.get(FOLLOWED)
+    if followed is None:
+        return [], air, air
+    for part in t.parts:
+        if part.stop - part.start < 2:
+            continue
+        walked = float(np.linalg.norm(followed[part.stop - 1] - followed[part.start])) / np.sqrt(3)
+        along = (t.t[part] - t.t[part.start]) / (t.t[part.stop - 1] - t.t[part.start])
+        air[part] = walked**2 * along * (1 - along)
+        for k, bump in enumerate(bumps, start=1):
+            bump[part] = walked * np.sqrt(2) / (k * np.pi) * np.sin(k * np.pi * along)
+    axes = t.frame[t.press]
+    left = np.clip(air - (bumps**2).sum(axis=0), 0.0, None)
+    return [axes[:, :, k] * bump[:, None] for bump in bumps for k in range(3)], air, left
+
+
+def _by_site(t: Presses, columns: list[tuple[str, np.ndarray]]) -> list[tuple[np.ndarray, np.ndarray]]:
+    result = []
+    site_of_row = t.site[t.press]
+    for site in range(t.sites):
+        rows = np.flatnonzero((site_of_row == site) & t.counted)
+        matrix = []
+        for level, column in columns:
+            part = column[rows]
+            if level == "site":
+                matrix.append(part.reshape(-1))
+                continue
+            for press in np.flatnonzero(t.site == site):
+                own = part * (t.press[rows] == press)[:, None]
+                matrix.append(own.reshape(-1))
+        result.append((rows, np.stack(matrix, axis=1)))
+    return result

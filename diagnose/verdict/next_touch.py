@@ -1,0 +1,231 @@
+"""What would best tell two explanations apart: every candidate press is predicted under both.
+
+Candidates: the places already pressed, straight or dragged sideways, three depths, three speeds, a short or a
+long hold, once or twice in a row. A press is worth the whitened distance between the two predictions, after
+first touch, stiffness of the place and the other nuisances have had their say. Beside them stand three
+presses on the bare support, where only a tool yields, and the base traced once more, which has moved or not.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import itertools
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.search.fit import settings_of
+from diagnose.search.forward import Forward
+from diagnose.search.judging import Candidate
+from diagnose.search.whiten import NuisanceOptions, Whitener
+from diagnose.verdict.result import NextTouch
+from mechanics.effects.settings import Settings
+from mechanics.leads import leads
+from mechanics.presses import Presses
+
+DEPTHS = (0.35, 0.8, 1.2)
+SPEEDS = (0.004, 0.02, 0.08)
+HOLDS = (0.3, 1.5)
+DRAG_M = 1.5e-3
+DEEPEST_M = 0.009
+CLEARANCE_M = 2e-3
+STEP_S = 0.01
+RIGID_N, RIGID_M = 4.0, 5e-5
+"""Force of a press on the support, and how far readings on something rigid scatter."""
+RETRACED_M = 3e-4
+"""By how much an outline that is traced twice is off, over a stretch."""
+
+
+@dataclass(frozen=True)
+class Plan:
+    """One way of pressing. depth: of the greatest so far, 1. speed: m/s. hold: s. drag: m. times: 1 or 2."""
+
+    depth: float
+    speed: float
+    hold: float
+    drag: float
+    times: int
+
+
+def plans() -> list[Plan]:
+    """All ways of pressing that are compared."""
+    once = [Plan(d, v, h, 0.0, 1) for d, v, h in itertools.product(DEPTHS, SPEEDS, HOLDS)]
+    dragged = [Plan(d, 0.02, 0.3, DRAG_M, 1) for d in DEPTHS]
+    return [*once, *dragged, Plan(0.8, 0.02, 0.3, 0.0, 2)]
+
+
+def next_touch(
+    forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate], options: NuisanceOptions
+) -> NextTouch:
+    """The best press to tell `first` from `second` (name, fitted candidate)."""
+    best: tuple[float, float, Plan, int] | None = None
+    for plan in plans():
+        virtual = dataclasses.replace(forward, touches=pressed(forward, plan))
+        predicted = [
+            virtual.predict(settings_of(virtual, c.found.effects, c.found.values)) for _, c in (first, second)
+        ]
+        difference = np.nan_to_num(predicted[0] - predicted[1])  # a press that no law carries through is none
+        modulus = settings_of(virtual, first[1].found.effects, first[1].found.values)
+        whitener = Whitener(virtual, modulus, options)
+        # what another modulus would do is taken out as well
+        both = np.stack([difference, np.nan_to_num(predicted[0])], axis=2)
+        gram = whitener.gram(both)
+        worth = gram[:, 0, 0] - gram[:, 0, 1] ** 2 / np.maximum(gram[:, 1, 1], 1e-12)
+        press = int(np.argmax(worth))
+        if best is None or worth[press] > best[0]:
+            rows = (virtual.touches.press == press) & virtual.touches.counted
+            size = float(np.sqrt((difference[rows] ** 2).sum(axis=1).mean()))
+            best = (float(worth[press]), size, plan, press)
+    assert best is not None
+    worth, size, plan, press = best
+    again, rigid = _retrace(forward, first, second), _rigid(forward, first, second)
+    # a surface that is fitted to the presses themselves moves along with them: none of them tells a move
+    hidden = forward.model.fitted_to(forward.touches)
+    if again is not None and (again.sigmas**2 > worth or (hidden and again.sigmas > 1)):
+        return again
+    if rigid is not None and rigid.sigmas**2 > worth:
+        return rigid
+    t = forward.touches
+    direction = -t.normal[press]
+    depth = _depth(t, plan)
+    if plan.drag:
+        direction = direction + plan.drag / depth * _sideways(forward, press)
+        direction = direction / np.linalg.norm(direction)
+    x, y, z = map(float, t.point[press])
+    towards = (float(direction[0]), float(direction[1]), float(direction[2]))
+    return NextTouch(
+        x,
+        y,
+        z,
+        direction=towards,
+        depth_m=float(depth),
+        speed_m_per_s=plan.speed,
+        hold_s=plan.hold,
+        separates=(first[0], second[0]),
+        why=_why(plan, first[0], second[0], size, np.sqrt(worth)),
+        difference_n=size,
+        sigmas=float(np.sqrt(worth)),
+    )
+
+
+def _rigid(forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]) -> NextTouch | None:
+    """Three presses on the bare support, which only a tool that yields gives way to; None where neither
+    does."""
+    one, other = (_meant(forward, c).tool_compliance for _, c in (first, second))
+    gives = RIGID_N * abs(one - other)
+    why = (
+        f"pressing the bare support three times with some {RIGID_N:g} N parts {_both(first, second)} most: a "
+        f"tool that yields reads {1e3 * gives:.2f} mm of travel there, where nothing else does"
+    )
+    return _on_the_support(forward, first, second, "rigid", gives / RIGID_M, why) if gives > 0 else None
+
+
+def _retrace(
+    forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]
+) -> NextTouch | None:
+    """The base traced once more, which has moved or has not; None where neither says that it has."""
+    one, other = (_meant(forward, c).onset for _, c in (first, second))
+    moved = float(np.sqrt(((one - other) ** 2).mean()))
+    why = (
+        f"tracing the base once more, now, parts {_both(first, second)} most: an object that moved is "
+        f"{1e3 * moved:.1f} mm from where it was traced first"
+    )
+    return _on_the_support(forward, first, second, "retrace", moved / RETRACED_M, why) if moved > 0 else None
+
+
+def _meant(forward: Forward, candidate: Candidate) -> Settings:
+    """What a candidate's effects set, its first touches aside."""
+    return settings_of(forward, candidate.found.effects, candidate.found.values)
+
+
+def _both(first: tuple[str, Candidate], second: tuple[str, Candidate]) -> str:
+    return f"{first[0].replace('_', ' ')} from {second[0].replace('_', ' ')}"
+
+
+def _on_the_support(
+    forward: Forward,
+    first: tuple[str, Candidate],
+    second: tuple[str, Candidate],
+    kind: str,
+    sigmas: float,
+    why: str,
+) -> NextTouch:
+    """Beside the object: a third of its reach off its foot to press, at the foot to trace."""
+    support = forward.model.support
+    out = forward.model.mesh.points - support.point
+    out = out - (out @ support.normal)[:, None] * support.normal
+    middle = out.mean(axis=0)
+    rim = out[np.argmax(((out - middle) ** 2).sum(axis=1))] - middle
+    x, y, z = map(float, support.point + middle + (1.4 if kind == "rigid" else 1.0) * rim)
+    a, b, c = map(float, -support.normal)
+    return NextTouch(
+        x, y, z, (a, b, c), 0.0, SPEEDS[1], HOLDS[0], (first[0], second[0]), why, 0.0, sigmas, kind
+    )
+
+
+def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str:
+    pace = {SPEEDS[0]: "slow", SPEEDS[1]: "middling", SPEEDS[2]: "fast"}[plan.speed]
+    depth = {DEPTHS[0]: "shallow", DEPTHS[1]: "deep", DEPTHS[2]: "deepest"}[plan.depth]
+    extra = " dragged sideways" if plan.drag else " done twice in a row" if plan.times > 1 else ""
+    held = f", held {plan.hold:.1f} s" if plan.hold > 1 else ""
+    return (
+        f"of all presses compared, a {pace}, {depth} one{extra}{held} at this place parts "
+        f"{first.replace('_', ' ')} from {second.replace('_', ' ')} most: {size * 1e3:.0f} mN rms, "
+        f"{sigmas:.0f} times what noise and our own errors would do"
+    )
+
+
+def _depth(t: Presses, plan: Plan) -> float:
+    return min(plan.depth * float(t.deepest.max()), DEEPEST_M)
+
+
+def _sideways(forward: Forward, press: int) -> np.ndarray:
+    return forward.touches.frame[press][1]
+
+
+def pressed(forward: Forward, plan: Plan) -> Presses:
+    """Every known press done over by a plan, each a site of its own."""
+    t = forward.touches
+    into, along = _path(_depth(t, plan), plan)
+    n, p = len(into), len(t)
+    local = np.column_stack([into, along, np.zeros(n)])
+    clock = STEP_S * np.arange(n)
+    contact = np.flatnonzero(into > 0)
+    centre = t.point + forward.tip_radius * t.normal
+    position = (centre[:, None] - np.einsum("pij,ni->pnj", t.frame, local)).reshape(-1, 3)
+    lead = np.concatenate([leads(clock, position[i * n : (i + 1) * n]) for i in range(p)])
+    turned = None if t.quaternion is None else np.repeat(t.quaternion[t.starts[:-1]], n, axis=0)
+    none = np.zeros_like(position)
+    return dataclasses.replace(
+        t,
+        starts=n * np.arange(p + 1),
+        t=np.tile(clock, p),
+        position=position,
+        force=none,
+        free_air=none,
+        quaternion=turned,
+        columns={"lead": lead},
+        site=np.arange(p),
+        onset_s=np.full(p, clock[contact[0]]),
+        peak_s=np.full(p, clock[int(np.argmax(into))]),
+        end_s=np.full(p, clock[contact[-1]]),
+    )
+
+
+def _path(depth: float, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
+    """(n,) m travel into the object and sideways, from the air to the air."""
+    times, into, side = [0.0], [-CLEARANCE_M], [0.0]
+
+    def go(seconds: float, to: float, across: float) -> None:
+        times.append(times[-1] + seconds)
+        into.append(to)
+        side.append(across)
+
+    way = (depth + CLEARANCE_M) / plan.speed
+    for _ in range(plan.times):
+        go(way, depth, 0.0)
+        go(plan.hold, depth, plan.drag)
+        go(way, -CLEARANCE_M, plan.drag)
+        go(0.3, -CLEARANCE_M, 0.0)
+    clock = np.arange(0.0, times[-1], STEP_S)
+    return np.interp(clock, times, into), np.interp(clock, times, side)

@@ -1,0 +1,209 @@
+"""A diagnosis: the three answers with their uncertainty, as the contract's JSON and as objects for the
+report."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagnose.instrument.freeair import FreeAir
+from diagnose.search.attribution import Attribution
+from diagnose.search.forward import Forward
+from diagnose.verdict.where import Where
+from mechanics.effects.registry import effect
+
+_SENTENCES = {
+    "none": "the gap is noise; no effect is missing",
+    "effect": "{effects} {explain} the gap",
+    "ambiguous": "{effects} {explain} the gap best, but these touches cannot rule out {candidates}",
+    "unknown": "there is a gap, and no effect known here explains it",
+    "effect+unknown": "{effects} {explain} part of the gap; something unknown remains",
+}
+
+
+def _said(entry: EffectEntry) -> str:
+    in_words = effect(entry.name).keys_in_words
+    return in_words(entry.parameters) if in_words and entry.parameters else str(entry.parameters or "")
+
+
+def _listed(names: tuple[str, ...]) -> str:
+    words = [n.replace("_", " ") for n in names]
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
+
+
+@dataclass(frozen=True)
+class EffectEntry:
+    """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
+
+    intervals: [low, high] of each parameter at 95 %. standing: p value of the model confidence set (nan where
+    it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
+    detectable_n: N rms of its force from which these presses show it at all (nan: not told).
+    """
+
+    name: str
+    domain: str
+    probability: float
+    gap_after_n: float
+    gap_closed: float | None
+    gap_closed_ci95: tuple[float, float] | None
+    parameters: dict[str, Any]
+    gain: float = 0.0
+    intervals: dict[str, Any] = field(default_factory=dict)
+    standing: float = float("nan")
+    detectable_n: float = float("nan")
+
+
+@dataclass(frozen=True)
+class NextTouch:
+    """What would best separate `separates`: a "press" of the object, or what is done beside it, "rigid"
+    presses of the bare support or the base traced once more ("retrace").
+
+    difference_n: rms by which predictions of a press differ; sigmas: by how many times noise and our own
+    errors what is told apart differs.
+    """
+
+    x: float
+    y: float
+    z: float
+    direction: tuple[float, float, float]
+    depth_m: float
+    speed_m_per_s: float
+    hold_s: float
+    separates: tuple[str, ...]
+    why: str
+    difference_n: float = 0.0
+    sigmas: float = 0.0
+    kind: str = "press"
+
+
+@dataclass(frozen=True)
+class Diagnosis:
+    """What `palpate diagnose` answers. Gaps: N, rms of the force 3-vector over held-out contact samples.
+
+    errors_n: our own errors, N rms: sensor, repeatability, shape, numerical. reasons: the verdict in words.
+    held_out_n: gap (before, after), N, at the places of the deepest and of the fastest presses, fitted to the
+    rest. left_out: effects that were not tried, as such presses cannot show them or a quick diagnosis does
+    without.
+    """
+
+    noise_n: float
+    gap_before_n: float
+    gap_after_n: float
+    gap_closed: float | None
+    gap_closed_ci95: tuple[float, float] | None
+    kind: str
+    effects: tuple[str, ...]
+    candidates: tuple[str, ...]
+    where: Where
+    entries: tuple[EffectEntry, ...]
+    young_modulus_pa: float
+    next_touch: NextTouch | None
+    errors_n: dict[str, float]
+    reasons: tuple[str, ...]
+    confusable: tuple[tuple[str, str, float], ...] = ()
+    seconds: dict[str, float] = field(default_factory=dict)
+    forward: Forward | None = None
+    attribution: Attribution | None = None
+    free_air: FreeAir | None = None
+    residual_before: np.ndarray | None = None
+    residual_after: np.ndarray | None = None
+    left_out: tuple[str, ...] = ()
+    held_out_n: dict[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def summary(self) -> str:
+        """The verdict in one sentence."""
+        return _SENTENCES[self.kind].format(
+            effects=_listed(self.effects),
+            candidates=_listed(self.candidates),
+            explain="explains" if len(self.effects) == 1 else "explain",
+        )
+
+    def words(self) -> list[str]:
+        """The three answers, a line each, for a terminal."""
+        near = self.where.leading
+        lines = [
+            f"verdict: {self.summary}",
+            f"where: gap {self.gap_before_n:.4f} N (noise {self.noise_n:.4f} N); it follows {near.axis} most "
+            f"(share {near.share:.0%}, p = {near.p:.2g})",
+            *(f"which: {e.name} {_said(e)}" for e in self.entries if e.name in self.effects),
+        ]
+        if self.gap_closed is not None and self.gap_closed_ci95 is not None:
+            low, high = self.gap_closed_ci95
+            lines.append(
+                f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N on places not fitted, "
+                f"{self.gap_closed:.0%} closed (95 % interval {low:.0%} to {high:.0%})"
+            )
+        lines += [f"  {reason}" for reason in self.reasons]
+        if self.next_touch is not None and self.unsettled:
+            lines.append(f"next touch: {self.next_touch.why}")
+        if self.left_out:
+            names = ", ".join(n.replace("_", " ") for n in self.left_out)
+            lines.append(f"not tried (these presses cannot show it, or --fast leaves it out): {names}")
+        return lines
+
+    @property
+    def unsettled(self) -> bool:
+        """Whether the verdict leaves something open: rivals, or a remainder."""
+        return bool(self.candidates) or "unknown" in self.kind
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, and some more."""
+        return {
+            "noise_n": self.noise_n,
+            "gap_before_n": self.gap_before_n,
+            "gap_after_n": self.gap_after_n,
+            "gap_closed": self.gap_closed,
+            "gap_closed_ci95": None if self.gap_closed_ci95 is None else list(self.gap_closed_ci95),
+            "verdict": {
+                "kind": self.kind,
+                "effects": list(self.effects),
+                "candidates": list(self.candidates),
+            },
+            "where": {
+                "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
+                "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
+                "bins": self.where.bins,
+            },
+            "effects": [
+                {
+                    "name": e.name,
+                    "domain": e.domain,
+                    "probability": e.probability,
+                    "gap_after_n": e.gap_after_n,
+                    "gap_closed": e.gap_closed,
+                    "gap_closed_ci95": None if e.gap_closed_ci95 is None else list(e.gap_closed_ci95),
+                    "parameters": e.parameters,
+                    "parameters_ci95": e.intervals,
+                    "confidence_set_p": e.standing if np.isfinite(e.standing) else None,
+                    "detectable_n": e.detectable_n if np.isfinite(e.detectable_n) else None,
+                }
+                for e in self.entries
+            ],
+            "young_modulus_pa": self.young_modulus_pa,
+            "next_touch": None
+            if self.next_touch is None
+            else {
+                **{k: getattr(self.next_touch, k) for k in ("x", "y", "z")},
+                "direction": list(self.next_touch.direction),
+                "depth_m": self.next_touch.depth_m,
+                "speed_m_per_s": self.next_touch.speed_m_per_s,
+                "hold_s": self.next_touch.hold_s,
+                "separates": list(self.next_touch.separates),
+                "why": self.next_touch.why,
+                "difference_n": self.next_touch.difference_n,
+                "sigmas": self.next_touch.sigmas,
+                "kind": self.next_touch.kind,
+            },
+            "errors_n": dict(self.errors_n),
+            "held_out": {k: {"gap_before_n": a, "gap_after_n": b} for k, (a, b) in self.held_out_n.items()},
+            "reasons": list(self.reasons),
+            "confusable": [{"pair": [a, b], "cosine": c} for a, b, c in self.confusable],
+            "seconds": dict(self.seconds),
+            "left_out": list(self.left_out),
+        }

@@ -1,0 +1,172 @@
+"""From evidence to verdict: what is named, what cannot be told apart, whether something is left over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from diagnose.instrument.freeair import FreeAir
+from diagnose.instrument.offsets import InstrumentOffsets
+from diagnose.search.attribution import Attribution
+from diagnose.search.finite import predicted_size
+from diagnose.search.forward import Forward
+from diagnose.search.judging import Search
+from diagnose.search.shape import heterogeneity, site_factors
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effect, effects
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that a verdict rests on. refit: report gaps of folds fitted anew (else of the linearised fits)."""
+
+    forward: Forward
+    search: Search
+    found: Attribution
+    free: FreeAir | None
+    instrument_offsets: InstrumentOffsets
+    site_sd: np.ndarray
+    excluded: frozenset[str]
+    bootstrap: int
+    seed: int
+    refit: bool
+
+    @property
+    def noise_n(self) -> float:
+        """N, rms of the force 3-vector's noise."""
+        return self.forward.touches.vector_noise_n
+
+
+@dataclass
+class Answer:
+    """What is said: names (strongest first), rivals, reasons in words, and whether something is left over."""
+
+    names: list[str]
+    candidates: list[str]
+    reasons: list[str] = field(default_factory=list)
+    remainder: bool = False
+    nameless_shape: bool = False
+
+    @property
+    def kind(self) -> str:
+        """The contract's word."""
+        remainder = self.remainder or self.nameless_shape
+        if self.names and remainder:
+            return "effect+unknown"
+        if remainder:
+            return "unknown"
+        if not self.names:
+            return "none"
+        return "ambiguous" if self.candidates else "effect"
+
+
+def answer_of(evidence: Evidence, counts: np.ndarray) -> Answer:
+    """Weigh the search's outcome. counts: (g,) thinned contact samples of each site."""
+    found, offsets = evidence.found, evidence.instrument_offsets
+    answer = Answer([*offsets.names, *found.chosen], list(found.rivals), list(offsets.reasons))
+    misfit, lone = _misfit(evidence, counts, answer)
+    answer.remainder = misfit
+    _slipping(evidence, answer)
+    _finite_strain(evidence, answer)
+    _shape(evidence, answer)
+    _unconfirmed_lump(evidence, answer)
+    # with nothing named the gap is there all the same
+    answer.remainder = answer.remainder or (lone and not answer.names)
+    if not answer.names and not answer.remainder:
+        answer.reasons.append("what is left is no larger than noise, first touch and shape can explain")
+    if misfit:
+        answer.reasons.append(
+            f"the best answer still misses by {np.sqrt(found.final.chi):.1f} times the noise: something else "
+            "is there"
+        )
+    return answer
+
+
+def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[bool, bool]:
+    """(something is left that no law explains, it is one place alone)."""
+    found, search = evidence.found, evidence.search
+    slack = max([effect(n).slack for n in found.chosen], default=1.0)
+    most = slack * search.options.unknown_chi
+    if found.final.chi <= most:
+        return False, False
+    rest, site = found.final.chi_but_for_one(counts)
+    if rest >= most:
+        return True, False
+    # one touch that slipped or met something else is no law that is missing
+    x, y, z = 1e3 * evidence.forward.touches.site_point[site]
+    answer.reasons.append(
+        f"the touches at ({x:.0f}, {y:.0f}, {z:.0f}) mm fit nothing, the others miss by "
+        f"{np.sqrt(rest):.1f} times the noise: touch there again"
+    )
+    return False, True
+
+
+def _slipping(evidence: Evidence, answer: Answer) -> None:
+    """Sticking is only trusted to a quarter, press by press, so a fit may let the sideways force go wrong."""
+    off = evidence.search.sideways_off(evidence.found.final)
+    slips = [e.name for e in effects() if e.slips]
+    if off and not set(slips) & set(answer.names):
+        answer.candidates[:0] = slips
+        answer.remainder = True
+        answer.reasons.append(f"the sideways force is off by {off:.0%} of itself: the tip may slip")
+
+
+def _finite_strain(evidence: Evidence, answer: Answer) -> None:
+    found, strain = evidence.found, evidence.search.finite_strain
+    if strain.name in evidence.excluded:
+        return
+    size_n = predicted_size(evidence.forward, found.base.found)
+    if size_n <= evidence.search.smallest_n:
+        return
+    if found.finite_strain_gain > evidence.search.options.beyond_doubt:
+        sizes = {n: max(s[n].size_n for s in found.steps if n in s) for n in found.chosen}
+        place = (i for i, n in enumerate(answer.names) if sizes.get(n, np.inf) < size_n)
+        answer.names.insert(next(place, len(answer.names)), strain.name)
+        answer.reasons.append(
+            f"the presses are deep enough that small-strain elasticity is off by about {size_n:.3f} N"
+        )
+    elif any(effect(n).stands_for_strain for n in found.chosen):
+        # deep enough for it, and it fitted no worse than the linear law until another took its place
+        if strain in (*found.final.found.effects, *found.base.found.effects):
+            answer.candidates.append(strain.name)
+
+
+def _unconfirmed_lump(evidence: Evidence, answer: Answer) -> None:
+    """A lump that closes something by one place alone may be a shape that is wrong there."""
+    found = evidence.found
+    for scores, name in zip(found.steps, found.picked, strict=False):
+        lives_in_few = name in scores and scores[name].effect.few_places
+        if lives_in_few and name in found.chosen and scores[name].closes <= 0:
+            answer.candidates += _rest()
+            answer.reasons.append("one place alone tells of the lump: the shape may be wrong there instead")
+
+
+def _shape(evidence: Evidence, answer: Answer) -> None:
+    """Sites that differ by more than the shape's uncertainty, by what no effect explains, enough to be
+    felt."""
+    found, t = evidence.found, evidence.forward.touches
+    factor, error = site_factors(found.final.found, t)
+    per_site = np.array([evidence.site_sd[t.site == s].mean() for s in range(t.sites)])
+    gain, spread = heterogeneity(factor, error, per_site)
+    felt_n = spread * t.force_rms_n
+    if gain <= evidence.search.options.shape_gain or felt_n <= evidence.search.smallest_n:
+        return
+    allowed = [n for n in _rest() if n not in evidence.excluded]
+    if not any(effect(n).few_places for n in found.chosen):
+        if allowed and not answer.remainder:
+            answer.names += allowed
+            ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
+            doubt = evidence.search.options.doubt
+            answer.candidates += [
+                s.name for s in ranked if s.effect.shape_rival and s.may_be and found.standing[s.name] > doubt
+            ]
+        answer.reasons.append(
+            f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"
+        )
+    answer.nameless_shape = not allowed
+
+
+def _rest() -> list[str]:
+    """What stands for a difference between places that nothing else explains."""
+    return [e.name for e in effects() if e.role is Role.REST]

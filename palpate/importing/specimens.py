@@ -1,0 +1,206 @@
+"""Files of bench instruments: what kind of test each is, and its curves in SI.
+
+A Chiaro's export, cylinders between platens and pulls to failure are told by their headers, relaxation
+curves and indentations by the names of their columns, whose units and separators are read as `palpate
+import` reads them.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from diagnose.specimen.bench import Curve
+from mechanics.bounds import LARGEST_N
+from mechanics.errors import OptionError, RecordingError
+from mechanics.recording import WIDEST_PATH_M, NotRead
+from palpate.importing.mapping import Said, find_columns
+from palpate.importing.tables import Table, read_tables
+from palpate.importing.units import without_unit
+from reconstruct.external.indentation import read_chiaro
+from reconstruct.external.uniaxial import Uniaxial, of_compression, read_tension
+
+KINDS = ("indentation", "compression", "tension", "relaxation")
+_LOOK = 4000
+_LEAST_ROWS = 8
+_BEYOND = 1e15
+_TIPS_M = (1e-9, 0.1)
+_MODULUS = ("relaxationmodulus", "modulus", "g", "e")
+
+
+@dataclass(frozen=True)
+class Tests:
+    """The curves of one kind: curves of an indentation, with the tip's radius; tests of compression or
+    tension; holds (t s, value) of relaxation. stated_modulus_pa: by the maker's own software, NaN where not
+    said."""
+
+    kind: str
+    curves: tuple[Curve, ...] = ()
+    tests: tuple[Uniaxial, ...] = ()
+    holds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    tip_radius_m: float | None = None
+    stated_modulus_pa: float = float("nan")
+
+
+def read_tests(
+    files: Sequence[str | Path],
+    *,
+    kind: str = "auto",
+    tip_radius_m: float | None = None,
+    columns: dict[str, str] | None = None,
+    units: dict[str, str] | None = None,
+) -> Tests:
+    """All files, which must be of one kind. Raises RecordingError where one cannot be read or is of another
+    kind, OptionError for a kind that does not exist."""
+    if kind not in ("auto", *KINDS):
+        raise OptionError(f"kind is '{kind}'; allowed are auto, {', '.join(KINDS)}")
+    if not files:
+        raise OptionError("no file was given: name at least one")
+    paths = [Path(f) for f in files]
+    told = [kind if kind != "auto" else kind_of(p) for p in paths]
+    if len(set(told)) > 1:
+        other = next(i for i, k in enumerate(told) if k != told[0])
+        raise RecordingError(
+            f"'{paths[0]}' is a test in {told[0]} and '{paths[other]}' one in {told[other]}: give "
+            "files of one kind"
+        )
+    if told[0] == "compression":
+        return Tests("compression", tests=tuple(of_compression(p, _specimen(p)) for p in paths))
+    if told[0] == "tension":
+        return Tests("tension", tests=tuple(map(read_tension, paths)))
+    if told[0] == "relaxation":
+        return Tests("relaxation", holds=tuple(_hold(p) for p in paths))
+    return _indentations(paths, tip_radius_m, columns or {}, units or {})
+
+
+def kind_of(path: Path) -> str:
+    """The kind of test that a file holds, by its header; raises RecordingError for a file that is not
+    there."""
+    try:
+        raw = path.read_bytes()[:_LOOK]
+    except OSError as error:
+        raise RecordingError(f"'{path}' cannot be read: {error.strerror}") from error
+    text = raw.decode("latin-1").lower()
+    if "cylinder diameter" in text and "compression" in text:
+        return "compression"
+    if "engineering strain" in text and "engineering stress" in text:
+        return "tension"
+    head = re.sub(r"[^a-z]", "", text.splitlines()[0]) if text.splitlines() else ""
+    if "relaxation" in head or ("modulus" in head and "time" in head):
+        return "relaxation"
+    return "indentation"
+
+
+def _specimen(path: Path) -> str:
+    found = re.search(r"_([A-Za-z]+)_?\d+$", path.stem)
+    return found[1] if found else path.stem
+
+
+def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
+    table = max(read_tables(path), key=lambda t: t.rows)
+    if len(table.columns) < 2:
+        raise RecordingError(f"'{path}' has one column: a relaxation needs time and modulus, force or stress")
+    t, value = (np.asarray(v, float) for v in list(table.columns.values())[:2])
+    good = _numbers(path, t, value)
+    order = np.argsort(t[good], kind="stable")
+    t, value = t[good][order], value[good][order]
+    fresh = _in_order(path, t)
+    if max(np.abs(t).max(), np.abs(value).max()) > _BEYOND:
+        raise RecordingError(
+            f"'{path}' holds numbers above {_BEYOND:g}, beyond any quantity here in SI units"
+        )
+    return t[fresh], value[fresh]
+
+
+def _indentations(
+    paths: list[Path], tip_radius_m: float | None, columns: dict[str, str], units: dict[str, str]
+) -> Tests:
+    curves, stated = [], []
+    for path in paths:
+        if not columns and _is_chiaro(path):
+            data = read_chiaro(path)
+            curves.append(Curve(data.t, data.travel, data.force, path.name))
+            tip_radius_m = tip_radius_m or data.tip_radius_m
+            stated.append(data.stated_modulus_pa)
+        else:
+            curves.append(_generic(path, columns, units))
+    if tip_radius_m is None:
+        raise RecordingError("the tip's radius is in no file: give --tip-radius M")
+    if not _TIPS_M[0] <= tip_radius_m <= _TIPS_M[1]:
+        raise OptionError(
+            f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and "
+            f"{_TIPS_M[1]:g} m: give metres"
+        )
+    good = [s for s in stated if np.isfinite(s)]
+    return Tests(
+        "indentation", curves=tuple(curves), tip_radius_m=tip_radius_m,
+        stated_modulus_pa=float(np.median(good)) if good else float("nan"),
+    )  # fmt: skip
+
+
+def _is_chiaro(path: Path) -> bool:
+    head = path.read_bytes()[:_LOOK].decode("latin-1")
+    return "Tip radius (um)" in head and "Cantilever (nm)" in head
+
+
+def _generic(path: Path, columns: dict[str, str], units: dict[str, str]) -> Curve:
+    tables = read_tables(path)
+    found = find_columns(tables, Said(columns=columns, units=units))
+    if "t" not in found:
+        raise RecordingError(
+            f"'{path}' has no column of time, and there are {_names(tables)}: --column t=NAME"
+        )
+    t, z, push = (np.asarray(found[role].values, float) for role in ("t", "z", "fz"))
+    if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
+        raise RecordingError(
+            f"'{path}' needs time, travel and load in columns of one length: {_names(tables)}"
+        )
+    good = _numbers(path, t, z, push)
+    t, travel, push = t[good], -z[good], push[good]
+    fresh = _in_order(path, t)
+    if np.ptp(travel) > WIDEST_PATH_M:
+        raise RecordingError(
+            f"'{path}': the tip travels {np.ptp(travel):.4g} m, which may be {WIDEST_PATH_M:g} m: name "
+            "the unit, as in --units position=um"
+        )
+    if np.abs(push).max() > LARGEST_N:
+        raise RecordingError(
+            f"'{path}' holds a load above {LARGEST_N:g} N: name its unit, as in --units force=uN"
+        )
+    return Curve(t[fresh], travel[fresh], push[fresh], path.name)
+
+
+def _numbers(path: Path, *columns: np.ndarray) -> np.ndarray:
+    """(n,) bool: rows that hold a number in every column, more than half of them; the others are told of."""
+    good = np.isfinite(np.column_stack(columns)).all(axis=1)
+    lost = int((~good).sum())
+    if 2 * lost > len(good):
+        raise RecordingError(
+            f"'{path}': {lost} of {len(good)} rows lack a number, the first is row {np.argmin(good) + 1}: "
+            "name the columns, as in --column fz=Load"
+        )
+    if lost:
+        warnings.warn(
+            f"'{path}': {lost} of {len(good)} rows lack a number and are left out, the first is row "
+            f"{np.argmin(good) + 1}",
+            NotRead,
+            stacklevel=2,
+        )
+    return good
+
+
+def _in_order(path: Path, t: np.ndarray) -> np.ndarray:
+    """(n,) bool: rows whose time is later than the one before."""
+    fresh = np.concatenate([[True], np.diff(t) > 0])[: len(t)]
+    if fresh.sum() < _LEAST_ROWS:
+        raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {_LEAST_ROWS} are needed")
+    return fresh
+
+
+def _names(tables: list[Table]) -> str:
+    return ", ".join(without_unit(n) for t in tables for n in t.columns)

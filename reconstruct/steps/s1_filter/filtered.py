@@ -1,0 +1,196 @@
+"""A recording as touches are looked for in it: low-passed, less what is read in free air, and how far that
+may be wrong."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from mechanics.errors import ContactError
+from mechanics.recording import Recording
+from mechanics.samples import runs
+from reconstruct.steps.s1_filter.baseline import free_air_force
+from reconstruct.steps.s1_filter.delay import Delay, delay_by_places
+from reconstruct.steps.s1_filter.filtering import low_pass_at, noise_gain, white_noise_std
+from reconstruct.steps.s1_filter.free_noise import crowd_scale, least_contrast, moving_spread
+from reconstruct.steps.s1_filter.passing import between, crowd_median, missed, passing, slowly
+from reconstruct.steps.s1_filter.tool_weight import ToolWeight, tool_weight
+from reconstruct.steps.s2_boundary.boundary import find_interval, in_its_plane
+from reconstruct.steps.s3_contacts.finding import Signals
+
+_LOW = 0.7
+"""A touch lasts while the force stays above this share of the least contrast."""
+_RIPPLE = 1e-4
+"""Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
+a rendered force knows no other noise."""
+_LEAST_SPAN_S = 0.05
+_SLIDE = 8.0
+"""Tip radii: touches that go further are slides."""
+_LOOSE = 0.5
+"""Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
+presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0210)."""
+_TIPS_M = (1e-3, 0.02)
+"""Radii that are believed for that."""
+
+
+@dataclass(frozen=True)
+class Filtered:
+    """A recording low-passed at `cutoff_hz`, and what it reads in free air.
+
+    free_air: (n, 3) N, taken off the signals' force. spread: (n,) N an axis, noise of the filtered force in
+    free motion; more where inertia is left. weight: the tool's share of free_air, None where forces were
+    taken as they are. air: (n,) bool, where the tip only passes, if no constant, drift and weight explain
+    the free air, so that it was followed from one touch to the next (`passing`); else None.
+    """
+
+    signals: Signals
+    free_air: np.ndarray
+    spread: np.ndarray
+    cutoff_hz: float
+    weight: ToolWeight | None = None
+    air: np.ndarray | None = None
+
+    @property
+    def followed(self) -> bool:
+        """Whether the free air was followed from one touch to the next."""
+        return self.air is not None
+
+    @cached_property
+    def least(self) -> float:
+        """How many spreads a touch must reach (reconstruct.steps.s1_filter.free_noise)."""
+        return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+
+    @cached_property
+    def touching(self) -> np.ndarray:
+        """(n,) bool: where something is touched, on the way or on purpose."""
+        gap = passing_zero(self.signals.recording.sample_rate_hz, self.cutoff_hz)
+        contrast = self.signals.magnitude / self.spread
+        if self.air is not None:
+            contrast = np.where(self.air, 0.0, contrast)
+        return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
+
+    @cached_property
+    def tracing(self) -> tuple[int, int]:
+        """Samples [first, last) of the tracing. Raises ContactError where none is found."""
+        recording = self.signals.recording
+        given, radius = stated_tracing(recording), recording.tip_radius_m
+        return find_interval(recording.t, self.signals.position, self.touching, given, radius)
+
+    @cached_property
+    def traced(self) -> tuple[int, int]:
+        """The tracing; (0, 0) where none is found."""
+        try:
+            return self.tracing
+        except ContactError:
+            return 0, 0
+
+    @cached_property
+    def spans(self) -> list[tuple[int, int]]:
+        """[start, end) samples of each touch after the tracing, short ones and slides left out."""
+        recording, path, touching = self.signals.recording, self.signals.position, self.touching.copy()
+        touching[: self.traced[1]] = False
+        shortest = max(3, round(_LEAST_SPAN_S * recording.sample_rate_hz))
+        found = [(a, b) for a, b in runs(touching) if b - a >= shortest and a > 0 and b < len(recording.t)]
+        reach = _SLIDE * float(np.clip(recording.tip_radius_m, *_TIPS_M))
+        return [(a, b) for a, b in found if np.ptp(path[a:b], axis=0).max() < reach]
+
+    @cached_property
+    def late(self) -> Delay:
+        """How late the force reads, by places that are passed twice."""
+        signals = self.signals
+        return delay_by_places(signals.recording.t, signals.position, signals.magnitude, self.spans)
+
+
+def filtered_of(
+    recording: Recording, cutoff_hz: float, *, tared: bool = False, near: ToolWeight | None = None
+) -> Filtered:
+    """Low-passed signals of a recording with the tool's weight, inertia and a slow drift taken off. Where the
+    force in free air changes faster (a tool that turns unseen), it is followed from where the tip passes.
+
+    tared: nothing is free air, and forces are taken as they are. near: what the tool weighs by a beginning
+    of the recording.
+    """
+    t, rate = recording.t, recording.sample_rate_hz
+    filtered = low_pass_at(t, recording.force_on_tool, rate, cutoff_hz)
+    position = low_pass_at(t, recording.position, rate, cutoff_hz)
+    ripple = _RIPPLE * float(np.linalg.norm(recording.force_on_tool, axis=1).max())
+    stated = 0.5 * (recording.force_noise_std_n or 0.0)
+    noise = max(white_noise_std(recording.force_on_tool), stated, ripple, 1e-6)
+    white = noise * noise_gain(rate, cutoff_hz)
+
+    def less(weight: ToolWeight | None, drift: np.ndarray, still: Callable[[np.ndarray], float]) -> Filtered:
+        """With weight and drift (n, 3) taken off; `still` tells the spread of a still tip by what is left."""
+        free_air = drift if weight is None else drift + weight.force
+        force, raw = filtered - free_air, recording.force_on_tool - free_air
+        size = np.linalg.norm(force, axis=1)
+        spread = np.full(len(size), max(white, still(size)))
+        if weight is not None:
+            spread = moving_spread(size, weight.inertia, float(spread[0]), round(rate / cutoff_hz))
+        signals = Signals(recording, position, force, size, raw, noise)
+        return Filtered(signals, free_air, spread, cutoff_hz, weight)
+
+    if tared:
+        return less(None, np.zeros_like(filtered), lambda size: white)
+    weight = tool_weight(recording, filtered, cutoff_hz, near=near)
+    left = filtered - weight.force
+    sliding = _sliding(recording, position)
+    scale = max(white, crowd_scale(np.linalg.norm(left[~sliding], axis=1)))
+    drift, _ = free_air_force(t, left, scale, touched=sliding)
+    steady = less(weight, drift, lambda size: crowd_scale(size[~sliding]))
+    if steady.spread.min() <= noise:
+        return steady  # free air is as quiet as its sensor: there is nothing to follow
+    air, traced = passing(t, position, steady.signals.force, recording.tip_radius_m, sliding)
+    slow = slowly(t, recording.force_on_tool - weight.force, air)
+    if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
+        return steady
+    # mass and lateness were read from a force that turned
+    again = tool_weight(recording, filtered - slow, cutoff_hz)
+    off = missed(t, filtered - again.force, air)
+
+    def followed(drift: np.ndarray, loose: np.ndarray) -> Filtered:
+        there = less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
+        return replace(there, spread=np.hypot(there.spread, _LOOSE * np.where(traced, 0.0, loose)), air=air)
+
+    raw = recording.force_on_tool - again.force
+    return followed(*between(t, raw, air, lambda *seen: followed(*seen).touching))
+
+
+def stated_tracing(recording: Recording) -> tuple[float, float] | None:
+    """(start, end) s of phase I as it is stated: by itself, or as the first segment of that kind."""
+    stated = [(s.start_s, s.end_s) for s in recording.segments if s.kind == "trace"]
+    return recording.boundary_phase or (stated[0] if stated else None)
+
+
+def _sliding(recording: Recording, position: np.ndarray) -> np.ndarray:
+    """(n,) bool: where the base is traced for certain; nowhere where nobody states when, or all would be."""
+    stated, t = stated_tracing(recording), recording.t
+    if stated is None:
+        return np.zeros(len(t), dtype=bool)
+    on = in_its_plane(position, (t >= stated[0]) & (t <= stated[1]), recording.tip_radius_m)
+    return on & ~on.all()
+
+
+def passing_zero(rate_hz: float, cutoff_hz: float) -> int:
+    """Samples that a low-passed force may be near zero and not end: a quarter of its fastest wave."""
+    return round(0.25 * rate_hz / cutoff_hz)
+
+
+def hysteresis(
+    magnitude: np.ndarray, low: float, high: float, force: np.ndarray | None = None, gap: int = 0
+) -> np.ndarray:
+    """(n,) bool: the state machine's contacts, each back-tracked: runs above `low` that reach `high`.
+
+    gap: samples; a shorter fall below `low` ends no contact whose force (n, 3) has not turned round by then.
+    """
+    state, above = np.zeros(len(magnitude), dtype=bool), magnitude > low
+    if force is not None:
+        for a, b in runs(~above):
+            if 0 < a and b < len(above) and b - a < gap and force[a - 1] @ force[b] > 0:
+                above[a:b] = True
+    for a, b in runs(above):
+        if magnitude[a:b].max() > high:
+            state[a:b] = True
+    return state

@@ -1,0 +1,72 @@
+"""How loud free motion is, and how far above it a touch must stand. Forces as low-passed, N."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.ndimage import maximum_filter1d
+from scipy.optimize import brentq
+
+from reconstruct.steps.s1_filter.filtering import low_pass
+
+_FALSE_PER_S = 1e-3
+"""False touches in free motion, at most so often."""
+_ROUNDS, _SETTLED = 60, 1e-4
+_ENOUGH = 20_000
+"""Samples that tell a scale to within half a percent; of more, an even choice is taken."""
+_BRISK = 0.8
+
+
+def crowd_scale(size: np.ndarray) -> float:
+    """Standard deviation an axis of the crowd about zero, from the lengths (n,) of 3-vectors.
+
+    The crowd's lengths follow Maxwell's distribution, what is no free motion an exponential one; their
+    mixture is fitted by expectation and maximisation.
+    """
+    size = np.asarray(size, dtype=float)
+    size = np.maximum(size[:: max(1, len(size) // _ENOUGH)], 1e-12)
+    scale = float(np.quantile(size, 0.2)) / 1.538  # Maxwell's median, where two fifths are free
+    rest, share = float(size.mean()), 0.5
+    for _ in range(_ROUNDS):
+        crowd = share * np.sqrt(2 / np.pi) * size**2 / scale**3 * np.exp(-0.5 * (size / scale) ** 2)
+        other = (1 - share) * np.exp(-size / rest) / rest
+        weight = crowd / np.maximum(crowd + other, 1e-300)
+        total = float(weight.sum())
+        if total < 3 or len(size) - total < 1e-6:
+            break
+        share = total / len(size)
+        before, scale = scale, max(float(np.sqrt((weight * size**2).sum() / (3 * total))), 1e-9)
+        rest = float(((1 - weight) * size).sum() / (len(size) - total))
+        if abs(scale - before) < _SETTLED * scale:
+            break
+    return scale
+
+
+def moving_spread(size: np.ndarray, inertia: np.ndarray, spread: float, samples: int) -> np.ndarray:
+    """(n,) N an axis: the spread of what is left in free motion, where some of the inertia is left too.
+
+    size: (n,) length of what is left; inertia: (n, 3) what was taken off. spread: of the whole. The share of
+    the inertia that is left is told where most was taken off. samples: it may lie so far aside.
+    """
+    taken = maximum_filter1d(np.linalg.norm(inertia, axis=1), 2 * samples + 1)
+    most = taken >= np.quantile(taken, _BRISK)  # the greatest may be one value for long
+    left = max(crowd_scale(size[most]) ** 2 - spread**2, 0.0) / max(float(np.mean(taken[most] ** 2)), 1e-300)
+    return np.sqrt(spread**2 + min(left, 1.0) * taken**2)
+
+
+def least_contrast(rate_hz: float, cutoff_hz: float, false_per_s: float = _FALSE_PER_S) -> float:
+    """How many standard deviations (an axis) the length of a low-passed 3-vector must reach, so that white
+    noise alone does so less than `false_per_s` times a second.
+
+    The rate of up-crossings of Gaussian noise follows from the spread of its slope (Rice 1945).
+    """
+    count = int(20 * rate_hz / cutoff_hz) | 1
+    impulse = np.zeros(count)
+    impulse[count // 2] = 1.0
+    passed = low_pass(impulse, rate_hz, cutoff_hz)
+    slope = np.linalg.norm(np.diff(passed)) * rate_hz / np.linalg.norm(passed)
+
+    def crossings(level: float) -> float:
+        density = np.sqrt(2 / np.pi) * level**2 * np.exp(-0.5 * level**2)
+        return float(np.log(slope / np.sqrt(2 * np.pi) * density / false_per_s))
+
+    return float(brentq(crossings, 2.0, 12.0))

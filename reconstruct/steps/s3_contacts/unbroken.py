@@ -1,0 +1,249 @@
+"""Contact that never breaks: whether there is free air at all, where a contact is cut, and where its pieces
+would have touched.
+
+A cycle is cut at the minima of force and depth. It has no first touch of its own in sight, so the contact
+law that its loading follows is carried on to zero force; how stiff the law is, all cycles tell together.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.signal import find_peaks
+
+from mechanics.robust import spread
+from reconstruct.steps.s3_contacts.finding import Found, Signals, initial_normal
+from reconstruct.steps.s3_contacts.onset import Rise, fit_rise
+
+_STEP_RADII = 1 / 8
+"""Of the tip: a way straight in or out so long without a change of the force is free air."""
+_AIR_WAYS = 2
+_FLAT = 6.0
+"""Standard deviations (an axis) that the force may range over such a way."""
+_FALLS = 0.2
+"""A cycle ends where the force falls by this share of its peak, and the tip withdraws by this share of the
+way of its loading."""
+_SIDEWAYS = 1.5
+"""A cycle begins and ends where the tip goes so many times as far along the surface as in or out ..."""
+_RISES = 0.5
+"""... and slides where its force does not rise by this share of its peak in between."""
+_ALIKE = 0.1
+"""Least spread of ln stiffness between places that is believed."""
+_ROWS = 250
+
+
+def free_air_seen(position: np.ndarray, force: np.ndarray, radius_m: float, noise_n: float) -> bool:
+    """Whether the tip is ever off the object: it goes straight in or out and the force stays.
+
+    position (n, 3) m and force (n, 3) N low-passed; noise_n of such a force, N an axis. A way along the
+    surface tells nothing: sliding at one depth changes no force either.
+    """
+    centred = force - force.mean(axis=0)
+    along = np.linalg.svd(centred[:: max(1, len(centred) // 5000)], full_matrices=False)[2][0]
+    step = _STEP_RADII * radius_m
+    deep = position @ along
+    aside = position - deep[:, None] * along
+    flat = 0
+    for a, b in _ways(deep, step):
+        way = abs(deep[b] - deep[a])
+        straight = way > 0.9 * step and np.linalg.norm(aside[b] - aside[a]) < way
+        flat += bool(straight and np.ptp(force[a : b + 1], axis=0).max() < _FLAT * noise_n)
+    return flat >= _AIR_WAYS
+
+
+def _ways(x: np.ndarray, step: float) -> list[tuple[int, int]]:
+    """Consecutive pieces [a, b] over which x (n,) changes by a step."""
+    cells = np.floor(x / step).astype(int)
+    turns = np.flatnonzero(np.diff(cells)) + 1
+    return list(zip(turns[:-1].tolist(), turns[1:].tolist(), strict=True))
+
+
+@dataclass(frozen=True)
+class Piece:
+    """Samples [start, end) of a contact and its peak; alone: the whole of it."""
+
+    start: int
+    peak: int
+    end: int
+    alone: bool
+
+
+def cycles(signals: Signals, a: int, b: int, least_n: float) -> list[Piece]:
+    """The contact [a, b) cut at its minima of force, where the tip withdraws as well.
+
+    least_n: N, a peak stands at least so far above the minima beside it.
+    """
+    size = signals.magnitude[a:b]
+    peaks, about = find_peaks(np.concatenate([[0.0], size, [0.0]]), prominence=least_n)
+    if not len(peaks):
+        return [Piece(a, a + int(size.argmax()), b, True)]
+    peaks = np.minimum(peaks - 1, len(size) - 1)
+    peaks = peaks[about["prominences"] > _FALLS * size[peaks]]
+    cuts, kept = [0], list(peaks[:1])
+    for peak in peaks[1:]:
+        low = kept[-1] + int(size[kept[-1] : peak].argmin())
+        if _withdrawn(signals, a + cuts[-1], a + kept[-1], a + low, a + int(peak)):
+            cuts.append(low)
+            kept.append(peak)
+        elif size[peak] > size[kept[-1]]:
+            kept[-1] = peak
+    ends = [*cuts[1:], len(size)]
+    alone = len(kept) < 2
+    return [
+        Piece(a + s, a + int(p), a + e, alone)
+        for s, p, e in zip(cuts, kept or [size.argmax()], ends, strict=True)
+    ]
+
+
+def _withdrawn(signals: Signals, start: int, peak: int, low: int, after: int) -> bool:
+    """Whether the tip went out by then and in again, along the force of the peaks: a force that only relaxes
+    or slips does not."""
+    push = signals.force[peak] + signals.force[after]
+    deep = -signals.position @ (push / max(float(np.linalg.norm(push)), 1e-300))
+    way = min(deep[peak], deep[after]) - deep[low]
+    return bool(way > _FALLS * max(deep[peak] - min(deep[start], deep[low]), 1e-9))
+
+
+@dataclass(frozen=True)
+class Loading:
+    """One loading: travel u (m) inwards from `origin` along -normal and push (N), both (k,)."""
+
+    u: np.ndarray
+    push: np.ndarray
+    origin: np.ndarray
+    normal: np.ndarray
+
+
+def loading(signals: Signals, piece: Piece) -> Loading | None:
+    """The loading of a piece; None where the force has no direction or hardly grows."""
+    normal = initial_normal(signals, piece.start, piece.peak)
+    if normal is None or piece.peak - piece.start < 3:
+        return None
+    rows = slice(piece.start, piece.peak + 1)
+    u = -(signals.position[rows] - signals.position[piece.start]) @ normal
+    push = signals.raw_force[rows] @ normal
+    block = max(1, len(u) // _ROWS)
+    count = len(u) // block
+    u, push = (v[-count * block :].reshape(count, block).mean(axis=1) for v in (u, push))
+    return Loading(u, push, signals.position[piece.start], normal)
+
+
+def in_place(signals: Signals, piece: Piece) -> Piece | None:
+    """The piece as long as the tip goes in and out rather than along; None where it slides into its peak."""
+    start = _goes_in(signals, piece, -1)
+    end = _goes_in(signals, piece, 1)
+    if signals.magnitude[start : piece.peak + 1].min() > (1 - _RISES) * signals.magnitude[piece.peak]:
+        return None
+    return dataclasses.replace(piece, start=start, end=end)
+
+
+def _goes_in(signals: Signals, piece: Piece, way: int) -> int:
+    """How far from its peak, backwards (-1) or forwards (1), a piece goes in or out: the sample to cut at."""
+    normal = signals.force[piece.peak] / signals.magnitude[piece.peak]
+    step = 0.5 * _STEP_RADII * signals.recording.tip_radius_m
+    last = piece.start if way < 0 else piece.end - 1
+    anchor = piece.peak
+    for i in range(piece.peak, last + way, way):
+        moved = signals.position[i] - signals.position[anchor]
+        if moved @ moved < step**2:
+            continue
+        deep = abs(float(moved @ normal))
+        if moved @ moved > (1 + _SIDEWAYS**2) * deep**2:
+            return anchor if way < 0 else anchor + 1
+        anchor = i
+    return piece.start if way < 0 else piece.end
+
+
+def first_touches(loadings: Sequence[Loading], noise_n: float) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) m, travel at which each loading would have met the surface, and its standard error.
+
+    Each loading's own law where it has four rows; then the law that all of them share, which a single row is
+    enough for, both weighed by their errors.
+    """
+    own = [_own(each, noise_n) for each in loadings]
+    known = [r for r in own if r is not None and np.isfinite(r.u0_error_m)]
+    if not known:
+        raise ValueError("no loading has four rows")
+    # a law's two stiffnesses trade with one another, so laws are ranked by how deep they go at one force
+    force = float(np.median([each.push.max() for each in loadings]))
+    log = np.log([_depth(r, force) for r in known])
+    weight = np.array([max(r.u0_error_m, 1e-9) for r in known]) ** -2.0
+    order = np.argsort(log)
+    total = np.cumsum(weight[order])
+    law = known[order[np.searchsorted(total, 0.5 * total[-1])]]
+    differ = max(_ALIKE, float(spread(log)) if len(log) > 3 else 0.0)
+    shift, error = np.empty(len(loadings)), np.empty(len(loadings))
+    for i, (each, rise) in enumerate(zip(loadings, own, strict=True)):
+        values = [_shared(each, law, differ, noise_n)]
+        if rise is not None and np.isfinite(rise.u0_error_m):
+            values.append((rise.u0_m, max(rise.u0_error_m, 1e-9)))
+        at, sd = np.array(values).T
+        share = sd**-2.0 / (sd**-2.0).sum()
+        shift[i] = share @ at
+        # what the two disagree by is an error too
+        error[i] = np.hypot((sd**-2.0).sum() ** -0.5, float(np.sqrt(share @ (at - shift[i]) ** 2)))
+    return shift, error
+
+
+def _own(each: Loading, noise_n: float) -> Rise | None:
+    if len(each.u) < 4 or np.ptp(each.u) <= 0:
+        return None
+    top = max(float(each.push.max()), 1e-12)
+    # F^(2/3) is nearly straight: its zero is a guess
+    root = np.cbrt(np.maximum(each.push, 0) / top) ** 2
+    high = root > 0.2
+    slope, level = (
+        np.polyfit(each.u[high], root[high], 1) if high.sum() > 1 and np.ptp(each.u[high]) > 0 else (0, 0)
+    )
+    guess = -level / slope if slope > 0 else each.u.min()
+    guess = float(np.clip(guess, each.u.max() - 10 * np.ptp(each.u), each.u.max() - 0.05 * np.ptp(each.u)))
+    return fit_rise(each.u, each.push, noise_n, guess_m=guess)
+
+
+def _depth(law: Rise, push: float | np.ndarray) -> np.ndarray:
+    """m, how deep a law is at forces of N."""
+    return np.asarray((push / law.hertz) ** (2 / 3) + law.compliance * push)
+
+
+def _shared(each: Loading, law: Rise, differ: float, noise_n: float) -> tuple[float, float]:
+    """First touch by a given law, from the rows whose force is above its noise; its standard error."""
+    used = each.push > max(3 * noise_n, 0.1 * float(each.push.max()))
+    if not used.any():
+        return float(each.u.min()), float(np.ptp(each.u)) + 1e-3
+    push, u = each.push[used], each.u[used]
+    depth = _depth(law, push)
+    slope = (_depth(law, 1.01 * push) - depth) / (0.01 * push)
+    by_noise = noise_n * float(np.median(slope)) / np.sqrt(len(push))
+    return float(np.median(u - depth)), float(np.hypot(by_noise, differ * float(np.median(depth))))
+
+
+def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Found], list[tuple[int, int, str]]]:
+    """The cycles of one recording as presses, and the pieces that are none: (start, end, reason)."""
+    kept, loadings, unused = [], [], []
+    for piece in pieces:
+        steady = in_place(signals, piece)
+        each = None if steady is None else loading(signals, steady)
+        if steady is None or each is None:
+            why = "slides into its peak" if steady is None else "shows no rise of force with depth"
+            unused.append((piece.start, piece.end, why))
+        else:
+            kept.append(steady)
+            loadings.append(each)
+    if not kept:
+        return [], unused
+    noise = signals.noise_n / np.sqrt(max(1, np.median([p.peak - p.start for p in kept]) // _ROWS))
+    try:
+        shift, error = first_touches(loadings, float(noise))
+    except ValueError:
+        return [], [*unused, *((p.start, p.end, "has too few samples") for p in kept)]
+    found = []
+    for piece, each, at, sd in zip(kept, loadings, shift, error, strict=True):
+        # straight over the peak: the tip may come from beside
+        peak = signals.position[piece.peak]
+        deep = -(peak - each.origin) @ each.normal - at
+        centre = peak + deep * each.normal
+        found.append(Found(piece.start, piece.peak, piece.end, centre, each.normal, float(sd), True))
+    return found, unused

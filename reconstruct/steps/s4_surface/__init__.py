@@ -1,0 +1,1 @@
+"""The surface through base and first touches (section 2.2)."""

@@ -1,0 +1,387 @@
+"""The surface of a touched object: candidates from `reconstruct.shapes`, one chosen with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechanics.errors import SurfaceError
+from mechanics.nearest import distance
+from mechanics.options import option
+from mechanics.progress import Progress, silent
+from reconstruct.shapes.balance import balanced
+from reconstruct.shapes.candidates import FITTED, HiddenOutlineError, first_guesses
+from reconstruct.shapes.drawing import draw
+from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence, support_axes
+from reconstruct.shapes.fit import Seen, fit
+from reconstruct.shapes.hull import hull_surface
+from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
+from reconstruct.shapes.kriging import Explained, explain
+from reconstruct.shapes.polyhedron import refine
+from reconstruct.shapes.tangent import tangent_surface
+
+if TYPE_CHECKING:
+    import trimesh
+
+    from reconstruct.steps.s3_contacts.contacts import Exploration
+
+SURFACES = ("auto", "hull", "tangent", "implicit", *FITTED)
+
+_CORRECTED = 6
+"""So many of the best shapes are tried with a free residual field as well."""
+
+_DIRECTION_RAD, _LEAST_LIKELY = np.radians(15.0), 3.0
+"""Standard deviation of a first force's direction; what a place can cost at most, for a slip is no proof."""
+
+_POOR_M = 0.0012
+"""Above this held-out error of the best shape, the implicit surface is tried as well."""
+
+_LOOSE_M, _LOOSE = 0.0006, 3.0
+"""A first touch whose own error is beyond this, and so many times the median's, places no surface."""
+
+_BELOW_M = 1e-4
+"""No surface reaches this far below the support it stands on."""
+
+Drawn = tuple[np.ndarray, np.ndarray, np.ndarray]
+Redraw = Callable[[float], tuple[np.ndarray, np.ndarray]]
+
+
+@dataclass(frozen=True)
+class SurfaceOptions:
+    """Which surface, and how finely it is drawn."""
+
+    surface: str = option(
+        "auto", "shape of the object; auto weighs all by held-out touches", choices=SURFACES
+    )
+    surface_spacing_m: float = option(
+        0.003, "edge length of the surface's triangles", unit="m", flag="--surface-spacing"
+    )
+
+
+@dataclass(frozen=True)
+class Surface:
+    """A closed surface standing on the support; device frame, m.
+
+    vertices: (n, 3). triangles: (m, 3), outward by the right-hand rule, base included. uncertainty_m: (n,)
+    standard deviation of the surface along its normal at each vertex. support_point, support_normal: (3,).
+    method: the shape's name, with '+' where a free field corrects it. reason: why it was chosen, in words.
+    parameters: what the shape's fit found (support frame). held_out_m: rms error of touches that were held
+    out, place by place, for every shape tried. bracket_m3: volumes of the hull of the touches and of the
+    tangent planes' intersection, between which a convex object's lies. redraw: the same surface with
+    triangles of another edge length (m), of the same volume; None where it has no finer truth.
+    """
+
+    vertices: np.ndarray
+    triangles: np.ndarray
+    uncertainty_m: np.ndarray
+    support_point: np.ndarray
+    support_normal: np.ndarray
+    method: str
+    reason: str
+    parameters: Mapping[str, float] = field(default_factory=dict)
+    held_out_m: Mapping[str, float] = field(default_factory=dict)
+    bracket_m3: tuple[float, float] = (float("nan"), float("nan"))
+    redraw: Redraw | None = field(default=None, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        if not self.mesh.is_watertight:
+            raise SurfaceError(
+                f"the {self.method} surface is open: touch more places or choose another --surface"
+            )
+        if not self.mesh.volume > 0:
+            raise SurfaceError(f"the {self.method} surface holds no volume: touch more places")
+
+    @cached_property
+    def mesh(self) -> trimesh.Trimesh:
+        """The surface for trimesh (volume, sampling), vertices in order."""
+        import trimesh
+
+        return trimesh.Trimesh(self.vertices, self.triangles, process=False)
+
+    @cached_property
+    def frame(self) -> np.ndarray:
+        """(3, 3), rows: unit vectors of a frame on the support, right-handed, the third along its normal."""
+        return support_axes(self.support_normal)
+
+    @property
+    def volume_m3(self) -> float:
+        """Enclosed volume."""
+        return float(self.mesh.volume)
+
+
+def evidence_of(exploration: Exploration) -> Evidence:
+    """What an exploration says about the shape: of touches known by far less well than most nothing.
+
+    Raises SurfaceError where it has no base outline.
+    """
+    boundary, presses = exploration.boundary, exploration.presses
+    if boundary is None:
+        raise SurfaceError(
+            "the recording has no base outline: trace the base or give a model whose base stands in"
+        )
+    error = presses.onset_error_m
+    fourth = np.sort(error)[:LEAST_TOUCHES][-1]
+    told = error <= max(_LOOSE_M, _LOOSE * float(np.median(error)), fourth)
+    return Evidence(
+        support_point=boundary.support_point,
+        support_normal=boundary.support_normal,
+        outline=boundary.outline,
+        outline_centres=boundary.centres,
+        centres=presses.centre[told],
+        normals=presses.contact_normal[told],
+        centre_error_m=error[told],
+        site=presses.site[told],
+        tip_radius_m=exploration.recording.tip_radius_m,
+    )
+
+
+def reconstruct_surface(
+    evidence: Evidence,
+    options: SurfaceOptions | None = None,
+    progress: Progress = silent,
+    *,
+    shaped: Callable[[Surface], object] | None = None,
+) -> Surface:
+    """The surface that the touches and the base outline speak for.
+
+    shaped: called once its shape is there and its uncertainty and bounds are not, so that a mesher can begin.
+    Raises SurfaceError where no closed surface can be made.
+    """
+    found = _found(evidence, options or SurfaceOptions(), progress, shaped or (lambda surface: None))
+    progress("surface", 1.0)
+    return found
+
+
+def _found(
+    evidence: Evidence, options: SurfaceOptions, progress: Progress, shaped: Callable[[Surface], object]
+) -> Surface:
+    if options.surface in ("hull", "tangent"):
+        shells = {"hull": hull_surface, "tangent": tangent_surface}
+        # finer than the facets need, so that the gap between the bounds is told inside them as well
+        vertices, triangles = refine(*shells[options.surface](evidence), 2 * options.surface_spacing_m)
+        gap = _bracket_gap(evidence, vertices, options.surface)
+        return _surface(
+            evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bounds(evidence)
+        )
+    if options.surface == "implicit":
+        return _implicit(evidence, options, "asked for")
+    try:
+        tried = try_shapes(evidence, options.surface, progress)
+    except HiddenOutlineError:
+        if options.surface != "auto":
+            raise
+        return _implicit(
+            evidence, options, "no point sees the whole base outline, which the other shapes need"
+        )
+    best, (vertices, triangles, deviation) = _best_drawn(tried, options.surface_spacing_m)
+    error = held_out_error(best)
+    if options.surface == "auto" and error > _POOR_M:
+        why = f"no shape explains the touches ({best.name}: {1e3 * error:.2f} mm)"
+        # one that is open is no rival
+        with suppress(SurfaceError):
+            implicit = _implicit(evidence, options, why)
+            if implicit.held_out_m["implicit"] < 0.8 * error:
+                return implicit
+
+    def redraw(spacing_m: float) -> tuple[np.ndarray, np.ndarray]:
+        coarse = draw(best, spacing_m)[:2]
+        return evidence.to_device(balanced(coarse, (vertices, triangles))), coarse[1]
+
+    surface = _surface(
+        evidence,
+        vertices,
+        triangles,
+        deviation,
+        best.name,
+        "asked for" if options.surface != "auto" else reason(best, tried),
+        {p.label: p.value for p in best.shape.parameters},
+        {e.name: held_out_error(e) for e in sorted(tried, key=score)},
+        redraw=redraw,
+    )
+    shaped(surface)
+    facing = best.feet[1][: len(evidence.centres)] @ evidence.axes
+    return replace(
+        surface,
+        uncertainty_m=np.hypot(deviation, _spread(vertices, best, tried)),
+        bracket_m3=bounds(replace(evidence, normals=facing)),
+    )
+
+
+def _best_drawn(tried: Sequence[Explained], spacing_m: float) -> tuple[Explained, Drawn]:
+    """The shape with the best score of those that can be drawn, and its drawing (reconstruct.shapes.drawing).
+
+    A field beside a shape may run away where nothing was touched: below the support, or far beyond all that
+    was. Raises SurfaceError where every one does.
+    """
+    for each in sorted(tried, key=score, reverse=True):
+        drawn = draw(each, spacing_m)
+        touched = np.vstack([each.seen.centres, each.seen.outline])
+        size = np.ptp(touched, axis=0).max()
+        beyond = np.maximum(drawn[0] - touched.max(axis=0), touched.min(axis=0) - drawn[0]).max()
+        if beyond < size and drawn[0][:, 2].min() > -_BELOW_M:
+            return each, drawn
+    raise SurfaceError("no shape stays near what was touched: touch more places, all round the object")
+
+
+def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:
+    vertices, triangles = implicit_surface(evidence, options.surface_spacing_m)
+    error = implicit_held_out(evidence, Seen.of(evidence))
+    deviation = implicit_deviation(evidence, vertices)
+    text = f"{why}; predicts touches at places left out within {1e3 * error:.2f} mm"
+    return _surface(
+        evidence,
+        vertices,
+        triangles,
+        deviation,
+        "implicit",
+        text,
+        None,
+        {"implicit": error},
+        bounds(evidence),
+    )
+
+
+def shape_table(surface: Surface) -> dict[str, Any]:
+    """What a model keeps of its surface ([shape] in model.toml): method and reason, volumes, deviations.
+
+    sd_median_m, sd_p95_m, sd_greatest_m: of the standard deviation over the vertices above the base.
+    hull_volume_m3, tangent_volume_m3: bounds of a convex object. held_out_m: by shape tried. parameters: of
+    the shape, in the support's frame.
+    """
+    height = (surface.vertices - surface.support_point) @ surface.support_normal
+    deviation = surface.uncertainty_m[height > 1e-6]
+    low, high = surface.bracket_m3
+    bounds = {"hull_volume_m3": low, "tangent_volume_m3": high}
+    return {
+        "surface": surface.method,
+        "reason": surface.reason,
+        "volume_m3": surface.volume_m3,
+        **{name: value for name, value in bounds.items() if np.isfinite(value)},
+        "sd_median_m": float(np.median(deviation)),
+        "sd_p95_m": float(np.percentile(deviation, 95)),
+        "sd_greatest_m": float(deviation.max()),
+        "held_out_m": dict(surface.held_out_m),
+        "parameters": dict(surface.parameters),
+    }
+
+
+def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = silent) -> list[Explained]:
+    """Every shape (or those named `which`), fitted, without and with a free residual field."""
+    seen = Seen.of(evidence)
+    guesses = [g for g in first_guesses(evidence, seen) if which in ("auto", g.name)]
+    if not guesses:
+        raise SurfaceError(f"the base outline does not allow a {which}: use --surface auto")
+    tried = []
+    for k, guess in enumerate(guesses):
+        tried.append(explain(*fit(guess, seen), seen, free=False))
+        progress("surface", (k + 1) / (len(guesses) + 3))
+    for plain in sorted(tried, key=score)[-_CORRECTED:]:
+        free = explain(plain.shape, plain.lean_m, seen, free=True)
+        # a free field follows systematic errors of the touches as well: it must predict places it has not
+        # seen
+        if held_out_error(free) < held_out_error(plain):
+            tried.append(free)
+    return tried
+
+
+def held_out_error(explained: Explained) -> float:
+    """Root mean square error (m) of touches at held-out places."""
+    return float(np.sqrt(np.mean(explained.held_out[0] ** 2)))
+
+
+def score(explained: Explained) -> float:
+    """Log density of the held-out places and of the forces' directions, less one for each idea: an idea must
+    earn its keep."""
+    return float(explained.held_out[1].sum()) + direction_score(explained) - explained.complexity
+
+
+def direction_score(explained: Explained) -> float:
+    """Log density, place by place, of the first forces' directions about the normals of the shape.
+
+    They are wrong by some 6 degrees, so they place no surface; but a wall touched near its rim pushes
+    sideways, where a shape whose top ends below that touch would have the tip on its edge and push upwards.
+    """
+    seen = explained.seen
+    along = np.einsum("ij,ij->i", seen.normals, explained.feet[1][: len(seen.normals)])
+    lost = np.minimum((np.arccos(np.clip(along, -1, 1)) / _DIRECTION_RAD) ** 2 / 2, _LEAST_LIKELY)
+    return -float(sum(lost[seen.sites == k].mean() for k in np.unique(seen.sites)))
+
+
+def reason(best: Explained, tried: list[Explained]) -> str:
+    """Why this shape, in one sentence."""
+    error = 1e3 * held_out_error(best)
+    others = [e for e in tried if e.shape.name != best.shape.name]
+    text = f"predicts touches at places left out within {error:.2f} mm"
+    if others:
+        second = max(others, key=score)
+        error = 1e3 * held_out_error(second)
+        text += f" (next best, {second.name}: {error:.2f} mm)"
+    return text
+
+
+def bounds(evidence: Evidence) -> tuple[float, float]:
+    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or
+    nan)."""
+    import trimesh
+
+    low = float(trimesh.Trimesh(*hull_surface(evidence), process=False).volume)
+    try:
+        high = float(trimesh.Trimesh(*tangent_surface(evidence), process=False).volume)
+    except SurfaceError:
+        high = float("nan")
+    return low, high
+
+
+def _spread(vertices: np.ndarray, best: Explained, tried: list[Explained]) -> np.ndarray:
+    """(n,) m: how far the other shapes lie from this one, weighted by how well they predict."""
+    square = np.zeros(len(vertices))
+    total = 1.0
+    for other in tried:
+        weight = np.exp(score(other) - score(best))
+        if other is best or weight < 0.003:
+            continue
+        shell = draw(other, 0.005)[:2]
+        square += weight * distance(*shell, vertices) ** 2
+        total += weight
+    return np.sqrt(square / total)
+
+
+def _bracket_gap(evidence: Evidence, vertices: np.ndarray, which: str) -> np.ndarray:
+    """(n,) m: half the distance to the other bound, as a standard deviation of a bound."""
+    try:
+        other = tangent_surface(evidence) if which == "hull" else hull_surface(evidence)
+    except SurfaceError:
+        return np.full(len(vertices), 0.002)
+    return distance(*other, vertices) / 2
+
+
+def _surface(
+    evidence: Evidence,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    uncertainty: np.ndarray,
+    method: str,
+    why: str,
+    parameters: Mapping[str, float] | None = None,
+    held_out: Mapping[str, float] | None = None,
+    bracket: tuple[float, float] = (float("nan"), float("nan")),
+    redraw: Redraw | None = None,
+) -> Surface:
+    return Surface(
+        vertices=evidence.to_device(vertices),
+        triangles=triangles,
+        uncertainty_m=uncertainty,
+        support_point=evidence.origin,
+        support_normal=evidence.axes[2],
+        method=method,
+        reason=why,
+        parameters=parameters or {},
+        held_out_m=held_out or {},
+        bracket_m3=bracket,
+        redraw=redraw,
+    )

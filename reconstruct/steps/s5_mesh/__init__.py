@@ -1,0 +1,1 @@
+"""Tetrahedra inside the surface (section 2.2)."""

@@ -1,0 +1,225 @@
+"""Tetrahedra inside a surface: base exactly on the support and fixed, everything else touchable (section
+2.2)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from mechanics.errors import MeshError
+from mechanics.nearest import closest, distance, sample
+from mechanics.options import option
+from mechanics.progress import Progress, silent
+from mechanics.tetmesh import FACES, TetMesh, lone_faces
+from reconstruct.shapes.voxels import voxel_surface
+from reconstruct.steps.s4_surface.surface import Surface
+from reconstruct.steps.s5_mesh.relaxation import radius_edge_ratio, relaxed
+from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
+
+_SAMPLES = 4000
+_TRIES = 3
+_LOST = 0.02  # of the volume, what may be left out because nothing holds it
+_PITCH = 0.8  # of sigma, a voxel: corners are cut by as much, and the mesh keeps to it within 0.4
+
+
+@dataclass(frozen=True)
+class MeshingOptions:
+    """Size and fidelity of the tetrahedra."""
+
+    mesh_size_m: float = option(0.010, "edge length l of the tetrahedra", unit="m", flag="--mesh-size")
+    surface_distance_m: float = option(
+        0.002, "bound sigma on the distance between mesh and surface", unit="m", flag="--surface-distance"
+    )
+    radius_edge_ratio: float = option(2.0, "bound rho on circumradius over shortest edge")
+    mesh_source: str = option(
+        "auto",
+        "what is meshed: the surface, or its voxels; auto: voxels in the paper's mode, else the surface",
+        choices=("auto", "surface", "voxels"),
+    )
+
+
+@dataclass(frozen=True)
+class MeshReport:
+    """Achieved quality. radius_edge_ratio: (m,). surface_distance_m: (k,) of samples of mesh and surface,
+    both ways.
+
+    edge_m: (e,) edge lengths. volume_m3 of the mesh; surface_volume_m3 of the surface it fills.
+    """
+
+    radius_edge_ratio: np.ndarray
+    surface_distance_m: np.ndarray
+    edge_m: np.ndarray
+    volume_m3: float
+    surface_volume_m3: float
+
+
+@dataclass(frozen=True)
+class Meshing:
+    """A linear mesh in the device frame, its quality and the surface's uncertainty (n,) m at its nodes."""
+
+    mesh: TetMesh
+    report: MeshReport
+    shape_uncertainty_m: np.ndarray
+
+
+def mesh_surface(
+    surface: Surface, options: MeshingOptions | None = None, progress: Progress = silent
+) -> Meshing:
+    """Fill the surface with linear tetrahedra (`mesh.quadratic()` adds mid-edge nodes), and judge them.
+
+    Raises MeshError where the mesher fails or the mesh does not stand on the support.
+    """
+    return as_meshed(fill(surface, options, progress), surface)
+
+
+def fill(surface: Surface, options: MeshingOptions | None = None, progress: Progress = silent) -> TetMesh:
+    """The mesh of `mesh_surface` alone, which needs the surface's shape and not its uncertainty."""
+    options = options or MeshingOptions()
+    if not options.mesh_size_m > 0:
+        raise MeshError(f"--mesh-size is {options.mesh_size_m} m; it must be greater than 0")
+    progress("meshing", 0.0)
+    up, origin = surface.support_normal, surface.support_point
+    sigma = options.surface_distance_m
+    lowest = float(((surface.vertices - origin) @ up).min())
+    if abs(lowest) > 0.1 * sigma:
+        raise MeshError(f"the surface ends {1e3 * lowest:.2f} mm above the support; it must stand on it")
+    vertices, triangles = _input(surface, options)
+    voxels = options.mesh_source == "voxels"
+    # the envelope keeps volume and edges; voxels are rough, and a wider one smooths that away
+    envelope = 0.4 * sigma if voxels else min(0.15 * sigma, 0.03 * options.mesh_size_m)
+    made: list[tuple[float, TetMesh]] = []
+    for rest in reversed(range(_TRIES)):
+        progress("meshing", 0.8 * (1 - (rest + 1) / _TRIES))
+        points, cells = tetrahedralize(
+            vertices, triangles, edge_m=options.mesh_size_m, envelope_m=envelope, simplify=voxels
+        )
+        # a tetrahedron may be flattened, or beyond what relaxing mends; the mesher's next mesh is another
+        try:
+            mesh = _standing(points, cells, surface, envelope, options.radius_edge_ratio)
+        except MeshError:
+            if not rest and not made:
+                raise
+            continue
+        worst = float(radius_edge_ratio(mesh.points[mesh.tetrahedra]).max())
+        made.append((worst, mesh))
+        if worst <= options.radius_edge_ratio:
+            break
+    progress("meshing", 1.0)
+    return min(made, key=lambda each: each[0])[1]
+
+
+def as_meshed(mesh: TetMesh, surface: Surface) -> Meshing:
+    """A mesh that was there already, as what `mesh_surface` returns."""
+    return Meshing(mesh, quality(mesh, surface), uncertainty_at(mesh, surface))
+
+
+def _standing(
+    points: np.ndarray, cells: np.ndarray, surface: Surface, envelope: float, ratio: float
+) -> TetMesh:
+    """The mesh put on its support and relaxed; raises MeshError where that leaves a flat tetrahedron."""
+    up, origin = surface.support_normal, surface.support_point
+    points, cells, fixed = _stand(points, cells, origin, up, 1.01 * envelope + 1e-6)
+    on_surface = np.zeros(len(points), dtype=bool)
+    on_surface[_boundary(cells)] = True
+    points = relaxed(points, cells, ratio, on_surface=on_surface, fixed=fixed, up=up, limit_m=envelope)
+    return TetMesh(points, cells, fixed, on_surface & ~fixed)
+
+
+def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:
+    """What the mesher is given, device frame: a drawing no finer than the tetrahedra need, or the voxels'
+    surface."""
+    frame = surface.frame
+    if options.mesh_source == "voxels":
+        flat = (surface.vertices - surface.support_point) @ frame.T
+        vertices, triangles = voxel_surface(flat, surface.triangles, _PITCH * options.surface_distance_m)
+        return vertices @ frame + surface.support_point, triangles
+    if surface.redraw is None:
+        return surface.vertices, surface.triangles
+    return surface.redraw(options.mesh_size_m)
+
+
+def _boundary(cells: np.ndarray) -> np.ndarray:
+    return cells[:, FACES].reshape(-1, 3)[lone_faces(cells)]
+
+
+def _stand(
+    points: np.ndarray, cells: np.ndarray, origin: np.ndarray, up: np.ndarray, reach_m: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes of downward faces within `reach_m` of the support, put on it: points, tetrahedra, which nodes
+    those are.
+
+    Tetrahedra that this flattens onto the support are left out, and nodes that no tetrahedron uses.
+    """
+    faces = _boundary(cells)
+    corner = points[faces]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    height = (points - origin) @ up
+    base = (np.abs(height[faces]) < reach_m).all(axis=1) & (normal @ up < -0.7)
+    if not base.any():
+        raise MeshError("the mesh has no face on the support: the surface does not stand on it")
+    fixed = np.zeros(len(points), dtype=bool)
+    fixed[faces[base]] = True
+    points = points.copy()
+    points[fixed] -= height[fixed, None] * up
+    cells = _held(points, cells[~fixed[cells].all(axis=1)], fixed)
+    used = np.unique(cells)
+    index = np.full(len(points), -1)
+    index[used] = np.arange(len(used))
+    return points[used], index[cells], fixed[used]
+
+
+def _held(points: np.ndarray, cells: np.ndarray, fixed: np.ndarray) -> np.ndarray:
+    """The tetrahedra (m, 4) of the largest piece and of those that stand on the base themselves.
+
+    Pieces hang together by faces. One that nothing holds (a drop of the drawing beside it, what hung on
+    flattened tetrahedra) would leave the stiffness singular. Raises MeshError where that is more than
+    _LOST of the volume.
+    """
+    faces = np.sort(cells[:, FACES].reshape(-1, 3), axis=1)
+    owner = np.repeat(np.arange(len(cells)), 4)
+    order = np.lexsort(faces.T)
+    same = (np.diff(faces[order], axis=0) == 0).all(axis=1)
+    pair = owner[order][:-1][same], owner[order][1:][same]
+    graph = coo_matrix((np.ones(len(pair[0])), pair), shape=(len(cells), len(cells)))
+    pieces, piece = connected_components(graph, directed=False)
+    if pieces == 1:
+        return cells
+    edges = points[cells[:, 1:]] - points[cells[:, :1]]
+    volume = np.bincount(piece, np.abs(np.linalg.det(edges)) / 6)
+    standing = [len(np.unique(cells[piece == k][fixed[cells[piece == k]]])) >= 3 for k in range(pieces)]
+    kept = np.array(standing) | (np.arange(pieces) == np.argmax(volume))
+    lost = float(volume[~kept].sum() / volume.sum())
+    if lost > _LOST:
+        raise MeshError(f"the surface is in pieces: {100 * lost:.0f} % of it does not stand on the support")
+    return cells[kept[piece]]
+
+
+def quality(mesh: TetMesh, surface: Surface) -> MeshReport:
+    """Radius-edge ratios, edge lengths, and distances between the mesh's boundary and the surface."""
+    corner = mesh.points[mesh.tetrahedra[:, :4]]
+    ratio = radius_edge_ratio(corner)
+    edges = np.linalg.norm(corner[:, [0, 1, 2, 0, 1, 2]] - corner[:, [1, 2, 0, 3, 3, 3]], axis=2)
+    shell, given = (mesh.points, mesh.surface[:, :3]), (surface.vertices, surface.triangles)
+    out = distance(*given, sample(*shell, _SAMPLES))
+    back = distance(*shell, sample(*given, _SAMPLES))
+    return MeshReport(
+        radius_edge_ratio=ratio,
+        surface_distance_m=np.concatenate([out, back]),
+        edge_m=edges.ravel(),
+        volume_m3=float(mesh.volumes.sum()),
+        surface_volume_m3=surface.volume_m3,
+    )
+
+
+def uncertainty_at(mesh: TetMesh, surface: Surface) -> np.ndarray:
+    """(n,) the surface's uncertainty at each node: of the closest place on it; 0 on the base's nodes
+    inside."""
+    found = np.zeros(len(mesh.points))
+    nodes = np.flatnonzero(mesh.touchable)
+    _, triangle, weight = closest(surface.vertices, surface.triangles, mesh.points[nodes])
+    found[nodes] = (weight * surface.uncertainty_m[surface.triangles[triangle]]).sum(axis=1)
+    return found

@@ -1,0 +1,231 @@
+"""A field of Young's modulus from presses: each press's own modulus, and how it answers to the elements'.
+
+Every press is fitted by itself, its first touch a nuisance (`press_fit`); what its modulus says of
+which element follows from the compliance's sensitivities (mechanics.field_response); the likeliest smooth
+field of all presses follows from there (mechanics.smooth_field). The object stays of one modulus where the
+evidence asks for no more: a field must be likelier than places that scatter at random, and predict places
+that were left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from mechanics.effects import stiffness_field
+from mechanics.field_response import shares_of, tips_of
+from mechanics.model import Model
+from mechanics.options import option
+from mechanics.patch import half_space_compliance
+from mechanics.places import Places
+from mechanics.presses import Presses
+from mechanics.sites import TouchSites, touch_sites
+from mechanics.smooth_field import (
+    Estimate,
+    Shares,
+    SmoothField,
+    correlation,
+    estimate,
+    lengths_of,
+    places_of,
+)
+from mechanics.touch import forces_at
+from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
+
+LEAST_GAIN = 4.0
+"""Log likelihood by which a field must be likelier than places that scatter at random ..."""
+LEAST_EXPLAINED = 0.2
+"""... and the share of the places' scatter that it must predict where they were left out."""
+LEAST_FELT = 0.05
+"""... and by how much the places' moduli must differ by it (standard deviation of ln E): less than that shape
+and mesh bring about as well."""
+LEAST_SITES = 6
+REFITS = 1
+LAW_ERROR = 0.03
+LEVEL_BIAS = 0.02
+"""Standard error of the level that no press tells: law and mesh, as of a global modulus
+(reconstruct.steps.s7_modulus.modulus.ModulusOptions.law_bias)."""
+DENT_DEPTH_SD = 0.25
+"""In tip radii: a dent feels a volume, of which no press tells how deep its middle lies; standard deviation
+from the depth at which its modulus is taken (mechanics.smooth_field). Chosen on slabs 1 to 3 of 'palpate
+bench field'."""
+
+
+@dataclass(frozen=True)
+class PressModuli:
+    """Each press's own modulus and what it tells of. fit: by the law. answer: (p,) m. shares: of the field.
+    data, sites, noise_n: what was fitted.
+
+    usable: (p,) bool, presses whose fit says anything.
+    """
+
+    fit: LawFit
+    answer: np.ndarray
+    shares: Shares
+    site: np.ndarray
+    places: Places
+    data: Presses
+    sites: TouchSites
+    noise_n: float
+
+    @property
+    def usable(self) -> np.ndarray:
+        e, error = self.fit.modulus_pa, self.fit.relative_error
+        return np.isfinite(e) & (e > 0) & np.isfinite(error) & (error < 1) & (self.fit.rows > 10)
+
+    def beside(self, field: SmoothField) -> LawFit:
+        """Every press's modulus as if the object were of one, from a fit with a field where it is: solved in
+        the elements, less what the field is to first order."""
+        there = with_field(self.sites, self.places, field)
+        radius, fit = self.data.tip_radius_m, self.fit
+        found = fit_law(
+            self.data, there.sites, radius, fit.law, fit.depth_m, LAW_ERROR, self.noise_n, start=fit
+        )
+        told = self.shares.weight @ field.at(self.shares.nodes)
+        return replace(found, modulus_pa=found.modulus_pa / there.ratio * np.exp(told))
+
+
+def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
+    """The presses' places on a model of one modulus, where they are solved as touch sites already."""
+    frame = presses.frame
+    far = np.einsum("pij,pjk,plk->pil", frame, sites.far, frame)
+    return Places(model, presses.point, presses.normal, frame, far, sites.curvature)
+
+
+def press_moduli(
+    presses: Presses, sites: TouchSites, places: Places, law: str, noise_n: float
+) -> PressModuli:
+    """Of presses that touch at `sites` and `places` (one a press, in order). noise_n: N, of a raw sample."""
+    data, radius = press_data(presses), presses.tip_radius_m
+    fit = fit_law(data, sites, radius, law, float(presses.depth_m.max()) + 1e-3, LAW_ERROR, noise_n)
+    answer = far_sensitivity(data, sites, fit, radius, LAW_ERROR, noise_n)
+    return PressModuli(fit, answer, shares_of(places, answer), presses.site, places, data, sites, noise_n)
+
+
+def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
+    """The likeliest field of the presses `seen` (numbers); None where too few places tell.
+
+    Shares of the compliance are first order in the field: where it is asked for, the presses are fitted anew
+    beside it.
+    """
+    found = _likeliest(own, seen)
+    for _ in range(REFITS):
+        if found is None or not asked_for(found):
+            break
+        found = _likeliest(replace(own, fit=own.beside(found.field)), seen)
+    return found
+
+
+def _likeliest(own: PressModuli, seen: np.ndarray) -> Estimate | None:
+    seen = seen[own.usable[seen]]
+    sites, first = np.unique(own.site[seen], return_index=True)
+    if len(sites) < LEAST_SITES:
+        return None
+    touched = tips_of(own.places)[seen[first]]
+    nodes = own.shares.nodes
+    elements = nodes[: own.shares.weight.shape[1] - len(own.site)]
+    shares = Shares(nodes, own.shares.weight[seen])
+    return estimate(
+        np.log(own.fit.modulus_pa[seen]), own.fit.relative_error[seen], own.site[seen], shares,
+        places_of(touched, elements), lengths_of(touched, elements),
+    )  # fmt: skip
+
+
+def asked_for(found: Estimate | None) -> bool:
+    """Whether the evidence asks for a field."""
+    return (
+        found is not None
+        and found.gain > LEAST_GAIN
+        and found.explained > LEAST_EXPLAINED
+        and found.felt > LEAST_FELT
+    )
+
+
+def map_sd(found: Estimate, tip_radius_m: float) -> np.ndarray:
+    """(c,) standard deviation of ln E at a field's places: the estimate's, the level's that no press tells,
+    and that of the depth at which a dent feels."""
+    apart = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, DENT_DEPTH_SD * tip_radius_m]])
+    alike = correlation(apart, apart, found.prior.length_m)[0, 1]
+    deep = found.prior.log_sd**2 * 2 * (1 - alike)
+    return np.sqrt(found.sd**2 + LEVEL_BIAS**2 + deep)
+
+
+@dataclass(frozen=True)
+class FieldSites:
+    """Touch sites of an object with a field. sites: their far fields over the modulus under each tip. ratio:
+    (p,) of that modulus over the object's."""
+
+    sites: TouchSites
+    ratio: np.ndarray
+
+    def unit_forces(self, presses: Presses, law: str, moved_m: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) N, device frame, for unit modulus of the object. moved_m: (p,) by how much earlier each
+        press meets the surface than it says."""
+        displacement = presses.displacement
+        if moved_m is not None:
+            displacement = displacement - (moved_m[:, None] * presses.normal)[presses.press]
+        force = forces_at(
+            self.sites, displacement, presses.starts, young_modulus_pa=1.0,
+            tip_radius_m=presses.tip_radius_m, law=law,
+        )  # fmt: skip
+        return force * self.ratio[presses.press][:, None]
+
+
+def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> FieldSites:
+    """The sites as they are with a field, solved with it in the elements; None: of one modulus."""
+    if field is None:
+        return FieldSites(sites, np.ones(len(sites)))
+    mesh, nu = places.model.mesh.quadratic(), sites.poisson_ratio
+    ratio = np.exp(field.at(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)))
+    points, normals = places.point[places.first], places.normal[places.first]
+    # of what is nearer than the load's width the modulus under the tip tells, not a sharper load
+    solved = touch_sites(mesh, points, normals, nu, ratio, curvature=0.0, tip_radius_m=_BLUNT_M)
+    half = np.array([half_space_compliance(n, nu, solved.patch_width_m) for n in solved.normals])
+    under = np.exp(field.at(tips_of(places)))
+    # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
+    scale = under[:, None, None]
+    far = scale * solved.far[places.place] + (scale - 1) * half[places.place]
+    width = solved.patch_width_m
+    return FieldSites(TouchSites(sites.points, sites.normals, sites.curvature, far, width, nu), under)
+
+
+_BLUNT_M = 1.0
+"""A tip that is wider than every load."""
+
+
+@dataclass(frozen=True)
+class FieldOptions:
+    """Whether an object may be of more than one modulus."""
+
+    field: str = option(
+        "homogeneous",
+        "a smooth field of the modulus: never, or where the presses ask for one",
+        choices=("homogeneous", "auto"),
+    )
+
+
+def fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Estimate | None:
+    """The likeliest field of the model's presses, which touch at `sites`, by the model's dent law; None where
+    they ask for none. noise_n: N, of a raw force component."""
+    presses = model.presses
+    places = places_at(model, presses, sites)
+    own = press_moduli(presses, sites, places, model.material.dent_law, noise_n)
+    found = fit_field(own, np.arange(len(presses)))
+    return found if asked_for(found) else None
+
+
+def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Model:
+    """The model with the field that its presses ask for; itself where they ask for none.
+
+    The modulus becomes that of the field's own level, with its 95 % interval.
+    """
+    found = fitted_field(model, sites, noise_n)
+    if found is None:
+        return model
+    modulus = float(np.exp(found.level))
+    share = float(np.exp(1.96 * np.hypot(found.level_sd, LEVEL_BIAS)))
+    levelled = model.with_material(
+        young_modulus_pa=modulus, young_modulus_ci95_pa=(modulus / share, modulus * share)
+    )
+    return stiffness_field.EFFECT.applied(levelled, stiffness_field.keys_of(found.field))
