@@ -21,9 +21,9 @@ from diagnose.search.misfit import misfit_of
 from diagnose.search.shape import site_stiffness_sd
 from diagnose.search.touches import LEAST_SITES, touches_of
 from diagnose.search.whiten import NuisanceOptions
+from diagnose.verdict.answer import Evidence
 from diagnose.verdict.conclusion import conclude
 from diagnose.verdict.result import Diagnosis
-from diagnose.verdict.verdict import Evidence
 from mechanics.effects.base import Role, Scope
 from mechanics.effects.registry import effects
 from mechanics.model import Model

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from diagnose.search.fit import settings_of
-from diagnose.verdict.verdict import Answer, Evidence
+from diagnose.verdict.answer import Answer, Evidence
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from diagnose.verdict.verdict import result as room
+from diagnose.verdict import result as room
 from palpate.results.base import Result
 from palpate.results.model import Model, model_of
 from palpate.results.recording import Recording, recording_of

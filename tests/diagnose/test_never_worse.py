@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.verdict.answer import Answer
 from diagnose.verdict.conclusion import Gaps, _never_worse
 from diagnose.verdict.never_worse import never_worse
-from diagnose.verdict.verdict import Answer
 
 COUNTS = np.full(20, 100.0)
 BEFORE = np.random.default_rng(0).uniform(8.0, 12.0, 20)

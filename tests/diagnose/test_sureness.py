@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import pytest
 
+from diagnose.verdict import sureness as module
 from diagnose.verdict.sureness import (
     ALONE,
     BOTH,
@@ -15,7 +16,6 @@ from diagnose.verdict.sureness import (
     standing,
     sureness,
 )
-from diagnose.verdict.verdict import sureness as module
 from tools.diagnose_sureness import stood
 
 

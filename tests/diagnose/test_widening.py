@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.verdict.verdict import widening
+from diagnose.verdict import widening
 from diagnose.verdict.widening import factors, widened
 from tools.diagnose_widening import chosen_factors, distances
 

@@ -22,7 +22,7 @@ from scenes.laboratory.effects import effect
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.paths import WAY_IN, WAY_OUT
 
-from ..render import shapes
+from ...render import shapes
 
 TIP, TOP, DEPTH, DT = 0.005, 0.05, 4e-3, 1e-3
 E_STAR = 30e3 / (1 - 0.49**2)

@@ -29,7 +29,7 @@ from render.passivity import PassivityOptions, passivity_parameters
 from render.press import press
 from render.scene import scene_of
 
-from ..render import shapes
+from ...render import shapes
 
 PERIOD = 1_000_000
 

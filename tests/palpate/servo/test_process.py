@@ -18,7 +18,7 @@ from mechanics.errors import DeviceError, PalpateError
 from palpate.servo import Recorder, SafetyOptions, Servo, ServoOptions
 from palpate.servo.elastic_plane import PlaneSource
 
-from ..devices.fake_inverse import FakeInverse
+from ...devices.fake_inverse import FakeInverse
 
 pytest.importorskip("websockets")
 

@@ -15,7 +15,7 @@ import render.press
 import render.replay  # noqa: F401
 from palpate.keywords import FUNCTIONS, kinds
 
-from ..render import shapes
+from ...render import shapes
 
 
 class Reached(Exception):

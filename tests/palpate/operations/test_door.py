@@ -16,7 +16,7 @@ import pytest
 import palpate as pp
 from palpate.child import module_environment
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 FUNCTIONS = [n for n in dir(pp) if inspect.isfunction(getattr(pp, n))]
 RESULTS = [n for n in dir(pp) if inspect.isclass(getattr(pp, n)) and hasattr(getattr(pp, n), "lines")]
 ERRORS = [n for n in dir(pp) if n.endswith("Error")]

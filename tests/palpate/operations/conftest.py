@@ -8,7 +8,7 @@ import pytest
 import palpate as pp
 from mechanics.recording import Recording
 
-from ..render import shapes
+from ...render import shapes
 
 PLACES_M = ((0.0, 0.0), (0.012, 0.0), (0.0, -0.012))
 DEPTH_M = 0.003

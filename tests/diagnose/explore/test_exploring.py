@@ -14,7 +14,7 @@ from diagnose.explore.rows import Instrument, Segment, together
 from mechanics.errors import OptionError, RecordingError
 from palpate.robot.protocol import segment_of, serve
 
-from ..reconstruct.exploration_of_cylinder import explore_cylinder
+from ...reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 def test_the_surfaces_error_is_the_quantile_of_a_gaussian():
@@ -151,7 +151,7 @@ def test_the_robots_example_runs_against_the_laboratory(tmp_path):
     import importlib.util
     from pathlib import Path
 
-    path = Path(__file__).parents[2] / "examples" / "robot_client.py"
+    path = Path(__file__).parents[3] / "examples" / "robot_client.py"
     spec = importlib.util.spec_from_file_location("robot_client", path)
     module = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(module)

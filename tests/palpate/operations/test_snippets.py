@@ -15,7 +15,7 @@ import palpate as pp
 from palpate.child import module_environment
 from palpate.keywords import FUNCTIONS
 
-REPOSITORY = Path(__file__).resolve().parents[2]
+REPOSITORY = Path(__file__).resolve().parents[3]
 
 
 def snippets(page: str) -> str:
