@@ -19,10 +19,10 @@ import numpy as np
 from numba import njit
 
 from mechanics.errors import OptionError
+from mechanics.quantities import USUAL_POISSON_RATIO
 
 DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
 _STEPS = 600
-USUAL_POISSON_RATIO = 0.49
 _RATIOS = {
     "linear": (0.10, 0.30, 0.40, USUAL_POISSON_RATIO),
     "neo-hookean": (0.40, USUAL_POISSON_RATIO),

@@ -10,6 +10,7 @@ import numpy as np
 
 from mechanics.dent import dent_laws
 from mechanics.errors import ModelError
+from mechanics.quantities import POISSON_RATIO
 from mechanics.schema import Key, Schema
 
 UNKNOWN = (float("nan"), float("nan"))
@@ -87,8 +88,8 @@ class Material:
         put = object.__setattr__
         put(self, "young_modulus_pa", positive("young_modulus_pa", self.young_modulus_pa))
         nu = float(finite("poisson_ratio", self.poisson_ratio))
-        if not -1 < nu < 0.5:
-            raise ModelError(f"poisson_ratio is {nu:g}; it must lie between -1 and 0.5")
+        if not POISSON_RATIO.takes(nu):
+            raise ModelError(f"poisson_ratio is {nu:g}; it must be {POISSON_RATIO.words}")
         put(self, "poisson_ratio", nu)
         low, high = numbers("young_modulus_ci95_pa", self.young_modulus_ci95_pa, (2,)).tolist()
         if low > high or min(low, high) < 0:

@@ -41,7 +41,8 @@ from mechanics.moduli import balls_ratio, gradient_ratio, skin_ratio, with_balls
 from mechanics.press_files import read_csv, read_presses, write_csv, write_presses
 from mechanics.press_making import no_presses
 from mechanics.presses import Presses
-from mechanics.recording import POISSON, TIP_RADIUS, dump_toml
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from mechanics.recording import dump_toml
 from mechanics.schema import ANY, Key, Named, Schema, check_table
 from mechanics.tetmesh import TetMesh, vertex_normals
 from mechanics.vtk_files import read_vtk, vtk_bytes
@@ -50,14 +51,13 @@ FORMAT = 3
 """Of model.toml. 1, which states none: moduli of elements in mesh.vtu, [inclusions], the dent law in
 [provenance]. 2: no [end], the last table, without which a file of format 3 was cut off."""
 
-_MODULUS = Key(low=1.0, high=1e9, unit="Pa", required=True)
 _COUNT = Key(int, low=1, high=10_000_000)
 SCHEMA: Schema = {
     "format": Key(int, low=1, high=FORMAT),
     "material": {
-        "young_modulus_pa": _MODULUS,
+        "young_modulus_pa": YOUNG_MODULUS,
         "young_modulus_ci95_pa": Key(low=0.0, high=1e12, size=2, unit="Pa", unknown=True),
-        "poisson_ratio": Key(low=POISSON.low, high=POISSON.high, required=True),
+        "poisson_ratio": dataclasses.replace(POISSON_RATIO, required=True),
         "dent_law": Key(str, choices=dent_laws()),
         "gradient": GRADIENT,
         "skin": SKIN,

@@ -14,6 +14,7 @@ import numpy as np
 from mechanics.compression import own_compliance
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
+from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 
@@ -21,7 +22,6 @@ CONTACT_IN_TIP_RADII = 0.44
 """Width of the Gaussian that stands for a contact 0.8 tip radii deep: by it a nodule is felt as in a contact
 solution (tops 4, 8, 14 mm deep: 1.05, 1.00, 1.00 of the contrast; docs/mechanics.md)."""
 
-USUAL_TIP_RADIUS_M = 0.005
 _NEGLIGIBLE = 1e-3  # of the contact's own compliance
 _BATCH = 32
 

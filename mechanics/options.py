@@ -13,6 +13,7 @@ from numbers import Real
 from typing import Any
 
 from mechanics.errors import OptionError
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from mechanics.schema import span
 
 _BY_NAME = {
@@ -23,9 +24,9 @@ _BY_NAME = {
     "base_spacing_m": (2e-4, 0.1),
     "indentation_m": (1e-5, 0.1),
     "site_m": (1e-5, 0.1),
-    "tip_radius_m": (1e-4, 0.04),
+    "tip_radius_m": (TIP_RADIUS.low, TIP_RADIUS.high),
     "position_resolution_m": (0.0, 0.01),
-    "poisson_ratio": (0.0, 0.4999),
+    "poisson_ratio": (POISSON_RATIO.low, POISSON_RATIO.high),
     "cutoff_hz": (1.0, 1e4),
     "radius_edge_ratio": (0.7, 100.0),
     "coloured_share": (0.0, 1.0),
@@ -51,7 +52,7 @@ _BY_UNIT = {
     "N s/m": (0.0, 1e4),
     "N/s": (0.0, 1e6),
     "m/s": (1e-4, 10.0),
-    "Pa": (1.0, 1e9),
+    "Pa": (YOUNG_MODULUS.low, YOUNG_MODULUS.high),
     "kg": (0.0, 100.0),
     "deg": (0.0, 90.0),
     "rad": (0.0, math.pi),

@@ -33,6 +33,7 @@ from mechanics.files import (
     reading,
     sha256_of_file,
 )
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
 from mechanics.schema import ANY, Key, Listed, Schema, check_table
 from mechanics.segments import STATED, Segment
 from mechanics.store import content_key
@@ -41,8 +42,6 @@ from mechanics.surface_files import UNITS
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
 
-POISSON = Key(low=0.0, high=0.4999)
-TIP_RADIUS = Key(low=1e-4, high=0.04, unit="m", required=True)
 SCHEMA: Schema = {
     "recording": {
         "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
@@ -62,7 +61,7 @@ SCHEMA: Schema = {
     },
     "object": {
         "name": Key(str),
-        "poisson_ratio": POISSON,
+        "poisson_ratio": POISSON_RATIO,
         "model": Key(str),
         "shape": Key(str),
         "shape_unit": Key(str, choices=tuple(UNITS)),
@@ -198,8 +197,8 @@ def _check_samples(recording: Recording) -> None:
     if not recording.sample_rate_hz > 0:
         raise RecordingError(f"sample_rate_hz is {recording.sample_rate_hz}; it must be greater than 0 Hz")
     nu = recording.poisson_ratio
-    if nu is not None and not -1 < nu < 0.5:
-        raise RecordingError(f"poisson_ratio is {nu}; it must lie between -1 and 0.5 (0.49 for silicone)")
+    if nu is not None and not POISSON_RATIO.takes(float(nu)):
+        raise RecordingError(f"poisson_ratio is {nu}; it must be {POISSON_RATIO.words} (0.49 for silicone)")
     if recording.boundary_phase is not None:
         start, end = recording.boundary_phase
         if not start < end:

@@ -11,9 +11,10 @@ from mechanics.errors import MeshError
 from mechanics.frames import tangents
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
-from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
+from mechanics.near_field import sharpening
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
+from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.refine import refined_around, refined_near_surface, typical_edge
 from mechanics.solver import Solver
 from mechanics.support import BaseHold

@@ -19,10 +19,11 @@ from mechanics.compression import compress, own_compliance
 from mechanics.floor import carried_by_floor
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
-from mechanics.near_field import USUAL_TIP_RADIUS_M, sharpening
+from mechanics.near_field import sharpening
 from mechanics.nearest import closest
 from mechanics.patch import PatchSampler, half_space_compliance, triangle_shapes
 from mechanics.progress import Progress, silent
+from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.recovery import edge_middles
 from mechanics.refine import typical_edge
 from mechanics.sites import SURFACE_EDGE_M, patch_width, touch_solver

@@ -16,6 +16,7 @@ from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
 from mechanics.effects.viscoelasticity import EFFECT as PRONY
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
+from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.importing.specimens import Tests
 from palpate.results.material import Material
 from reconstruct.external.holds import held_out_relaxation
@@ -40,7 +41,7 @@ def material_of(
     files: Sequence[str | Path],
     *,
     layer_m: float | None = None,
-    poisson_ratio: float = 0.49,
+    poisson_ratio: float = USUAL_POISSON_RATIO,
     specimens: bool = False,
     fast: bool = False,
     seed: int = 0,
@@ -51,8 +52,8 @@ def material_of(
     names = tuple(Path(f).name for f in files)
     if layer_m is not None and not layer_m > 0:
         raise OptionError(f"--layer is {layer_m} m; it must be greater than 0")
-    if not -1 < poisson_ratio < 0.5:
-        raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must lie between -1 and 0.5")
+    if not POISSON_RATIO.takes(poisson_ratio):
+        raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must be {POISSON_RATIO.words}")
     if tests.kind in ("compression", "tension"):
         return _uniaxial(tests, names)
     if tests.kind == "relaxation":

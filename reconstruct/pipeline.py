@@ -17,6 +17,7 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool, read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
+from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from mechanics.tetmesh import TetMesh
@@ -47,7 +48,6 @@ from reconstruct.steps.s7_modulus.modulus_field import FieldOptions, with_fitted
 from reconstruct.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
 from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
 
-DEFAULT_POISSON_RATIO = 0.49
 METHODS = ("finite-tip", "paper")
 
 
@@ -254,9 +254,9 @@ def _meshing_options(options: ReconstructOptions) -> MeshingOptions:
 def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     nu = options.poisson_ratio
     if nu is None:
-        nu = recording.poisson_ratio if recording.poisson_ratio is not None else DEFAULT_POISSON_RATIO
-    if not -1 < nu < 0.5:
-        raise OptionError(f"--poisson-ratio is {nu}; it must lie between -1 and 0.5 (0.49 for silicone)")
+        nu = recording.poisson_ratio if recording.poisson_ratio is not None else USUAL_POISSON_RATIO
+    if not POISSON_RATIO.takes(float(nu)):
+        raise OptionError(f"--poisson-ratio is {nu}; it must be {POISSON_RATIO.words} (0.49 for silicone)")
     return float(nu)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from mechanics.errors import OptionError, RecordingError
 from mechanics.files import Kind, atomic_file, read_text
-from mechanics.recording import TIP_RADIUS
+from mechanics.quantities import TIP_RADIUS
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
 from render.scene import TouchScene, scene_of

@@ -21,10 +21,11 @@ from mechanics.files import atomic_folder, cache_folder, reading
 from mechanics.material import Ball, Material
 from mechanics.model import MODEL, Model, Support, Tool, read_model, write_model
 from mechanics.progress import Progress, silent
+from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from mechanics.recording import read_recording, recording_files
 from mechanics.standing import Standing, standing
 from mechanics.surface_files import surface_of
-from reconstruct.pipeline import DEFAULT_POISSON_RATIO, reconstruct
+from reconstruct.pipeline import reconstruct
 from reconstruct.shapes.decimation import decimated
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
@@ -35,7 +36,6 @@ from scenes.scene import Scene
 from scenes.virtual_presses import palpate_model
 
 VERSION = 6
-DEFAULT_TIP_RADIUS_M = 0.005
 MESH_SIZE_M, LEAST_EDGES = 0.010, 8
 """Edge length of the tetrahedra, and the least number of edges along an object."""
 
@@ -150,7 +150,7 @@ def model_of_mesh(shape: Any, scene: Scene, progress: Progress = silent) -> Mode
     return _built(
         scene,
         standing(surface, scene.up, scene.sink_m),
-        Material(DEFAULT_MODULUS_PA, DEFAULT_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
+        Material(DEFAULT_MODULUS_PA, USUAL_POISSON_RATIO, inclusions=_balls(scene.inclusions or ())),
         {"method": "scene", "mesh": surface.name, "mended": ", ".join(surface.notes)},
         progress,
     )
@@ -182,7 +182,7 @@ def _built(
         mesh=meshing.mesh.quadratic(),
         material=material,
         support=Support(surface.support_point, surface.support_normal),
-        tool=Tool(scene.tip_radius_m or DEFAULT_TIP_RADIUS_M),
+        tool=Tool(scene.tip_radius_m or USUAL_TIP_RADIUS_M),
         mesh_size_m=edge,
         effects={"finite_strain": {}} if scene.finite_strain else {},
         provenance=provenance,

@@ -14,6 +14,7 @@ import numpy as np
 
 from mechanics.errors import SceneError
 from mechanics.files import no_file
+from mechanics.quantities import USUAL_POISSON_RATIO
 from mechanics.standing import standing
 from mechanics.surface_files import SUFFIXES, is_surface_file, read_surface
 
@@ -46,7 +47,7 @@ class Phantom:
     vertices: np.ndarray
     faces: np.ndarray
     young_modulus_pa: float
-    poisson_ratio: float = 0.49
+    poisson_ratio: float = USUAL_POISSON_RATIO
     regions: tuple[Region, ...] = field(default=())
 
     def __post_init__(self) -> None:

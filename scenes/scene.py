@@ -28,7 +28,7 @@ from devices.mapper import MapperOptions, axis_matrix
 from mechanics.errors import OptionError, SceneError
 from mechanics.files import named_in, read_toml
 from mechanics.material import BALL
-from mechanics.recording import POISSON, TIP_RADIUS
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from mechanics.schema import Key, Listed, Schema, check_table
 from mechanics.surface_files import SUFFIXES, is_surface_file
 from scenes.embedded import embedded_names, embedded_recording
@@ -47,8 +47,8 @@ SCHEMA: Schema = {
         "mesh": Key(str),
         "model": Key(str),
         "recording": Key(str),
-        "young_modulus_pa": Key(low=1.0, high=1e9, unit="Pa"),
-        "poisson_ratio": POISSON,
+        "young_modulus_pa": replace(YOUNG_MODULUS, required=False),
+        "poisson_ratio": POISSON_RATIO,
         "mesh_size_m": Key(low=5e-4, high=0.2, unit="m"),
         "finite_strain": Key(bool),
         "unit": Key(str),

@@ -27,6 +27,7 @@ from mechanics.errors import (
     SurfaceError,
 )
 from mechanics.nearest import distance
+from mechanics.quantities import USUAL_POISSON_RATIO
 from mechanics.recording import Recording, write_recording
 from reconstruct.pipeline import Clock
 from reconstruct.steps.s2_boundary.boundary import Boundary
@@ -152,7 +153,7 @@ class Explorer:
         goals: GoalOptions | None = None,
         reach: ReachOptions | None = None,
         *,
-        poisson_ratio: float = 0.49,
+        poisson_ratio: float = USUAL_POISSON_RATIO,
         seed: int = 0,
         order: Order | None = None,
     ) -> None:

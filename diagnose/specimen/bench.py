@@ -30,6 +30,7 @@ from mechanics.model import Model, Support, Tool
 from mechanics.press_cutting import cut
 from mechanics.presses import HOLDING
 from mechanics.progress import Progress, silent
+from mechanics.quantities import USUAL_POISSON_RATIO, parse_unit, unit_of_key
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
 from reconstruct.geometry.known_shape import flat_mesh, half_space_size
@@ -72,25 +73,17 @@ class Similarity:
     time: float
 
     def back(self, keys: Mapping[str, Any]) -> dict[str, Any]:
-        """Parameters in the machine's units; which unit is told by a key's ending, as everywhere."""
-        return {key: _times(value, 1 / self._factor(key)) for key, value in keys.items()}
+        """Parameters in the machine's size: each by the powers of metres, newtons and seconds in the unit
+        that its key states."""
+        return {key: _times(value, 1 / self._factor(unit_of_key(key))) for key, value in keys.items()}
 
-    def _factor(self, key: str) -> float:
-        for ending, (metres, newtons, seconds) in _ENDINGS.items():
-            if key.endswith(ending):
-                return self.length**metres * self.force**newtons * self.time**seconds
-        return 1.0
+    def _factor(self, unit: str) -> float:
+        return parse_unit(unit).factor(self.length, self.force, self.time)
 
     @property
     def modulus(self) -> float:
         """Factor from Pa to Pa."""
-        return self.force / self.length**2
-
-
-_ENDINGS = {
-    "_pa_per_m": (-3, 1, 0), "_n_per_m": (-1, 1, 0), "_n_per_s": (0, 1, -1), "_m_per_n": (1, -1, 0),
-    "_m_per_s": (1, 0, -1), "_pa": (-2, 1, 0), "_n": (0, 1, 0), "_m": (1, 0, 0), "_s": (0, 0, 1),
-}  # fmt: skip
+        return self._factor("Pa")
 
 
 def _times(value: Any, factor: float) -> Any:
@@ -122,7 +115,7 @@ def bench_of(
     tip_radius_m: float,
     *,
     layer_m: float | None = None,
-    poisson_ratio: float = 0.49,
+    poisson_ratio: float = USUAL_POISSON_RATIO,
     specimens: bool = False,
 ) -> Bench:
     """layer_m: thickness of the sample on its plate, None is a half-space. specimens: each curve is of

@@ -152,7 +152,7 @@ EFFECT = Effect(
         *(Parameter(f"centre_{a}_m", "m", -10.0, 10.0, 0.0, (0.0,), 1e-3) for a in "xyz"),
         Parameter("radius_m", "m", 3e-3, 0.03, 8e-3, (8e-3,), 5e-4, 0.006),
         Parameter(
-            "log_ratio", "1", np.log(RATIO_LIMITS[0]), np.log(RATIO_LIMITS[1]), 0.0, (1.0, -0.7), 0.05, 1.5
+            "log_ratio", "ln 1", np.log(RATIO_LIMITS[0]), np.log(RATIO_LIMITS[1]), 0.0, (1.0, -0.7), 0.05, 1.5
         ),
     ),
     keys=BALL,

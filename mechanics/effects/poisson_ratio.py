@@ -1,13 +1,14 @@
 """Poisson's ratio: not what was stated. Thin places against thick ones, normal against tangential."""
 
+import dataclasses
+
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import far_at_poisson
 from mechanics.model import Model
-from mechanics.recording import POISSON
-from mechanics.schema import Key
+from mechanics.quantities import POISSON_RATIO
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -25,7 +26,7 @@ EFFECT = Effect(
     scope=Scope.EVERYWHERE,
     words="the material is more compressible than stated",
     parameters=(Parameter("poisson_ratio", "1", 0.30, 0.49, 0.49, (0.40,), 0.01),),
-    keys={"poisson_ratio": Key(low=POISSON.low, high=POISSON.high, required=True)},
+    keys={"poisson_ratio": dataclasses.replace(POISSON_RATIO, required=True)},
     report=lambda values, scene, modulus_pa: {"poisson_ratio": float(values[0])},
     change=_change,
     apply=_apply,

@@ -78,7 +78,7 @@ EFFECT = Effect(
     words="a skin of another stiffness covers the object",
     parameters=(
         Parameter("thickness_m", "m", 3e-4, 8e-3, 3e-3, (2e-3, 2e-3), 2e-4),
-        Parameter("log_ratio", "1", -2.0, 3.0, 0.0, (0.5, -0.4), 0.03),
+        Parameter("log_ratio", "ln 1", -2.0, 3.0, 0.0, (0.5, -0.4), 0.03),
     ),
     keys=SKIN,
     report=_report,

@@ -21,7 +21,8 @@ from diagnose.explore.goals import GoalOptions
 from diagnose.explore.rows import Instrument
 from mechanics.errors import OptionError
 from mechanics.options import check_ranges
-from mechanics.recording import POISSON, SAMPLES, read_recording
+from mechanics.quantities import POISSON_RATIO
+from mechanics.recording import SAMPLES, read_recording
 from palpate.arguments import (
     add_input,
     add_json,
@@ -108,8 +109,8 @@ def run(arguments: argparse.Namespace) -> int:
     goals = options_from(arguments, GoalOptions)
     check_goals(goals)
     reach = options_from(arguments, ReachOptions)
-    if not POISSON.takes(arguments.poisson_ratio):
-        raise OptionError(f"--poisson-ratio is {arguments.poisson_ratio}; it must be {POISSON.words}")
+    if not POISSON_RATIO.takes(arguments.poisson_ratio):
+        raise OptionError(f"--poisson-ratio is {arguments.poisson_ratio}; it must be {POISSON_RATIO.words}")
     if arguments.robot:
         return _robot(arguments, goals, reach)
     if arguments.device:
