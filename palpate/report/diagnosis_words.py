@@ -8,8 +8,26 @@ import numpy as np
 
 from diagnose.verdict.result import Diagnosis
 from mechanics.effects.registry import effect
+from mechanics.quantities import read_unit, split_key
 
 AXIS_WORDS = {
+    "depth": "how deep the press is",
+    "rate": "how fast the press is",
+    "phase": "whether the tip goes in, rests or comes out",
+    "direction": "whether the tip is dragged sideways",
+    "space": "the place on the object",
+    "order": "when in the session it was touched",
+    "repeat": "whether a place is touched for the first time or again",
+    "free_air": "what the sensor reads in free air, touching nothing",
+}
+
+ERROR_WORDS = {
+    "sensor": "noise of the force sensor",
+    "repeatability": "touching one place again does not give the same force",
+    "shape": "the object's shape is not known where nobody touched",
+}
+
+WORDS = {
     "depth": "how deep the press is",
     "rate": "how fast the press is",
     "phase": "whether the tip goes in, rests or comes out",
@@ -221,8 +239,9 @@ MOST_NUMBERS = 12
 
 def plain_key(key: str) -> tuple[str, float, str]:
     """(words, factor from SI, unit) of a parameter's key, in units that a hand knows."""
-    suffix, factor, unit = next((u for u in UNITS if key.endswith(u[0])), ("", 1.0, ""))
-    return WORDS.get(key, key.removesuffix(suffix).replace("_", " ")), factor, unit
+    name, si = split_key(key)
+    unit, factor = read_unit(si)
+    return WORDS.get(key, name.replace("_", " ")), factor, unit
 
 
 def number(value: Any, factor: float = 1.0) -> str:

@@ -6,6 +6,8 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from mechanics.quantities import prefixed
+
 
 @dataclass(frozen=True)
 class Quantity:
@@ -55,5 +57,5 @@ def readable(label: str, values: Sequence[float]) -> tuple[str, list[float]]:
     if not found:
         return label, list(values)
     most = max((abs(v) for v in values if abs(v) > _NOTHING), default=1.0)
-    prefix, scale = ("k", 1e-3) if found[2] == "Pa" else ("m", 1e3) if most < 1.0 else ("", 1.0)
-    return f"{found[1]}[{prefix}{found[2]}]", [0.0 if abs(v) <= _NOTHING else scale * v for v in values]
+    unit, scale = prefixed(found[2], most)
+    return f"{found[1]}[{unit}]", [0.0 if abs(v) <= _NOTHING else scale * v for v in values]
