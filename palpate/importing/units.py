@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 
-SI: dict[str, dict[str, float]] = {
-    "time": {"s": 1.0, "sec": 1.0, "seconds": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9, "min": 60.0},
-    "position": {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "nm": 1e-9, "in": 0.0254, "inch": 0.0254},
-    "force": {
-        "N": 1.0, "mN": 1e-3, "uN": 1e-6, "nN": 1e-9, "kN": 1e3, "gf": 9.80665e-3, "kgf": 9.80665,
-        "lbf": 4.4482216,
-        "newton": 1.0, "g": 9.80665e-3, "kg": 9.80665,
-    },
-}  # fmt: skip
+from mechanics.quantities import parse_unit
+
+_SPELT = {
+    "time": ("s", "sec", "seconds", "ms", "us", "ns", "min"),
+    "position": ("m", "cm", "mm", "um", "nm", "in", "inch"),
+    "force": ("N", "mN", "uN", "nN", "kN", "gf", "kgf", "lbf", "newton", "g", "kg"),
+}
+_SAME = {"sec": "s", "seconds": "s", "inch": "in", "newton": "N", "g": "gf", "kg": "kgf"}
+"""Other spellings; a column of force in grams holds the weight of so much."""
+SI = {
+    kind: {unit: parse_unit(_SAME.get(unit, unit)).scale for unit in units} for kind, units in _SPELT.items()
+}
 """Kind of quantity -> unit -> what one is in SI."""
 _BRACKETS = re.compile(r"[\[({]\s*([^\])}\d][^\])}]*?)\s*[\])}]\s*(?:#\d+)?$")
 _TAIL = re.compile(r"(?:\s*[_/,]\s*|\s+)([A-Za-zµμ]+)$")
