@@ -111,5 +111,5 @@ def _limits(recording: Recording, model: Model) -> dict[str, float]:
     base = search.judge([strain])
     searched = [e for e in effects() if e.role is Role.SEARCHED]
     misfit = misfit_of(forward, base.found, site_sd)
-    search.starts = {e.name: e.seek(forward, misfit) for e in searched if e.seek is not None}
+    search.starts = {e.name: e.hints.seek(forward, misfit) for e in searched if e.hints.seek is not None}
     return detectable(search, base, searched)

@@ -98,13 +98,13 @@ def diagnose(
         forward, model.material.young_modulus_pa, nuisance=nuisance, options=rules, site_sd=site_sd,
         finite_strain=next(e for e in effects() if e.role is Role.KNOWN),
     )  # fmt: skip
-    left_out = {e.name for e in effects() if e.costly and options.fast}
-    hidden = {e.name for e in effects() if e.by_first_touches and own}
+    left_out = {e.name for e in effects() if e.hints.expensive and options.fast}
+    hidden = {e.name for e in effects() if e.hints.by_first_touches and own}
     tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (left_out | settled | hidden)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)
-    search.starts = {e.name: e.seek(forward, misfit) for e in tried if e.seek is not None}
+    search.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
     lap("baseline")
     seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
     if rigid is not None and seen:
@@ -144,5 +144,5 @@ def untold_effects(presses: Presses) -> set[str]:
     names = {e.name for e in effects() if e.scope in told_nothing}
     if not presses.local_force[:, 1:].any():
         # a machine of one axis: nothing sideways, and no axis beside another
-        names |= {e.name for e in effects() if e.slips or e.common_factor > 0}
+        names |= {e.name for e in effects() if e.hints.slips or e.hints.common_factor > 0}
     return names - {e.name for e in effects() if e.role is Role.KNOWN}

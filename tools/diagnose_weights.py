@@ -95,7 +95,7 @@ def rows_of(opened: dict[str, Any]) -> list[tuple[str, str, tuple[float, float],
 
 def _phenomenon(name: str) -> str:
     """What an effect is a law of; its own name where it is the only law, or no effect of the library."""
-    known = {e.name: e.phenomenon for e in effects()}
+    known = {e.name: e.hints.phenomenon for e in effects()}
     return known.get(name) or name
 
 

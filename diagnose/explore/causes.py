@@ -354,8 +354,8 @@ def tried(presses: Presses) -> list[Effect]:
     """Effects that may be the cause: those that a quick diagnosis searches for and such presses tell, but for
     what can take the form of others."""
     untold = untold_effects(presses)
-    able = [e for e in effects() if e.role is Role.SEARCHED and not e.any_form and not e.costly]
-    return [e for e in able if e.name not in untold]
+    able = [e for e in effects() if e.role is Role.SEARCHED and e.name not in untold]
+    return [e for e in able if not (e.hints.any_form or e.hints.expensive)]
 
 
 def forms_of(forward: Forward) -> list[tuple[str, Act]]:
@@ -364,8 +364,8 @@ def forms_of(forward: Forward) -> list[tuple[str, Act]]:
     laws: dict[str, str] = {}
     for each in tried(forward.touches):
         # of the laws of one phenomenon the first stands for all
-        name = laws.setdefault(each.phenomenon, each.name) if each.phenomenon else each.name
-        if each.seek is None:
+        name = laws.setdefault(each.hints.phenomenon, each.name) if each.hints.phenomenon else each.name
+        if each.hints.seek is None:
             forms += [(name, _acting(each, values)) for values in _values(each)]
     return forms
 

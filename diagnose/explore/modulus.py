@@ -40,7 +40,7 @@ def modulus_beside(
     for name, probability in sorted(causes.probability.items(), key=lambda item: -item[1])[:MOST]:
         if probability < LEAST:
             continue
-        sought = name != NONE and effect(name).seek is None
+        sought = name != NONE and effect(name).hints.seek is None
         log, sd = _beside(estimate, weighing, causes, name, seed) if sought else plain
         if np.isfinite(log) and 0 < sd < np.inf:
             found.append((log, sd, probability))

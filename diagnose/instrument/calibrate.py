@@ -164,8 +164,8 @@ def _systematic(found: Fit) -> np.ndarray:
     parts = [np.zeros(1)]
     for effect in found.effects:
         none = np.zeros(len(effect.parameters))
-        share = np.asarray(effect.systematic_share or none) * found.of(effect.name)
-        parts.append(np.hypot(effect.systematic or none, share))
+        share = np.asarray(effect.hints.systematic_share or none) * found.of(effect.name)
+        parts.append(np.hypot(effect.hints.systematic or none, share))
     return np.concatenate(parts)
 
 

@@ -97,7 +97,7 @@ def find_instrument_offsets(
     if not _matters(forward, change, rules):
         return offsets
     forward.touches = dataclasses.replace(t, position=t.position + t.force / stiffness)
-    error = np.hypot(rigid.error, SPRING.systematic_share[0] * rigid.compliance)
+    error = np.hypot(rigid.error, SPRING.hints.systematic_share[0] * rigid.compliance)
     low, high = (1 / max(rigid.compliance + s * 1.96 * error, 1e-9) for s in (1, -1))
     yields = f"on the rigid support the tip's reading gives by {1e3 * rigid.compliance:.3f} mm a newton"
     return InstrumentOffsets(
@@ -282,7 +282,7 @@ def _free_air_offsets(
     error = {
         "bias_n": level_se,
         "rate_n_per_s": free.rate_se_n_per_s,
-        "mass_kg": np.hypot(mass_se, INERTIA.systematic_share[0] * abs(mass_kg)),
+        "mass_kg": np.hypot(mass_se, INERTIA.hints.systematic_share[0] * abs(mass_kg)),
     }
     frame = t.frame[t.press]
     local = {n: np.einsum("nij,nj->ni", frame, parts[n]) for n in parts if n in named}

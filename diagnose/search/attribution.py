@@ -125,8 +125,8 @@ def attribute(
 
 def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
     """Whether one of the others is another law of the same phenomenon."""
-    return bool(effect.phenomenon) and any(
-        o.phenomenon == effect.phenomenon and o.name != effect.name for o in others
+    return bool(effect.hints.phenomenon) and any(
+        o.hints.phenomenon == effect.hints.phenomenon and o.name != effect.name for o in others
     )
 
 
@@ -159,7 +159,7 @@ def _with_hidden_strain(
     search: Search, effect: Effect, candidate: Candidate, current: Candidate
 ) -> Candidate:
     """The candidate, or with finite strain beside it where each may have hidden the other."""
-    if not effect.hides_strain or search.finite_strain in current.found.effects:
+    if not effect.hints.hides_strain or search.finite_strain in current.found.effects:
         return candidate
     both = search.judge([search.finite_strain, *candidate.found.effects], like=candidate)
     return both if both.found.loss < candidate.found.loss else candidate
@@ -171,7 +171,7 @@ def _paired(search: Search, effects: Sequence[Effect], current: Candidate) -> Ca
         return None
     able = [e for e in effects if e.scope is Scope.TIME and e.name not in current.found.names]
     # of the laws of one phenomenon the first stands for all
-    able = list({e.phenomenon or e.name: e for e in reversed(able)}.values())
+    able = list({e.hints.phenomenon or e.name: e for e in reversed(able)}.values())
     found = []
     for one, two in itertools.combinations(able, 2):
         candidate = search.judge([*current.found.effects, one, two], like=current)
@@ -189,10 +189,10 @@ def _not_blind_to_slip(search: Search, passing: list[Score]) -> list[Score]:
 
 def _refined(search: Search, effect: Effect, current: Candidate) -> Candidate:
     """The set with an effect's law made exact at its fit, twice; as it was where its law is exact already."""
-    if effect.refine is None:
+    if effect.hints.refine is None:
         return current
     for _ in range(2):
-        effect.refine(search.forward, current.found.of(effect.name))
+        effect.hints.refine(search.forward, current.found.of(effect.name))
         search.renew(current.found)
         current = search.judge(current.found.effects, like=current)
     return current
@@ -233,7 +233,7 @@ def _without_idle(
             continue
         without = search.judge([e for e in current.found.effects if e.name != name])
         effect = next(e for e in current.found.effects if e.name == name)
-        if effect.slips and search.sideways_off(without):
+        if effect.hints.slips and search.sideways_off(without):
             continue
         score = search.score([effect], current, without)
         if not score.may_be:
@@ -266,7 +266,7 @@ def _rivals(
         for score in scores.values():
             if score.name in chosen or _of_one(score.effect, first.added):
                 continue
-            if score.effect.any_form and first.effect.scope.between_places and score.gain < first.gain:
+            if score.effect.hints.any_form and first.effect.scope.between_places and score.gain < first.gain:
                 continue
             if p[score.name] > search.options.doubt and search.passes(score):
                 found.setdefault(score.name, first.log_odds - score.log_odds)

@@ -38,7 +38,7 @@ def detectable(search: Search, base: Candidate, effects: Sequence[Effect]) -> di
     before = np.nan_to_num(forward.predict(plainly))
     fitted = forward.model.fitted_to(forward.touches)
     names, changes = [], [found.jacobian[:, :, 0]]
-    limits = {e.name: np.inf for e in effects if fitted and e.by_first_touches}
+    limits = {e.name: np.inf for e in effects if fitted and e.hints.by_first_touches}
     for effect in effects:
         if effect.name in (*found.names, *limits):
             continue

@@ -43,13 +43,13 @@ def parameter_intervals(
         return {}
     own = found.place_of(name)
     spread = covariance(found, forward.touches.noise.variance_inflation, dof)[own, own]
-    systematic = np.array(effect.systematic or np.zeros(k))
-    share = np.array(effect.systematic_share or np.zeros(k))
+    systematic = np.array(effect.hints.systematic or np.zeros(k))
+    share = np.array(effect.hints.systematic_share or np.zeros(k))
     spread = spread + np.diag(systematic**2 + (share * found.values[own]) ** 2)
     low, high = effect.bounds
     draws = rng.multivariate_normal(found.values[own], spread, DRAWS, check_valid="ignore")
-    draws *= 1 + effect.common_factor * rng.standard_normal((DRAWS, 1))
-    for i in effect.signed:
+    draws *= 1 + effect.hints.common_factor * rng.standard_normal((DRAWS, 1))
+    for i in effect.hints.signed:
         # what was named is known to be harder or softer; how much is what the interval says
         draws[:, i] = np.sign(found.values[own][i]) * np.abs(draws[:, i])
     reports = [effect.report(v, forward, found.modulus) for v in np.clip(draws, low, high)]

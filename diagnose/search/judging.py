@@ -83,7 +83,7 @@ class Score:
     def evidence(self) -> float:
         """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
         is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
-        if self.effect.few_places:
+        if self.effect.hints.few_places:
             return self.gain - float(np.log(len(self.per_group)))
         return self.gain - max(float(self.per_group.max()), 0.0)
 
@@ -91,7 +91,7 @@ class Score:
     def closure(self) -> float:
         """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
         places, as it is."""
-        return self.share if self.effect.few_places else self.closes
+        return self.share if self.effect.hints.few_places else self.closes
 
     @property
     def log_odds(self) -> float:
@@ -186,7 +186,7 @@ class Search:
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
         # a lump under one place is told by that place: what it closes there counts, as its evidence does
-        if all(e.few_places for e in added):
+        if all(e.hints.few_places for e in added):
             was, left = old.fitted_plain, new.fitted_plain
         else:
             was, left = old.plain, np.where(told, new.plain, old.plain)
@@ -202,7 +202,7 @@ class Search:
 
     def passes(self, score: Score, *, first: bool = True) -> bool:
         """Whether a score names its effect. first: nothing else is named yet."""
-        if score.effect.by_first_touches and not first:
+        if score.effect.hints.by_first_touches and not first:
             return False
         return score.closure > 0 and score.probability > self.options.sure
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from diagnose.search.fit import Fit, settings_of
 from diagnose.search.forward import Forward
-from mechanics.effects.base import Misfit
+from mechanics.effects.hints import Misfit
 
 LEAST_SD = 0.015
 """Share by which a press's stiffness is off at least, beside noise and shape."""

@@ -86,7 +86,7 @@ def answer_of(evidence: Evidence, counts: np.ndarray) -> Answer:
 def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[bool, bool]:
     """(something is left that no law explains, it is one place alone)."""
     found, search = evidence.found, evidence.search
-    slack = max([effect(n).slack for n in found.chosen], default=1.0)
+    slack = max([effect(n).hints.slack for n in found.chosen], default=1.0)
     most = slack * search.options.unknown_chi
     if found.final.chi <= most:
         return False, False
@@ -105,7 +105,7 @@ def _misfit(evidence: Evidence, counts: np.ndarray, answer: Answer) -> tuple[boo
 def _slipping(evidence: Evidence, answer: Answer) -> None:
     """Sticking is only trusted to a quarter, press by press, so a fit may let the sideways force go wrong."""
     off = evidence.search.sideways_off(evidence.found.final)
-    slips = [e.name for e in effects() if e.slips]
+    slips = [e.name for e in effects() if e.hints.slips]
     if off and not set(slips) & set(answer.names):
         answer.candidates[:0] = slips
         answer.remainder = True
@@ -126,7 +126,7 @@ def _finite_strain(evidence: Evidence, answer: Answer) -> None:
         answer.reasons.append(
             f"the presses are deep enough that small-strain elasticity is off by about {size_n:.3f} N"
         )
-    elif any(effect(n).stands_for_strain for n in found.chosen):
+    elif any(effect(n).hints.stands_for_strain for n in found.chosen):
         # deep enough for it, and it fitted no worse than the linear law until another took its place
         if strain in (*found.final.found.effects, *found.base.found.effects):
             answer.candidates.append(strain.name)
@@ -136,7 +136,7 @@ def _unconfirmed_lump(evidence: Evidence, answer: Answer) -> None:
     """A lump that closes something by one place alone may be a shape that is wrong there."""
     found = evidence.found
     for scores, name in zip(found.steps, found.picked, strict=False):
-        lives_in_few = name in scores and scores[name].effect.few_places
+        lives_in_few = name in scores and scores[name].effect.hints.few_places
         if lives_in_few and name in found.chosen and scores[name].closes <= 0:
             answer.candidates += _rest()
             answer.reasons.append("one place alone tells of the lump: the shape may be wrong there instead")
@@ -153,13 +153,15 @@ def _shape(evidence: Evidence, answer: Answer) -> None:
     if gain <= evidence.search.options.shape_gain or felt_n <= evidence.search.smallest_n:
         return
     allowed = [n for n in _rest() if n not in evidence.excluded]
-    if not any(effect(n).few_places for n in found.chosen):
+    if not any(effect(n).hints.few_places for n in found.chosen):
         if allowed and not answer.remainder:
             answer.names += allowed
             ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
             doubt = evidence.search.options.doubt
             answer.candidates += [
-                s.name for s in ranked if s.effect.shape_rival and s.may_be and found.standing[s.name] > doubt
+                s.name
+                for s in ranked
+                if s.effect.hints.shape_rival and s.may_be and found.standing[s.name] > doubt
             ]
         answer.reasons.append(
             f"places differ in stiffness by {100 * spread:.0f} % more than the shape's uncertainty"

@@ -12,6 +12,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Touch
 from mechanics.model import Model
@@ -80,6 +81,8 @@ EFFECT = Effect(
     touch=_touch,
     law=LAW,
     apply=unchanged,
-    phenomenon="stickiness",
-    systematic_share=(0.1, 0.2, 0.0),
+    hints=SearchHints(
+        phenomenon="stickiness",
+        systematic_share=(0.1, 0.2, 0.0),
+    ),
 )

@@ -8,6 +8,7 @@ not taken off a recording: the tip's side of the play is not known in free air.
 import numpy as np
 
 from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.leads import play
 from mechanics.schema import Key
@@ -37,7 +38,9 @@ EFFECT = Effect(
     keys={"width_m": Key(low=0.0, high=0.1, unit="m", required=True)},
     report=lambda values, scene, modulus_pa: {"width_m": abs(float(values[0]))},
     change=_change,
-    # within the play the tip's place is not known, so a fit with the right width still misses
-    slack=2.5,
-    systematic_share=(0.15,),
+    hints=SearchHints(
+        # within the play the tip's place is not known, so a fit with the right width still misses
+        slack=2.5,
+        systematic_share=(0.15,),
+    ),
 )

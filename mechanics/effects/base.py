@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from enum import Enum
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
+from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
 from mechanics.model import Model
 from mechanics.recording import Recording
 from mechanics.schema import ANY, Schema
-
-if TYPE_CHECKING:
-    from mechanics.effects.settings import Scene, Settings, Touch
 
 DOMAINS = ("object", "contact", "boundary", "instrument")
 Keys = Mapping[str, Any]
@@ -70,17 +69,6 @@ class Parameter:
 
 
 @dataclass(frozen=True)
-class Misfit:
-    """What starts can be sought from; p presses. level: (p,) share by which each is stiffer than predicted.
-    answer: (p,) change of that share a unit of compliance along the normal, unit modulus, m. weight: (p,) of
-    the level, 1 over its variance."""
-
-    level: np.ndarray
-    answer: np.ndarray
-    weight: np.ndarray
-
-
-@dataclass(frozen=True)
 class Effect:
     """A departure from the ideal model.
 
@@ -97,22 +85,7 @@ class Effect:
     hold(keys, young_modulus_pa): how the base is held, as fields of mechanics.support.BaseHold.
     correct(recording, keys): the recording without it; None: it cannot be taken off.
     read_as: place among the corrections of a reading; what the instrument does last is taken off first.
-    candidates(): start vectors, where the parameters' own are not enough. seek(scene, misfit): start vectors
-    found from the data. refine(scene, values): makes its law exact near a fit.
-    few_places: it lives in few places, so the one that speaks loudest counts, and the shape may be its rival.
-    shape_rival: what a wrong shape may be taken for. any_form: it can take the form of others that differ
-    from place to place, so it is no rival of one of them that gains more. slips: it caps the sideways force,
-    where a fit that trusts the stick may go wrong. by_first_touches: it shows by them alone, and not where
-    another effect moved them or the surface was fitted to them.
-    hides_strain: it bends force against depth the other way than finite strain, so neither shows alone.
-    stands_for_strain: once it is named, finite strain may have been taken for it. costly: a quick diagnosis
-    leaves it out.
-    phenomenon: what several effects are laws of: the first stands for all until it is picked, then the law
-    with the most evidence is named; they are no rivals of one another.
-    slack: factor on the lack of fit that its law may leave. systematic: (k,) standard deviations of its
-    values that no noise tells, from known cases; systematic_share: the same in shares of the values;
-    common_factor: standard deviation of a factor on all values that the modulus takes up. signed: values
-    whose sign is sure once named.
+    hints: what only the search of a diagnosis needs.
     """
 
     name: str
@@ -133,23 +106,7 @@ class Effect:
     hold: Callable[[Keys, float], dict[str, Any]] | None = None
     correct: Callable[[Recording, Keys], Recording] | None = None
     read_as: int = 0
-    candidates: Callable[[], list[np.ndarray]] | None = None
-    seek: Callable[[Scene, Misfit], list[np.ndarray]] | None = None
-    refine: Callable[[Scene, np.ndarray], None] | None = None
-    few_places: bool = False
-    shape_rival: bool = False
-    any_form: bool = False
-    slips: bool = False
-    by_first_touches: bool = False
-    hides_strain: bool = False
-    stands_for_strain: bool = False
-    costly: bool = False
-    phenomenon: str = ""
-    slack: float = 1.0
-    systematic: tuple[float, ...] = ()
-    systematic_share: tuple[float, ...] = ()
-    common_factor: float = 0.0
-    signed: tuple[int, ...] = ()
+    hints: SearchHints = SearchHints()
 
     @property
     def rendered(self) -> bool:
@@ -173,8 +130,8 @@ class Effect:
 
     def starts(self) -> list[np.ndarray]:
         """Start vectors of a fit."""
-        if self.candidates is not None:
-            return self.candidates()
+        if self.hints.candidates is not None:
+            return self.hints.candidates()
         count = max((len(p.starts) for p in self.parameters), default=1)
         return [
             np.array([p.starts[min(i, len(p.starts) - 1)] for p in self.parameters], dtype=float)

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.schema import Key
 from mechanics.support_motion import far_on_springs
@@ -53,7 +54,9 @@ EFFECT = Effect(
     change=_change,
     apply=unchanged,
     hold=_hold,
-    shape_rival=True,
-    hides_strain=True,
-    costly=True,
+    hints=SearchHints(
+        shape_rival=True,
+        hides_strain=True,
+        expensive=True,
+    ),
 )

@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import MIXED, Scene, Settings
 from mechanics.recording import Recording
 from mechanics.schema import ANY
@@ -37,8 +38,11 @@ EFFECT = Effect(
     change=_change,
     correct=_correct,
     read_as=MIXED,
-    hides_strain=True,
-    stands_for_strain=True,
-    # the modulus takes up any factor common to all axes: how far a sensor may be off on the whole is a guess
-    common_factor=0.12,
+    hints=SearchHints(
+        hides_strain=True,
+        stands_for_strain=True,
+        # the modulus takes up any factor common to all axes: how far a sensor may be off as a whole is a
+        # guess
+        common_factor=0.12,
+    ),
 )

@@ -9,6 +9,7 @@ from __future__ import annotations
 from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
 from mechanics.schema import Key
@@ -59,5 +60,7 @@ EFFECT = Effect(
     report=lambda values, scene, modulus_pa: {"mu": float(values[0])},
     touch=_touch,
     apply=unchanged,
-    slips=True,
+    hints=SearchHints(
+        slips=True,
+    ),
 )

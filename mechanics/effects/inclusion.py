@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Keys, Misfit, Parameter, Scope
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
 from mechanics.material import BALL, Ball
@@ -159,11 +160,13 @@ EFFECT = Effect(
     report=_report,
     change=_change,
     apply=_apply,
-    seek=_seek,
-    refine=_refine,
-    few_places=True,
-    shape_rival=True,
-    # a large soft ball and a small hard one look alike, and first order pulls the place towards the tip
-    systematic=(3e-3, 3e-3, 3e-3, 4e-3, 0.7),
-    signed=(4,),
+    hints=SearchHints(
+        seek=_seek,
+        refine=_refine,
+        few_places=True,
+        shape_rival=True,
+        # a large soft ball and a small hard one look alike, and first order pulls the place towards the tip
+        systematic=(3e-3, 3e-3, 3e-3, 4e-3, 0.7),
+        signed=(4,),
+    ),
 )

@@ -19,6 +19,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.model import Model
@@ -190,6 +191,8 @@ EFFECT = Effect(
     change=_change,
     law=LAW,
     apply=unchanged,
-    phenomenon="stickiness",
-    costly=True,
+    hints=SearchHints(
+        phenomenon="stickiness",
+        expensive=True,
+    ),
 )

@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import GRADIENT, Gradient
@@ -49,6 +50,8 @@ EFFECT = Effect(
     report=_report,
     change=_change,
     apply=_apply,
-    shape_rival=True,
-    costly=True,
+    hints=SearchHints(
+        shape_rival=True,
+        expensive=True,
+    ),
 )

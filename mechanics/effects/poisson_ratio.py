@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import far_at_poisson
 from mechanics.model import Model
@@ -30,7 +31,9 @@ EFFECT = Effect(
     report=lambda values, scene, modulus_pa: {"poisson_ratio": float(values[0])},
     change=_change,
     apply=_apply,
-    hides_strain=True,
-    stands_for_strain=True,
-    costly=True,
+    hints=SearchHints(
+        hides_strain=True,
+        stands_for_strain=True,
+        expensive=True,
+    ),
 )

@@ -15,6 +15,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Touch
 from mechanics.effects.viscoelasticity import changed, let_go, recall
@@ -94,5 +95,7 @@ EFFECT = Effect(
     touch=_touch,
     law=LAW,
     apply=unchanged,
-    systematic=(0.02, 0.1),
+    hints=SearchHints(
+        systematic=(0.02, 0.1),
+    ),
 )

@@ -16,6 +16,7 @@ import numpy as np
 from scipy.optimize import nnls
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Touch
 from mechanics.effects.viscoelasticity import add_terms
 from mechanics.model import Model
@@ -75,8 +76,10 @@ EFFECT = Effect(
     keys_in_words=_in_words,
     touch=_touch,
     apply=unchanged,
-    phenomenon="relaxation",
-    # holds of half a second tell share and lasting modulus apart to a tenth of the share
-    systematic=(0.015, 0.02),
-    systematic_share=(0.12, 0.0),
+    hints=SearchHints(
+        phenomenon="relaxation",
+        # holds of half a second tell share and lasting modulus apart to a tenth of the share
+        systematic=(0.015, 0.02),
+        systematic_share=(0.12, 0.0),
+    ),
 )

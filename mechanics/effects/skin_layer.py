@@ -13,6 +13,7 @@ import numpy as np
 
 from mechanics.dent import grid
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import SKIN, Skin
@@ -85,7 +86,9 @@ EFFECT = Effect(
     of_material=_of_material,
     change=_change,
     apply=_apply,
-    hides_strain=True,
-    stands_for_strain=True,
-    costly=True,
+    hints=SearchHints(
+        hides_strain=True,
+        stands_for_strain=True,
+        expensive=True,
+    ),
 )

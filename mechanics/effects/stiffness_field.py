@@ -13,7 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.effects.base import Effect, Keys, Misfit, Parameter, Scope
+from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields
 from mechanics.field_response import far_of, shares_in_elements, tips_of
@@ -156,10 +157,12 @@ EFFECT = Effect(
     keys_in_words=_words,
     change=_change,
     apply=_apply,
-    seek=_seek,
-    shape_rival=True,
-    any_form=True,
-    costly=True,
-    # first order in the far field: on four slabs of 'palpate bench field' the contrast was 0.82 to 0.99
-    systematic_share=(0.13,) * MODES,
+    hints=SearchHints(
+        seek=_seek,
+        shape_rival=True,
+        any_form=True,
+        expensive=True,
+        # first order in the far field: on four slabs of 'palpate bench field' the contrast was 0.82 to 0.99
+        systematic_share=(0.13,) * MODES,
+    ),
 )

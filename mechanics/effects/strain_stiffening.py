@@ -20,6 +20,7 @@ from scipy.interpolate import PchipInterpolator
 
 from mechanics.dent import grid
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
 from mechanics.schema import Key
@@ -81,6 +82,8 @@ EFFECT = Effect(
     report=lambda values, scene, modulus_pa: {"c20_over_c10": float(values[0])},
     touch=_touch,
     apply=unchanged,
-    hides_strain=True,
-    stands_for_strain=True,
+    hints=SearchHints(
+        hides_strain=True,
+        stands_for_strain=True,
+    ),
 )

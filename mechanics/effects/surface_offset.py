@@ -6,6 +6,7 @@ The model's surface is wrong then, and this says where it was, not what it shoul
 import numpy as np
 
 from mechanics.effects.base import Effect, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.schema import Key
 
@@ -34,6 +35,8 @@ EFFECT = Effect(
         "rotation_rad": [float(v) for v in values[3:]],
     },
     change=_change,
-    # a delay or a play has already moved the first touches that the surface was fitted to
-    by_first_touches=True,
+    hints=SearchHints(
+        # a delay or a play has already moved the first touches that the surface was fitted to
+        by_first_touches=True,
+    ),
 )

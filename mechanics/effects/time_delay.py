@@ -6,6 +6,7 @@ import dataclasses
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import LATE, Scene, Settings
 from mechanics.recording import Recording
 from mechanics.samples import delayed
@@ -33,5 +34,7 @@ EFFECT = Effect(
     change=_change,
     correct=_correct,
     read_as=LATE,
-    systematic=(2e-4,),
+    hints=SearchHints(
+        systematic=(2e-4,),
+    ),
 )

@@ -1,6 +1,7 @@
 """Tip radius: the sphere is not as large as stated; the dent's force goes with its square root."""
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Touch
 from mechanics.model import Model
 from mechanics.schema import Key
@@ -22,8 +23,10 @@ EFFECT = Effect(
     report=lambda values, scene, modulus_pa: {"tip_radius_m": float(values[0] * scene.tip_radius)},
     touch=_touch,
     apply=unchanged,
-    hides_strain=True,
-    stands_for_strain=True,
-    # a site law that bends a little differently looks like another tip
-    systematic=(0.1,),
+    hints=SearchHints(
+        hides_strain=True,
+        stands_for_strain=True,
+        # a site law that bends a little differently looks like another tip
+        systematic=(0.1,),
+    ),
 )

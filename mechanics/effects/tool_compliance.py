@@ -5,6 +5,7 @@ import dataclasses
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.recording import Recording
 from mechanics.schema import Key
@@ -30,8 +31,10 @@ EFFECT = Effect(
     change=_change,
     correct=_correct,
     read_as=-1,
-    hides_strain=True,
-    # what a turning tool's weight adds to the force on the support
-    systematic_share=(0.005,),
-    stands_for_strain=True,
+    hints=SearchHints(
+        hides_strain=True,
+        # what a turning tool's weight adds to the force on the support
+        systematic_share=(0.005,),
+        stands_for_strain=True,
+    ),
 )

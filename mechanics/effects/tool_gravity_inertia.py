@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import WEIGHED, Scene, Settings
 from mechanics.kinematics import acceleration
 from mechanics.recording import Recording
@@ -55,6 +56,8 @@ EFFECT = Effect(
     change=_change,
     correct=_correct,
     read_as=WEIGHED,
-    # what smoothing does to a mass: six known ones came out 1 to 5 % large
-    systematic_share=(0.03, 0.0),
+    hints=SearchHints(
+        # what smoothing does to a mass: six known ones came out 1 to 5 % large
+        systematic_share=(0.03, 0.0),
+    ),
 )

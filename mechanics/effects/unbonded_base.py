@@ -5,6 +5,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
 from mechanics.schema import Key
 from mechanics.support_motion import ANGLES, far_partly_bonded, support_axes
@@ -47,7 +48,9 @@ EFFECT = Effect(
     change=_change,
     apply=unchanged,
     hold=_hold,
-    candidates=_starts,
-    shape_rival=True,
-    costly=True,
+    hints=SearchHints(
+        candidates=_starts,
+        shape_rival=True,
+        expensive=True,
+    ),
 )

@@ -13,6 +13,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
+from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
@@ -136,8 +137,10 @@ EFFECT = Effect(
     change=_change,
     law=LAW,
     apply=unchanged,
-    phenomenon="relaxation",
-    candidates=_starts,
-    # a contact that shrinks is slower than the elastic force, and two terms stand for what may be more
-    systematic=(0.015, 0.06, 0.015, 0.3),
+    hints=SearchHints(
+        phenomenon="relaxation",
+        candidates=_starts,
+        # a contact that shrinks is slower than the elastic force, and two terms stand for what may be more
+        systematic=(0.015, 0.06, 0.015, 0.3),
+    ),
 )

@@ -53,7 +53,7 @@ def test_silicones_in_compression_stay_within_3_percent(measured_data):
 @pytest.mark.slow
 def test_beef_is_closed_and_never_made_worse(measured_data):
     (found,) = rows(measured_data, "beef")
-    assert "relaxation" in {effect(name).phenomenon for name in found["effects"]}
+    assert "relaxation" in {effect(name).hints.phenomenon for name in found["effects"]}
     assert never_worse([found]) and found["closed"] > BEEF_CLOSED
     assert found["holds_closed"] > HOLDS_CLOSED
     assert found["ceiling"] < found["error"] < found["floor"]

@@ -62,7 +62,7 @@ def test_what_no_noise_tells_is_added(late):
     rng = np.random.default_rng(0)
     low, high = parameter_intervals(found, "time_delay", search.forward, search.dof, rng)["delay_s"]
     formal = np.sqrt(covariance(found, 1.0, search.dof)[1, 1])
-    expected = 2 * 1.96 * np.hypot(formal, DELAY.systematic[0])
+    expected = 2 * 1.96 * np.hypot(formal, DELAY.hints.systematic[0])
     assert high - low == pytest.approx(expected, rel=0.2)
 
 
