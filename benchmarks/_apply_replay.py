@@ -18,7 +18,8 @@ from diagnose.pipeline import DiagnoseOptions, diagnose
 from mechanics.effects.registry import effect
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file
-from mechanics.model import Model, read_model, write_model
+from mechanics.model import Model
+from mechanics.model_files import read_model, write_model
 from mechanics.recording import Recording, read_recording
 from reconstruct.pipeline import ReconstructOptions, reconstruct
 from reconstruct.placing import presses_on

@@ -14,7 +14,8 @@ from benchmarks.timing import table
 from devices.registry import DeviceChoice
 from diagnose.apply import with_effects
 from mechanics.compliance import load_or_condense
-from mechanics.model import Model, read_model, write_model
+from mechanics.model import Model
+from mechanics.model_files import read_model, write_model
 from mechanics.recording import write_recording
 from palpate.servo.client import Servo
 

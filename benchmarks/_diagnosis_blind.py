@@ -101,7 +101,7 @@ def prepare(case: dict[str, Any], solve: bool, work: str, laboratory: int) -> di
 
     Raises NotSolved where touches would have to be solved and `solve` does not allow for it.
     """
-    from mechanics.model import write_model
+    from mechanics.model_files import write_model
     from mechanics.recording import read_recording
     from reconstruct.pipeline import ReconstructOptions, reconstruct
 
@@ -165,7 +165,7 @@ def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[
     from benchmarks._baselines import best_by_bic, regressed_gap
     from diagnose.pipeline import DiagnoseOptions, diagnose
     from diagnose.verdict.widening import factors
-    from mechanics.model import read_model
+    from mechanics.model_files import read_model
     from mechanics.recording import read_recording
 
     this, at = _case(case), Path(work)

@@ -15,7 +15,8 @@ from benchmarks._device_bytes import MESSAGES
 from benchmarks._mutations import EXTREMES, MUTATIONS, OF_SAMPLES, Mutation
 from mechanics.box_mesh import box_mesh
 from mechanics.material import Material
-from mechanics.model import Model, Support, Tool, read_model, write_model
+from mechanics.model import Model, Support, Tool
+from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording, write_recording
 from palpate import cli
 from scenes.embedded import embedded_names, embedded_recording

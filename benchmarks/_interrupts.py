@@ -36,7 +36,7 @@ from benchmarks._small_disk import SmallDisk
 from benchmarks.timing import table
 from mechanics.errors import OptionError, PalpateError
 from mechanics.files import temporary_prefix
-from mechanics.model import read_model, write_model
+from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording, recording_files, write_recording
 from palpate.child import module_command, module_environment
 from scenes.embedded import embedded_names, embedded_recording

@@ -14,7 +14,8 @@ from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
 from mechanics.files import cache_folder
 from mechanics.material import Material
-from mechanics.model import Model, Support, Tool, read_model, write_model
+from mechanics.model import Model, Support, Tool
+from mechanics.model_files import read_model, write_model
 from palpate.servo.clock import compiled_now_ns, compiled_sleep_until, compiled_thread_cpu_ns
 from palpate.servo.histogram import BINS, Histogram, count
 from palpate.servo.layout import (

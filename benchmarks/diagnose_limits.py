@@ -16,7 +16,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.model import Model, read_model
+from mechanics.model import Model
+from mechanics.model_files import read_model
 from mechanics.recording import Recording, read_recording
 
 SUMMARY = "what recordings can show: the instrument on the support, the smallest effect of each kind"

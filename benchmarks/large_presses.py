@@ -17,7 +17,8 @@ from typing import Any
 import numpy as np
 
 from benchmarks.timing import table
-from mechanics.model import Model, read_model
+from mechanics.model import Model
+from mechanics.model_files import read_model
 from mechanics.recording import Recording, read_recording
 from mechanics.sites import touch_sites
 from mechanics.tetmesh import TetMesh

@@ -27,7 +27,7 @@ from benchmarks.timing import table
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.verdict.result import Diagnosis, NextTouch
 from mechanics.errors import PalpateError
-from mechanics.model import read_model
+from mechanics.model_files import read_model
 from mechanics.recording import read_recording
 from palpate.arguments import progress_bar
 from reconstruct.pipeline import reconstruct

@@ -99,7 +99,7 @@ def _row(found: dict[str, Any]) -> list[Any]:
 def held_out(recording: Path, folder: Path | None, chosen: list[type[Peer]]) -> list[dict[str, Any]]:
     """Held-out rms error of each peer, N, over the contact samples of all presses."""
     from diagnose.compare.comparison import CompareOptions, compare
-    from mechanics.model import read_model
+    from mechanics.model_files import read_model
 
     model = None if folder is None else read_model(folder)
     measured = read_recording(recording)

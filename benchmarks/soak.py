@@ -21,7 +21,8 @@ from benchmarks._servo_load import block_model
 from benchmarks.timing import table
 from devices.safety import LATCHING, SILENT, WORDS
 from mechanics.files import cache_folder
-from mechanics.model import Model, read_model, write_model
+from mechanics.model import Model
+from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording
 from palpate.servo import Servo, exploring_hand
 from palpate.servo.layout import DEADLINE, LATE, MISSED, STARTED, TICKS

@@ -6,7 +6,6 @@ its bias, its matrix; then the play between sensor and tip, and the bending of t
 
 from __future__ import annotations
 
-import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -17,9 +16,9 @@ import numpy as np
 from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file, read_toml
 from mechanics.leads import leads, play
-from mechanics.recording import Recording, dump_toml
 from mechanics.samples import delayed
 from mechanics.schema import ANY, Key, Schema, check_table
+from mechanics.toml_text import dump_toml
 
 SCHEMA: Schema = {
     "calibration": ANY,
@@ -59,26 +58,22 @@ class Calibration:
     interval: Mapping[str, Any] = field(default_factory=dict)
     about: Mapping[str, Any] = field(default_factory=dict)
 
-    def applied(self, recording: Recording) -> Recording:
-        """The recording as an ideal instrument had read it."""
-        force, position = recording.force_on_tool, recording.position
+    def as_ideal(
+        self, t: np.ndarray, force: np.ndarray, position: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """(force on the tool (n, 3) N, position (n, 3) m) as an ideal instrument had read them at t (n,)
+        s."""
         if self.delay_s:
-            force = delayed([slice(None)], recording.t, force, -self.delay_s)
+            force = delayed([slice(None)], t, force, -self.delay_s)
         if self.bias_n is not None:
             force = force - self.bias_n
         if self.matrix is not None:
             force = force @ np.linalg.inv(self.matrix).T
         if self.play_m:
-            position = _played(recording.t, position, self.play_m)
+            position = _played(t, position, self.play_m)
         if self.stiffness_n_per_m is not None:
             position = position + force / self.stiffness_n_per_m
-        return dataclasses.replace(
-            recording,
-            force_on_tool=force,
-            position=position,
-            tip_radius_m=self.tip_radius_m or recording.tip_radius_m,
-            force_noise_std_n=self.force_noise_std_n or recording.force_noise_std_n,
-        )
+        return force, position
 
     def table(self) -> dict[str, Any]:
         """What the TOML holds."""

@@ -4,15 +4,13 @@ from __future__ import annotations
 
 import csv
 import dataclasses
-import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mechanics.errors import CacheError, ModelError
-from mechanics.files import atomic_file, read_text
-from mechanics.press_making import of_places
+from mechanics.files import atomic_file
 from mechanics.presses import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
 from mechanics.segments import KINDS, Segment
 from mechanics.store import read_arrays, write_arrays
@@ -32,23 +30,6 @@ def write_csv(path: Path | str, presses: Presses) -> None:
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(CSV_COLUMNS)
         writer.writerows([repr(float(v)) for v in row] for row in table)
-
-
-def read_csv(path: Path | str, tip_radius_m: float) -> Presses:
-    """The table that `palpations.csv` holds, without samples; raises ModelError where a column is missing or
-    a value is no number."""
-    rows = list(csv.DictReader(io.StringIO(read_text(path, ModelError))))
-    missing = [c for c in CSV_COLUMNS if rows and c not in rows[0]]
-    if missing:
-        raise ModelError(f"'{path}' lacks the columns {', '.join(missing)}")
-    try:
-        table = np.array([[float(row[c]) for c in CSV_COLUMNS] for row in rows]).reshape(-1, len(CSV_COLUMNS))
-    except (TypeError, ValueError) as error:
-        raise ModelError(f"'{path}' has a value that is no number: {error}") from error
-    return of_places(
-        table[:, 2:5], table[:, 5:8], tip_radius_m, depth_m=table[:, 8], onset_s=table[:, 0],
-        peak_s=table[:, 1], fits=dict(zip(FITS, table[:, 9:].T, strict=True)),
-    )  # fmt: skip
 
 
 _NUMBERS = ("tip_radius_m", "sample_rate_hz", "delay_s", "delay_error_s", "block")
@@ -72,7 +53,7 @@ def write_presses(path: Path, presses: Presses) -> None:
 def read_presses(path: Path) -> Presses:
     """Read what `write_presses` wrote; raises ModelError where the file is damaged."""
     try:
-        arrays = read_arrays(path, _FORMAT, before=True)
+        arrays = read_arrays(path, _FORMAT)
         named: dict[str, Any] = {
             n: np.array(arrays[n]) for n in (*ROW_COLUMNS, *PRESS_COLUMNS) if n in arrays
         }

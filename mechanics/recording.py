@@ -9,7 +9,6 @@ from __future__ import annotations
 import dataclasses
 import gzip
 import io
-import re
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -19,9 +18,9 @@ from types import MappingProxyType
 from typing import Any
 
 import numpy as np
-import tomli_w
 
 from mechanics.bounds import LARGEST_N
+from mechanics.calibration import Calibration, read_calibration
 from mechanics.errors import RecordingError
 from mechanics.files import (
     Kind,
@@ -38,6 +37,7 @@ from mechanics.schema import ANY, Key, Listed, Schema, check_table
 from mechanics.segments import STATED, Segment
 from mechanics.store import content_key
 from mechanics.surface_files import UNITS
+from mechanics.toml_text import dump_toml
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
@@ -156,6 +156,17 @@ class Recording:
         none = np.zeros(0)
         quaternion = none if self.quaternion is None else self.quaternion
         return content_key(self.t, self.position, self.force_on_tool, quaternion, self.tip_radius_m)
+
+    def corrected(self, calibration: Calibration) -> Recording:
+        """The recording as an ideal instrument had read it."""
+        force, position = calibration.as_ideal(self.t, self.force_on_tool, self.position)
+        return dataclasses.replace(
+            self,
+            force_on_tool=force,
+            position=position,
+            tip_radius_m=calibration.tip_radius_m or self.tip_radius_m,
+            force_noise_std_n=calibration.force_noise_std_n or self.force_noise_std_n,
+        )
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled by its fields and built anew, since a mapping proxy cannot be and arrays come back
@@ -351,10 +362,8 @@ def read_recording(path: Path | str) -> Recording:
             stacklevel=2,
         )
     if "calibration" in tool:
-        from mechanics.calibration import read_calibration
-
         named = named_in(description, str(tool["calibration"]), RecordingError)
-        return read_calibration(named).applied(recording)
+        return recording.corrected(read_calibration(named))
     return recording
 
 
@@ -518,31 +527,3 @@ def description_table(recording: Recording) -> dict[str, Any]:
     if recording.truth is not None:
         table["truth"] = dict(recording.truth)
     return table
-
-
-def dump_toml(table: Mapping[str, Any]) -> str:
-    """A mapping of scalars, lists, arrays and nested mappings as TOML text.
-
-    Values that are None are left out, since TOML has no such value. A list of scalars stays on one line.
-    """
-    return _SPREAD.sub(_on_one_line, tomli_w.dumps(_plain(table)))
-
-
-# tomli_w gives each item a line; a line break cannot be part of a string, so this is always a list's
-_SPREAD = re.compile(r"\[\n((?: +[^ \[\]{].*,\n)+) *\]")
-
-
-def _on_one_line(spread: re.Match[str]) -> str:
-    items = spread[1].splitlines()
-    return "[" + ", ".join(item.strip().removesuffix(",") for item in items) + "]"
-
-
-def _plain(value: Any) -> Any:
-    """The value in Python's own types, without None; other objects by their text."""
-    if isinstance(value, Mapping):
-        return {str(key): _plain(v) for key, v in value.items() if v is not None}
-    if isinstance(value, list | tuple | np.ndarray):
-        return [_plain(v) for v in value]
-    if isinstance(value, np.generic):
-        return value.item()
-    return value if isinstance(value, bool | int | float) else str(value)

@@ -19,8 +19,6 @@ from mechanics.errors import CacheError
 from mechanics.files import atomic_file
 
 _MAGIC = b"PALPATE2"
-_BEFORE = b"PALPATE1"
-"""Files of before have no checksum of the header."""
 _ALIGN, _START, _DIGEST = 64, 16, 32
 
 
@@ -66,23 +64,19 @@ def write_arrays(path: Path, key: str, arrays: Mapping[str, np.ndarray]) -> None
         file.flush()
 
 
-def read_arrays(path: Path, key: str, *, before: bool = False) -> dict[str, np.ndarray]:
-    """Map the arrays read-only; raises CacheError where the file is not whole, altered, or of another key.
-
-    before: files without a checksum of the header are taken too, for what cannot be made again.
-    """
+def read_arrays(path: Path, key: str) -> dict[str, np.ndarray]:
+    """Map the arrays read-only; raises CacheError where the file is not whole, altered, or of another key."""
     try:
         with open(path, "rb") as file:
             start = file.read(_START)
-            if len(start) < _START or start[:8] not in ((_MAGIC, _BEFORE) if before else (_MAGIC,)):
+            if len(start) < _START or start[:8] != _MAGIC:
                 raise CacheError(f"'{path}' is no file of arrays of this version")
             length = int.from_bytes(start[8:], "little")
             if length > 1 << 20:
                 raise CacheError(f"'{path}' has an impossible header")
-            sealed = start[:8] == _MAGIC
-            seal = file.read(_DIGEST) if sealed else b""
+            seal = file.read(_DIGEST)
             raw = file.read(length)
-            if sealed and hashlib.sha256(start + raw).digest() != seal:
+            if hashlib.sha256(start + raw).digest() != seal:
                 raise CacheError(f"'{path}' fails the checksum of its header")
             header = json.loads(raw)
         if header["key"] != key:

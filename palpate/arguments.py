@@ -205,7 +205,7 @@ def add_output(
 
 def add_model_output(parser: argparse.ArgumentParser) -> None:
     """Add -o MODEL, the folder of the model to write."""
-    from mechanics.model import MODEL
+    from mechanics.model_files import MODEL
 
     add_output(
         parser, "-o", "--output", kind=MODEL, metavar="MODEL", required=True,

@@ -11,7 +11,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.model import Model, write_model
+from mechanics.model import Model
+from mechanics.model_files import write_model
 from mechanics.options import option
 from mechanics.progress import Progress
 from mechanics.recording import Recording, read_recording

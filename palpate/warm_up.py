@@ -50,7 +50,8 @@ def warm_up() -> None:
     import render
     from mechanics.box_mesh import box_mesh
     from mechanics.material import Material
-    from mechanics.model import Model, Support, Tool, write_model
+    from mechanics.model import Model, Support, Tool
+    from mechanics.model_files import write_model
     from palpate.servo.headless import run_headless
     from render.replay import replay
 

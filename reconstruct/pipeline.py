@@ -14,13 +14,15 @@ import numpy as np
 from mechanics.errors import ContactError, NoBaseError, OptionError
 from mechanics.linear_range import linear_range
 from mechanics.material import Material
-from mechanics.model import Model, Support, Tool, read_model
+from mechanics.model import Model, Support, Tool
+from mechanics.model_files import read_model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from mechanics.tetmesh import TetMesh
+from mechanics.toml_text import plain
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
@@ -326,19 +328,13 @@ def _provenance(
         "method": options.method,
         "surface": surface.method,
         "surface_reason": surface.reason,
-        "options": _plain(dataclasses.asdict(options)),
+        "options": plain(dataclasses.asdict(options)),
     }
     if exploration.delay_s:
         about |= {"force_delay_s": exploration.delay_s, "force_delay_sd_s": exploration.delay_error_s}
     if fit is not None:
         about["modulus_reason"] = fit.reason
     return about
-
-
-def _plain(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {k: _plain(v) for k, v in value.items() if v is not None}
-    return value
 
 
 def _part(progress: Progress, low: float, high: float) -> Progress:

@@ -13,7 +13,6 @@ import json
 import warnings
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from scipy.interpolate import RBFInterpolator
@@ -23,6 +22,7 @@ from mechanics.files import atomic_file
 from mechanics.model import Model
 from mechanics.sites import TouchSites
 from mechanics.store import content_key
+from mechanics.toml_text import plain
 from mechanics.touch import touch_forces
 from mechanics.vtk_files import vtk_bytes
 from render.base import Renderer
@@ -178,13 +178,9 @@ def _material_key(model: Model) -> str:
         float(model.material.young_modulus_pa),
         float(model.material.poisson_ratio),
         model.element_ratio,
-        json.dumps(model.effects, sort_keys=True, default=_plain),
+        json.dumps(plain(model.effects), sort_keys=True),
         rendered_touch(model, RenderOptions()).law_of_dent(model.material.poisson_ratio).table,
     )
-
-
-def _plain(value: Any) -> Any:
-    return value.tolist() if hasattr(value, "tolist") else dict(value)
 
 
 def _keep(model: Model, surface: FeltSurface) -> FeltSurface:

@@ -41,7 +41,8 @@ from mechanics.files import (
     temporary_prefix,
 )
 from mechanics.material import Ball, Material, Skin
-from mechanics.model import MODEL, Model, Support, Tool, read_model, write_model
+from mechanics.model import Model, Support, Tool
+from mechanics.model_files import MODEL, read_model, write_model
 from mechanics.options import check_range, option
 from mechanics.recording import NotRead, base_model_of, read_recording
 from mechanics.store import read_arrays, write_arrays
@@ -344,7 +345,7 @@ MODELS = {
     "a ball that is a number": ("[material.inclusions.lump]", "[material.inclusions]\nlump = 3\n[x]", "lump"),
     "no frame": ("[frame]", "[fame]", "lacks .frame."),
     "no mesh size": ("mesh_size_m = 0.02", "", "mesh_size_m is missing"),
-    "a future format": ("format = 3", "format = 4", "reads 1 to 3"),
+    "a future format": ("format = 3", "format = 4", "this program reads 3"),
 }
 
 

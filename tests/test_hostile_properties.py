@@ -21,8 +21,8 @@ from benchmarks._mutations import MUTATIONS, OF_SAMPLES
 from benchmarks._servo_load import block_model
 from mechanics import recording as of_recording
 from mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
-from mechanics.model import SCHEMA as OF_MODEL
-from mechanics.model import read_model, write_model
+from mechanics.model_files import SCHEMA as OF_MODEL
+from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording
 from mechanics.schema import Key
 from scenes.scene import SCHEMA as OF_SCENE

@@ -28,7 +28,7 @@ def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
     where there is none.
     """
     from mechanics.model import Model as Plain
-    from mechanics.model import read_model
+    from mechanics.model_files import read_model
     from palpate.results.model import model_of
     from scenes.build import model_of as scene_model
     from scenes.scene import Scene, load_scene
@@ -72,7 +72,7 @@ def model_of(
     from dataclasses import replace as changed
 
     from mechanics.files import check_target
-    from mechanics.model import MODEL
+    from mechanics.model_files import MODEL
     from palpate.results.model import model_of as dressed_model
     from scenes.build import model_of_mesh
     from scenes.scene import Scene
@@ -108,7 +108,7 @@ def reconstruct(
     The result goes wherever a model goes. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
     from mechanics.files import check_target
-    from mechanics.model import MODEL, write_model
+    from mechanics.model_files import MODEL, write_model
     from palpate.results.reconstruction import reconstruction_of
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
     from render.felt import felt_surface

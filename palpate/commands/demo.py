@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.files import check_target, sole_writer
-from mechanics.model import MODEL
+from mechanics.model_files import MODEL
 from palpate.arguments import (
     add_input,
     add_json,

@@ -11,7 +11,7 @@ from __future__ import annotations
 import argparse
 
 from mechanics.errors import OptionError
-from mechanics.model import MODEL
+from mechanics.model_files import MODEL
 from mechanics.recording import SAMPLES
 from palpate import api
 from palpate.arguments import (

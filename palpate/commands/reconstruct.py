@@ -9,7 +9,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from mechanics.model import read_model
+from mechanics.model_files import read_model
 from palpate import api
 from palpate.arguments import (
     add_input,

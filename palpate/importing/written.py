@@ -16,9 +16,9 @@ from mechanics.recording import (
     QUATERNION_COLUMNS,
     REQUIRED_COLUMNS,
     SAMPLES,
-    dump_toml,
     samples_path,
 )
+from mechanics.toml_text import dump_toml
 from palpate.importing.convert import Understood
 
 PICTURE = Kind(

@@ -109,7 +109,7 @@ class Batch(Result, room.Batch):
     def _place(self, plotter: Plotter) -> None:
         import pyvista
 
-        from mechanics.model import read_model
+        from mechanics.model_files import read_model
         from palpate.results.scenery import OBJECT_COLOUR, surface_of
 
         folders = [

@@ -41,7 +41,7 @@ class Calibration(Result, room.Calibration):
 
     def corrected(self, recording: Recording) -> Recording:
         """The recording as an ideal instrument had read it."""
-        return recording_of(self.applied(recording))
+        return recording_of(recording.corrected(self))
 
     def lines(self) -> list[str]:
         """What `print` says, line by line, with units."""

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechanics import model as room
+from mechanics.model_files import write_model
 from palpate.results.base import Result, dressed, quantity
 
 if TYPE_CHECKING:
@@ -33,7 +34,7 @@ class Model(Result, room.Model):
         What is computed for the model later, its compliance, is kept there. Raises ModelError where the
         folder exists and holds something else.
         """
-        return model_of(self.replaced(path=room.write_model(path, self)))
+        return model_of(self.replaced(path=write_model(path, self)))
 
     @property
     def name(self) -> str:

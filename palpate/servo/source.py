@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from mechanics.files import sweep, temporary_prefix
-from mechanics.model import Model, read_model, write_model
+from mechanics.model import Model
+from mechanics.model_files import read_model, write_model
 from mechanics.progress import Progress
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.files import atomic_file
-from mechanics.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, Recording, description_table, dump_toml
+from mechanics.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, Recording, description_table
+from mechanics.toml_text import dump_toml
 from scenes.variety.draws import Draw
 
 SCRIPTS = (

@@ -13,7 +13,7 @@ from diagnose.apply import improved, with_effects, with_replayed_modulus
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from mechanics.effects.registry import effect
 from mechanics.material import Ball
-from mechanics.model import read_model, write_model
+from mechanics.model_files import read_model, write_model
 from mechanics.near_field import surface_softness
 from mechanics.sites import touch_solver
 from render.fem import FemRenderer

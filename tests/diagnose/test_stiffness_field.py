@@ -101,7 +101,7 @@ def test_what_is_applied_is_what_was_fitted(forward):
 def test_written_and_read_back_the_field_is_there(forward, tmp_path):
     import pyvista
 
-    from mechanics.model import read_model, write_model
+    from mechanics.model_files import read_model, write_model
 
     values = np.zeros(len(FIELD.parameters))
     values[0] = 1.0

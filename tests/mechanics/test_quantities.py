@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from mechanics import model, recording
+from mechanics import model_files, recording
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
 from mechanics.quantities import parse_unit, prefixed, read_unit, unit_of_key
@@ -55,7 +55,7 @@ def _keys(schema, names=()):
 
 
 def test_a_key_states_the_unit_that_its_name_ends_with():
-    tables = [e.keys for e in effects()] + [recording.SCHEMA, model.SCHEMA]
+    tables = [e.keys for e in effects()] + [recording.SCHEMA, model_files.SCHEMA]
     stated = [pair for table in tables for pair in _keys(table or {})]
     stated += [(p.name, p.unit) for e in effects() for p in e.parameters if not p.unit.startswith("ln ")]
     unlike = {name: unit for name, unit in stated if (unit or "1") != unit_of_key(name)}

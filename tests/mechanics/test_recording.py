@@ -11,8 +11,9 @@ import numpy as np
 import pytest
 
 from mechanics.errors import RecordingError
-from mechanics.recording import Recording, dump_toml, read_recording, write_recording
+from mechanics.recording import Recording, read_recording, write_recording
 from mechanics.segments import Segment
+from mechanics.toml_text import dump_toml
 
 TOML = """[recording]
 sample_rate_hz = 1000.0

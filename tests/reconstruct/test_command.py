@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import explore_cylinder
 
-from mechanics.model import read_model
+from mechanics.model_files import read_model
 from mechanics.recording import write_recording
 from palpate import cli
 

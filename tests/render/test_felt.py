@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from mechanics.model import Model, read_model, write_model
+from mechanics.model import Model
+from mechanics.model_files import read_model, write_model
 from mechanics.press_making import no_presses, of_places
 from mechanics.sites import TouchSites
 from palpate.cli import main

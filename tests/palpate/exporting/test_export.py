@@ -15,7 +15,8 @@ import trimesh
 import palpate as pp
 from mechanics.box_mesh import box_mesh
 from mechanics.material import Ball, Material
-from mechanics.model import Model, Support, Tool, write_model
+from mechanics.model import Model, Support, Tool
+from mechanics.model_files import write_model
 from mechanics.surface_files import read_surface
 from palpate import cli
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.material import Material
-from mechanics.model import Model, Support, Tool, read_model, write_model
+from mechanics.model import Model, Support, Tool
+from mechanics.model_files import read_model, write_model
 from mechanics.tetmesh import TetMesh
 from scenes.virtual_presses import palpate_model
 
