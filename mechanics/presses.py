@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import ModelError
-from mechanics.frames import tangents
+from mechanics.frames import local_frames
 from mechanics.samples import delayed
 from mechanics.segments import Segment, within
 
@@ -194,7 +194,7 @@ class Presses:
     @cached_property
     def frame(self) -> np.ndarray:
         """(p, 3, 3) rows normal, tangent, tangent."""
-        return np.array([np.stack([n, *tangents(n)]) for n in self.normal]).reshape(-1, 3, 3)
+        return local_frames(self.normal)
 
     @cached_property
     def travel(self) -> np.ndarray:

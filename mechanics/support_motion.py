@@ -17,7 +17,7 @@ from scipy.linalg import cho_factor, cho_solve, solve
 from mechanics.elasticity import stiffness, triangle_mass
 from mechanics.far_field import energy_fields
 from mechanics.floor import resting
-from mechanics.model import Model
+from mechanics.frames import local_frames
 from mechanics.places import Places
 from mechanics.support import base_triangles
 from mechanics.tetmesh import EDGES, TetMesh
@@ -29,7 +29,8 @@ _BATCH = 128
 
 @dataclass(frozen=True)
 class SupportMotion:
-    """plane: (b, 2) m, corner nodes of the base in the support's axes. stiffness: (3 b, 3 b) m, of the object
+    """plane: (b, 2) m, corner nodes of the base along the support's two tangents.
+    stiffness: (3 b, 3 b) m, of the object
     against motions of its base (normal, across, along). mass: (b, b) m^2. reaction: (q, 3 b, 3) for unit
     loads at q places."""
 
@@ -50,7 +51,7 @@ def _condensed(places: Places) -> dict[str, np.ndarray]:
     fields = energy_fields(places)
     solver = fields.solver
     mesh, free = solver.mesh, solver.free
-    axes = np.stack([places.model.support.normal, *support_axes(places.model)])
+    axes = local_frames(places.model.support.normal)[0]
     corners, interpolation = _corner_motion(mesh)
     fixed = np.setdiff1d(np.arange(3 * len(mesh.points)), free)
     full = stiffness(mesh, solver.poisson_ratio)
@@ -69,14 +70,6 @@ def _condensed(places: Places) -> dict[str, np.ndarray]:
         "mass": _mass(mesh, corners),
         "reaction": np.ascontiguousarray(reaction),
     }
-
-
-def support_axes(model: Model) -> tuple[np.ndarray, np.ndarray]:
-    """Two unit vectors in the support plane."""
-    normal = model.support.normal
-    across = np.cross(normal, [0.0, 1.0, 0.0] if abs(normal[1]) < 0.9 else [1.0, 0.0, 0.0])
-    across /= np.linalg.norm(across)
-    return across, np.cross(normal, across)
 
 
 def _corner_motion(mesh: TetMesh) -> tuple[np.ndarray, sp.csr_matrix]:

@@ -8,6 +8,8 @@ holds the place where it first touched (method of dimensionality reduction with 
 Hess 2015, equivalent to Mindlin's incremental 8 G a / (2 - nu)); it forgets it when it lets go.
 Unilateral, no adhesion.
 
+The local frame has the normal first (mechanics.frames): n outward, then the tangents u and v.
+
 The kernels are plain numba on arrays: 1 kHz rendering, replay and fits run the same ones. `state` is a
 float array of STATE_SIZE, zero before first touch; it holds the ring memory and the last dent.
 """
@@ -18,6 +20,7 @@ import numpy as np
 from numba import njit
 
 from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
+from mechanics.frames import local_frames
 from mechanics.sites import TouchSites
 
 _STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
@@ -102,19 +105,19 @@ def touch_remember(state, dent, a, du, dv, radius):
 
 @njit(cache=True, error_model="numpy")
 def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
-    """Force at displacement d without writing the memory: (f_u, f_v, f_n, dent, a, d_u, d_v, k_n).
+    """Force at displacement d without writing the memory: (f_n, f_u, f_v, dent, a, d_u, d_v, k_n).
 
     Arguments as for touch_step. f: N on the tool, local frame. dent: m. a: stick radius, m. d_u, d_v:
     tangential dent, m. k_n: slope of the normal force against pressing deeper, N/m. `touch_remember` takes
     what it needs.
     """
-    press = -d[2]
+    press = -d[0]
     if not press > 0.0:
         return 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
-    cuu, cuv, cvv, cnn = far[0, 0], far[0, 1], far[1, 1], far[2, 2]
+    cnn, cuu, cuv, cvv = far[0, 0], far[1, 1], far[1, 2], far[2, 2]
     # no dent is deeper than what a stiffening support (1 / (1 - _STIFFEST)) makes of the whole displacement:
     # a tip that is dragged far while it sticks must not run away
-    low, high = 0.0, (press + np.sqrt(d[0] * d[0] + d[1] * d[1])) / (1.0 - _STIFFEST)
+    low, high = 0.0, (press + np.sqrt(d[1] * d[1] + d[2] * d[2])) / (1.0 - _STIFFEST)
     dent = state[1] if 0.0 < state[1] < high else 0.5 * press
     tolerance = 1e-10 * radius
     fn = fu = fv = a = du = dv = stiffness = compliance = 0.0
@@ -124,7 +127,7 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
         # that
         compliance = max(cnn, -_STIFFEST / stiffness)
         # near an edge the coupling may exceed what keeps the joint compliance positive definite
-        cun, cvn = far[0, 2], far[1, 2]
+        cun, cvn = far[1, 0], far[2, 0]
         couple = cun * cun + cvn * cvn
         held = stick * a
         least = (1.0 / stiffness + compliance) * (1.0 / held + max(min(cuu, cvv), -_STIFFEST / held))
@@ -132,7 +135,7 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
             cun *= np.sqrt(_STIFFEST * least / couple)
             cvn *= np.sqrt(_STIFFEST * least / couple)
         # on the object the normal force is -fn n; its far-field compliance appears in the tangential balance
-        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[0] + cun * fn, d[1] + cvn * fn)
+        fu, fv, du, dv = _tangential(state, a, stick, cuu, cuv, cvv, d[1] + cun * fn, d[2] + cvn * fn)
         excess = dent + compliance * fn - cun * fu - cvn * fv - press
         if excess > 0.0:
             high = dent
@@ -144,22 +147,22 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
         dent += step
         if not (low < dent < high):
             dent = 0.5 * (low + high)
-    return -fu, -fv, fn, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness)
+    return fn, -fu, -fv, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness)
 
 
 @njit(cache=True, error_model="numpy")
 def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
-    """Advance one touch to displacement d: (f_u, f_v, f_n) on the tool, N, local frame (u, v, n).
+    """Advance one touch to displacement d: (f_n, f_u, f_v) on the tool, N, local frame (n, u, v).
 
     state: (STATE_SIZE,), changed in place; all zero before first touch.
-    d: (3,) m since first touch, local frame (n outward: d[2] < 0 presses in).
+    d: (3,) m since first touch, local frame (n outward: d[0] < 0 presses in).
     far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective,
     m.
     plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
     """
-    fu, fv, fn, dent, a, du, dv, _ = touch_solve(state, d, far, table, radius, plane_strain_modulus, stick)
+    fn, fu, fv, dent, a, du, dv, _ = touch_solve(state, d, far, table, radius, plane_strain_modulus, stick)
     touch_remember(state, dent, a, du, dv, radius)
-    return fu, fv, fn
+    return fn, fu, fv
 
 
 @njit(cache=True, error_model="numpy")
@@ -171,9 +174,9 @@ def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out):
     for i in range(d.shape[0]):
         for r in range(3):
             local[r] = frame[r, 0] * d[i, 0] + frame[r, 1] * d[i, 1] + frame[r, 2] * d[i, 2]
-        fu, fv, fn = touch_step(state, local, local_far, table, radius, plane_strain_modulus, stick)
+        fn, fu, fv = touch_step(state, local, local_far, table, radius, plane_strain_modulus, stick)
         for c in range(3):
-            out[i, c] = frame[0, c] * fu + frame[1, c] * fv + frame[2, c] * fn
+            out[i, c] = frame[1, c] * fu + frame[2, c] * fv + frame[0, c] * fn
 
 
 @njit(cache=True, error_model="numpy")
@@ -181,14 +184,6 @@ def _touch_paths(d, starts, frames, fars, table, radii, plane_strain_modulus, st
     for k in range(len(starts) - 1):
         part = slice(starts[k], starts[k + 1])
         touch_path(d[part], frames[k], fars[k], table, radii[k], plane_strain_modulus, stick, out[part])
-
-
-def site_frames(normals: np.ndarray) -> np.ndarray:
-    """(k, 3, 3) rows u, v, n: turns a global vector into the frame of a site with outward normal (k, 3)."""
-    helper = np.eye(3)[np.argmin(np.abs(normals), axis=1)]
-    u = np.cross(helper, normals)
-    u /= np.linalg.norm(u, axis=1, keepdims=True)
-    return np.stack([u, np.cross(normals, u), normals], axis=1)
 
 
 def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]:
@@ -251,7 +246,7 @@ def touch_forces(
     radii = np.broadcast_to(effective_radius(tip_radius_m, np.asarray(curvature, dtype=float)), (count,))
     plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
     out = np.zeros_like(displacement)
-    frames = site_frames(np.asarray(normals, dtype=float).reshape(count, 3))
+    frames = local_frames(normals)
     fars = np.ascontiguousarray(np.asarray(far, dtype=float) / young_modulus_pa)
     _touch_paths(
         displacement, starts, frames, fars, table, np.ascontiguousarray(radii), plane_strain, stick, out

@@ -25,7 +25,7 @@ def forget(state, i):
 def conclude(p, state, tips, i):
     """Write tip i's memories and its force; let go of it where nothing presses and nothing pulls."""
     grip, out, normal = state.grip, state.solution[i], state.normals[i]
-    pressed = out[2] > 0.0
+    pressed = out[0] > 0.0
     if pressed:
         touch_remember(state.memory[i], out[3], out[4], out[5], out[6], state.radius[i])
         depth = state.radii_m[i]

@@ -72,7 +72,7 @@ def solve_one(p, state, tips, i):
             d[k] += state.carried[k, i]
         for r in range(3):
             local[r] = frame[r, 0] * d[0] + frame[r, 1] * d[1] + frame[r, 2] * d[2]
-        fu, fv, fn, dent, a, du, dv, tangent = touch_solve(
+        fn, fu, fv, dent, a, du, dv, tangent = touch_solve(
             state.memory[i], local, state.local_far[i], p.table, state.radius[i], plane_strain, stick
         )
         state.memory[i, 1] = dent  # where the next solution starts from
@@ -83,23 +83,23 @@ def solve_one(p, state, tips, i):
         if excess == 0.0:
             break
         # the anchor follows the tip by what the excess stretches; the centre above it moves by 1 + R / rho
-        compliance = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 0, 0] + state.local_far[i, 1, 1])
+        compliance = 1.0 / (stick * a) + 0.5 * (state.local_far[i, 1, 1] + state.local_far[i, 2, 2])
         lever = max(1.0 + state.radii_m[i] * state.curvature[i], 0.25)
         length = slip_length(slip, excess, before, length, compliance, lever)
         before = excess
         for k in range(3):
-            move[k] = -length * (fu * frame[0, k] + fv * frame[1, k]) / pull
+            move[k] = -length * (fu * frame[1, k] + fv * frame[2, k]) / pull
         grip.triangle[i] = walk(p.surface, grip.triangle[i], grip.weights[i], move)
         settle(p, state, i)
         plane_strain = state.young[i] / (1.0 - nu**2)
         stick = 4.0 * state.young[i] / ((1.0 + nu) * (2.0 - nu))
     for k in range(3):
-        move[k] = fu * frame[0, k] + fv * frame[1, k] + fn * frame[2, k] - state.elastic[i, k]
+        move[k] = fu * frame[1, k] + fv * frame[2, k] + fn * frame[0, k] - state.elastic[i, k]
         state.elastic[i, k] += move[k]
         state.carried_before[k, i] = state.carried[k, i]
     if tips.shape[0] > 1:
         carry(state.links[i], state.carried, move[0], move[1], move[2])
-    out[0], out[1], out[2], out[3] = fu, fv, fn, dent
+    out[0], out[1], out[2], out[3] = fn, fu, fv, dent
     out[4], out[5], out[6], out[7] = a, du, dv, tangent
 
 

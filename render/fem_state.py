@@ -45,7 +45,7 @@ class FemParameters(NamedTuple):
 class FemState(NamedTuple):
     """render.base.State, and what the step keeps between ticks.
 
-    grip: where each tip is held. frames: (m, 3, 3) rows u, v, n. elastic: (m, 3) N, quasi-static forces on
+    grip: where each tip is held. frames: (m, 3, 3) rows n, u, v. elastic: (m, 3) N, quasi-static forces on
     the tools. memory: (m, STATE_SIZE) of the sticks. remembered: (m, laws, k) by the laws along each touch's
     path (mechanics.effects.path). young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,)
     greatest load of each fine vertex.

@@ -30,7 +30,6 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, 
     whole. table: of a dent law. tool_compliance: 1 / k of a spring in series, m/N. mu: friction; inf: the tip
     sticks. Writes out: (n, 3) N.
     """
-    order = np.array([1, 2, 0])
     state = np.zeros(STATE_SIZE)
     compliance = np.empty((3, 3))
     d = np.empty(3)
@@ -38,7 +37,7 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, 
         for i in range(3):
             for j in range(3):
                 own = tool_compliance if i == j else 0.0
-                compliance[i, j] = far[p, order[i], order[j]] / e_far[p] + own
+                compliance[i, j] = far[p, i, j] / e_far[p] + own
         plane_strain = e_dent[p] / (1.0 - nu * nu)
         stick = 4.0 * e_dent[p] / ((1.0 + nu) * (2.0 - nu))
         touch_remember(state, 0.0, 0.0, 0.0, 0.0, radius[p])
@@ -54,10 +53,10 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, 
             fu = fv = fn = dent = a = du = dv = 0.0
             length = before = 0.0
             for slip in range(SLIPS):
-                d[0] = anchor1 - y[i, 1]
-                d[1] = anchor2 - y[i, 2]
-                d[2] = -y[i, 0]
-                fu, fv, fn, dent, a, du, dv, _k = touch_solve(
+                d[0] = -y[i, 0]
+                d[1] = anchor1 - y[i, 1]
+                d[2] = anchor2 - y[i, 2]
+                fn, fu, fv, dent, a, du, dv, _k = touch_solve(
                     state, d, compliance, table, radius[p], plane_strain, stick
                 )
                 state[1] = dent  # where the next solution starts from
@@ -67,7 +66,7 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, 
                 fv *= kept
                 if excess == 0.0:
                     break
-                both = 1.0 / (stick * a) + 0.5 * (compliance[0, 0] + compliance[1, 1])
+                both = 1.0 / (stick * a) + 0.5 * (compliance[1, 1] + compliance[2, 2])
                 length = slip_length(slip, excess, before, length, both, 1.0)
                 before = excess
                 anchor1 += length * fu / pull

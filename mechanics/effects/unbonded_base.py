@@ -7,8 +7,9 @@ import numpy as np
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
+from mechanics.frames import tangents
 from mechanics.schema import Key
-from mechanics.support_motion import ANGLES, far_partly_bonded, support_axes
+from mechanics.support_motion import ANGLES, far_partly_bonded
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -16,7 +17,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 
 def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
-    across, along = support_axes(scene.places.model)
+    across, along = tangents(scene.places.model.support.normal)
     direction = np.cos(values[1]) * across + np.sin(values[1]) * along
     return {"bonded_fraction": float(1 - values[0]), "direction": [float(v) for v in direction]}
 

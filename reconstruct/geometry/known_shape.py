@@ -17,6 +17,7 @@ import numpy as np
 
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import ContactError, OptionError, SurfaceError
+from mechanics.frames import support_axes
 from mechanics.options import option
 from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
@@ -36,7 +37,6 @@ from reconstruct.geometry.registration import (
     register,
 )
 from reconstruct.shapes.decimation import decimated
-from reconstruct.shapes.evidence import support_axes
 from reconstruct.shapes.polyhedron import refine
 from reconstruct.steps.s1_filter.filtered import hysteresis
 from reconstruct.steps.s2_boundary.boundary import Boundary, BoundaryOptions, find_boundary, find_interval

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechanics.frames import support_axes
 from mechanics.standing import Standing
 from reconstruct.shapes.balance import balanced
-from reconstruct.shapes.evidence import support_axes
 
 _PER_TRIANGLE = 0.43
 """Area of an equilateral triangle over its edge squared."""

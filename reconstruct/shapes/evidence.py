@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.frames import support_axes
 from mechanics.press_sites import sites_of
 
 LEAST_TOUCHES = 4
@@ -92,12 +93,3 @@ class Evidence:
     def to_device(self, points: np.ndarray) -> np.ndarray:
         """Points (..., 3) from the support frame into the device frame."""
         return np.asarray(points) @ self.axes + self.origin
-
-
-def support_axes(normal: np.ndarray) -> np.ndarray:
-    """(3, 3), rows: a right-handed frame whose third axis is along the support's normal (3,)."""
-    up = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
-    start = np.eye(3)[np.argmin(np.abs(up))]
-    first = np.cross(start, up)
-    first /= np.linalg.norm(first)
-    return np.array([first, np.cross(up, first), up])

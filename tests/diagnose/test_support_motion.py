@@ -8,11 +8,12 @@ import pytest
 from diagnose.search.forward import build_forward
 from diagnose.search.touches import touches_of
 from mechanics.far_field import energy_fields
+from mechanics.frames import tangents
 from mechanics.patch import PatchSampler
 from mechanics.refine import typical_edge
 from mechanics.solver import Solver
 from mechanics.support import BaseHold
-from mechanics.support_motion import far_on_springs, far_partly_bonded, loosened, support_axes, support_motion
+from mechanics.support_motion import far_on_springs, far_partly_bonded, loosened, support_motion
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +51,7 @@ def test_springs(places, normal, tangential):
 
 
 def test_partly_loose(places):
-    across, _ = support_axes(places.model)
+    across, _ = tangents(places.model.support.normal)
     # the same rows of nodes let go: here nodes are freed, there triangles
     expected = _compliance(places, BaseHold(np.array([0, 0, 1.0]), bonded_fraction=0.26, direction=across))
     got = loosened(support_motion(places), 0.6, 0.0)[0]

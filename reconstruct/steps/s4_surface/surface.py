@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.frames import support_axes
 from mechanics.nearest import distance
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError, first_guesses
 from reconstruct.shapes.drawing import draw
-from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence, support_axes
+from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence
 from reconstruct.shapes.fit import Seen, fit
 from reconstruct.shapes.hull import hull_surface
 from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
