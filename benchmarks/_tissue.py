@@ -15,9 +15,9 @@ from mechanics.box_mesh import box_mesh
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.patch import half_space_compliance
-from mechanics.press_making import of_paths
+from mechanics.press_making import PathErrors, of_paths
 from mechanics.presses import Presses
-from mechanics.sites import TouchSites, touch_sites
+from mechanics.sites import LoadPatch, TouchSites, touch_sites, touch_solver
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import forces_at
 from reconstruct.steps.s7_modulus.modulus_field import FieldSites
@@ -77,7 +77,7 @@ def tissue(
     read = centre + rng.normal(0, touch_error_m, len(points))[:, None] * UP if touch_error_m else centre
     presses = of_paths(
         starts, centre.repeat(len(ramp), axis=0) + travel, force + rng.normal(0, noise, force.shape), read,
-        normals, tip_radius_m=tip, sample_rate_hz=RATE_HZ, onset_error_m=touch_error_m, noise_n=noise,
+        normals, tip_radius_m=tip, sample_rate_hz=RATE_HZ, errors=PathErrors(touch_error_m, noise),
     )  # fmt: skip
     model = Model(
         coarse.quadratic(), Material(modulus, NU), Support(np.zeros(3), UP), Tool(tip), COARSE_M,
@@ -118,7 +118,8 @@ def _solved(
     """(sites whose far field is over the modulus under each tip, that modulus over the slab's (p,))."""
     ratio = np.exp(log_ratio(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)))
     # the far field alone: the width of the load is the patch's
-    solved = touch_sites(mesh, points, normals, NU, ratio, curvature=0.0, tip_radius_m=1.0)
+    solver, wide = touch_solver(mesh, NU, ratio), LoadPatch(tip_radius_m=1.0)
+    solved = touch_sites(mesh, points, normals, NU, solver=solver, curvature=0.0, patch=wide)
     half = half_space_compliance(UP, NU, solved.patch_width_m)
     ball = rng.normal(size=(_DENT_POINTS, 3))
     ball *= (rng.uniform(size=_DENT_POINTS) ** (1 / 3) / np.linalg.norm(ball, axis=1))[:, None]

@@ -24,11 +24,11 @@ from mechanics.model import Model, Support, Tool
 from mechanics.nearest import closest
 from mechanics.patch import PatchSampler
 from mechanics.refine import refined_near_surface
-from mechanics.sites import patch_loads, touch_sites
+from mechanics.sites import LoadPatch, patch_loads, touch_sites
 from mechanics.solver import Solver
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
-from mechanics.touch import touch_forces
+from mechanics.touch import TouchedPlaces, touch_forces
 from render.fem import FemRenderer
 
 SUMMARY = "compressed compliance of 5,000 to 20,000 touchable nodes"
@@ -48,14 +48,16 @@ def press_errors(
 ) -> np.ndarray:
     """(k,) relative error of the force of a press of 5 mm at places, against solves there."""
     width = float(made.own_width_m[0])
-    sites = touch_sites(solver.mesh, points, normals, NU, solver=solver, patch_width_m=width, curvature=0.0)
+    sites = touch_sites(
+        solver.mesh, points, normals, NU, solver=solver, patch=LoadPatch(width), curvature=0.0
+    )
     path = (-np.linspace(0, 0.005, 60)[:, None] * normals[:, None]).reshape(-1, 3)
     starts = 60 * np.arange(len(points) + 1)
     force = partial(
         touch_forces, young_modulus_pa=MODULUS, poisson_ratio=NU, tip_radius_m=RADIUS, law="neo-hookean"
     )
     served, solved = (
-        np.linalg.norm(force(path, starts, normals, far)[59::60], axis=1)
+        np.linalg.norm(force(path, starts, TouchedPlaces(normals, far))[59::60], axis=1)
         for far in (made.far_at(points, normals), sites.far)
     )
     return np.abs(served / solved - 1)

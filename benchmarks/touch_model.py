@@ -17,7 +17,7 @@ from benchmarks._sample_shapes import sample_mesh
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.recording import Recording, read_recording
-from mechanics.sites import patch_width, touch_sites, touch_solver
+from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import forces_at
 
@@ -117,7 +117,7 @@ def run(arguments: argparse.Namespace) -> dict:
             solver = touch_solver(mesh, nu) if refined else Solver(mesh.quadratic(), nu)
             width = patch_width(solver.mesh)
             sites[refined] = touch_sites(
-                solver.mesh, points, normals, nu, solver=solver, patch_width_m=width, curvature=bent
+                solver.mesh, points, normals, nu, solver=solver, patch=LoadPatch(width), curvature=bent
             )
         for law, refined in WAYS:
             predicted = forces_at(

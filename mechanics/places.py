@@ -12,7 +12,7 @@ import numpy as np
 from mechanics.model import Model
 from mechanics.near_field import contact_width
 from mechanics.patch import PatchSampler
-from mechanics.sites import touch_sites
+from mechanics.sites import touch_sites, touch_solver
 from mechanics.store import content_key, load_or_build
 
 VERSION = 2
@@ -83,7 +83,7 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
     def solve() -> dict[str, np.ndarray]:
         ratio = model.element_ratio if np.ptp(model.element_ratio) > 0 else None
         mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
-        sites = touch_sites(mesh, point[first], normal[first], nu, ratio)
+        sites = touch_sites(mesh, point[first], normal[first], nu, solver=touch_solver(mesh, nu, ratio))
         return {"far": sites.far, "curvature": sites.curvature}
 
     sites = _stored("sites", model, point, normal, solve)

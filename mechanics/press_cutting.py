@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -113,66 +114,70 @@ def _robust_std(values: np.ndarray) -> float:
     return spread_about_zero(values - np.median(values, axis=0))
 
 
+@dataclass(frozen=True)
+class FoundPresses:
+    """p presses that were found, in order of time. onset_s, peak_s: (p,) s of first touch and of the greatest
+    force. centre, normal: (p, 3) m, the tip's centre and the outward normal at first touch.
+
+    onset_error_m: (p,) standard errors; None: 0. until_s: (p,) s, when each stood above the noise last, where
+    that is known. kinds: (p,), None: all "press"; a "cycle" or "points" has contact before and after and
+    lasts until `until_s`, and no row beyond is its own.
+    """
+
+    onset_s: np.ndarray
+    peak_s: np.ndarray
+    centre: np.ndarray
+    normal: np.ndarray
+    onset_error_m: np.ndarray | None = None
+    until_s: np.ndarray | None = None
+    kinds: Sequence[str] | None = None
+
+
+@dataclass(frozen=True)
+class FoundAround:
+    """What was found of a recording beside its presses. free_air: (n, 3) N, as late as the force; None: 0.
+    trace_s: when the base was traced. others_s: further contacts, which are neither presses nor free air.
+    supported: segments on the support. noise_n: N, of a sample; None: the stated or a usual one. delay_s: by
+    which the force reads late, and its standard error."""
+
+    free_air: np.ndarray | None = None
+    trace_s: tuple[float, float] | None = None
+    others_s: Sequence[tuple[float, float]] = ()
+    supported: Sequence[Segment] = ()
+    noise_n: float | None = None
+    delay_s: float = 0.0
+    delay_error_s: float = 0.0
+
+
 def cut(
     recording: Recording,
+    found: FoundPresses,
+    around: FoundAround = FoundAround(),
     *,
-    onset_s: np.ndarray,
-    peak_s: np.ndarray,
-    centre: np.ndarray,
-    normal: np.ndarray,
-    onset_error_m: np.ndarray | None = None,
-    free_air: np.ndarray | None = None,
-    trace_s: tuple[float, float] | None = None,
-    others_s: Iterable[tuple[float, float]] = (),
-    supported: Iterable[Segment] = (),
-    noise_n: float | None = None,
-    delay_s: float = 0.0,
-    delay_error_s: float = 0.0,
     site_m: float = SITE_M,
-    kinds: Sequence[str] | None = None,
-    until_s: np.ndarray | None = None,
 ) -> Presses:
-    """The table of a recording whose presses were found: first touches onset_s (p,) and greatest forces
-    peak_s (p,) s, in order, the tip's centre (p, 3) m and the outward normal (p, 3) at first touch.
-
-    onset_error_m: (p,) standard errors. free_air: (n, 3) N, as late as the force. trace_s: when the base was
-    traced. others_s: further contacts, which are neither presses nor free air. noise_n: N, of a sample; None:
-    the stated or a usual one. until_s: (p,) s, when each stood above the noise last, where that is known.
-    kinds: (p,) of the presses; a "cycle" or "points" has contact before and after and lasts until then, and
-    no row beyond is its own.
-    """
-    t, count = recording.t, len(onset_s)
-    normal = np.asarray(normal, dtype=float).reshape(-1, 3)
-    centre = np.asarray(centre, dtype=float).reshape(-1, 3)
-    free = np.zeros_like(recording.force_on_tool) if free_air is None else free_air
-    noise = noise_n or recording.force_noise_std_n or USUAL_NOISE_N
-    limits = np.append(np.asarray(onset_s)[1:] - LEAD_S, t[-1])
-    onset, end = np.asarray(onset_s, dtype=float), np.empty(count)
-    kinds = ["press"] * count if kinds is None else list(kinds)
-    for i in range(count):
-        if kinds[i] != "press":
-            assert until_s is not None
-            end[i] = until_s[i]
-            continue
-        if until_s is not None:
-            limits[i] = min(limits[i], max(until_s[i], peak_s[i]) + delay_s + _MOST_AFTER_S)
-        near = slice(*np.searchsorted(t, [onset[i] - 0.2, max(limits[i], peak_s[i]) + 0.2]))
-        end[i] = loss_of_touch(
-            t[near], (recording.force_on_tool - free)[near] @ normal[i], recording.sample_rate_hz,
-            onset_s=onset[i], peak_s=peak_s[i], limit_s=limits[i], noise_n=noise,
-        )  # fmt: skip
+    """The table of a recording whose presses were found. site_m: presses further apart are no repeats."""
+    free = np.zeros_like(recording.force_on_tool) if around.free_air is None else around.free_air
+    noise = around.noise_n or recording.force_noise_std_n or USUAL_NOISE_N
+    onset = np.asarray(found.onset_s, dtype=float)
+    end = _ends(recording, found, free, noise, around.delay_s)
+    count = len(onset)
+    normal = np.asarray(found.normal, dtype=float).reshape(-1, 3)
+    centre = np.asarray(found.centre, dtype=float).reshape(-1, 3)
+    kinds = _kinds(found)
+    t = recording.t
     pieces = []
     for i in range(count):
-        around = AROUND_S if kinds[i] == "press" else 0.0
-        stop = min(end[i] + around, onset[i + 1] if i + 1 < count else np.inf)
-        pieces.append(np.arange(*np.searchsorted(t, [onset[i] - around, stop])))
+        margin = AROUND_S if kinds[i] == "press" else 0.0
+        stop = min(end[i] + margin, onset[i + 1] if i + 1 < count else np.inf)
+        pieces.append(np.arange(*np.searchsorted(t, [onset[i] - margin, stop])))
     rows = np.concatenate(pieces) if pieces else np.zeros(0, dtype=int)
-    touches = np.array([*zip(onset, end, strict=True), *others_s]).reshape(-1, 2)
-    begin = -np.inf if trace_s is None else trace_s[1] + SETTLED_S
+    touches = np.array([*zip(onset, end, strict=True), *around.others_s]).reshape(-1, 2)
+    begin = -np.inf if around.trace_s is None else around.trace_s[1] + SETTLED_S
     air = free_segments(t, touches[:, 0], touches[:, 1], begin)
-    segments = [] if trace_s is None else [Segment("trace", *map(float, trace_s))]
+    segments = [] if around.trace_s is None else [Segment("trace", *map(float, around.trace_s))]
     segments += [Segment(k, float(a), float(b)) for k, a, b in zip(kinds, onset, end, strict=True)]
-    segments += [s for s in (*recording.segments, *supported) if s.kind in ON_SUPPORT]
+    segments += [s for s in (*recording.segments, *around.supported) if s.kind in ON_SUPPORT]
     point = centre - recording.tip_radius_m * normal
     table = Presses(
         starts=np.concatenate([[0], np.cumsum([len(piece) for piece in pieces])]),
@@ -182,19 +187,19 @@ def cut(
         free_air=free[rows],
         quaternion=None if recording.quaternion is None else recording.quaternion[rows],
         onset_s=onset,
-        peak_s=peak_s,
+        peak_s=found.peak_s,
         end_s=end,
         centre=centre,
         contact_normal=normal,
-        onset_error_m=np.zeros(count) if onset_error_m is None else onset_error_m,
+        onset_error_m=np.zeros(count) if found.onset_error_m is None else found.onset_error_m,
         point=point,
         normal=normal,
         depth_m=np.zeros(count),
         site=sites_of(point, normal, site_m),
         tip_radius_m=recording.tip_radius_m,
         sample_rate_hz=recording.sample_rate_hz,
-        delay_s=delay_s,
-        delay_error_s=delay_error_s,
+        delay_s=around.delay_s,
+        delay_error_s=around.delay_error_s,
         segments=(*segments, *air),
         recording=recording.content,
     )
@@ -202,3 +207,30 @@ def cut(
     return dataclasses.replace(
         table, depth_m=table.greatest_depth(), noise=measured_noise(recording, quiet, noise)
     )
+
+
+def _kinds(found: FoundPresses) -> list[str]:
+    return ["press"] * len(found.onset_s) if found.kinds is None else list(found.kinds)
+
+
+def _ends(
+    recording: Recording, found: FoundPresses, free_air: np.ndarray, noise_n: float, delay_s: float
+) -> np.ndarray:
+    """(p,) s, when each press loses touch. free_air: (n, 3) N."""
+    t, onset, until = recording.t, np.asarray(found.onset_s, dtype=float), found.until_s
+    normal = np.asarray(found.normal, dtype=float).reshape(-1, 3)
+    limits = np.append(onset[1:] - LEAD_S, t[-1])
+    end = np.empty(len(onset))
+    for i, kind in enumerate(_kinds(found)):
+        if kind != "press":
+            assert until is not None
+            end[i] = until[i]
+            continue
+        if until is not None:
+            limits[i] = min(limits[i], max(until[i], found.peak_s[i]) + delay_s + _MOST_AFTER_S)
+        near = slice(*np.searchsorted(t, [onset[i] - 0.2, max(limits[i], found.peak_s[i]) + 0.2]))
+        end[i] = loss_of_touch(
+            t[near], (recording.force_on_tool - free_air)[near] @ normal[i], recording.sample_rate_hz,
+            onset_s=onset[i], peak_s=found.peak_s[i], limit_s=limits[i], noise_n=noise_n,
+        )  # fmt: skip
+    return end

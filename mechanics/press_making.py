@@ -3,11 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
 from mechanics.press_sites import sites_of
 from mechanics.presses import STEP_S, USUAL_NOISE_N, Noise, Presses
+
+
+@dataclass(frozen=True)
+class PathErrors:
+    """What is stated of made paths. onset_m: (p,) or one, m, standard error of first touch. noise_n: N an
+    axis, white."""
+
+    onset_m: np.ndarray | float = 0.0
+    noise_n: float = USUAL_NOISE_N
 
 
 def of_paths(
@@ -19,12 +29,11 @@ def of_paths(
     *,
     tip_radius_m: float,
     sample_rate_hz: float,
-    onset_error_m: np.ndarray | float = 0.0,
-    noise_n: float = USUAL_NOISE_N,
+    errors: PathErrors = PathErrors(),
 ) -> Presses:
     """A table of paths that nobody recorded: press i holds the rows starts[i] to starts[i + 1] of position
     (n, 3) m and force (n, 3) N on the tool, and touches where the tip's centre passes centre[i] (3,) m along
-    -normal[i]. One second lies between two presses; the forces' noise (an axis, white) is noise_n.
+    -normal[i]. One second lies between two presses.
     """
     p, lengths = len(starts) - 1, np.diff(starts)
     press = np.repeat(np.arange(p), lengths)
@@ -52,14 +61,14 @@ def of_paths(
         end_s=end,
         centre=centre,
         contact_normal=normal,
-        onset_error_m=np.broadcast_to(np.asarray(onset_error_m, float), p),
+        onset_error_m=np.broadcast_to(np.asarray(errors.onset_m, float), p),
         point=point,
         normal=normal,
         depth_m=deepest,
         site=sites_of(point, normal),
         tip_radius_m=tip_radius_m,
         sample_rate_hz=sample_rate_hz,
-        noise=Noise(noise_n, noise_n / np.sqrt(max(1, round(STEP_S * sample_rate_hz)))),
+        noise=Noise(errors.noise_n, errors.noise_n / np.sqrt(max(1, round(STEP_S * sample_rate_hz)))),
     )
 
 

@@ -56,6 +56,15 @@ class TouchSites:
             object.__setattr__(self, name, array)
 
 
+@dataclass(frozen=True)
+class LoadPatch:
+    """How the load of a touch is spread. width_m: None takes `patch_width`. tip_radius_m: only matters where
+    the modulus varies close below the surface (mechanics.near_field)."""
+
+    width_m: float | None = None
+    tip_radius_m: float = USUAL_TIP_RADIUS_M
+
+
 def touch_solver(
     mesh: TetMesh,
     poisson_ratio: float,
@@ -91,23 +100,17 @@ def touch_sites(
     points: np.ndarray,
     normals: np.ndarray,
     poisson_ratio: float,
-    modulus_ratio: np.ndarray | None = None,
     *,
-    balls: Sequence[Ball] = (),
-    patch_width_m: float | None = None,
-    curvature: np.ndarray | float | None = None,
     solver: Solver | None = None,
-    tip_radius_m: float = USUAL_TIP_RADIUS_M,
+    curvature: np.ndarray | float | None = None,
+    patch: LoadPatch = LoadPatch(),
     progress: Progress = silent,
 ) -> TouchSites:
     """Far-field compliance at surface points (k, 3) m with outward normals (k, 3).
 
-    mesh: linear or quadratic; modulus_ratio: (m,), without the balls. patch_width_m: None takes
-    `patch_width`.
+    mesh: linear or quadratic. solver: a factorisation to use, whose own mesh then counts; None makes
+    `touch_solver(mesh, poisson_ratio)`, of one modulus.
     curvature: (k,) 1/m where the caller knows it; None estimates it from the mesh.
-    solver: a factorisation to reuse, whose own mesh then counts; None makes `touch_solver(mesh, ...)`, for
-    which the balls are.
-    tip_radius_m: only matters where the modulus varies close below the surface (mechanics.near_field).
     Raises MeshError for points off the surface.
     """
     points = np.atleast_2d(np.asarray(points, dtype=float))
@@ -118,8 +121,8 @@ def touch_sites(
             f"points {points.shape} and normals {normals.shape} must both be (k, 3), normals not 0"
         )
     normals = normals / length
-    solver = solver or touch_solver(mesh, poisson_ratio, modulus_ratio, balls=balls)
-    width = patch_width_m or patch_width(solver.mesh)
+    solver = solver or touch_solver(mesh, poisson_ratio)
+    width = patch.width_m or patch_width(solver.mesh)
     sampler = PatchSampler(solver.mesh, width)
     far = np.empty((len(points), 3, 3))
     for start in range(0, len(points), _BATCH):
@@ -127,7 +130,7 @@ def touch_sites(
         patches = [sampler.weights(points[i]) for i in batch]
         far[list(batch)] = patch_compliance(solver, patches)
         progress("touch sites", (batch[-1] + 1) / len(points))
-    far += sharpening(solver, points, width, tip_radius_m)
+    far += sharpening(solver, points, width, patch.tip_radius_m)
     for i, normal in enumerate(normals):
         far[i] -= half_space_compliance(normal, poisson_ratio, width)
     if curvature is None:

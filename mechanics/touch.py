@@ -16,6 +16,8 @@ float array of STATE_SIZE, zero before first touch; it holds the ring memory and
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numba import njit
 
@@ -192,6 +194,16 @@ def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]
     return young_modulus_pa / (1 - nu**2), 4 * young_modulus_pa / ((1 + nu) * (2 - nu))
 
 
+@dataclass(frozen=True)
+class TouchedPlaces:
+    """Where k touches are. normals: (k, 3) outward unit. far: (k, 3, 3) 1/m, unit modulus (TouchSites.far).
+    curvature: (k,) or one, 1/m, mean, convex positive."""
+
+    normals: np.ndarray
+    far: np.ndarray
+    curvature: np.ndarray | float = 0.0
+
+
 def touch_force(
     displacement: np.ndarray,
     normal: np.ndarray,
@@ -212,12 +224,10 @@ def touch_force(
     return touch_forces(
         displacement,
         starts,
-        np.asarray(normal)[None],
-        np.asarray(far)[None],
+        TouchedPlaces(np.asarray(normal)[None], np.asarray(far)[None], np.array([curvature])),
         young_modulus_pa=young_modulus_pa,
         poisson_ratio=poisson_ratio,
         tip_radius_m=tip_radius_m,
-        curvature=np.array([curvature]),
         law=law,
     )
 
@@ -225,29 +235,29 @@ def touch_force(
 def touch_forces(
     displacement: np.ndarray,
     starts: np.ndarray,
-    normals: np.ndarray,
-    far: np.ndarray,
+    places: TouchedPlaces,
     *,
     young_modulus_pa: float,
     poisson_ratio: float,
     tip_radius_m: float,
-    curvature: np.ndarray | float = 0.0,
     law: str | DentLaw = "sphere",
 ) -> np.ndarray:
     """Force on the tool (n, 3), N, of k touches whose paths follow one another.
 
     displacement: (n, 3) m; touch i holds the rows starts[i] to starts[i + 1] (k + 1 entries) and begins
-    untouched. normals: (k, 3). far: (k, 3, 3) 1/m, unit modulus. curvature: (k,) or one, 1/m.
+    untouched.
     """
     table = (law if isinstance(law, DentLaw) else dent_law(law, poisson_ratio)).table
     displacement = np.ascontiguousarray(displacement, dtype=float)
     starts = np.ascontiguousarray(starts, dtype=np.int64)
     count = len(starts) - 1
-    radii = np.broadcast_to(effective_radius(tip_radius_m, np.asarray(curvature, dtype=float)), (count,))
+    radii = np.broadcast_to(
+        effective_radius(tip_radius_m, np.asarray(places.curvature, dtype=float)), (count,)
+    )
     plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
     out = np.zeros_like(displacement)
-    frames = local_frames(normals)
-    fars = np.ascontiguousarray(np.asarray(far, dtype=float) / young_modulus_pa)
+    frames = local_frames(places.normals)
+    fars = np.ascontiguousarray(np.asarray(places.far, dtype=float) / young_modulus_pa)
     _touch_paths(
         displacement, starts, frames, fars, table, np.ascontiguousarray(radii), plane_strain, stick, out
     )
@@ -267,11 +277,9 @@ def forces_at(
     return touch_forces(
         displacement,
         starts,
-        sites.normals,
-        sites.far,
+        TouchedPlaces(sites.normals, sites.far, sites.curvature),
         young_modulus_pa=young_modulus_pa,
         poisson_ratio=sites.poisson_ratio,
         tip_radius_m=tip_radius_m,
-        curvature=sites.curvature,
         law=law,
     )

@@ -23,7 +23,7 @@ from mechanics.model import Model
 from mechanics.sites import TouchSites
 from mechanics.store import content_key
 from mechanics.toml_text import plain
-from mechanics.touch import touch_forces
+from mechanics.touch import TouchedPlaces, touch_forces
 from mechanics.vtk_files import vtk_bytes
 from render.base import Renderer
 from render.effects import rendered_touch
@@ -89,12 +89,10 @@ def _from_touches(model: Model, surface: FeltSurface, sites: TouchSites) -> np.n
     forces = touch_forces(
         np.tile(-depths[:, None] * up, (len(spread), 1)),
         _STEPS * np.arange(len(spread) + 1),
-        np.tile(up, (len(spread), 1)),
-        spread[:, 0, None, None] * np.eye(3),
+        TouchedPlaces(np.tile(up, (len(spread), 1)), spread[:, 0, None, None] * np.eye(3), spread[:, 1]),
         young_modulus_pa=model.material.young_modulus_pa,
         poisson_ratio=model.material.poisson_ratio,
         tip_radius_m=model.tool.tip_radius_m,
-        curvature=spread[:, 1],
         law=rendered_touch(model, RenderOptions()).law_of_dent(model.material.poisson_ratio),
     )
     return forces[_STEPS - 1 :: _STEPS, 2] / OWN_DEPTH_M

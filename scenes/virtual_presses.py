@@ -14,7 +14,7 @@ from mechanics.errors import SceneError
 from mechanics.model import Model
 from mechanics.press_making import of_paths
 from mechanics.progress import Progress, silent
-from mechanics.sites import touch_sites
+from mechanics.sites import LoadPatch, touch_sites, touch_solver
 from mechanics.touch import forces_at
 from reconstruct.steps.s6_one_d.one_d import columns, fit_robust
 
@@ -34,14 +34,14 @@ def palpate_model(
     """The model with a table of presses: one to `depth_m` at each of `sites` places."""
     chosen = spread_places(model, sites)
     points, normals = model.mesh.points[chosen], model.normals[chosen]
+    nu, balls = model.material.poisson_ratio, tuple(model.material.inclusions.values())
     touched = touch_sites(
         model.mesh,
         points,
         normals,
-        model.material.poisson_ratio,
-        model.ratio_without_balls,
-        balls=tuple(model.material.inclusions.values()),
-        tip_radius_m=model.tool.tip_radius_m,
+        nu,
+        solver=touch_solver(model.mesh, nu, model.ratio_without_balls, balls=balls),
+        patch=LoadPatch(tip_radius_m=model.tool.tip_radius_m),
         progress=progress,
     )
     samples = max(8, round(depth_m / SPEED_M_PER_S * RATE_HZ))

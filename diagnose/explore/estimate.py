@@ -17,7 +17,7 @@ from diagnose.explore.goals import surface_error, vertex_areas
 from mechanics.nearest import distance
 from mechanics.presses import Presses
 from mechanics.recording import Recording
-from mechanics.sites import TouchSites, patch_width, touch_sites, touch_solver
+from mechanics.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from reconstruct.pipeline import Clock
@@ -197,7 +197,7 @@ def solved_sites(
             normals[new],
             poisson_ratio,
             solver=solved.solver,
-            patch_width_m=width,
+            patch=LoadPatch(width),
         )
         gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):

@@ -27,7 +27,7 @@ from mechanics.dent import dent_law
 from mechanics.errors import ContactError
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.press_cutting import cut
+from mechanics.press_cutting import FoundAround, FoundPresses, cut
 from mechanics.presses import HOLDING
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, parse_unit, unit_of_key
@@ -167,11 +167,10 @@ def bench_of(
     centre = np.tile([0.0, 0.0, size[2] + HAND_TIP_M], (len(rows), 1))
     lifted = dataclasses.replace(recording, position=recording.position + at_top)
     presses = cut(
-        lifted, onset_s=lifted.t[first], peak_s=lifted.t[peak], centre=centre,
-        normal=np.tile(UP, (len(rows), 1)),
-        onset_error_m=error, noise_n=noise / top,
-        others_s=[(lifted.t[a], lifted.t[b - 1]) for a, b in times],
-    )  # fmt: skip
+        lifted,
+        FoundPresses(lifted.t[first], lifted.t[peak], centre, np.tile(UP, (len(rows), 1)), error),
+        FoundAround(others_s=[(lifted.t[a], lifted.t[b - 1]) for a, b in times], noise_n=noise / top),
+    )
     model = Model(
         mesh=mesh.quadratic(), material=Material(middle, poisson_ratio), support=Support(np.zeros(3), UP),
         tool=Tool(HAND_TIP_M), mesh_size_m=0.01, presses=presses,

@@ -9,7 +9,7 @@ import pytest
 
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.press_cutting import cut
+from mechanics.press_cutting import FoundPresses, cut
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.sites import touch_sites
@@ -115,7 +115,7 @@ class Bench:
         onset, peak, place = self.known
         normal = self.normals[place]
         centre = self.points[place] + RADIUS * normal
-        return cut(recording, onset_s=onset, peak_s=peak, centre=centre, normal=normal)
+        return cut(recording, FoundPresses(onset, peak, centre, normal))
 
 
 @pytest.fixture(scope="session")

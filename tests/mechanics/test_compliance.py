@@ -9,7 +9,7 @@ from mechanics.compliance import ComplianceOptions, condense
 from mechanics.errors import MeshError, OptionError
 from mechanics.nearest import closest
 from mechanics.pardiso import available
-from mechanics.sites import touch_sites
+from mechanics.sites import LoadPatch, touch_sites
 from mechanics.solver import Solver
 from mechanics.surface_compliance import patch_blocks, surface_compliance
 from mechanics.tetmesh import TetMesh
@@ -127,7 +127,7 @@ def test_low_rank_tables_serve_the_same_compliance(box):
     solver = Solver(mesh.quadratic(), 0.45)
     width = float(made.own_width_m[0])
     sites = touch_sites(
-        mesh, points, normals, 0.45, solver=solver, patch_width_m=width, curvature=np.zeros(12)
+        mesh, points, normals, 0.45, solver=solver, patch=LoadPatch(width), curvature=np.zeros(12)
     )
     size = np.abs(made.own).max(axis=(0, 1, 2))
     assert np.abs(made.far_at(points, normals) - sites.far).max() < 0.04 * size

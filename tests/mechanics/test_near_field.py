@@ -9,7 +9,7 @@ from mechanics.material import Ball
 from mechanics.moduli import balls_ratio, inclusion_ratio, mixed_ratio
 from mechanics.near_field import contact_width, sharpening
 from mechanics.refine import refined_around, refined_near_surface
-from mechanics.sites import patch_width, touch_sites, touch_solver
+from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 
 NU = 0.49
@@ -40,7 +40,9 @@ def test_a_narrower_contact_feels_more_of_a_nodule(mesh):
     assert (away == 0).all(), "too far to matter, so it is not solved for"
     assert (np.linalg.eigvalsh(near) < 0).all() and np.allclose(near, near.T)
     plain = touch_sites(mesh, TOP[:1], UP[:1], NU, solver=Solver(mesh, NU), curvature=0.0).far[0]
-    wide = touch_sites(mesh, TOP[:1], UP[:1], NU, solver=solver, tip_radius_m=1.0, curvature=0.0).far[0]
+    wide = touch_sites(
+        mesh, TOP[:1], UP[:1], NU, solver=solver, patch=LoadPatch(tip_radius_m=1.0), curvature=0.0
+    ).far[0]
     tip = touch_sites(mesh, TOP[:1], UP[:1], NU, solver=solver, curvature=0.0).far[0]
     assert np.allclose(tip - wide, near, rtol=1e-6, atol=1e-6)
     assert (tip - plain)[2, 2] < 1.3 * (wide - plain)[2, 2] < 0

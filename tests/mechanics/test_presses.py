@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import ModelError
-from mechanics.press_cutting import cut, free_segments
+from mechanics.press_cutting import FoundAround, FoundPresses, cut, free_segments
 from mechanics.press_files import read_presses, write_csv, write_presses
 from mechanics.press_making import of_places
 from mechanics.press_sites import sites_of
@@ -35,15 +35,16 @@ def recording(
     return Recording(np.arange(len(x)) / rate, position, force, rate, TIP, force_noise_std_n=noise)
 
 
-def table(made: Recording, places=3, repeats=2, **known):
+def table(made: Recording, places=3, repeats=2, until_s=None, **around):
     count = places * repeats
     begin = 2.0 * np.arange(count)
     x = np.tile(np.arange(places) * 0.02, repeats)
     centre = np.column_stack([x, np.zeros(count), np.full(count, TIP)])
     return cut(
-        made, onset_s=begin + 1.0 + 1 / 6, peak_s=begin + 1.5, centre=centre, normal=np.tile(UP, (count, 1)),
-        **known,
-    )  # fmt: skip
+        made,
+        FoundPresses(begin + 1.0 + 1 / 6, begin + 1.5, centre, np.tile(UP, (count, 1)), until_s=until_s),
+        FoundAround(**around),
+    )
 
 
 def test_a_table_knows_touch_depth_site_and_noise():

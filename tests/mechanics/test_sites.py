@@ -106,8 +106,8 @@ def test_refined_elements_inherit_their_modulus(box):
     ratio = np.random.default_rng(0).uniform(1, 5, len(mesh.tetrahedra))
     point, normal = np.array([[0.0, 0.0, 0.04]]), UP[None]
     plain = touch_sites(mesh, point, normal, 0.4).far[0, 2, 2]
-    stiff = touch_sites(mesh, point, normal, 0.4, ratio).far[0, 2, 2]
-    double = touch_sites(mesh, point, normal, 0.4, 2 * np.ones_like(ratio))
+    stiff = touch_sites(mesh, point, normal, 0.4, solver=touch_solver(mesh, 0.4, ratio)).far[0, 2, 2]
+    double = touch_sites(mesh, point, normal, 0.4, solver=touch_solver(mesh, 0.4, 2 * np.ones_like(ratio)))
     solver = touch_solver(mesh, 0.4)
     known = plain + (1 - 0.4**2) / (2 * np.sqrt(np.pi) * patch_width(solver.mesh))
     assert stiff < plain

@@ -8,7 +8,7 @@ from closed_forms import bonded_punch_sideways_force, hertz_force
 
 from mechanics.dent import dent_law
 from mechanics.frames import local_frames, support_axes, tangents
-from mechanics.touch import STATE_SIZE, moduli, touch_force, touch_forces, touch_step
+from mechanics.touch import STATE_SIZE, TouchedPlaces, moduli, touch_force, touch_forces, touch_step
 
 E, NU, R = 29e3, 0.49, 5e-3
 UP = np.array([0.0, 0.0, 1.0])
@@ -108,7 +108,7 @@ def test_many_touches_at_once_equal_one_by_one():
     fars = np.array([np.eye(3) * k for k in (20.0, 50.0, -8.0)])
     starts = np.concatenate([[0], np.cumsum([len(p) for p in paths])])
     bent = np.array([0.0, 20.0, 10.0])
-    together = touch_forces(np.vstack(paths), starts, normals, fars, curvature=bent, **KNOWN)
+    together = touch_forces(np.vstack(paths), starts, TouchedPlaces(normals, fars, bent), **KNOWN)
     for k, p in enumerate(paths):
         alone = touch_force(p, normals[k], fars[k], curvature=bent[k], **KNOWN)
         assert np.array_equal(together[starts[k] : starts[k + 1]], alone)

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 from boxes import box
 
-from mechanics.press_making import of_paths
+from mechanics.press_making import PathErrors, of_paths
 from mechanics.press_sites import sites_of
 from mechanics.presses import Presses
-from mechanics.sites import TouchSites, touch_sites
+from mechanics.sites import LoadPatch, TouchSites, touch_sites
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
-from mechanics.touch import touch_forces
+from mechanics.touch import forces_at
 from reconstruct.steps.s7_modulus.modulus import ModulusOptions, between_sites, combine, fit_modulus
 from reconstruct.steps.s7_modulus.press_fit import fit_law, press_data
 from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
@@ -44,10 +44,7 @@ def pressed(
         paths.append(-travel[:, None] * n + slide)
         centres.append(p + (TIP + onset * random.standard_normal()) * n)
     starts = np.arange(len(sites) + 1) * len(travel)
-    force = touch_forces(
-        np.vstack(paths), starts, sites.normals, sites.far, young_modulus_pa=E, poisson_ratio=NU,
-        tip_radius_m=TIP, curvature=sites.curvature, law=law,
-    )  # fmt: skip
+    force = forces_at(sites, np.vstack(paths), starts, young_modulus_pa=E, tip_radius_m=TIP, law=law)
     each = np.repeat(np.ones(len(sites)) if scale is None else scale, len(travel))
     force = force * each[:, None] + noise * random.standard_normal(force.shape)
     position = np.vstack(
@@ -55,7 +52,7 @@ def pressed(
     )
     return of_paths(
         starts, position, force, np.array(centres), sites.normals, tip_radius_m=TIP, sample_rate_hz=1000.0,
-        onset_error_m=onset, noise_n=noise,
+        errors=PathErrors(onset, noise),
     )  # fmt: skip
 
 
@@ -183,7 +180,7 @@ def test_shape_covariance_matches_a_changed_shape(block):
         corners = TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable).linear()
         far = touch_sites(
             corners, middle.points, middle.normals, NU, solver=Solver(corners.quadratic(), NU), curvature=0.0,
-            patch_width_m=middle.patch_width_m,
+            patch=LoadPatch(middle.patch_width_m),
         ).far  # fmt: skip
         changes.append(far[0, 2, 2])
     # triangles of the top beside the moved rim count for part of it as well

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from mechanics.errors import OptionError, RecordingError
-from mechanics.press_cutting import cut
+from mechanics.press_cutting import FoundPresses, cut
 from mechanics.recording import Recording
 from palpate.cli import main
 from render.press import greatest_difference, press, read_curve, write_curve
@@ -75,9 +75,14 @@ def test_replay_error_counts_contact_samples_of_phase_two_only(cylinder_renderer
     forces = replay(cylinder_renderer, t, position)
     touched = np.flatnonzero(curve.depth > 0)[0]
     presses = cut(
-        recording, onset_s=t[[lead + touched]], peak_s=t[[lead + int(np.argmax(curve.depth))]],
-        centre=curve.position[[touched]], normal=np.array([[0.0, 0.0, 1.0]]),
-    )  # fmt: skip
+        recording,
+        FoundPresses(
+            onset_s=t[[lead + touched]],
+            peak_s=t[[lead + int(np.argmax(curve.depth))]],
+            centre=curve.position[[touched]],
+            normal=np.array([[0.0, 0.0, 1.0]]),
+        ),
+    )
     error = replay_error(recording, presses, forces)
     assert error.rmse_n == pytest.approx(0.01 * np.sqrt(3), rel=0.05)
     touched = np.linalg.norm(np.vstack([np.zeros((lead, 3)), curve.force]), axis=1) > 0.05

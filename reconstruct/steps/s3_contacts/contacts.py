@@ -13,7 +13,7 @@ import numpy as np
 
 from mechanics.errors import ContactError, LoudAirError, OptionError
 from mechanics.options import option
-from mechanics.press_cutting import cut
+from mechanics.press_cutting import FoundAround, FoundPresses, cut
 from mechanics.press_sites import SITE_M
 from mechanics.presses import Presses
 from mechanics.recording import Recording
@@ -197,23 +197,27 @@ def _tabled(
     late = np.clip(np.arange(len(t)) - round(delay_s * recording.sample_rate_hz), 0, len(t) - 1)
     presses = cut(
         recording,
-        onset_s=t[[c.start for c in contacts]],
-        peak_s=t[[c.peak for c in contacts]],
-        centre=np.array([c.centre for c in contacts]),
-        normal=np.array([c.normal for c in contacts]),
-        onset_error_m=np.array(
-            [np.hypot(c.onset_error_m, delay_error_s * _speed(signals, c)) for c in contacts]
+        FoundPresses(
+            onset_s=t[[c.start for c in contacts]],
+            peak_s=t[[c.peak for c in contacts]],
+            centre=np.array([c.centre for c in contacts]),
+            normal=np.array([c.normal for c in contacts]),
+            onset_error_m=np.array(
+                [np.hypot(c.onset_error_m, delay_error_s * _speed(signals, c)) for c in contacts]
+            ),
+            until_s=t[[c.end - 1 for c in contacts]],
+            kinds=["cycle" if c.unbroken else "press" for c in contacts],
         ),
-        free_air=found.free_air[late],
-        trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
-        others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
-        supported=found.supported,
-        noise_n=signals.noise_n,
-        delay_s=delay_s,
-        delay_error_s=delay_error_s,
+        FoundAround(
+            free_air=found.free_air[late],
+            trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
+            others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
+            supported=found.supported,
+            noise_n=signals.noise_n,
+            delay_s=delay_s,
+            delay_error_s=delay_error_s,
+        ),
         site_m=given.contact.site_m,
-        kinds=["cycle" if c.unbroken else "press" for c in contacts],
-        until_s=t[[c.end - 1 for c in contacts]],
     )
     return Exploration(
         recording=recording,

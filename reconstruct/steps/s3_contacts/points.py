@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import ContactError
-from mechanics.press_cutting import cut
+from mechanics.press_cutting import FoundAround, FoundPresses, cut
 from mechanics.press_sites import sites_of
 from mechanics.presses import Presses
 from mechanics.recording import Recording
@@ -160,16 +160,18 @@ def _tabled(
     peak = np.array([t[c + int(g.loading.push.argmax())] for c, g in zip(counts[:-1], groups, strict=True)])
     table = cut(
         gathered,
-        onset_s=begin,
-        peak_s=peak,
-        until_s=end,
-        centre=np.array(
-            [g.loading.origin - at * g.loading.normal for g, at in zip(groups, shift, strict=True)]
+        FoundPresses(
+            onset_s=begin,
+            peak_s=peak,
+            centre=np.array(
+                [g.loading.origin - at * g.loading.normal for g, at in zip(groups, shift, strict=True)]
+            ),
+            normal=np.array([g.loading.normal for g in groups]),
+            onset_error_m=error,
+            until_s=end,
+            kinds=["points"] * len(groups),
         ),
-        normal=np.array([g.loading.normal for g in groups]),
-        onset_error_m=error,
-        noise_n=noise,
+        FoundAround(noise_n=noise),
         site_m=options.site_m,
-        kinds=["points"] * len(groups),
     )
     return dataclasses.replace(table, recording=recording.content)

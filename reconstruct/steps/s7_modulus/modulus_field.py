@@ -20,7 +20,7 @@ from mechanics.options import option
 from mechanics.patch import half_space_compliance
 from mechanics.places import Places
 from mechanics.presses import Presses
-from mechanics.sites import TouchSites, touch_sites
+from mechanics.sites import LoadPatch, TouchSites, touch_sites, touch_solver
 from mechanics.smooth_field import (
     Estimate,
     Shares,
@@ -180,7 +180,8 @@ def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> 
     ratio = np.exp(field.at(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)))
     points, normals = places.point[places.first], places.normal[places.first]
     # of what is nearer than the load's width the modulus under the tip tells, not a sharper load
-    solved = touch_sites(mesh, points, normals, nu, ratio, curvature=0.0, tip_radius_m=_BLUNT_M)
+    solver, blunt = touch_solver(mesh, nu, ratio), LoadPatch(tip_radius_m=_BLUNT_M)
+    solved = touch_sites(mesh, points, normals, nu, solver=solver, curvature=0.0, patch=blunt)
     half = np.array([half_space_compliance(n, nu, solved.patch_width_m) for n in solved.normals])
     under = np.exp(field.at(tips_of(places)))
     # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field

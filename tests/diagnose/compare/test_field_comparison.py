@@ -7,7 +7,7 @@ import pytest
 
 from benchmarks._tissue import tissue
 from diagnose.compare.comparison import HOMOGENEOUS, RIVALS, CompareOptions, as_touched, compare_presses
-from mechanics.press_making import of_paths
+from mechanics.press_making import PathErrors, of_paths
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -24,7 +24,7 @@ def _presses(late_m: np.ndarray, stated_m: float):
     read = centre - late_m[:, None] * UP
     return of_paths(
         starts, position, force, read, np.tile(UP, (p, 1)), tip_radius_m=0.005, sample_rate_hz=100.0,
-        onset_error_m=stated_m,
+        errors=PathErrors(stated_m),
     )  # fmt: skip
 
 
