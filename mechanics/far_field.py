@@ -15,7 +15,7 @@ from scipy.spatial import cKDTree
 from mechanics.elasticity import element_stiffness
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.places import Places
-from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES, typical_edge
+from mechanics.sites import PATCH_WIDTH_IN_EDGES, typical_edge
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 
@@ -93,7 +93,7 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
 
 
 def _sampler(mesh: TetMesh) -> PatchSampler:
-    return PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+    return PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
 
 
 def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler) -> np.ndarray:

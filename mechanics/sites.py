@@ -21,7 +21,6 @@ from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
-PATCH_WIDTH_IN_MESH_SIZES = PATCH_WIDTH_IN_EDGES
 SURFACE_EDGE_M = 0.006
 _BATCH = 16
 

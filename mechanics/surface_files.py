@@ -18,6 +18,7 @@ import numpy as np
 
 from mechanics.errors import SurfaceError
 from mechanics.files import bounded_memory, no_file
+from mechanics.quantities import parse_unit
 from mechanics.vtk_files import read_vtk
 
 if TYPE_CHECKING:
@@ -28,7 +29,7 @@ BY_VTK = (".vtp", ".vtu", ".vtk")
 BY_MESHIO = {".msh": "gmsh", ".inp": "abaqus"}
 """And as what: of an ending that it does not know for sure it tries every reader, one of which never ends."""
 SUFFIXES = (*BY_TRIMESH, *BY_VTK, *BY_MESHIO)
-UNITS = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "in": 0.0254}
+UNITS = {unit: parse_unit(unit).scale for unit in ("m", "cm", "mm", "um", "in")}
 """Metres in a file's unit of length."""
 LEAST_M, GREATEST_M = 0.002, 2.0
 """An object that a hand explores is so large across."""

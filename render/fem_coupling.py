@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.mutual import between_mixed, mix_factor
+from mechanics.compression import between_mixed, mix_factor
 from render.kernels import kernel, part
 
 NOWHERE = -2

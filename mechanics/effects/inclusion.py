@@ -22,7 +22,7 @@ from mechanics.moduli import inclusion_ratio
 from mechanics.patch import PatchSampler
 from mechanics.places import Places
 from mechanics.refine import typical_edge
-from mechanics.sites import PATCH_WIDTH_IN_MESH_SIZES
+from mechanics.sites import PATCH_WIDTH_IN_EDGES
 from mechanics.solver import Solver
 
 RATIO_LIMITS = (0.15, 20.0)
@@ -69,7 +69,7 @@ def _refine(scene: Scene, values: np.ndarray) -> None:
     mesh = fields.solver.mesh
     ratio = inclusion_ratio(mesh, values[:3], float(values[3]), float(np.exp(values[4])))
     solver = Solver(mesh, places.model.material.poisson_ratio, ratio)
-    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_MESH_SIZES * typical_edge(mesh))
+    sampler = PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
     forces = np.zeros((len(mesh.points), 3, len(places.first)))
     for k, press in enumerate(places.first):
         nodes, weights = sampler.weights(places.point[press])

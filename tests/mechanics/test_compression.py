@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compression import compress
+from mechanics.compression import between_mixed, compress, mix_factor
 from mechanics.errors import MeshError
-from mechanics.mutual import between_mixed, mix_factor
 from mechanics.patch import PatchSampler
 from mechanics.solver import Solver
 
