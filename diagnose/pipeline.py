@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,7 +28,7 @@ from mechanics.effects.registry import effects
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.presses import Presses
-from mechanics.progress import Progress, silent
+from mechanics.progress import Clock, Progress, silent
 from mechanics.recording import Recording
 from reconstruct.placing import presses_on
 
@@ -60,15 +59,7 @@ def diagnose(
     options = options or DiagnoseOptions()
     nuisance = nuisance or NuisanceOptions()
     rules = attribution or AttributionOptions(most=1 if options.fast else 3)
-    seconds: dict[str, float] = {}
-    clock = time.perf_counter()
-
-    def lap(name: str) -> None:
-        nonlocal clock
-        now = time.perf_counter()
-        seconds[name] = round(now - clock, 2)
-        clock = now
-
+    clock = Clock()
     progress("touches", 0.02)
     presses = presses_on(recording, model)
     model = with_tip_of(model, presses)
@@ -77,10 +68,10 @@ def diagnose(
     met = reached(presses) if own else np.ones(len(presses), dtype=bool)
     touches = touches_of(presses.of(met))
     free = free_air_of(recording, presses)
-    lap("touches")
+    clock.lap("touches")
     progress("sites", 0.05)
     forward = build_forward(touches, model)
-    lap("sites")
+    clock.lap("sites")
     untold = untold_effects(presses)
     excluded = {n.strip() for n in options.without.split(",") if n.strip()} | untold
     allowed = effects(without=excluded)
@@ -105,7 +96,7 @@ def diagnose(
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)
     search.starts = {e.name: e.hints.seek(forward, misfit) for e in tried if e.hints.seek is not None}
-    lap("baseline")
+    clock.lap("baseline")
     seen = read_sideways(rigid, rules) & frozenset(e.name for e in tried)
     if rigid is not None and seen:
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, rigid.words))
@@ -113,15 +104,17 @@ def diagnose(
         lost = f"presses not weighed, as the surface passes them by over {1e3 * REACH_M:g} mm: {(~met).sum()}"
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, lost))
     found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
-    lap("effects")
+    clock.lap("effects")
     evidence = Evidence(
         forward, search, found, free, offsets, site_sd, frozenset(excluded),
         options.bootstrap, options.seed, refit=not options.fast,
     )  # fmt: skip
-    result = conclude(evidence, lap)
+    result = conclude(evidence, clock.lap)
     progress("done", 1.0)
     return dataclasses.replace(
-        result, seconds=seconds, left_out=tuple(sorted(left_out | untold | hidden - settled))
+        result,
+        seconds={name: round(s, 2) for name, s in clock.laps.items()},
+        left_out=tuple(sorted(left_out | untold | hidden - settled)),
     )
 
 

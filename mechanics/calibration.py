@@ -6,6 +6,7 @@ its bias, its matrix; then the play between sensor and tip, and the bending of t
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,6 +17,7 @@ import numpy as np
 from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file, read_toml
 from mechanics.leads import leads, play
+from mechanics.quantities import TIP_RADIUS
 from mechanics.samples import delayed
 from mechanics.schema import ANY, Key, Schema, check_table
 from mechanics.toml_text import dump_toml
@@ -23,7 +25,7 @@ from mechanics.toml_text import dump_toml
 SCHEMA: Schema = {
     "calibration": ANY,
     "tool": {
-        "tip_radius_m": Key(low=1e-6, high=0.04, unit="m"),
+        "tip_radius_m": dataclasses.replace(TIP_RADIUS, low=1e-6, required=False),  # an AFM's is so small
         "stiffness_n_per_m": Key(low=1.0, high=1e9, unit="N/m"),
         "play_m": Key(low=-0.01, high=0.01, unit="m"),
     },

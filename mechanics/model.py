@@ -21,6 +21,7 @@ from mechanics.material import (
 from mechanics.moduli import gradient_ratio, skin_ratio, with_balls, within_limits
 from mechanics.press_making import no_presses
 from mechanics.presses import Presses
+from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 
@@ -77,7 +78,7 @@ class Model:
     tool: Tool
     mesh_size_m: float
     shape_uncertainty_m: np.ndarray | None = None
-    presses: Presses = field(default_factory=lambda: no_presses(0.005))
+    presses: Presses = field(default_factory=lambda: no_presses(USUAL_TIP_RADIUS_M))
     effects: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     provenance: Mapping[str, Any] = field(default_factory=dict)
     about: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import dataclasses
-import time
 from concurrent.futures import Executor, Future, ThreadPoolExecutor
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -17,7 +16,7 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.model_files import read_model
 from mechanics.options import option
-from mechanics.progress import Progress, silent
+from mechanics.progress import Clock, Progress, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites, touch_sites, touch_solver
@@ -339,17 +338,3 @@ def _provenance(
 
 def _part(progress: Progress, low: float, high: float) -> Progress:
     return lambda stage, fraction: progress(stage, low + (high - low) * fraction)
-
-
-class Clock:
-    """Wall time of steps, s: `lap` books what passed since the last to a name."""
-
-    def __init__(self) -> None:
-        self.laps: dict[str, float] = {}
-        self._last = time.perf_counter()
-
-    def lap(self, name: str) -> None:
-        """The step `name` ends here."""
-        now = time.perf_counter()
-        self.laps[name] = self.laps.get(name, 0.0) + now - self._last
-        self._last = now

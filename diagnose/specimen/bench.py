@@ -30,14 +30,14 @@ from mechanics.model import Model, Support, Tool
 from mechanics.press_cutting import FoundAround, FoundPresses, cut
 from mechanics.presses import HOLDING
 from mechanics.progress import Progress, silent
-from mechanics.quantities import USUAL_POISSON_RATIO, parse_unit, unit_of_key
+from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
 from reconstruct.geometry.known_shape import flat_mesh, half_space_size
 from reconstruct.steps.s1_filter.filtering import white_noise_std
 from reconstruct.steps.s3_contacts.unbroken import Loading, first_touches
 
-HAND_TIP_M, PEAK_N = 0.005, 1.0
+HAND_TIP_M, PEAK_N = USUAL_TIP_RADIUS_M, 1.0
 """The size to which curves are brought: tip's radius, and the force of the middle one at its peak."""
 HAND_S, RATE_HZ = 2.0, 200.0
 """The pace to which they are brought: how long the middle curve takes, and readings a second at most."""
