@@ -1,4 +1,4 @@
-"""Mechanics: pure arrays and the frozen types that every other room shares. Imports nothing of ours."""
+"""Mechanics: pure arrays and the frozen types that every other package shares. Imports none of them."""
 
 from mechanics.kernel_cache import choose_folder
 

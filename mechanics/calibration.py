@@ -42,7 +42,7 @@ TOOL = Kind("a tool's calibration", (b"[calibration]",))
 
 @dataclass(frozen=True)
 class Calibration:
-    """None where a thing was not told; then it is left as it is.
+    """None where a value is not known; then the reading is left as it is.
 
     tip_radius_m; stiffness_n_per_m of the tool between sensor and tip; play_m, positive where the tip lags
     behind the sensor, negative where the sensor lags; matrix (3, 3), read = matrix true; bias_n (3,);

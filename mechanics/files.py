@@ -55,7 +55,7 @@ _REMEDIES = {
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of file that this program writes, told by how it begins, so that nothing else is replaced.
+    """A kind of file that this program writes, recognised by how it begins, so that nothing else is replaced.
 
     words: for people. starts: what such a file may begin with. holds: bytes that stand somewhere in it.
     likely_bytes: room that one takes. goes: where it is written if a path is named. beside: further files
@@ -113,7 +113,7 @@ def cache_folder() -> Path:
     return user_cache_path("palpate", appauthor=False)
 
 
-def told(error: OSError, path: Path | str | None, doing: str) -> str:
+def refusal(error: OSError, path: Path | str | None, doing: str) -> str:
     """One line for a person: which file, what failed, what to do. doing: 'read' or 'written'."""
     named = path if path is not None else error.filename
     what = error.strerror or str(error) or type(error).__name__
@@ -134,7 +134,7 @@ def reading(path: Path | str, error: type[PalpateError] = FileError) -> Iterator
     except (gzip.BadGzipFile, zlib.error) as refused:
         raise error(f"'{path}' cannot be unpacked ({refused}): it is damaged; copy it again") from refused
     except OSError as refused:
-        raise error(told(refused, path, "read")) from refused
+        raise error(refusal(refused, path, "read")) from refused
 
 
 @contextmanager
@@ -145,7 +145,7 @@ def writing(path: Path | str) -> Iterator[None]:
     except PalpateError:
         raise
     except OSError as refused:
-        raise FileError(told(refused, path, "written")) from refused
+        raise FileError(refusal(refused, path, "written")) from refused
 
 
 def no_file(path: Path | str) -> str:

@@ -3,7 +3,7 @@
 Numba keeps a kernel on disk by the text of its own file and does not see that a kernel it calls, or a number
 it took from another module, has changed. So the folder is named by a hash of every source of ours that holds
 kernels and of what those import: change one, and all are compiled anew. It must be chosen before a kernel is
-decorated, hence from `mechanics/__init__.py`, which every room imports first.
+decorated, hence from `mechanics/__init__.py`, which every package imports first.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The pressed places of a model, and what is dear there: solved when asked for, kept beside the model."""
+"""The pressed places of a model, and what is expensive there: solved on demand, kept beside the model."""
 
 from __future__ import annotations
 

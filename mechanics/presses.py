@@ -28,7 +28,7 @@ CANNOT_TELL = {
     "cycle": ("force in free air", "adhesion", "own first touch: it follows from the law of the others"),
     "points": ("rates", "delay", "memory", "drift", "force in free air", "own noise"),
 }
-"""What a segment of a kind says nothing of; of the other kinds all is told."""
+"""What a segment of a kind says nothing of; the other kinds show everything."""
 FITS = ("k_kv", "b_kv", "k_hc", "b_hc", "r_hc", "k_v", "k_c", "r_c", "k_h", "e_pa")
 """What is fitted to each press: Kelvin-Voigt, eq. (1): k_kv N/m, b_kv N s/m; Hunt-Crossley, eq. (2): k_hc
 N/m^r, b_hc N s/m^(r+1), r_hc; without damping k_v N/m, eq. (5), k_c N/m^r, r_c, eq. (6), and k_h N/m^r, eq.

@@ -1,4 +1,4 @@
-"""Progress is told to a callable, so that pure code can report without knowing a terminal; and a clock of
+"""Progress is reported to a callable, so that pure code can report without knowing a terminal; and a clock of
 steps."""
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ Progress = Callable[[str, float], None]
 
 
 def silent(stage: str, fraction: float) -> None:
-    """The default: tells nobody."""
+    """The default: reports to nobody."""
 
 
 class Clock:

@@ -77,7 +77,7 @@ class Listed:
 
 
 ANY = None
-"""A key whose value is nobody's business."""
+"""A key whose value is not checked."""
 Schema = Mapping[str, "Key | Named | Listed | Schema | None"]
 
 

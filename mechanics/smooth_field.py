@@ -3,8 +3,9 @@
 Few numbers say how it varies: standard deviation, and length over which places are alike (Matern 5/2). What
 is unknown are its values at places that are spread over the object, the touched ones first; between them it
 is kriged. A press tells of a weighted mean of the field, by the share of its compliance that lies in each
-element and under its tip (`Shares`), so that depth is told as far as presses tell it. Standard deviation,
-length, and how much places scatter without any field, are those of the greatest restricted likelihood.
+element and under its tip (`Shares`), so that depth is resolved as far as presses resolve it. Standard
+deviation, length, and how much places scatter without any field, are those of the greatest restricted
+likelihood.
 Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, chapters 2, 4, 5 and 8.
 """
 

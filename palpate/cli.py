@@ -124,7 +124,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
     import warnings
 
     from mechanics.errors import PalpateError
-    from mechanics.files import sweep_scratch, told
+    from mechanics.files import refusal, sweep_scratch
     from mechanics.recording import NotRead
     from palpate.arguments import check_paths
 
@@ -153,7 +153,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             return 0
         except OSError as error:
-            return refused(told(error, None, "used"))
+            return refused(refusal(error, None, "used"))
         except MemoryError as error:
             return refused(
                 f"not enough memory ({error}): use a coarser mesh or a shorter recording, or close programs"

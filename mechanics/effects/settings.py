@@ -1,4 +1,4 @@
-"""What a prediction is told, the ideal model until effects change it; and what it lets effects see."""
+"""The settings of a prediction, the ideal model until effects change them; and what effects see of it."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ class Touch:
 
 @dataclass
 class Settings:
-    """What a prediction is told; the defaults are the ideal model.
+    """The settings of a prediction; the defaults are the ideal model.
 
     modulus: Pa. nu: Poisson's ratio. far: (p, 3, 3) local, unit modulus. dent_ratio: (p,) modulus under the
     tip over the global one. onset: (p,) m, how much earlier each press meets the surface. stiffness: (p,)
