@@ -22,8 +22,8 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "reconstruct": (
         "reconstruct.pipeline:ReconstructOptions",
         "reconstruct.geometry.known_shape:GeometryOptions",
-        "reconstruct.steps.s1_filter.filtering:FilterOptions",
-        "reconstruct.steps.s2_boundary.boundary:BoundaryOptions",
+        "reconstruct.steps.s1_filter.low_pass:FilterOptions",
+        "reconstruct.steps.s2_base.outline:BoundaryOptions",
         "reconstruct.steps.s3_contacts.contacts:ContactOptions",
         "reconstruct.steps.s4_surface.surface:SurfaceOptions",
         "reconstruct.steps.s5_mesh.meshing:MeshingOptions",

@@ -25,9 +25,9 @@ from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
-from reconstruct.steps.s1_filter.filtered import Filtered
-from reconstruct.steps.s1_filter.filtering import FilterOptions
-from reconstruct.steps.s2_boundary.boundary import Boundary, BoundaryOptions
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
+from reconstruct.steps.s1_filter.signals import Filtered
+from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
 from reconstruct.steps.s3_contacts.points import explore_points, is_points
 from reconstruct.steps.s3_contacts.slides import without_slides

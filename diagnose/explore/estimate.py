@@ -22,8 +22,8 @@ from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from reconstruct.pipeline import Clock
 from reconstruct.shapes.evidence import LEAST_TOUCHES
-from reconstruct.steps.s1_filter.filtered import filtered_of
-from reconstruct.steps.s1_filter.filtering import FilterOptions
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
+from reconstruct.steps.s1_filter.signals import filtered_of
 from reconstruct.steps.s1_filter.tool_weight import ToolWeight
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
 from reconstruct.steps.s4_surface.casting import cast

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 
 from reconstruct.checks.base import Finding
-from reconstruct.checks.sight import Sight
-from reconstruct.steps.s1_filter.filtering import noise_gain
+from reconstruct.checks.believed import Sight
+from reconstruct.steps.s1_filter.low_pass import noise_gain
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S, _LATEST_S = 0.075, 0.25

@@ -14,7 +14,7 @@ from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
 from mechanics.segments import within
 from reconstruct.checks.base import Finding, decades_of_tail, p_words, sure
-from reconstruct.checks.sight import CHANNELS, Sight
+from reconstruct.checks.believed import CHANNELS, Sight
 
 _NINE_OF_TEN = 1.645
 """Standard deviations within which nine of ten readings of a Gaussian lie."""

@@ -8,7 +8,7 @@ import numpy as np
 
 from mechanics.samples import runs
 from reconstruct.checks.base import Finding
-from reconstruct.checks.sight import Sight
+from reconstruct.checks.believed import Sight
 
 _TOLD = 0.02
 _GAP, _GAP_S, _PAUSE_S = 5.0, 0.05, 1.0

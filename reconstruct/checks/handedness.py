@@ -15,7 +15,7 @@ import numpy as np
 
 from mechanics.press_sites import SITE_M, sites_of
 from reconstruct.checks.base import SURE_ODDS, Finding
-from reconstruct.checks.sight import Sight
+from reconstruct.checks.believed import Sight
 
 _LEAST_SITES = 5
 _LEAST_ANGLE_RAD = 0.15

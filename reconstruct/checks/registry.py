@@ -14,16 +14,16 @@ from mechanics.errors import ContactError, NoBaseError, RecordingError
 from mechanics.recording import Recording
 from reconstruct.checks.air import air, delay
 from reconstruct.checks.base import Finding
+from reconstruct.checks.believed import Sight
 from reconstruct.checks.channels import channels
 from reconstruct.checks.clock import clock
 from reconstruct.checks.handedness import handedness
 from reconstruct.checks.outcome import Result, outcome
-from reconstruct.checks.sight import Sight
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
 from reconstruct.geometry.known_shape import GeometryOptions, stated_geometry
-from reconstruct.steps.s1_filter.filtered import Filtered
-from reconstruct.steps.s1_filter.filtering import FilterOptions
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
+from reconstruct.steps.s1_filter.signals import Filtered
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 
 OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)

@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 from mechanics.recording import Recording
 from reconstruct.checks.base import SURE_ODDS, Finding, p_words, sure
-from reconstruct.checks.sight import Sight, Units
+from reconstruct.checks.believed import Sight, Units
 
 READINGS = {
     "time": {"s": 1.0, "ms": 1e3, "us": 1e6},

@@ -38,8 +38,8 @@ from reconstruct.geometry.registration import (
 from reconstruct.shapes.decimation import decimated
 from reconstruct.shapes.evidence import support_axes
 from reconstruct.shapes.polyhedron import refine
-from reconstruct.steps.s1_filter.filtered import hysteresis
-from reconstruct.steps.s2_boundary.boundary import Boundary, BoundaryOptions, find_boundary, find_interval
+from reconstruct.steps.s1_filter.signals import hysteresis
+from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary, find_interval
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import PoseError

@@ -31,7 +31,7 @@ def implicit_surface(
     """
     import pyvista
 
-    from reconstruct.steps.s2_boundary.boundary import farthest_points
+    from reconstruct.steps.s2_base.outline import farthest_points
 
     used = slice(None) if left_out is None else ~left_out
     centres = evidence.to_support(evidence.centres)[used]

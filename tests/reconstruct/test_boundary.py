@@ -7,7 +7,7 @@ import pytest
 from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 from mechanics.errors import ContactError
-from reconstruct.steps.s2_boundary.boundary import (
+from reconstruct.steps.s2_base.outline import (
     BoundaryOptions,
     farthest_points,
     find_boundary,

@@ -11,9 +11,9 @@ from exploration_of_cylinder import explore_cylinder
 from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
 from reconstruct.checks.base import Finding, decades_of_tail
+from reconstruct.checks.believed import Sight
 from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
-from reconstruct.checks.sight import Sight
 
 NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")
 

@@ -8,9 +8,9 @@ from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinde
 
 from mechanics.errors import ContactError, OptionError
 from mechanics.segments import Segment
-from reconstruct.steps.s1_filter.filtering import low_pass
+from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s1_filter.tool_weight import tool_weight
-from reconstruct.steps.s3_contacts import finding
+from reconstruct.steps.s3_contacts import first_touch as finding
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 
 
@@ -221,7 +221,7 @@ def test_a_soft_object_pressed_shallowly_keeps_its_presses():
 
 def test_a_foot_traced_in_straight_pieces_with_a_bounce_is_one_phase():
     """One straight side alone tells no plane, and a bounce of 20 ms ends no tracing."""
-    from reconstruct.steps.s2_boundary.boundary import find_interval
+    from reconstruct.steps.s2_base.outline import find_interval
 
     rate, rng = 1000, np.random.default_rng(5)
     corners = np.array([[0, 0], [0.06, 0], [0.06, 0.06], [0, 0.06], [0, 0]])

@@ -15,8 +15,8 @@ from mechanics.errors import MeshError, SurfaceError
 from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.voxels import labels, voxel_surface
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
+from reconstruct.steps.s5_mesh.element_shape import radius_edge_ratio, relaxed
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, _held, mesh_surface
-from reconstruct.steps.s5_mesh.relaxation import radius_edge_ratio, relaxed
 from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
 
 

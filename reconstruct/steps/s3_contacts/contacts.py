@@ -2,7 +2,7 @@
 
 Two modes. `paper`: contact at a threshold tau = 1 N, back-tracked to the first rise. `noise` (default):
 thresholds from the sensor's noise, every press used, first touch by fitting the contact law
-(reconstruct.steps.s3_contacts.onset).
+(reconstruct.steps.s3_contacts.contact_law).
 """
 
 from __future__ import annotations
@@ -20,13 +20,13 @@ from mechanics.recording import Recording
 from mechanics.samples import runs
 from mechanics.segments import ON_SUPPORT, Segment
 from reconstruct.shapes.evidence import LEAST_TOUCHES
-from reconstruct.steps.s1_filter.delay import Delay, force_delay
-from reconstruct.steps.s1_filter.filtered import Filtered, filtered_of
-from reconstruct.steps.s1_filter.filtering import FilterOptions, low_pass_at, noise_gain, white_noise_std
-from reconstruct.steps.s2_boundary.boundary import Boundary, BoundaryOptions, find_boundary
-from reconstruct.steps.s3_contacts.finding import Found, Signals, fitted_contact, paper_contact
+from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass_at, noise_gain, white_noise_std
+from reconstruct.steps.s1_filter.signals import Filtered, filtered_of
+from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary
+from reconstruct.steps.s3_contacts.cycles import Piece, cycles, found_cycles, free_air_seen
+from reconstruct.steps.s3_contacts.first_touch import Found, Signals, fitted_contact, paper_contact
+from reconstruct.steps.s3_contacts.force_delay import Delay, force_delay
 from reconstruct.steps.s3_contacts.on_support import on_it, recognised, stated
-from reconstruct.steps.s3_contacts.unbroken import Piece, cycles, found_cycles, free_air_seen
 
 PAPER_THRESHOLD_N = 1.0
 METHODS = ("noise", "paper")

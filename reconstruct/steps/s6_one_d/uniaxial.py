@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from mechanics.presses import Presses
-from reconstruct.steps.s1_filter.filtering import FilterOptions, low_pass
+from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass
 
 
 def low_passed(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> Presses:

@@ -11,9 +11,9 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.steps.s1_filter.delay import Delay
-from reconstruct.steps.s1_filter.filtered import Filtered, filtered_of
-from reconstruct.steps.s1_filter.filtering import FilterOptions, white_noise_std
+from reconstruct.steps.s1_filter.low_pass import FilterOptions, white_noise_std
+from reconstruct.steps.s1_filter.signals import Filtered, filtered_of
+from reconstruct.steps.s3_contacts.force_delay import Delay
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples

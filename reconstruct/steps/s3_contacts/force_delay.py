@@ -15,8 +15,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.robust import biweight, spread_about_zero
-from reconstruct.steps.s3_contacts.finding import Found, Signals
-from reconstruct.steps.s3_contacts.onset import fit_rise
+from reconstruct.steps.s3_contacts.contact_law import fit_rise
+from reconstruct.steps.s3_contacts.first_touch import Found, Signals
 
 _TAIL_S = 0.15
 _AWAY_M = 0.004

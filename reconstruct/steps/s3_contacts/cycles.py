@@ -15,8 +15,8 @@ import numpy as np
 from scipy.signal import find_peaks
 
 from mechanics.robust import spread
-from reconstruct.steps.s3_contacts.finding import Found, Signals, initial_normal
-from reconstruct.steps.s3_contacts.onset import Rise, fit_rise
+from reconstruct.steps.s3_contacts.contact_law import Rise, fit_rise
+from reconstruct.steps.s3_contacts.first_touch import Found, Signals, initial_normal
 
 _STEP_RADII = 1 / 8
 """Of the tip: a way straight in or out so long without a change of the force is free air."""

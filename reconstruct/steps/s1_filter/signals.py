@@ -12,14 +12,14 @@ import numpy as np
 from mechanics.errors import ContactError
 from mechanics.recording import Recording
 from mechanics.samples import runs
-from reconstruct.steps.s1_filter.baseline import free_air_force
-from reconstruct.steps.s1_filter.delay import Delay, delay_by_places
-from reconstruct.steps.s1_filter.filtering import low_pass_at, noise_gain, white_noise_std
-from reconstruct.steps.s1_filter.free_noise import crowd_scale, least_contrast, moving_spread
-from reconstruct.steps.s1_filter.passing import between, crowd_median, missed, passing, slowly
+from reconstruct.steps.s1_filter.fast_drift import between, crowd_median, missed, passing, slowly
+from reconstruct.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
+from reconstruct.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
+from reconstruct.steps.s1_filter.slow_drift import free_air_force
 from reconstruct.steps.s1_filter.tool_weight import ToolWeight, tool_weight
-from reconstruct.steps.s2_boundary.boundary import find_interval, in_its_plane
-from reconstruct.steps.s3_contacts.finding import Signals
+from reconstruct.steps.s2_base.outline import find_interval, in_its_plane
+from reconstruct.steps.s3_contacts.first_touch import Signals
+from reconstruct.steps.s3_contacts.force_delay import Delay, delay_by_places
 
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
@@ -60,7 +60,7 @@ class Filtered:
 
     @cached_property
     def least(self) -> float:
-        """How many spreads a touch must reach (reconstruct.steps.s1_filter.free_noise)."""
+        """How many spreads a touch must reach (reconstruct.steps.s1_filter.noise_level)."""
         return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
 
     @cached_property

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.steps.s3_contacts.onset import contact_law, fit_rise
+from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_rise
 
 _LEAD_S = 0.15
 _FIT_SAMPLES = 250
