@@ -26,9 +26,9 @@ from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
-from reconstruct.steps.s1_filter.signals import Filtered
 from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from reconstruct.steps.s3_contacts.first_touch import ContactSpans
 from reconstruct.steps.s3_contacts.points import explore_points, is_points
 from reconstruct.steps.s3_contacts.slides import without_slides
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
@@ -133,13 +133,13 @@ def _reconstructed(
 
     if geometry.known:
         exploration, placed = _on_known(
-            recording, options, geometry, checkup.filtered, _part(progress, 0.02, 0.3)
+            recording, options, geometry, checkup.spans, _part(progress, 0.02, 0.3)
         )
         checkup.presses(exploration)
         surface = placed.surface
         clock.lap("contacts and registration")
     else:
-        exploration = _explored(recording, options, checkup.filtered)
+        exploration = _explored(recording, options, checkup.spans)
         checkup.presses(exploration)
         clock.lap("contacts")
         surface = reconstruct_surface(
@@ -263,7 +263,7 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
 def _touches(
     recording: Recording,
     options: ReconstructOptions,
-    filtered: Filtered | None,
+    spans: ContactSpans | None,
     base: Boundary | None = None,
     unbroken: bool = False,
 ) -> Exploration:
@@ -276,32 +276,32 @@ def _touches(
         boundary_options=options.boundary,
         filter_options=options.filter,
         boundary=base,
-        filtered=filtered,
+        spans=spans,
         unbroken=unbroken,
     )
 
 
-def _explored(recording: Recording, options: ReconstructOptions, filtered: Filtered | None) -> Exploration:
+def _explored(recording: Recording, options: ReconstructOptions, spans: ContactSpans | None) -> Exploration:
     """Where the recording traces no base, that of [object] model = PATH stands in."""
     try:
-        return _touches(recording, options, filtered)
+        return _touches(recording, options, spans)
     except NoBaseError:
         if recording.base_model is None:
             raise
     base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-    return _touches(recording, options, filtered, base)
+    return _touches(recording, options, spans, base)
 
 
 def _on_known(
     recording: Recording,
     options: ReconstructOptions,
     geometry: GeometryOptions,
-    filtered: Filtered | None,
+    spans: ContactSpans | None,
     progress: Progress,
 ) -> tuple[Exploration, Placed]:
     """Touches told without a support place the geometry; then they are told again, over its base."""
     least = options.contact.least_palpations
-    first = without_slides(_touches(recording, options, filtered, nowhere(recording), unbroken=True), least)
+    first = without_slides(_touches(recording, options, spans, nowhere(recording), unbroken=True), least)
     progress("contacts", 0.3)
     placed = place(
         recording,
@@ -311,7 +311,7 @@ def _on_known(
         spacing_m=options.surface.surface_spacing_m,
         progress=_part(progress, 0.3, 0.8),
     )
-    again = _touches(recording, options, filtered, placed.base, unbroken=True)
+    again = _touches(recording, options, spans, placed.base, unbroken=True)
     return without_slides(again, least), placed
 
 

@@ -18,7 +18,8 @@ from diagnose.explore.goals import Standing, surface_error, vertex_areas
 from diagnose.explore.parting import Parting
 from mechanics.options import option
 from mechanics.tetmesh import vertex_normals
-from reconstruct.steps.s2_base.outline import Boundary, farthest_points
+from reconstruct.shapes.points import farthest_points
+from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import CORRELATION_M
 

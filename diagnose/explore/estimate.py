@@ -26,6 +26,7 @@ from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s1_filter.signals import filtered_of
 from reconstruct.steps.s1_filter.tool_weight import ToolWeight
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from reconstruct.steps.s3_contacts.first_touch import ContactSpans
 from reconstruct.steps.s4_surface.casting import cast
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface, uncertainty_at
@@ -118,7 +119,7 @@ def updated(
     clock = Clock()
     filtered = filtered_of(recording, FilterOptions().cutoff_hz, near=before.weight)
     options = ContactOptions(least_palpations=LEAST_PRESSES)
-    exploration = explore(recording, contact_options=options, filtered=filtered)
+    exploration = explore(recording, contact_options=options, spans=ContactSpans(filtered))
     clock.lap("presses")
     surface, chosen_at, choice_error = _surface(exploration, before, within_m)
     clock.lap("surface")

@@ -39,7 +39,8 @@ from reconstruct.shapes.decimation import decimated
 from reconstruct.shapes.evidence import support_axes
 from reconstruct.shapes.polyhedron import refine
 from reconstruct.steps.s1_filter.signals import hysteresis
-from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary, find_interval
+from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary
+from reconstruct.steps.s2_base.tracing import find_interval
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import PoseError
@@ -196,15 +197,11 @@ def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) ->
 
 def _traced_support(recording: Recording, first: Exploration) -> tuple[np.ndarray, np.ndarray] | None:
     """The support of a recording that traces it all the same; None where it does not."""
-    size = np.linalg.norm(first.force, axis=1)
-    touching = hysteresis(size, 5 * first.noise_n, 10 * first.noise_n)
+    touching = hysteresis(np.linalg.norm(first.force, axis=1), 5 * first.noise_n, 10 * first.noise_n)
+    t, radius = recording.t, recording.tip_radius_m
     try:
-        interval = find_interval(
-            recording.t, first.position, touching, recording.boundary_phase, recording.tip_radius_m
-        )
-        found = find_boundary(
-            first.position, first.force, touching, interval, recording.tip_radius_m, BoundaryOptions()
-        )
+        interval = find_interval(t, first.position, touching, recording.boundary_phase, radius)
+        found = find_boundary(first.position, first.force, touching, interval, radius, BoundaryOptions())
     except ContactError:
         return None
     # sliding on the object itself is no tracing: touches lie over a support

@@ -7,6 +7,7 @@ from scipy.spatial import Delaunay, QhullError
 
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.evidence import Evidence
+from reconstruct.shapes.points import farthest_points
 
 
 def hull_surface(evidence: Evidence, base_spacing_m: float = 0.005) -> tuple[np.ndarray, np.ndarray]:
@@ -15,7 +16,6 @@ def hull_surface(evidence: Evidence, base_spacing_m: float = 0.005) -> tuple[np.
     Touched points below the support are lifted onto it. The hull is an inner bound of a convex object.
     Raises SurfaceError where the points are flat.
     """
-    from reconstruct.steps.s2_base.outline import farthest_points
 
     rim = evidence.to_support(evidence.outline)
     rim[:, 2] = 0.0

@@ -9,31 +9,36 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import ContactError
 from mechanics.recording import Recording
 from mechanics.samples import runs
+from reconstruct.shapes.points import in_its_plane
 from reconstruct.steps.s1_filter.fast_drift import between, crowd_median, missed, passing, slowly
 from reconstruct.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
 from reconstruct.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
 from reconstruct.steps.s1_filter.slow_drift import free_air_force
 from reconstruct.steps.s1_filter.tool_weight import ToolWeight, tool_weight
-from reconstruct.steps.s2_base.outline import find_interval, in_its_plane
-from reconstruct.steps.s3_contacts.first_touch import Signals
-from reconstruct.steps.s3_contacts.force_delay import Delay, delay_by_places
 
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
-_LEAST_SPAN_S = 0.05
-_SLIDE = 8.0
-"""Tip radii: touches that go further are slides."""
 _LOOSE = 0.5
 """Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
 presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0210)."""
-_TIPS_M = (1e-3, 0.02)
-"""Radii that are believed for that."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What presses are read from: low-passed position and force (n, 3), its magnitude, noise N an axis,
+    raw force."""
+
+    recording: Recording
+    position: np.ndarray
+    force: np.ndarray
+    magnitude: np.ndarray
+    raw_force: np.ndarray
+    noise_n: float
 
 
 @dataclass(frozen=True)
@@ -71,37 +76,6 @@ class Filtered:
         if self.air is not None:
             contrast = np.where(self.air, 0.0, contrast)
         return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
-
-    @cached_property
-    def tracing(self) -> tuple[int, int]:
-        """Samples [first, last) of the tracing. Raises ContactError where none is found."""
-        recording = self.signals.recording
-        given, radius = stated_tracing(recording), recording.tip_radius_m
-        return find_interval(recording.t, self.signals.position, self.touching, given, radius)
-
-    @cached_property
-    def traced(self) -> tuple[int, int]:
-        """The tracing; (0, 0) where none is found."""
-        try:
-            return self.tracing
-        except ContactError:
-            return 0, 0
-
-    @cached_property
-    def spans(self) -> list[tuple[int, int]]:
-        """[start, end) samples of each touch after the tracing, short ones and slides left out."""
-        recording, path, touching = self.signals.recording, self.signals.position, self.touching.copy()
-        touching[: self.traced[1]] = False
-        shortest = max(3, round(_LEAST_SPAN_S * recording.sample_rate_hz))
-        found = [(a, b) for a, b in runs(touching) if b - a >= shortest and a > 0 and b < len(recording.t)]
-        reach = _SLIDE * float(np.clip(recording.tip_radius_m, *_TIPS_M))
-        return [(a, b) for a, b in found if np.ptp(path[a:b], axis=0).max() < reach]
-
-    @cached_property
-    def late(self) -> Delay:
-        """How late the force reads, by places that are passed twice."""
-        signals = self.signals
-        return delay_by_places(signals.recording.t, signals.position, signals.magnitude, self.spans)
 
 
 def filtered_of(

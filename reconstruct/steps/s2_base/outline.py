@@ -1,7 +1,4 @@
-"""Phase I: the tip slides on the rigid support around the object (paper, section 2.1).
-
-From its path come the support plane, in any device frame, and the outline of the object's base.
-"""
+"""The base: support plane and outline, in any device frame, from the path of the tracing (section 2.1)."""
 
 from __future__ import annotations
 
@@ -10,21 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.ndimage import distance_transform_edt, gaussian_filter1d, label
 
-from mechanics.errors import ContactError, NoBaseError, OptionError
+from mechanics.errors import ContactError, OptionError
 from mechanics.options import option
-from mechanics.robust import biweight
-from mechanics.samples import runs
-
-_LEAST_SLIDE = 8.0  # tip radii; a drag within a palpation is shorter or leaves the plane
-_LEAST_PIECE = 2.0  # tip radii; less tells no plane
-_FLAT = 0.1  # tip radii off the plane
-_MOMENT_S = 0.05  # a contact that is shorter is no press
-_BREAK_S = 2.5  # longer than a tracing is broken off
-_THINNED = 5  # samples
-_FOOT = 0.4  # tip radii: a wider gap in a tracing is open, a wider leap parts its strokes; off it is the air
-_STEP_M = 0.0005
-_LEAST_STEPS = 20
-_DRAWN = 200
+from reconstruct.shapes.points import FOOT, LEAST_STEPS, STEP_M, farthest_points, fit_plane, resampled
 
 
 @dataclass(frozen=True)
@@ -65,135 +50,6 @@ class Boundary:
         return (np.asarray(points) - self.support_point) @ self.support_normal
 
 
-def fit_plane(points: np.ndarray) -> tuple[np.ndarray, np.ndarray, float]:
-    """(centre, unit normal, rms) of the plane through points (n, 3), robust (Tukey's biweight on
-    distances)."""
-
-    def plane(weight: np.ndarray) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
-        centre = np.average(points, axis=0, weights=weight)
-        offset = points - centre
-        normal = np.linalg.eigh((offset * weight[:, None]).T @ offset)[1][:, 0]
-        return (centre, normal), offset @ normal
-
-    found = biweight(plane, len(points), least=1e-7, reach=6.0, rounds=12)
-    return *found.fitted, float(np.sqrt(np.average(found.residual**2, weights=found.weight)))
-
-
-def farthest_points(points: np.ndarray, spacing_m: float, start: int = 0) -> np.ndarray:
-    """Indices of a farthest-point sample: added until no point is further than `spacing_m` from the
-    sample."""
-    chosen = [start]
-    distance = np.linalg.norm(points - points[start], axis=1)
-    while distance.max() > spacing_m:
-        chosen.append(int(np.argmax(distance)))
-        distance = np.minimum(distance, np.linalg.norm(points - points[chosen[-1]], axis=1))
-    return np.array(chosen)
-
-
-def find_interval(
-    t: np.ndarray,
-    position: np.ndarray,
-    touching: np.ndarray,
-    given: tuple[float, float] | None,
-    tip_radius_m: float,
-) -> tuple[int, int]:
-    """Sample indices [first, last) of phase I.
-
-    given: approximate times from the recording; contact that starts inside is followed to its end. Without
-    them: contacts in which the tip slides further than 8 radii while it stays in one plane, until one leaves
-    that plane for good. touching: (n,) bool. Raises ContactError where there is none.
-    """
-    found = runs(touching)
-    if given is not None:
-        inside = [(a, b) for a, b in found if t[min(b, len(t) - 1)] > given[0] and t[a] < given[1]]
-        inside = [(a, b) for a, b in inside if _travel(position[a:b]) > 2 * tip_radius_m]
-        if not inside:
-            raise NoBaseError(
-                f"no contact with the support between {given[0]:.2f} and {given[1]:.2f} s (boundary_phase): "
-                "trace the object's base first, or give [object] model = PATH of a model whose base stands in"
-            )
-        return inside[0][0], inside[-1][1]
-    for i, (a, b) in enumerate(found):
-        if _travel(position[a:b]) < _LEAST_PIECE * tip_radius_m:
-            continue
-        centre, normal, flatness = fit_plane(position[a:b])
-        if flatness > _FLAT * tip_radius_m:
-            continue
-        first, last = _coplanar(t, position, found, i, tip_radius_m)
-        if sum(_travel(position[c:d]) for c, d in found[first : last + 1]) > _LEAST_SLIDE * tip_radius_m:
-            return found[first][0], found[last][1]
-    raise NoBaseError(
-        "no boundary phase found: nowhere does the tip slide further than 8 of its radii in one plane; trace "
-        "the object's base first, state [recording] boundary_phase, or give [object] model = PATH of a "
-        "model whose base stands in"
-    )
-
-
-def in_its_plane(position: np.ndarray, inside: np.ndarray, tip_radius_m: float) -> np.ndarray:
-    """(n,) bool: samples of a tracing that lie in the plane of most of its way; the others are in the air.
-
-    position: (n, 3) m. inside: (n,) bool, when the base is stated to be traced.
-    """
-    way = _resampled(position[inside], _STEP_M) if inside.any() else position[inside]
-    if len(way) < _LEAST_STEPS:
-        return inside
-    corners = way[np.random.default_rng(0).integers(len(way), size=(_DRAWN, 3))]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    near = np.abs(way @ normals.T - np.einsum("ij,ij->i", corners[:, 0], normals)) < _FLAT * tip_radius_m
-    on = way[near[:, np.argmax(near.sum(axis=0))]]  # the plane of three points that holds most of the way
-    centre, normal, _ = fit_plane(on)
-    return inside & (np.abs((position - centre) @ normal) < _FOOT * tip_radius_m)
-
-
-def _coplanar(
-    t: np.ndarray, position: np.ndarray, found: list[tuple[int, int]], start: int, tip_radius_m: float
-) -> tuple[int, int]:
-    """First and last of the contacts around `start` that lie in one plane with it, none left out between.
-
-    The plane is fitted anew with each contact that is tried: one straight side of a foot alone tells no
-    plane. A contact of a moment, as of a tip that bounces, ends nothing; nor does one that slides nowhere and
-    stays within a tip's radius of the plane, as of a tip that is lifted along the object's wall, or comes so
-    soon that it may be the swing of a heavy tool while the tracing is broken off.
-    """
-    lasting = [k for k, (a, b) in enumerate(found) if k == start or t[b - 1] - t[a] > _MOMENT_S]
-    at = lasting.index(start)
-    low = high = at
-
-    def thinned(k: int) -> np.ndarray:
-        a, b = found[lasting[k]]
-        return position[a:b:_THINNED]
-
-    def off(pieces: list[np.ndarray], of: list[np.ndarray]) -> float:
-        """m, the most by which the middle of any piece is off the plane of some."""
-        centre, normal, _ = fit_plane(np.concatenate(of))
-        return max(float(np.median(np.abs((piece - centre) @ normal))) for piece in pieces)
-
-    def apart(k: int, other: int) -> float:
-        """s between two contacts."""
-        early, late = found[lasting[min(k, other)]], found[lasting[max(k, other)]]
-        return float(t[late[0]] - t[early[1] - 1])
-
-    pieces = [thinned(at)]
-    for step in (1, -1):
-        tried = at
-        while 0 <= (tried := tried + step) < len(lasting):
-            own = thinned(tried)
-            together = [*pieces, own]
-            if off(together, together) <= _FLAT * tip_radius_m:
-                pieces, low, high = together, min(low, tried), max(high, tried)
-            elif _travel(position[slice(*found[lasting[tried]])]) > _LEAST_PIECE * tip_radius_m:
-                break
-            elif apart(tried, high if step > 0 else low) > _BREAK_S and off([own], pieces) > tip_radius_m:
-                break
-    return lasting[low], lasting[high]
-
-
-def _travel(points: np.ndarray) -> float:
-    # positions come in steps, so the path is measured on every 50th sample
-    return float(np.linalg.norm(np.diff(points[::50], axis=0), axis=1).sum()) if len(points) > 50 else 0.0
-
-
 def find_boundary(
     position: np.ndarray,
     force_on_tool: np.ndarray,
@@ -216,11 +72,11 @@ def find_boundary(
     height = (path - centre) @ normal - tip_radius_m
     path = path[np.abs(height) < max(6 * flatness, 2e-4)]
     path = path - ((path - centre) @ normal)[:, None] * normal
-    face = _enclosed(path, normal, _FOOT * tip_radius_m)
+    face = _enclosed(path, normal, FOOT * tip_radius_m)
     if face is not None:
         path = path[face.away(path) < face.reach_m]
-    strokes = _strokes(path, _FOOT * tip_radius_m)
-    if sum(map(len, strokes)) < _LEAST_STEPS:
+    strokes = _strokes(path, FOOT * tip_radius_m)
+    if sum(map(len, strokes)) < LEAST_STEPS:
         raise ContactError("the boundary phase is shorter than 1 cm: trace the object's whole base")
     smoothed = [gaussian_filter1d(stroke, 3.0, axis=0, mode="nearest") for stroke in strokes]
     smooth = np.concatenate(smoothed)
@@ -306,18 +162,8 @@ def _strokes(path: np.ndarray, gap_m: float) -> list[np.ndarray]:
     """The path cut where it leaps by more than `gap_m`, each piece at equal steps; pieces of less
     than three steps are no stroke."""
     leaps = np.flatnonzero(np.linalg.norm(np.diff(path, axis=0), axis=1) > gap_m) + 1
-    found = [_resampled(piece, _STEP_M) for piece in np.split(path, leaps)]
+    found = [resampled(piece, STEP_M) for piece in np.split(path, leaps)]
     return [piece for piece in found if len(piece) > 3]
-
-
-def _resampled(path: np.ndarray, step_m: float) -> np.ndarray:
-    """The path at equal steps of its length; a step is taken only once the tip has moved so far (no
-    jitter)."""
-    kept = [0]
-    for i in range(0, len(path), 5):
-        if np.linalg.norm(path[i] - path[kept[-1]]) >= step_m:
-            kept.append(i)
-    return path[kept]
 
 
 def _winding(path: np.ndarray, normal: np.ndarray) -> float:

@@ -9,8 +9,8 @@ import numpy as np
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.segments import ON_SUPPORT
+from reconstruct.steps.s1_filter.signals import Signals
 from reconstruct.steps.s2_base.outline import Boundary
-from reconstruct.steps.s3_contacts.first_touch import Signals
 
 _SLID = 2.0
 """Tip radii: what stays within is pressed, what goes farther slides."""
