@@ -29,8 +29,8 @@ from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
 from reconstruct.steps.s3_contacts.first_touch import ContactSpans
+from reconstruct.steps.s3_contacts.left_out import on_base, without_slides
 from reconstruct.steps.s3_contacts.points import explore_points, is_points
-from reconstruct.steps.s3_contacts.slides import without_slides
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import (
     Surface,
@@ -299,7 +299,7 @@ def _on_known(
     spans: ContactSpans | None,
     progress: Progress,
 ) -> tuple[Exploration, Placed]:
-    """Touches told without a support place the geometry; then they are told again, over its base."""
+    """Touches found without a support place the geometry, whose base then tells which lie on the support."""
     least = options.contact.least_palpations
     first = without_slides(_touches(recording, options, spans, nowhere(recording), unbroken=True), least)
     progress("contacts", 0.3)
@@ -311,8 +311,7 @@ def _on_known(
         spacing_m=options.surface.surface_spacing_m,
         progress=_part(progress, 0.3, 0.8),
     )
-    again = _touches(recording, options, spans, placed.base, unbroken=True)
-    return without_slides(again, least), placed
+    return on_base(first, placed.base, least), placed
 
 
 def _provenance(

@@ -38,9 +38,7 @@ from reconstruct.geometry.registration import (
 from reconstruct.shapes.decimation import decimated
 from reconstruct.shapes.evidence import support_axes
 from reconstruct.shapes.polyhedron import refine
-from reconstruct.steps.s1_filter.signals import hysteresis
-from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions, find_boundary
-from reconstruct.steps.s2_base.tracing import find_interval
+from reconstruct.steps.s2_base.outline import Boundary, BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import PoseError
@@ -175,7 +173,7 @@ def place(
     given = read_surface(options.shape, options.unit)
     stood = standing(given, options.up, options.sink_m)
     traces = options.pose == "auto" and set(presses.kinds) == {"press"}
-    support = _traced_support(recording, first) if traces else None
+    support = _traced_support(first) if traces else None
     body = Body(stood.vertices, stood.triangles, stood.support_point, stood.support_normal)
     touched = _touched(presses, support)
     found = register(body, touched, free=options.pose == "auto")
@@ -195,17 +193,16 @@ def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) ->
     )
 
 
-def _traced_support(recording: Recording, first: Exploration) -> tuple[np.ndarray, np.ndarray] | None:
+def _traced_support(first: Exploration) -> tuple[np.ndarray, np.ndarray] | None:
     """The support of a recording that traces it all the same; None where it does not."""
-    touching = hysteresis(np.linalg.norm(first.force, axis=1), 5 * first.noise_n, 10 * first.noise_n)
-    t, radius = recording.t, recording.tip_radius_m
+    if first.spans is None:
+        return None
     try:
-        interval = find_interval(t, first.position, touching, recording.boundary_phase, radius)
-        found = find_boundary(first.position, first.force, touching, interval, radius, BoundaryOptions())
+        found = first.spans.base(BoundaryOptions())
     except ContactError:
         return None
     # sliding on the object itself is no tracing: touches lie over a support
-    above = np.median(found.height(first.presses.point)) > 2 * recording.tip_radius_m
+    above = np.median(found.height(first.presses.point)) > 2 * first.presses.tip_radius_m
     return (found.support_point, found.support_normal) if above else None
 
 

@@ -19,7 +19,7 @@ from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import Seen
 from reconstruct.shapes.implicit import implicit_held_out
 from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s3_contacts.slides import without_slides
+from reconstruct.steps.s3_contacts.left_out import without_slides
 from scenes.scene import Scene
 
 

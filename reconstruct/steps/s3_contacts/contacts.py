@@ -7,7 +7,7 @@ thresholds from the sensor's noise, every press used, first touch by fitting the
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -85,7 +85,7 @@ class Exploration:
     off and read earlier by delay_s, as late as it comes (standard error: delay_error_s).
     noise_n: standard deviation of the raw force an axis. presses: the table, forces in it as read; places and
     normals those of the touches themselves. rejected: (t, reason) of contacts not used. threshold_n: tau.
-    method: 'noise' or 'paper'.
+    method: 'noise' or 'paper'. spans: of all contacts, None for points without a time.
     """
 
     recording: Recording
@@ -99,6 +99,7 @@ class Exploration:
     method: str
     delay_s: float = 0.0
     delay_error_s: float = 0.0
+    spans: ContactSpans | None = field(default=None, repr=False, compare=False)
 
 
 def explore(
@@ -149,7 +150,7 @@ def explore(
         delay, error = spans.late.seconds, spans.late.error_s
         spans = spans_of(read_earlier(recording, delay))
     found = find_first_touches(spans, request)
-    step = force_delay(found.filtered.signals, found.touches)
+    step = force_delay(found.spans.filtered.signals, found.touches)
     if not shifts or not (step.certain or delay):
         return _tabled(recording, found, method, options)
     for _ in range(_DELAY_ROUNDS):
@@ -158,7 +159,7 @@ def explore(
             break
         delay += samples / recording.sample_rate_hz
         found = find_first_touches(spans_of(read_earlier(recording, delay)), request)
-        step = force_delay(found.filtered.signals, found.touches)
+        step = force_delay(found.spans.filtered.signals, found.touches)
     error = step.error_s if np.isfinite(step.error_s) else error
     return _tabled(recording, found, method, options, (delay, error))
 
@@ -185,7 +186,7 @@ def _tabled(
 
     delay: s, and its standard error.
     """
-    signals, contacts, (delay_s, delay_error_s) = found.filtered.signals, found.touches, delay
+    signals, contacts, (delay_s, delay_error_s) = found.spans.filtered.signals, found.touches, delay
     t, first_last = recording.t, found.boundary.interval
     late = np.clip(np.arange(len(t)) - round(delay_s * recording.sample_rate_hz), 0, len(t) - 1)
     presses = cut(
@@ -197,7 +198,7 @@ def _tabled(
         onset_error_m=np.array(
             [np.hypot(c.onset_error_m, delay_error_s * _speed(signals, c)) for c in contacts]
         ),
-        free_air=found.filtered.free_air[late],
+        free_air=found.spans.filtered.free_air[late],
         trace_s=(t[first_last[0]], t[first_last[1] - 1]) if first_last[1] > first_last[0] else None,
         others_s=[(t[a], t[b - 1]) for a, b in (*((a, b) for a, b, _ in found.unused), *found.cut)],
         supported=found.supported,
@@ -220,6 +221,7 @@ def _tabled(
         method=method,
         delay_s=delay_s,
         delay_error_s=delay_error_s,
+        spans=found.spans,
     )
 
 

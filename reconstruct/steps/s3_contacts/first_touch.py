@@ -147,7 +147,7 @@ class FirstTouches:
     were cut into cycles. supported: contacts with the support, as recognised.
     """
 
-    filtered: Filtered
+    spans: ContactSpans
     boundary: Boundary
     touches: tuple[Touch, ...]
     unused: tuple[tuple[int, int, str], ...]
@@ -207,7 +207,7 @@ def find_first_touches(spans: ContactSpans, request: TouchRequest) -> FirstTouch
     _check_loudness(signals, touches, request, threshold)
     t = recording.t
     supported = tuple(Segment(kind, float(t[a]), float(t[b - 1])) for (a, b), kind in known.items())
-    return FirstTouches(filtered, boundary, tuple(touches), tuple(unused), threshold, tuple(cut), supported)
+    return FirstTouches(spans, boundary, tuple(touches), tuple(unused), threshold, tuple(cut), supported)
 
 
 def _threshold_n(filtered: Filtered, request: TouchRequest) -> float:
@@ -232,7 +232,7 @@ def _unusable(
         return f"peaks at {top:.3f} N, below {least:.3g} N"
     if a == 0:
         return "has no approach: the recording starts in contact"
-    return on_it(signals, boundary, a, b)
+    return on_it(signals.position[a:b], boundary, signals.recording.tip_radius_m)
 
 
 def _too_few(
