@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from mechanics.gaussian import matern_3_2
 from mechanics.robust import spread_about_zero
 from reconstruct.shapes.base import Shape, gradient, parameter_slopes
 from reconstruct.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
@@ -35,10 +36,10 @@ class Law:
 
     def covariance(self, p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray) -> np.ndarray:
         """(k, l) m^2 between g at points p (k, 3) with normals n and at q (l, 3) with normals m."""
-        apart = ((p[:, None] - q) ** 2).sum(axis=2) / self.length_m**2
+        apart = ((p[:, None] - q) ** 2).sum(axis=2)
         turn = ((n[:, None] - m) ** 2).sum(axis=2) / _TURN**2
-        root = np.sqrt(3 * apart)
-        return self.size(n)[:, None] * self.size(m) * (1 + root) * np.exp(-root - 0.5 * turn)
+        variance = self.size(n)[:, None] * self.size(m)
+        return matern_3_2(apart, self.length_m, variance=variance, fall=0.5 * turn)
 
     def size(self, n: np.ndarray) -> np.ndarray:
         """(k,) m, standard deviation of g where the normal is n (k, 3)."""
