@@ -24,7 +24,8 @@ from mechanics.progress import Progress, silent
 from mechanics.recording import read_recording, recording_files
 from mechanics.standing import Standing, standing
 from mechanics.surface_files import surface_of
-from reconstruct.pipeline import DEFAULT_POISSON_RATIO, reconstruct
+from reconstruct.methods import DEFAULT_POISSON_RATIO
+from reconstruct.pipeline import reconstruct
 from reconstruct.shapes.decimation import decimated
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface

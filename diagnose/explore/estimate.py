@@ -16,11 +16,11 @@ import numpy as np
 from diagnose.explore.goals import surface_error, vertex_areas
 from mechanics.nearest import distance
 from mechanics.presses import Presses
+from mechanics.progress import Clock
 from mechanics.recording import Recording
 from mechanics.sites import TouchSites, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
-from reconstruct.pipeline import Clock
 from reconstruct.shapes.evidence import LEAST_TOUCHES
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s1_filter.signals import filtered_of

@@ -27,8 +27,8 @@ from mechanics.errors import (
     SurfaceError,
 )
 from mechanics.nearest import distance
+from mechanics.progress import Clock
 from mechanics.recording import Recording, write_recording
-from reconstruct.pipeline import Clock
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s7_modulus.modulus import ModulusOptions
