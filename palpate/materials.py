@@ -18,7 +18,7 @@ from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from palpate.importing.specimens import Tests
 from palpate.results.material import Material
-from reconstruct.external.holds import held_out_relaxation
+from reconstruct.external.relaxation import held_out_relaxation
 from reconstruct.external.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
 
 UNIAXIAL_UNKNOWN = (

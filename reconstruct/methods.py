@@ -12,7 +12,8 @@ from mechanics.presses import Presses
 from mechanics.progress import Clock, Progress, part
 from mechanics.sites import TouchSites, touch_sites, touch_solver
 from mechanics.tetmesh import TetMesh
-from reconstruct.geometry.known_shape import GeometryOptions, Placed
+from reconstruct.geometry.placed import Placed
+from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s2_base.outline import BoundaryOptions
 from reconstruct.steps.s3_contacts.contacts import ContactOptions

@@ -20,7 +20,9 @@ from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
-from reconstruct.geometry.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
+from reconstruct.geometry.known_shape import place
+from reconstruct.geometry.placed import Placed, nowhere
+from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.methods import BY_NAME, DEFAULT_POISSON_RATIO, Body, Method
 from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.outline import Boundary
@@ -31,8 +33,7 @@ from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.background import BackgroundMesher
 from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import OneD, columns
-from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
 from reconstruct.steps.s7_modulus.modulus_paper import PaperFit

@@ -30,8 +30,7 @@ from reconstruct.steps.s3_contacts.first_touch import ContactSpans
 from reconstruct.steps.s4_surface.casting import cast
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import OneD, fit_robust
-from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s6_one_d.one_d import OneD, fit_robust, profiles
 from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.steps.s7_modulus.shape_error import compliance_covariance, shape_gradients
 

@@ -32,7 +32,7 @@ from mechanics.presses import HOLDING
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
-from reconstruct.geometry.known_shape import flat_mesh, half_space_size
+from reconstruct.geometry.slab import flat_mesh, half_space_size
 from reconstruct.steps.s1_filter.low_pass import white_noise_std
 from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
 

@@ -21,7 +21,7 @@ from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.samples import Samples
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
-from reconstruct.geometry.known_shape import GeometryOptions, stated_geometry
+from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.first_touch import ContactSpans

@@ -17,7 +17,7 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.presses import CANNOT_TELL
 from mechanics.tetmesh import TetMesh
-from reconstruct.geometry.known_shape import nowhere
+from reconstruct.geometry.placed import nowhere
 from reconstruct.placing import presses_on
 from reconstruct.steps.s1_filter.low_pass import low_pass, noise_gain
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore

@@ -11,18 +11,16 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import SurfaceError
-from mechanics.nearest import distance
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from reconstruct.shapes.balance import balanced
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError
+from reconstruct.shapes.coarse_drawing import balanced
+from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds
 from reconstruct.shapes.drawing import draw
 from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence, support_axes
 from reconstruct.shapes.fit import Seen
-from reconstruct.shapes.hull import hull_surface
 from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
 from reconstruct.shapes.polyhedron import refine
-from reconstruct.shapes.tangent import tangent_surface
 from reconstruct.steps.s4_surface.shape_choice import (
     best_drawn,
     held_out_error,
@@ -161,7 +159,7 @@ def _found(
         shells = {"hull": hull_surface, "tangent": tangent_surface}
         # finer than the facets need, so that the gap between the bounds is told inside them as well
         vertices, triangles = refine(*shells[options.surface](evidence), 2 * options.surface_spacing_m)
-        gap = _bracket_gap(evidence, vertices, options.surface)
+        gap = gap_to_other_bound(evidence, vertices, options.surface)
         return Surface(
             vertices=evidence.to_device(vertices),
             triangles=triangles,
@@ -170,7 +168,7 @@ def _found(
             support_normal=evidence.axes[2],
             method=options.surface,
             reason="asked for",
-            bracket_m3=bounds(evidence),
+            bracket_m3=volume_bounds(evidence),
         )
     if options.surface == "implicit":
         return _implicit(evidence, options, "asked for")
@@ -213,7 +211,7 @@ def _found(
     return replace(
         surface,
         uncertainty_m=np.hypot(deviation, rivals_spread(vertices, best, tried)),
-        bracket_m3=bounds(replace(evidence, normals=facing)),
+        bracket_m3=volume_bounds(replace(evidence, normals=facing)),
     )
 
 
@@ -229,7 +227,7 @@ def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:
         method="implicit",
         reason=f"{why}; predicts touches at places left out within {1e3 * error:.2f} mm",
         held_out_m={"implicit": error},
-        bracket_m3=bounds(evidence),
+        bracket_m3=volume_bounds(evidence),
     )
 
 
@@ -255,25 +253,3 @@ def shape_table(surface: Surface) -> dict[str, Any]:
         "held_out_m": dict(surface.held_out_m),
         "parameters": dict(surface.parameters),
     }
-
-
-def bounds(evidence: Evidence) -> tuple[float, float]:
-    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or
-    nan)."""
-    import trimesh
-
-    low = float(trimesh.Trimesh(*hull_surface(evidence), process=False).volume)
-    try:
-        high = float(trimesh.Trimesh(*tangent_surface(evidence), process=False).volume)
-    except SurfaceError:
-        high = float("nan")
-    return low, high
-
-
-def _bracket_gap(evidence: Evidence, vertices: np.ndarray, which: str) -> np.ndarray:
-    """(n,) m: half the distance to the other bound, as a standard deviation of a bound."""
-    try:
-        other = tangent_surface(evidence) if which == "hull" else hull_surface(evidence)
-    except SurfaceError:
-        return np.full(len(vertices), 0.002)
-    return distance(*other, vertices) / 2
