@@ -1,17 +1,14 @@
 """Relaxation under a held displacement: a Prony series, whether a Kelvin-Voigt element could do the same, and
-what a press's own ramp says of its hold."""
+how many exponentials a curve needs, judged on stretches of time that were left out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import least_squares, nnls
-from scipy.special import expit
+from scipy.optimize import nnls
 
-from mechanics.effects.power_law_relaxation import prony_terms
 from mechanics.errors import RecordingError
 
 BLOCKS = 8
@@ -81,61 +78,6 @@ def _search(
 
     norm, pick, weights = min(map(fitted, combinations(range(len(grid)), terms)), key=lambda each: each[0])
     return grid[list(pick)], weights, float(norm / np.sqrt(len(t)))
-
-
-@dataclass(frozen=True)
-class Held:
-    """One press, a ramp and a hold: force (n,) N at t (n,) s from before first touch; the tip stands still
-    from sample `held` on."""
-
-    t: np.ndarray
-    force: np.ndarray
-    held: int
-
-
-def from_own_ramp(press: Held, g: np.ndarray, tau_s: np.ndarray) -> np.ndarray:
-    """(n,) N that a press reads with the memory g, tau_s (k,) whose elastic force is what its own ramp tells.
-
-    The memory is taken off the ramp, which is then read as it was; from the hold on the elastic force stays.
-    No law of the dent enters, so a piece's own shape and stiffness do not.
-    """
-    g, tau = np.asarray(g, dtype=float), np.asarray(tau_s, dtype=float)
-    steps = np.diff(press.t)
-    branch, elastic, out = np.zeros(len(g)), 0.0, np.zeros(len(press.t))
-    for n, dt in enumerate(steps, start=1):
-        fading, gain = np.exp(-dt / tau), tau / dt * -np.expm1(-dt / tau)
-        now = elastic
-        if n <= press.held:
-            now = (press.force[n] - g @ (fading * branch - gain * elastic)) / (1 + g @ gain)
-        branch = fading * branch + gain * (now - elastic)
-        elastic = now
-        out[n] = elastic + g @ branch
-    return out
-
-
-FORMS: dict[str, tuple[Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tuple[float, ...]]] = {
-    "elastic": (lambda values: (np.zeros(1), np.ones(1)), ()),
-    "prony": (lambda values: (np.exp(values[:2]), np.exp(values[2:])), (0.0, 0.0, -1.0, 1.5)),
-    "power law": (lambda values: prony_terms(np.exp(values[0]), expit(values[1])), (0.0, -0.5)),
-}
-"""Forms of a memory: values to (g, tau_s), and where a fit of the values starts."""
-
-
-def fit_holds(presses: Sequence[Held], form: str) -> tuple[np.ndarray, np.ndarray]:
-    """(g, tau_s) of the form, one of FORMS, that predict the presses' holds from their own ramps best."""
-    terms, start = FORMS[form]
-    if not start:
-        return terms(np.zeros(0))
-
-    def missed(values: np.ndarray) -> np.ndarray:
-        return np.concatenate([hold_error(press, *terms(values)) for press in presses])
-
-    return terms(least_squares(missed, start, bounds=(-8.0, 8.0)).x)
-
-
-def hold_error(press: Held, g: np.ndarray, tau_s: np.ndarray) -> np.ndarray:
-    """N, predicted less measured after the ramp."""
-    return (from_own_ramp(press, g, tau_s) - press.force)[press.held + 1 :]
 
 
 def thinned(t: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
