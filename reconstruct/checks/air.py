@@ -12,7 +12,7 @@ from reconstruct.steps.s1_filter.low_pass import noise_gain
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S, _LATEST_S = 0.075, 0.25
-"""A force that reads later than the first is told of, one later than the second is not corrected: presses
+"""A force that reads later than the first is reported, one later than the second is not corrected: presses
 keep 0.3 s of samples around them."""
 _CERTAIN = 5.0
 _ALIKE_S = 0.01

@@ -146,12 +146,12 @@ def _best(seen: dict[str, float]) -> tuple[dict[str, str], dict[str, float]]:
 
 def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, float]) -> Finding:
     index, columns = list(READINGS).index(kind), COLUMNS[kind]
-    told = [(QUANTITIES[k], v) for k, v in seen.items() if QUANTITIES[k].powers[index]]
-    told.sort(key=lambda pair: -abs(pair[0].off(pair[1])))
-    shown = ", ".join(f"{q.words} {v:.3g} (usual {q.usual:.3g})" for q, v in told[:_SHOWN])
+    shown = [(QUANTITIES[k], v) for k, v in seen.items() if QUANTITIES[k].powers[index]]
+    shown.sort(key=lambda pair: -abs(pair[0].off(pair[1])))
+    listed = ", ".join(f"{q.words} {v:.3g} (usual {q.usual:.3g})" for q, v in shown[:_SHOWN])
     return Finding(
         "tip radius" if kind == "tip" else f"{kind} unit",
-        f"{', '.join(columns)} look like {name}: {shown}",
+        f"{', '.join(columns)} look like {name}: {listed}",
         f"odds {odds:.1g} to 1 over {_SI[kind]}",
         f"convert {', '.join(columns)} to {_SI[kind]}; check the stated noise, resolution and tip radius",
         float("inf"),

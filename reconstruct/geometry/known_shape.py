@@ -36,7 +36,7 @@ from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import PoseError
 
 _ALIKE = 1.5
-"""A rival pose whose residual is less than this times the best one's cannot be told from it."""
+"""A rival pose whose residual is less than this times the best one's cannot be ruled out."""
 _FAR = 0.1
 """Of the size: a median residual beyond this is another object, unit or frame."""
 
@@ -50,7 +50,7 @@ def place(
     spacing_m: float,
     progress: Progress = silent,
 ) -> Placed:
-    """Where a known geometry lies. first: the touches, told without any support.
+    """Where a known geometry lies. first: the touches, found without any support.
 
     Raises SurfaceError where the file cannot be used or the touches do not lie on it.
     """

@@ -23,7 +23,7 @@ class Placed:
 
     surface: closed, its uncertainty that of pose and file together. local_sd_m: of the file alone. pose: its
     error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base:
-    as a tracing would have told it. residual_m: (k,) of the first touches. about: what model.toml keeps,
+    as a tracing would give it. residual_m: (k,) of the first touches. about: what model.toml keeps,
     [geometry]. notes: what the user should know, one line each.
     """
 

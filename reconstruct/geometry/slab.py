@@ -130,9 +130,9 @@ def _plane(presses: Presses) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.nda
             weight: np.ndarray, flat: np.ndarray = flat, lean: np.ndarray = lean, slopes: np.ndarray = slopes
         ) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
             w = weight * share / sigma**2
-            told = share / DIRECTION_RAD**2
-            matrix = (slopes * w[:, None]).T @ slopes + np.diag([told.sum(), told.sum(), 1e-12])
-            right = slopes.T @ (w * flat[:, 2]) - np.append(told @ lean[:, :2], 0.0)
+            known = share / DIRECTION_RAD**2
+            matrix = (slopes * w[:, None]).T @ slopes + np.diag([known.sum(), known.sum(), 1e-12])
+            right = slopes.T @ (w * flat[:, 2]) - np.append(known @ lean[:, :2], 0.0)
             found = np.linalg.solve(matrix, right)
             return (found, np.linalg.inv(matrix)), flat[:, 2] - slopes @ found
 

@@ -1,6 +1,6 @@
 """What a fitted shape leaves unexplained, spread over its surface with its uncertainty (a Gaussian process).
 
-The true surface lies g(p) outside the fitted one. Each touch says what g is at its foot, up to an error; g is
+The true surface lies g(p) outside the fitted one. Each touch measures g at its foot, up to an error; g is
 smooth along the surface and says little across an edge (its covariance falls with distance and with the turn
 of the normal). The shape's parameters stay uncertain beside it: their slopes enter the same covariance
 (universal kriging), so that held-out errors and the uncertainty of places that nobody touched are in closed
@@ -63,7 +63,7 @@ class Explained:
 
     @property
     def complexity(self) -> int:
-        """Ideas needed: the shape's, and three more for a free field."""
+        """Assumptions: the shape's, and three more for a free field."""
         return self.shape.complexity + 3 * self.free
 
     @property
@@ -173,7 +173,7 @@ def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained
     """The residual field of greatest likelihood; without one (free false) only the touches' error is sought.
 
     Touches that lie far off while all others agree are given their own error, so that a bad press neither
-    bends the surface nor speaks against a shape more than once.
+    bends the surface nor counts against a shape more than once.
     """
     found = _explain(shape, lean_m, seen, free=free)
     touches = len(seen.centres)

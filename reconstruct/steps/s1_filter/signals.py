@@ -12,7 +12,13 @@ import numpy as np
 from mechanics.recording import Recording
 from mechanics.samples import runs
 from reconstruct.shapes.points import in_its_plane
-from reconstruct.steps.s1_filter.fast_drift import between, crowd_median, missed, passing, slowly
+from reconstruct.steps.s1_filter.fast_drift import (
+    crowd_median,
+    follow_free_air,
+    interpolation_error,
+    passing,
+    slow_part,
+)
 from reconstruct.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
 from reconstruct.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
 from reconstruct.steps.s1_filter.slow_drift import free_air_force
@@ -117,19 +123,19 @@ def filtered_of(
     if steady.spread.min() <= noise:
         return steady  # free air is as quiet as its sensor: there is nothing to follow
     air, traced = passing(t, position, steady.signals.force, recording.tip_radius_m, sliding)
-    slow = slowly(t, recording.force_on_tool - weight.force, air)
-    if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
+    slow = slow_part(t, recording.force_on_tool - weight.force, air)
+    if slow is None or interpolation_error(t, left, air) > crowd_median(steady.signals.magnitude[air]):
         return steady
     # mass and lateness were read from a force that turned
     again = tool_weight(recording, filtered - slow, cutoff_hz)
-    off = missed(t, filtered - again.force, air)
+    off = interpolation_error(t, filtered - again.force, air)
 
     def followed(drift: np.ndarray, loose: np.ndarray) -> Filtered:
         there = less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
         return replace(there, spread=np.hypot(there.spread, _LOOSE * np.where(traced, 0.0, loose)), air=air)
 
     raw = recording.force_on_tool - again.force
-    return followed(*between(t, raw, air, lambda *seen: followed(*seen).touching))
+    return followed(*follow_free_air(t, raw, air, lambda *seen: followed(*seen).touching))
 
 
 def stated_tracing(recording: Recording) -> tuple[float, float] | None:

@@ -1,6 +1,6 @@
 """Presses that turn out to be none once all are found: they slide, or lie on a support that is known later.
 
-A slide tells where the surface is and how it rubs; its depth has no first touch that the place shares, so no
+A slide shows where the surface is and how it rubs; its depth has no first touch that the place shares, so no
 modulus and no 1D law is read off it.
 """
 
@@ -48,7 +48,7 @@ def without_slides(exploration: Exploration, least: int) -> Exploration:
 
 
 def on_base(exploration: Exploration, base: Boundary, least: int) -> Exploration:
-    """The exploration over a base that its own touches told: without presses whose tip came down to it.
+    """The exploration over a base that its own touches placed: without presses whose tip came down to it.
 
     Raises ContactError where fewer than `least` presses are left.
     """

@@ -1,4 +1,4 @@
-"""Which shape the touches speak for: each is fitted and scored by the touches at places left out."""
+"""Which shape is the most likely: each is fitted and scored by the touches at places left out."""
 
 from __future__ import annotations
 
@@ -52,8 +52,8 @@ def held_out_error(explained: Explained) -> float:
 
 
 def score(explained: Explained) -> float:
-    """Log density of the held-out places and of the forces' directions, less one for each idea: an idea must
-    earn its keep."""
+    """Log density of the held-out places and of the forces' directions, less one for each of its
+    assumptions."""
     return float(explained.held_out[1].sum()) + direction_score(explained) - explained.complexity
 
 

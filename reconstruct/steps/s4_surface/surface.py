@@ -110,7 +110,7 @@ class Surface:
 
 
 def evidence_of(exploration: Exploration) -> Evidence:
-    """What an exploration says about the shape: of touches known by far less well than most nothing.
+    """What an exploration says about the shape; touches known far less well than most are left out.
 
     Raises SurfaceError where it has no base outline.
     """
@@ -121,16 +121,16 @@ def evidence_of(exploration: Exploration) -> Evidence:
         )
     error = presses.onset_error_m
     fourth = np.sort(error)[:LEAST_TOUCHES][-1]
-    told = error <= max(_LOOSE_M, _LOOSE * float(np.median(error)), fourth)
+    good = error <= max(_LOOSE_M, _LOOSE * float(np.median(error)), fourth)
     return Evidence(
         support_point=boundary.support_point,
         support_normal=boundary.support_normal,
         outline=boundary.outline,
         outline_centres=boundary.centres,
-        centres=presses.centre[told],
-        normals=presses.contact_normal[told],
-        centre_error_m=error[told],
-        site=presses.site[told],
+        centres=presses.centre[good],
+        normals=presses.contact_normal[good],
+        centre_error_m=error[good],
+        site=presses.site[good],
         tip_radius_m=exploration.recording.tip_radius_m,
     )
 
@@ -142,7 +142,7 @@ def reconstruct_surface(
     *,
     shaped: Callable[[Surface], object] | None = None,
 ) -> Surface:
-    """The surface that the touches and the base outline speak for.
+    """The most likely surface by the touches and the base outline.
 
     shaped: called once its shape is there and its uncertainty and bounds are not, so that a mesher can begin.
     Raises SurfaceError where no closed surface can be made.
@@ -157,7 +157,7 @@ def _found(
 ) -> Surface:
     if options.surface in ("hull", "tangent"):
         shells = {"hull": hull_surface, "tangent": tangent_surface}
-        # finer than the facets need, so that the gap between the bounds is told inside them as well
+        # finer than the facets need, so that the gap between the bounds is known inside them as well
         vertices, triangles = refine(*shells[options.surface](evidence), 2 * options.surface_spacing_m)
         gap = gap_to_other_bound(evidence, vertices, options.surface)
         return Surface(

@@ -4,7 +4,7 @@ Moving a free surface outward by v (m) changes the compliance under a unit load 
 v dS (Hadamard; sigma : eps is twice the strain energy density of that load). With the surface's standard
 deviation place by place and a correlation length, this gives the covariance of the errors of all presses,
 without meshing again. A clamped base moved outward adds as much. With both, an object that is moved as a
-whole (a known shape whose pose is uncertain) is told too.
+whole (a known shape whose pose is uncertain) is covered too.
 """
 
 from __future__ import annotations
