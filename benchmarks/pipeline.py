@@ -10,7 +10,8 @@ import numpy as np
 
 from benchmarks._recording import add_indentation, add_recording, recording_of
 from benchmarks.timing import table
-from reconstruct.pipeline import METHODS, ReconstructOptions, reconstruct_fully
+from reconstruct.methods import METHODS
+from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 
 SUMMARY = "the whole reconstruction, step by step"

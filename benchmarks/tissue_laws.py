@@ -20,10 +20,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._machine_curves import FORMS, Held, fit_elastomer, fit_holds, hold_error
 from benchmarks.timing import table
 from mechanics.errors import RecordingError
-from reconstruct.external.compression import Compression, fit_elastomer, read_compression
-from reconstruct.external.relaxation import FORMS, Held, fit_holds, hold_error
+from reconstruct.external.compression import Compression, read_compression
 
 SUMMARY = "laws of tissue: silicones that soften and holds of beef, on unseen curves"
 FROM_STRAIN = 0.02

@@ -37,3 +37,35 @@ def sample(vertices: np.ndarray, triangles: np.ndarray, count: int, seed: int = 
     chosen = corner[generator.choice(len(area), count, p=area / area.sum())]
     r, s = np.sqrt(generator.random(count)), generator.random(count)
     return np.einsum("ik,ikj->ij", np.column_stack([1 - r, r * (1 - s), r * s]), chosen)
+
+
+def first_hits(
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    starts: np.ndarray,
+    directions: np.ndarray,
+    *,
+    beyond: float = 0.0,
+) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) how far along unit directions (k, 3) rays from starts (k, 3) first meet the surface, infinite
+    where they do not, and which triangle (k,) they meet there, -1 where none.
+
+    VTK's tree of oriented boxes names the triangles. beyond: nearer hits do not count.
+    """
+    import pyvista
+
+    vertices, triangles = np.asarray(vertices, dtype=float), np.asarray(triangles)
+    shell = pyvista.PolyData.from_regular_faces(vertices, triangles)
+    corner = vertices[triangles]
+    across = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    middle, size = vertices.mean(axis=0), float(np.linalg.norm(np.ptp(vertices, axis=0)))
+    found, hit = np.full(len(starts), np.inf), np.full(len(starts), -1)
+    for k, (start, way) in enumerate(zip(starts, directions, strict=True)):
+        end = start + (float(np.linalg.norm(start - middle)) + size) * way
+        met = np.unique(shell.ray_trace(start, end)[1]).astype(int)
+        # the tree's points are of single precision, so where it meets each triangle's plane is found again
+        far = np.einsum("ij,ij->i", corner[met, 0] - start, across[met]) / (across[met] @ way)
+        met, far = met[far > beyond], far[far > beyond]
+        if len(met):
+            found[k], hit[k] = far.min(), met[np.argmin(far)]
+    return found, hit

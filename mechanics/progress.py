@@ -1,5 +1,4 @@
-"""Progress is reported to a callable, so that pure code can report without knowing a terminal; and a clock of
-steps."""
+"""Progress is reported to a callable, so that pure code needs no terminal; and the time that steps take."""
 
 from __future__ import annotations
 
@@ -12,6 +11,11 @@ Progress = Callable[[str, float], None]
 
 def silent(stage: str, fraction: float) -> None:
     """The default: reports to nobody."""
+
+
+def part(progress: Progress, low: float, high: float) -> Progress:
+    """The progress of a part of the work, from `low` to `high` of the whole."""
+    return lambda stage, fraction: progress(stage, low + (high - low) * fraction)
 
 
 class Clock:

@@ -18,6 +18,8 @@ from scipy.linalg import cho_factor, cho_solve
 from scipy.optimize import minimize
 from scipy.spatial.distance import cdist
 
+from mechanics.gaussian import matern_5_2
+
 LEAST_LENGTH_M = 0.003
 LENGTHS = 9
 """Lengths that are tried, from half the touched places' spacing to one and a half times the object's size."""
@@ -96,8 +98,7 @@ class Estimate:
 
 def correlation(a: np.ndarray, b: np.ndarray, length_m: float) -> np.ndarray:
     """(n, k) of points a (n, 3) and b (k, 3) m: Matern 5/2."""
-    r = np.sqrt(5.0) * cdist(a, b) / length_m
-    return (1 + r + r**2 / 3) * np.exp(-r)
+    return matern_5_2(cdist(a, b), length_m)
 
 
 def kriging(points: np.ndarray, places: np.ndarray, length_m: float) -> np.ndarray:

@@ -21,9 +21,9 @@ _RENDER = ("render.options:RenderOptions",)
 _KINDS: dict[str, tuple[str, ...]] = {
     "reconstruct": (
         "reconstruct.pipeline:ReconstructOptions",
-        "reconstruct.geometry.known_shape:GeometryOptions",
-        "reconstruct.steps.s1_filter.filtering:FilterOptions",
-        "reconstruct.steps.s2_boundary.boundary:BoundaryOptions",
+        "reconstruct.geometry.stated:GeometryOptions",
+        "reconstruct.steps.s1_filter.low_pass:FilterOptions",
+        "reconstruct.steps.s2_base.outline:BoundaryOptions",
         "reconstruct.steps.s3_contacts.contacts:ContactOptions",
         "reconstruct.steps.s4_surface.surface:SurfaceOptions",
         "reconstruct.steps.s5_mesh.meshing:MeshingOptions",
@@ -40,8 +40,8 @@ _KINDS: dict[str, tuple[str, ...]] = {
         "diagnose.search.deciding:AttributionOptions",
         "diagnose.search.whiten:NuisanceOptions",
     ),
-    "changes": ("reconstruct.geometry.known_shape:GeometryOptions",),
-    "calibrate": ("reconstruct.geometry.known_shape:GeometryOptions",),
+    "changes": ("reconstruct.geometry.stated:GeometryOptions",),
+    "calibrate": ("reconstruct.geometry.stated:GeometryOptions",),
     "simulate": ("scenes.laboratory.session:SimulateOptions", "scenes.laboratory.hand:HandOptions"),
 }
 FUNCTIONS = tuple(_KINDS)

@@ -19,7 +19,7 @@ from mechanics.progress import Progress, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from palpate.importing.specimens import Tests
 from palpate.results.material import Material
-from reconstruct.external.holds import held_out_relaxation
+from reconstruct.external.relaxation import held_out_relaxation
 from reconstruct.external.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
 
 UNIAXIAL_UNKNOWN = (

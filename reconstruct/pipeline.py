@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
-from concurrent.futures import Executor, Future, ThreadPoolExecutor
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from importlib.metadata import version
 from typing import Any
 
@@ -15,64 +14,32 @@ from mechanics.linear_range import linear_range
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.model_files import read_model
-from mechanics.options import option
-from mechanics.progress import Clock, Progress, silent
+from mechanics.progress import Clock, Progress, part, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording import Recording, base_model_of
-from mechanics.sites import TouchSites, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
+from mechanics.sites import TouchSites
 from mechanics.toml_text import plain
 from reconstruct.checks.base import Finding
 from reconstruct.checks.outcome import result_of
 from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
-from reconstruct.geometry.known_shape import GeometryOptions, Placed, nowhere, place, stated_geometry
-from reconstruct.steps.s1_filter.filtered import Filtered
-from reconstruct.steps.s1_filter.filtering import FilterOptions
-from reconstruct.steps.s2_boundary.boundary import Boundary, BoundaryOptions
-from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from reconstruct.geometry.known_shape import place
+from reconstruct.geometry.placed import Placed, nowhere
+from reconstruct.geometry.stated import GeometryOptions, stated_geometry
+from reconstruct.methods import BY_NAME, Body, Method
+from reconstruct.methods import ReconstructOptions as ReconstructOptions
+from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s3_contacts.contacts import Exploration, explore
+from reconstruct.steps.s3_contacts.left_out import on_base, without_slides
 from reconstruct.steps.s3_contacts.points import explore_points, is_points
-from reconstruct.steps.s3_contacts.slides import without_slides
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
-from reconstruct.steps.s4_surface.surface import (
-    Surface,
-    SurfaceOptions,
-    evidence_of,
-    reconstruct_surface,
-    shape_table,
-)
-from reconstruct.steps.s5_mesh.meshing import Meshing, MeshingOptions, as_meshed, fill, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import OneD, columns, fit_paper, fit_robust
-from reconstruct.steps.s6_one_d.uniaxial import profiles
-from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
-from reconstruct.steps.s7_modulus.modulus_field import FieldOptions, with_fitted_field
-from reconstruct.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
-from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
-
-METHODS = ("finite-tip", "paper")
-
-
-@dataclass(frozen=True)
-class ReconstructOptions:
-    """What holds for the whole reconstruction; each step has options of its own."""
-
-    method: str = option(
-        "finite-tip", "finite-tip; paper: tau = 1 N, hull, point load on linear tetrahedra", choices=METHODS
-    )
-    poisson_ratio: float | None = option(
-        None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
-    )
-    geometry: GeometryOptions = field(default_factory=GeometryOptions)
-    force: bool = option(False, "go on although the check-up finds something grave")
-    filter: FilterOptions = field(default_factory=FilterOptions)
-    boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
-    contact: ContactOptions = field(default_factory=ContactOptions)
-    surface: SurfaceOptions = field(default_factory=SurfaceOptions)
-    meshing: MeshingOptions = field(default_factory=MeshingOptions)
-    modulus: ModulusOptions = field(default_factory=ModulusOptions)
-    modulus_field: FieldOptions = field(default_factory=FieldOptions)
-    paper: PaperOptions = field(default_factory=PaperOptions)
-    seed: int = 0
+from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
+from reconstruct.steps.s5_mesh.background import BackgroundMesher
+from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
+from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
+from reconstruct.steps.s7_modulus.modulus import ModulusFit
+from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
+from reconstruct.steps.s7_modulus.modulus_paper import PaperFit
 
 
 @dataclass(frozen=True)
@@ -111,106 +78,59 @@ def reconstruct_fully(
     recording: Recording, options: ReconstructOptions | None = None, progress: Progress = silent
 ) -> Reconstruction:
     """As `reconstruct`, with the intermediate results."""
-    # the mesher is a process of its own: what needs no mesh is done meanwhile
-    with ThreadPoolExecutor(1) as beside:
-        return _reconstructed(recording, options or ReconstructOptions(), progress, beside)
+    options = options or ReconstructOptions()
+    if options.method not in BY_NAME:
+        raise OptionError(f"method {options.method!r} is unknown; allowed are {', '.join(BY_NAME)}")
+    method = BY_NAME[options.method](options)
+    with BackgroundMesher(method.meshing_options) as mesher:
+        return _reconstructed(recording, method, progress, mesher)
 
 
 def _reconstructed(
-    recording: Recording, options: ReconstructOptions, progress: Progress, beside: Executor
+    recording: Recording, method: Method, progress: Progress, mesher: BackgroundMesher
 ) -> Reconstruction:
-    paper = options.method == "paper"
-    nu = _poisson_ratio(recording, options)
-    clock = Clock()
+    """Section 2 in order; what the two methods do differently is theirs."""
+    options, clock = method.options, Clock()
+    poisson_ratio = _poisson_ratio(recording, options)
     progress("contacts", 0.02)
     geometry = stated_geometry(recording, options.geometry)
-    _check_points(recording, geometry, paper)
+    _check_points(recording, geometry, options)
     checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
-    placed: Placed | None = None
-    meshes: list[Future[TetMesh]] = []
-
-    def begin_mesh(shape: Surface) -> None:
-        meshes.append(beside.submit(fill, shape, _meshing_options(options)))
-
+    touched = _Touched(recording, method, checkup, mesher, clock)
+    placed: Placed | None
     if geometry.known:
-        exploration, placed = _on_known(
-            recording, options, geometry, checkup.filtered, _part(progress, 0.02, 0.3)
-        )
-        checkup.presses(exploration)
-        surface = placed.surface
-        clock.lap("contacts and registration")
+        exploration, surface, placed = _on_known(touched, geometry, progress)
     else:
-        exploration = _explored(recording, options, checkup.filtered)
-        checkup.presses(exploration)
-        clock.lap("contacts")
-        surface = reconstruct_surface(
-            evidence_of(exploration), _surface_options(options), _part(progress, 0.1, 0.3), shaped=begin_mesh
-        )
-        clock.lap("surface")
-    known_mesh = None if placed is None else placed.mesh
-    if known_mesh is None and not meshes:
-        begin_mesh(surface)
+        exploration, surface, placed = _explored(touched, progress)
     progress("meshing", 0.3)
-    touched = exploration.presses
-    where = cast(surface.vertices, surface.triangles, touched.point, touched.contact_normal)
-    presses = touched.on_surface(where.points, where.normals)
+    found = exploration.presses
+    where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal)
+    presses = found.on_surface(where.points, where.normals)
     curves = profiles(presses, options.filter.cutoff_hz)
-    one_d = (fit_paper if paper else fit_robust)(curves, exploration.noise_n)
+    one_d = method.fit_one_d(curves, exploration.noise_n)
     clock.lap("1D models")
-    coarse = meshes[0].result() if known_mesh is None else known_mesh
-    judged = beside.submit(as_meshed, coarse, surface)
+    mesh = mesher.mesh(surface)
     clock.lap("mesh")
     progress("factorise", 0.5)
-    mesh = coarse if paper else coarse.quadratic()
-    sites, fit, paper_fit = None, None, None
-    if paper:
-        progress("modulus", 0.6)
-        paper_fit = fit_paper_modulus(curves, mesh, nu, options.paper, seed=options.seed)
-        modulus, interval, each = paper_fit.modulus_pa, paper_fit.ci95_pa, paper_fit.press_modulus_pa
-    else:
-        solver = touch_solver(coarse, nu)
-        clock.lap("factorise")
-        sites = touch_sites(
-            mesh, where.points, where.normals, nu, solver=solver, progress=_part(progress, 0.5, 0.8)
-        )
-        clock.lap("touch sites")
-        progress("modulus", 0.8)
-        local = surface if placed is None else placed.by_itself
-        covariance = compliance_covariance(
-            solver, sites, uncertainty_at(solver.mesh, local), pose=None if placed is None else placed.pose
-        )
-        clock.lap("shape error")
-        fit = fit_modulus(
-            presses,
-            sites,
-            exploration.noise_n,
-            options.modulus,
-            compliance_covariance=covariance,
-            seed=options.seed,
-        )
-        modulus, interval, each = fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa
-    interval = checkup.interval(result_of(presses, modulus, interval, fit))
+    body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n)
+    fitted = method.fit(body, progress, clock)
+    interval = checkup.interval(result_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
     progress("model", 0.95)
-    meshing = judged.result()
-    tables = {"shape": shape_table(surface)}
-    if placed is not None:
-        tables["geometry"] = placed.about
-    if sites is not None:
-        tables["linear_range"] = linear_range(sites, recording.tip_radius_m).table()
+    meshing = mesher.judged()
     model = Model(
-        mesh=mesh,
-        material=Material(modulus, nu, interval, dent_law="linear" if fit is None else fit.press.law),
+        mesh=fitted.mesh,
+        material=Material(fitted.modulus_pa, poisson_ratio, interval, dent_law=fitted.dent_law),
         support=Support(exploration.boundary.support_point, exploration.boundary.support_normal),
         tool=Tool(recording.tip_radius_m),
         mesh_size_m=options.meshing.mesh_size_m,
-        shape_uncertainty_m=meshing.shape_uncertainty_m if paper else uncertainty_at(mesh, surface),
-        presses=presses.with_fits(**columns(one_d, each)),
-        provenance=_provenance(exploration, options, surface, fit),
-        about=tables,
+        shape_uncertainty_m=uncertainty_at(fitted.mesh, surface),
+        presses=presses.with_fits(**columns(one_d, fitted.press_modulus_pa)),
+        provenance=_provenance(exploration, options, surface, fitted.modulus),
+        about=_tables(surface, placed, fitted.sites, recording.tip_radius_m),
     )
-    if sites is not None and options.modulus_field.field != "homogeneous":
-        model = with_fitted_field(model, sites, exploration.noise_n)
+    if fitted.sites is not None and options.modulus_field.field != "homogeneous":
+        model = with_fitted_field(model, fitted.sites, exploration.noise_n)
         clock.lap("modulus field")
     progress("done", 1.0)
     return Reconstruction(
@@ -220,36 +140,99 @@ def _reconstructed(
         meshing=meshing,
         cast=where,
         one_d=tuple(one_d),
-        press_modulus_pa=each,
+        press_modulus_pa=fitted.press_modulus_pa,
         seconds=clock.laps,
-        sites=sites,
-        modulus=fit,
-        paper_fit=paper_fit,
+        sites=fitted.sites,
+        modulus=fitted.modulus,
+        paper_fit=fitted.paper_fit,
         placed=placed,
         findings=checkup.found,
     )
 
 
-def _check_points(recording: Recording, geometry: GeometryOptions, paper: bool) -> None:
-    """Raises ContactError where quasi-static points lack what their first touches are told by."""
-    if is_points(recording) and (paper or not geometry.known):
+@dataclass(frozen=True)
+class _Touched:
+    """A recording on its way to a surface, and what goes on beside it."""
+
+    recording: Recording
+    method: Method
+    checkup: Checkup
+    mesher: BackgroundMesher
+    clock: Clock
+
+    def presses(self, base: Boundary | None = None, unbroken: bool = False) -> Exploration:
+        """The palpations, over a base that is known or traced."""
+        options = self.method.options
+        if base is not None and is_points(self.recording):
+            return explore_points(self.recording, base, options.contact)
+        return explore(
+            self.recording,
+            method=self.method.contacts,
+            contact_options=options.contact,
+            boundary_options=options.boundary,
+            filter_options=options.filter,
+            boundary=base,
+            spans=self.checkup.spans,
+            unbroken=unbroken,
+        )
+
+
+def _explored(touched: _Touched, progress: Progress) -> tuple[Exploration, Surface, None]:
+    """Palpations and the surface through them. Where the recording traces no base, that of [object] model
+    = PATH stands in."""
+    recording = touched.recording
+    try:
+        exploration = touched.presses()
+    except NoBaseError:
+        if recording.base_model is None:
+            raise
+        base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
+        exploration = touched.presses(base)
+    touched.checkup.presses(exploration)
+    touched.clock.lap("contacts")
+    surface = reconstruct_surface(
+        evidence_of(exploration),
+        touched.method.surface_options,
+        part(progress, 0.1, 0.3),
+        shaped=touched.mesher.begin,
+    )
+    touched.clock.lap("surface")
+    return exploration, surface, None
+
+
+def _on_known(
+    touched: _Touched, geometry: GeometryOptions, progress: Progress
+) -> tuple[Exploration, Surface, Placed]:
+    """Touches found without a support place the geometry, whose base then tells which lie on the support."""
+    recording, options, within = touched.recording, touched.method.options, part(progress, 0.02, 0.3)
+    least = options.contact.least_palpations
+    first = without_slides(touched.presses(nowhere(recording), unbroken=True), least)
+    within("contacts", 0.3)
+    placed = place(
+        recording,
+        first,
+        geometry,
+        mesh_size_m=options.meshing.mesh_size_m,
+        spacing_m=options.surface.surface_spacing_m,
+        progress=part(within, 0.3, 0.8),
+    )
+    exploration = on_base(first, placed.base, least)
+    touched.checkup.presses(exploration)
+    touched.clock.lap("contacts and registration")
+    if placed.mesh is not None:
+        touched.mesher.known(placed.mesh)
+    touched.mesher.begin(placed.surface)
+    return exploration, placed.surface, placed
+
+
+def _check_points(recording: Recording, geometry: GeometryOptions, options: ReconstructOptions) -> None:
+    """Raises ContactError where quasi-static points lack what their first touches are found by."""
+    if is_points(recording) and (options.method == "paper" or not geometry.known):
         raise ContactError(
             f"'{recording.name}' holds quasi-static points without a time, which trace no base: say what they"
             " lie on with --slab M, --shape FILE or --half-space (method finite-tip); if its rows are in "
             "order of time, import it with --rate HZ"
         )
-
-
-def _surface_options(options: ReconstructOptions) -> SurfaceOptions:
-    if options.method == "paper" and options.surface.surface == "auto":
-        return dataclasses.replace(options.surface, surface="hull")
-    return options.surface
-
-
-def _meshing_options(options: ReconstructOptions) -> MeshingOptions:
-    if options.method == "paper" and options.meshing.mesh_source == "auto":
-        return dataclasses.replace(options.meshing, mesh_source="voxels")
-    return options.meshing
 
 
 def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
@@ -261,66 +244,23 @@ def _poisson_ratio(recording: Recording, options: ReconstructOptions) -> float:
     return float(nu)
 
 
-def _touches(
-    recording: Recording,
-    options: ReconstructOptions,
-    filtered: Filtered | None,
-    base: Boundary | None = None,
-    unbroken: bool = False,
-) -> Exploration:
-    if base is not None and is_points(recording):
-        return explore_points(recording, base, options.contact)
-    return explore(
-        recording,
-        method="paper" if options.method == "paper" else "noise",
-        contact_options=options.contact,
-        boundary_options=options.boundary,
-        filter_options=options.filter,
-        boundary=base,
-        filtered=filtered,
-        unbroken=unbroken,
-    )
-
-
-def _explored(recording: Recording, options: ReconstructOptions, filtered: Filtered | None) -> Exploration:
-    """Where the recording traces no base, that of [object] model = PATH stands in."""
-    try:
-        return _touches(recording, options, filtered)
-    except NoBaseError:
-        if recording.base_model is None:
-            raise
-    base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-    return _touches(recording, options, filtered, base)
-
-
-def _on_known(
-    recording: Recording,
-    options: ReconstructOptions,
-    geometry: GeometryOptions,
-    filtered: Filtered | None,
-    progress: Progress,
-) -> tuple[Exploration, Placed]:
-    """Touches told without a support place the geometry; then they are told again, over its base."""
-    least = options.contact.least_palpations
-    first = without_slides(_touches(recording, options, filtered, nowhere(recording), unbroken=True), least)
-    progress("contacts", 0.3)
-    placed = place(
-        recording,
-        first,
-        geometry,
-        mesh_size_m=options.meshing.mesh_size_m,
-        spacing_m=options.surface.surface_spacing_m,
-        progress=_part(progress, 0.3, 0.8),
-    )
-    again = _touches(recording, options, filtered, placed.base, unbroken=True)
-    return without_slides(again, least), placed
+def _tables(
+    surface: Surface, placed: Placed | None, sites: TouchSites | None, tip_radius_m: float
+) -> dict[str, Any]:
+    """What else model.toml keeps."""
+    tables: dict[str, Any] = {"shape": shape_table(surface)}
+    if placed is not None:
+        tables["geometry"] = placed.about
+    if sites is not None:
+        tables["linear_range"] = linear_range(sites, tip_radius_m).table()
+    return tables
 
 
 def _provenance(
     exploration: Exploration, options: ReconstructOptions, surface: Surface, fit: ModulusFit | None
 ) -> dict[str, Any]:
     recording = exploration.recording
-    about = {
+    about: dict[str, Any] = {
         "recording": recording.name,
         "recording_sha256": recording.sha256,
         "version": version("palpate"),
@@ -334,7 +274,3 @@ def _provenance(
     if fit is not None:
         about["modulus_reason"] = fit.reason
     return about
-
-
-def _part(progress: Progress, low: float, high: float) -> Progress:
-    return lambda stage, fraction: progress(stage, low + (high - low) * fraction)

@@ -27,7 +27,7 @@ from mechanics.recording import read_recording, recording_files
 from mechanics.standing import Standing, standing
 from mechanics.surface_files import surface_of
 from reconstruct.pipeline import reconstruct
-from reconstruct.shapes.decimation import decimated
+from reconstruct.shapes.coarse_drawing import decimated
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 from scenes.embedded import embedded_names, embedded_recording

@@ -16,9 +16,11 @@ import numpy as np
 
 from diagnose.explore.goals import Standing, surface_error, vertex_areas
 from diagnose.explore.parting import Parting
+from mechanics.gaussian import squared_exponential
 from mechanics.options import option
 from mechanics.tetmesh import vertex_normals
-from reconstruct.steps.s2_boundary.boundary import Boundary, farthest_points
+from reconstruct.shapes.points import farthest_points
+from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s7_modulus.shape_error import CORRELATION_M
 
@@ -181,7 +183,7 @@ def after_touch(vertices: np.ndarray, deviation_m: np.ndarray, row: int) -> np.n
     """(n,) m: the surface's standard deviation once vertex `row` was touched."""
     variance = np.asarray(deviation_m, dtype=float) ** 2
     squared = ((vertices - vertices[row]) ** 2).sum(axis=1)
-    shared = np.exp(-squared / CORRELATION_M**2)  # the square of exp(-r^2 / (2 L^2))
+    shared = squared_exponential(2 * squared, CORRELATION_M)  # the square of exp(-r^2 / (2 L^2))
     told = variance[row] / (variance[row] + TOUCH_ERROR_M**2)
     return np.sqrt(variance * (1 - shared * told))
 
@@ -203,7 +205,7 @@ def _mean_variance(points: np.ndarray, depths_m: np.ndarray) -> float:
     """
     squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
     own = 1.5 * TOUCH_ERROR_M / np.maximum(depths_m, TOUCH_ERROR_M)
-    covariance = PLACE_ERROR**2 * np.exp(-squared / (2 * CORRELATION_M**2)) + np.diag(own**2)
+    covariance = PLACE_ERROR**2 * squared_exponential(squared, CORRELATION_M) + np.diag(own**2)
     return float(1 / np.linalg.solve(covariance, np.ones(len(points))).sum())
 
 

@@ -41,6 +41,7 @@ from mechanics.effects.base import Effect, Role
 from mechanics.effects.registry import effect, effects
 from mechanics.effects.settings import Settings
 from mechanics.far_field import energy_fields
+from mechanics.gaussian import squared_exponential
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.places import Places
@@ -347,7 +348,7 @@ def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.
 def _field(points: np.ndarray, site_sd: np.ndarray) -> np.ndarray:
     """(p, p) covariance of the share by which the stiffness of places (p, 3) m is off."""
     squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
-    return np.outer(site_sd, site_sd) * np.exp(-squared / (2 * FIELD_M**2))
+    return np.outer(site_sd, site_sd) * squared_exponential(squared, FIELD_M)
 
 
 def tried(presses: Presses) -> list[Effect]:

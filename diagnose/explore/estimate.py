@@ -16,21 +16,21 @@ import numpy as np
 from diagnose.explore.goals import surface_error, vertex_areas
 from mechanics.nearest import distance
 from mechanics.presses import Presses
+from mechanics.progress import Clock
 from mechanics.recording import Recording
 from mechanics.sites import LoadPatch, TouchSites, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
-from reconstruct.pipeline import Clock
 from reconstruct.shapes.evidence import LEAST_TOUCHES
-from reconstruct.steps.s1_filter.filtered import filtered_of
-from reconstruct.steps.s1_filter.filtering import FilterOptions
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
+from reconstruct.steps.s1_filter.signals import filtered_of
 from reconstruct.steps.s1_filter.tool_weight import ToolWeight
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration, explore
+from reconstruct.steps.s3_contacts.first_touch import ContactSpans
 from reconstruct.steps.s4_surface.casting import cast
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, evidence_of, reconstruct_surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface, uncertainty_at
-from reconstruct.steps.s6_one_d.one_d import OneD, fit_robust
-from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s6_one_d.one_d import OneD, fit_robust, profiles
 from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
 from reconstruct.steps.s7_modulus.shape_error import compliance_covariance, shape_gradients
 
@@ -118,7 +118,7 @@ def updated(
     clock = Clock()
     filtered = filtered_of(recording, FilterOptions().cutoff_hz, near=before.weight)
     options = ContactOptions(least_palpations=LEAST_PRESSES)
-    exploration = explore(recording, contact_options=options, filtered=filtered)
+    exploration = explore(recording, contact_options=options, spans=ContactSpans(filtered))
     clock.lap("presses")
     surface, chosen_at, choice_error = _surface(exploration, before, within_m)
     clock.lap("surface")

@@ -27,10 +27,10 @@ from mechanics.errors import (
     SurfaceError,
 )
 from mechanics.nearest import distance
+from mechanics.progress import Clock
 from mechanics.quantities import USUAL_POISSON_RATIO
 from mechanics.recording import Recording, write_recording
-from reconstruct.pipeline import Clock
-from reconstruct.steps.s2_boundary.boundary import Boundary
+from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s7_modulus.modulus import ModulusOptions
 

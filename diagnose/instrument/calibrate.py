@@ -41,7 +41,7 @@ from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.samples import delayed
 from reconstruct.placing import presses_on
-from reconstruct.steps.s1_filter.filtering import low_pass
+from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s3_contacts.contacts import Exploration
 
 TRUSTED = ("tip", "gain")

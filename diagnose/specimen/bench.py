@@ -33,9 +33,9 @@ from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
-from reconstruct.geometry.known_shape import flat_mesh, half_space_size
-from reconstruct.steps.s1_filter.filtering import white_noise_std
-from reconstruct.steps.s3_contacts.unbroken import Loading, first_touches
+from reconstruct.geometry.slab import flat_mesh, half_space_size
+from reconstruct.steps.s1_filter.low_pass import white_noise_std
+from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
 
 HAND_TIP_M, PEAK_N = USUAL_TIP_RADIUS_M, 1.0
 """The size to which curves are brought: tip's radius, and the force of the middle one at its peak."""

@@ -46,7 +46,7 @@ def calibrate(
     from diagnose.instrument.calibrate import calibrate_on_object, calibrate_on_plate
     from palpate.results.base import dressed
     from palpate.results.calibration import Calibration
-    from reconstruct.geometry.known_shape import nowhere
+    from reconstruct.geometry.placed import nowhere
     from reconstruct.steps.s3_contacts.contacts import explore
 
     taken("calibrate", options)

@@ -20,7 +20,7 @@ from mechanics.recording import Recording
 from palpate.importing.mapping import ROLES, Column, Said, find_columns, time_of
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
-from reconstruct.steps.s1_filter.filtering import white_noise_std
+from reconstruct.steps.s1_filter.low_pass import white_noise_std
 
 GRAVITY_M_PER_S2 = 9.80665
 _SEARCH_S, _SURE = 3.0, 0.5

@@ -15,7 +15,7 @@ from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, PHASE_
 from palpate.report.page import Page, save_figures
 from palpate.report.quantities import readable
 from reconstruct.checks.base import Finding
-from reconstruct.checks.sight import CHANNELS
+from reconstruct.checks.samples import CHANNELS
 
 if TYPE_CHECKING:
     from palpate.results.check import Checkup

@@ -18,7 +18,7 @@ from palpate.report.quantities import ERROR, UNCERTAINTY
 from palpate.report.view3d import Colouring, Line, View, facing, local, thing_of, traces_of, usual_colourings
 from palpate.servo.histogram import lower_edge_ns
 from palpate.servo.report import ServoReport
-from reconstruct.steps.s6_one_d.uniaxial import low_passed
+from reconstruct.steps.s6_one_d.one_d import low_passed
 from render.felt import felt_surface
 
 SHOWN_PRESSES = 4

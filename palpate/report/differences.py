@@ -6,7 +6,7 @@ import numpy as np
 
 from palpate.report.modulus_figures import height_trends
 from reconstruct.pipeline import Reconstruction
-from reconstruct.steps.s6_one_d.uniaxial import low_passed
+from reconstruct.steps.s6_one_d.one_d import low_passed
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 
 _PAPER_THRESHOLD_N, _PAPER_INDENTATION_M = 1.0, 0.010

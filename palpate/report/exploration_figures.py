@@ -13,7 +13,7 @@ from mechanics.model import Model
 from palpate.report.object3d import draw_object, view_axes
 from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s3_contacts.contacts import Exploration
-from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s6_one_d.one_d import profiles
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
 from render.felt import felt_surface
 

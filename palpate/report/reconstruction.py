@@ -35,7 +35,7 @@ from palpate.report.reconstruction_tables import (
 )
 from palpate.report.view3d import Colouring, Line, View, facing, local, thing_of, traces_of, usual_colourings
 from reconstruct.pipeline import Reconstruction
-from reconstruct.steps.s6_one_d.uniaxial import low_passed
+from reconstruct.steps.s6_one_d.one_d import low_passed
 
 
 def write_report(path: Path | str, result: Reconstruction, beside: dict[str, Model] | None = None) -> Path:

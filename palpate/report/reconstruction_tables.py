@@ -14,8 +14,7 @@ from mechanics.sites import patch_compliance, patch_width
 from mechanics.solver import Solver
 from palpate.report.modulus_figures import column
 from reconstruct.pipeline import Reconstruction
-from reconstruct.steps.s6_one_d.one_d import OneD, fit_paper, fit_robust
-from reconstruct.steps.s6_one_d.uniaxial import profiles
+from reconstruct.steps.s6_one_d.one_d import OneD, fit_paper, fit_robust, profiles
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
 
 PAPER_TABLE = (

@@ -19,7 +19,7 @@ from scipy.spatial.transform import Rotation
 from diagnose.explore.explorer import Suggestion
 from diagnose.explore.rows import Instrument, Segment
 from mechanics.errors import SceneError
-from mechanics.nearest import closest
+from mechanics.nearest import closest, first_hits
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from scenes.laboratory.beside import on_the_support, waving
@@ -201,13 +201,15 @@ class LaboratoryRobot:
 
     def _landed(self, start: np.ndarray, way: np.ndarray, depth: float) -> Touch:
         """The touch of a tip that comes from `start` along `way` until it feels something, then `depth` m."""
-        met = _first_hit(self._surface, start, way)
-        if met is None:
+        surface = self._surface
+        far, face = (x[0] for x in first_hits(surface.vertices, surface.faces, start[None], way[None]))
+        if face >= 0:
+            point = start + far * way
+        else:
             # a miss: the nearest place to where it aimed stands for where the robot feels its way to
             at = np.atleast_2d(start + 0.05 * way)
-            hits, faces, _ = closest(self._surface.vertices, self._surface.faces, at)
-            met = hits[0], int(faces[0])
-        point, normal = met[0], self._surface.face_normals[met[1]]
+            (point,), (face,), _ = closest(surface.vertices, surface.faces, at)
+        normal = surface.face_normals[face]
         if point[2] < 0.004:
             raise SceneError(
                 f"a touch {1e3 * point[2]:.1f} mm above the support would press the support: choose a "
@@ -225,22 +227,3 @@ class LaboratoryRobot:
             direction=way / np.linalg.norm(way),
             side=np.zeros(3),
         )
-
-
-def _first_hit(surface: trimesh.Trimesh, start: np.ndarray, way: np.ndarray) -> tuple[np.ndarray, int] | None:
-    """(point (3,), triangle) where a ray first meets a surface (Moeller and Trumbore 1997), or None."""
-    corner = surface.triangles
-    one, two = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
-    across = np.cross(way, two)
-    size = np.einsum("ij,ij->i", one, across)
-    safe = np.where(np.abs(size) > 1e-15, size, 1.0)
-    off = start - corner[:, 0]
-    u = np.einsum("ij,ij->i", off, across) / safe
-    other = np.cross(off, one)
-    v = other @ way / safe
-    far = np.einsum("ij,ij->i", two, other) / safe
-    met = (np.abs(size) > 1e-15) & (u >= 0) & (v >= 0) & (u + v <= 1) & (far > 0)
-    if not met.any():
-        return None
-    face = int(np.argmin(np.where(met, far, np.inf)))
-    return start + far[face] * way, face

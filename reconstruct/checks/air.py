@@ -7,28 +7,28 @@ from collections.abc import Iterator
 import numpy as np
 
 from reconstruct.checks.base import Finding
-from reconstruct.checks.sight import Sight
-from reconstruct.steps.s1_filter.filtering import noise_gain
+from reconstruct.checks.samples import Samples
+from reconstruct.steps.s1_filter.low_pass import noise_gain
 
 _SEEN, _LOST, _LOUD = 0.05, 0.1, 15.0
 _LATE_S, _LATEST_S = 0.075, 0.25
-"""A force that reads later than the first is told of, one later than the second is not corrected: presses
+"""A force that reads later than the first is reported, one later than the second is not corrected: presses
 keep 0.3 s of samples around them."""
 _CERTAIN = 5.0
 _ALIKE_S = 0.01
 """Touches that disagree by more about the delay are none, or drags."""
 
 
-def air(sight: Sight) -> Iterator[Finding]:
+def air(data: Samples) -> Iterator[Finding]:
     """What is left in free air, weight, inertia and steady drift taken off, against the presses."""
-    pushes = np.linalg.norm(sight.touches.push, axis=1)
-    peak = float(np.median(pushes)) if len(pushes) else float(np.percentile(sight.size, 99))
-    white = sight.noise_n * noise_gain(sight.rate_hz, sight.cutoff_hz)
-    if sight.filtered.followed:
-        yield _followed(sight, peak)
+    pushes = np.linalg.norm(data.touches.push, axis=1)
+    peak = float(np.median(pushes)) if len(pushes) else float(np.percentile(data.size, 99))
+    white = data.noise_n * noise_gain(data.rate_hz, data.cutoff_hz)
+    if data.filtered.followed:
+        yield _followed(data, peak)
         return
     # a fifth of the samples at least is of a tip in the air, whatever the rest is
-    wander = float(np.percentile(sight.size, 20))
+    wander = float(np.percentile(data.size, 20))
     share, loud = wander / max(peak, 1e-9), wander / white
     if share < _SEEN or loud < _LOUD:
         return
@@ -40,14 +40,14 @@ def air(sight: Sight) -> Iterator[Finding]:
         "let the sensor warm up, lift the tip for a second between presses, log the tool's orientation",
         float(share) if share < _LOST else np.inf,
         np.inf,
-        (float(sight.recording.t[0]), float(sight.recording.t[-1])),
+        (float(data.recording.t[0]), float(data.recording.t[-1])),
         ("fx", "fy", "fz"),
     )
 
 
-def _followed(sight: Sight, peak: float) -> Finding:
+def _followed(data: Samples, peak: float) -> Finding:
     """What no constant, drift and weight explain, and how far the line through a touch may miss it."""
-    filtered = sight.filtered
+    filtered = data.filtered
     wander = float(np.linalg.norm(filtered.free_air.std(axis=0)))
     miss = float(filtered.spread.min())
     return Finding(
@@ -58,32 +58,32 @@ def _followed(sight: Sight, peak: float) -> Finding:
         "log the tool's orientation, let the sensor warm up",
         miss / max(peak, 1e-9),
         np.inf,
-        (float(sight.recording.t[0]), float(sight.recording.t[-1])),
+        (float(data.recording.t[0]), float(data.recording.t[-1])),
         ("fx", "fy", "fz"),
     )
 
 
-def delay(sight: Sight) -> Iterator[Finding]:
+def delay(data: Samples) -> Iterator[Finding]:
     """A force that reads so late or early that there are two clocks; grave beyond what can be corrected."""
-    late, error = abs(sight.late.seconds), sight.late.error_s
+    late, error = abs(data.late.seconds), data.late.error_s
     if error > _ALIKE_S or late < _LATE_S + _CERTAIN * error:
         return
-    a, b = sight.spans[len(sight.spans) // 2]
-    room = round(late * sight.rate_hz)
-    touches = sight.touches
-    rise_s = float(np.median(touches.peak - touches.start)) / sight.rate_hz
-    way, mended = "late" if sight.late.seconds > 0 else "early", late < _LATEST_S
+    a, b = data.spans[len(data.spans) // 2]
+    room = round(late * data.rate_hz)
+    touches = data.touches
+    rise_s = float(np.median(touches.peak - touches.start)) / data.rate_hz
+    way, mended = "late" if data.late.seconds > 0 else "early", late < _LATEST_S
     yield Finding(
         "delay",
         f"the force reads {late * 1e3:.0f} +- {error * 1e3:.0f} ms {way}; "
         + ("that is taken off" if mended else f"up to {_LATEST_S * 1e3:.0f} ms is taken off"),
-        f"{late / error:.0f} standard errors, {sight.late.presses} touches that pass one place twice",
+        f"{late / error:.0f} standard errors, {data.late.presses} touches that pass one place twice",
         "log position and force by one clock, or shift the force's times",
         1.5 * error / max(rise_s, error) if mended else np.inf,
         float(min(0.5 * (late / error) ** 2 / np.log(10), 300)),
         (
-            float(sight.recording.t[max(a - room, 0)]),
-            float(sight.recording.t[min(b + room, len(sight.t)) - 1]),
+            float(data.recording.t[max(a - room, 0)]),
+            float(data.recording.t[min(b + room, len(data.t)) - 1]),
         ),
         ("fx", "fy", "fz"),
     )

@@ -14,7 +14,7 @@ from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
 from mechanics.segments import within
 from reconstruct.checks.base import Finding, decades_of_tail, p_words, sure
-from reconstruct.checks.sight import CHANNELS, Sight
+from reconstruct.checks.samples import CHANNELS, Samples
 
 _NINE_OF_TEN = 1.645
 """Standard deviations within which nine of ten readings of a Gaussian lie."""
@@ -29,28 +29,28 @@ _SIGNAL = 5.0
 _GAP = 5.0
 
 
-def channels(sight: Sight) -> Iterator[Finding]:
+def channels(data: Samples) -> Iterator[Finding]:
     """Dead, stuck, limited, coarse and spiky channels."""
-    yield from _dead(sight)
-    yield from _stuck(sight)
-    yield from _limited(sight)
-    yield from _coarse(sight)
-    yield from _spiky(sight)
+    yield from _dead(data)
+    yield from _stuck(data)
+    yield from _limited(data)
+    yield from _coarse(data)
+    yield from _spiky(data)
 
 
 def _unit(channel: int, value: float) -> str:
     return f"{value * 1e3:.3g} mm" if channel < 3 else f"{value:.3g} N"
 
 
-def _dead(sight: Sight) -> Iterator[Finding]:
+def _dead(data: Samples) -> Iterator[Finding]:
     """A channel without any change, or a force axis that in contact shows no more than its noise."""
-    values = sight.values
+    values = data.values
     dead = [k for k in range(6) if np.ptp(values[:, k]) == 0]
-    touching = sight.contact
+    touching = data.contact
     if 0 < touching.sum() < len(touching):
-        noise = max(sight.spread_n, 1e-9)
-        signal = np.sqrt(np.mean(sight.net[touching] ** 2, axis=0)) / noise
-        expected = np.sqrt(np.mean((sight.touches.travel**2), axis=0)) if len(sight.touches) else np.zeros(3)
+        noise = max(data.spread_n, 1e-9)
+        signal = np.sqrt(np.mean(data.net[touching] ** 2, axis=0)) / noise
+        expected = np.sqrt(np.mean((data.touches.travel**2), axis=0)) if len(data.touches) else np.zeros(3)
         expected = expected / max(float(np.linalg.norm(expected)), 1e-12) * np.linalg.norm(signal)
         dead += [
             3 + k for k in range(3) if signal[k] < 1.5 and expected[k] > 2 * _SIGNAL and 3 + k not in dead
@@ -66,7 +66,7 @@ def _dead(sight: Sight) -> Iterator[Finding]:
         "check the cable and the driver of that axis, and record anew",
         np.inf,
         np.inf,
-        _greatest(sight),
+        _greatest(data),
         names,
     )
 
@@ -75,38 +75,38 @@ _ALONG = 0.8
 """Share of a force that lies along one axis, from which on it counts as pressing along it."""
 
 
-def _stuck(sight: Sight) -> Iterator[Finding]:
+def _stuck(data: Samples) -> Iterator[Finding]:
     """Windows in which a channel stands still although its companions move: how long in a row."""
-    n = len(sight.t)
-    size = max(_LEAST_WINDOW, round(_WINDOW_S * sight.rate_hz))
+    n = len(data.t)
+    size = max(_LEAST_WINDOW, round(_WINDOW_S * data.rate_hz))
     count = n // size
     if count < 20:
         return
-    spread = np.ptp(sight.values[: count * size].reshape(count, size, 6), axis=1)
-    first = sight.values[: count * size : size]
-    limit = (first == sight.values.max(axis=0)) | (first == sight.values.min(axis=0))
+    spread = np.ptp(data.values[: count * size].reshape(count, size, 6), axis=1)
+    first = data.values[: count * size : size]
+    limit = (first == data.values.max(axis=0)) | (first == data.values.min(axis=0))
     limit[:, :3] = False
-    least = np.where(sight.step > 0, sight.step, 1e-12)
-    move = np.ptp(sight.path[: count * size].reshape(count, size, 3), axis=1)
-    felt = np.ptp(sight.net[: count * size].reshape(count, size, 3), axis=1).max(axis=1)
-    load = np.abs(sight.net[: count * size].reshape(count, size, 3).mean(axis=1))
+    least = np.where(data.step > 0, data.step, 1e-12)
+    move = np.ptp(data.path[: count * size].reshape(count, size, 3), axis=1)
+    felt = np.ptp(data.net[: count * size].reshape(count, size, 3), axis=1).max(axis=1)
+    load = np.abs(data.net[: count * size].reshape(count, size, 3).mean(axis=1))
     # what presses mostly along an axis may slide on something flat and hard across it: the traced support
-    held = (load > _ALONG * np.linalg.norm(load, axis=1, keepdims=True)) & (load > _FELT * sight.spread_n)
+    held = (load > _ALONG * np.linalg.norm(load, axis=1, keepdims=True)) & (load > _FELT * data.spread_n)
     # a robot presses the bare support straight down: nothing moves across
-    rigid = within(sight.recording.segments, "rigid", sight.recording.t)
+    rigid = within(data.recording.segments, "rigid", data.recording.t)
     held |= rigid[: count * size : size, None]
     resolution = max(float(np.median(least[:3])), 1e-6)
-    fastest = _fastest(sight, count, size)
+    fastest = _fastest(data, count, size)
     worst: tuple[float, int, int, list[int]] | None = None
     for k in range(6):
-        if np.ptp(sight.values[:, k]) == 0:
+        if np.ptp(data.values[:, k]) == 0:
             continue
-        if k >= 3 and np.mean(np.diff(sight.values[:, k]) == 0) > 0.5:
+        if k >= 3 and np.mean(np.diff(data.values[:, k]) == 0) > 0.5:
             continue  # its steps are wider than its noise: `_coarse`
         still = (spread[:, k] < 0.5 * least[k]) & ~limit[:, k]
         if k < 3:
             others = move[:, [j for j in range(3) if j != k]].max(axis=1) > _MOVED * resolution
-            active = np.where(others, ~held[:, k], felt > _FELT * sight.spread_n)
+            active = np.where(others, ~held[:, k], felt > _FELT * data.spread_n)
         else:  # noise alone keeps a force channel moving
             active = np.ones(count, dtype=bool)
         row = active & still
@@ -114,7 +114,7 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         for a, b in runs(still):
             many = int(row[a:b].sum())
             decades = -many * float(np.log10(usual))
-            if (b - a) * size / sight.rate_hz < _STUCK_S or many < 3 or not sure(decades):
+            if (b - a) * size / data.rate_hz < _STUCK_S or many < 3 or not sure(decades):
                 continue
             if k < 3 and b < count:  # what was stuck comes back with a jump, a hand that held still does not
                 elsewhere = np.delete(fastest[:, k], np.arange(a, b + 1))
@@ -128,14 +128,14 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
         return
     decades, a, b, stuck = worst
     names = tuple(CHANNELS[k] for k in stuck)
-    begin, end = float(sight.recording.t[a * size]), float(sight.recording.t[min(b * size, n - 1)])
-    seconds = (b - a) * size / sight.rate_hz
-    lost = sum(any(a * size <= i < b * size for i in (start, stop)) for start, stop in sight.spans)
-    share = max(seconds / (n / sight.rate_hz), lost / max(len(sight.spans), 1))
+    begin, end = float(data.recording.t[a * size]), float(data.recording.t[min(b * size, n - 1)])
+    seconds = (b - a) * size / data.rate_hz
+    lost = sum(any(a * size <= i < b * size for i in (start, stop)) for start, stop in data.spans)
+    share = max(seconds / (n / data.rate_hz), lost / max(len(data.spans), 1))
     yield Finding(
         "stuck channel",
-        f"{', '.join(names)} stand still for {seconds:.3g} s from {sight.t[a * size]:.1f} s on, while the "
-        "rest goes on" + (f"; {lost} of {len(sight.spans)} touches lie there" if lost else ""),
+        f"{', '.join(names)} stand still for {seconds:.3g} s from {data.t[a * size]:.1f} s on, while the "
+        "rest goes on" + (f"; {lost} of {len(data.spans)} touches lie there" if lost else ""),
         p_words(decades),
         "cut that stretch out of the recording, or record anew",
         np.inf if share > _MOST_STUCK else max(float(share), 0.02),
@@ -145,33 +145,33 @@ def _stuck(sight: Sight) -> Iterator[Finding]:
     )
 
 
-def _fastest(sight: Sight, count: int, size: int) -> np.ndarray:
+def _fastest(data: Samples, count: int, size: int) -> np.ndarray:
     """(count, 6) fastest change of each channel, per second, within each window and into the next."""
-    change = np.abs(np.diff(sight.values, axis=0)) / np.maximum(np.diff(sight.t), 1e-9)[:, None]
+    change = np.abs(np.diff(data.values, axis=0)) / np.maximum(np.diff(data.t), 1e-9)[:, None]
     change = np.vstack([change, np.zeros((1, 6))])
     return change[: count * size].reshape(count, size, 6).max(axis=1)
 
 
-def _limited(sight: Sight) -> Iterator[Finding]:
+def _limited(data: Samples) -> Iterator[Finding]:
     """Touches whose greatest reading is one and the same: as improbable as their peaks are unlike."""
     signals: dict[str, tuple[np.ndarray, float, tuple[str, ...]]] = {
-        f"{name} {words}": (sign * sight.force[:, k], float(sight.step[3 + k]), (name,))
+        f"{name} {words}": (sign * data.force[:, k], float(data.step[3 + k]), (name,))
         for k, name in enumerate(CHANNELS[3:])
         for sign, words in ((1, "upwards"), (-1, "downwards"))
     }
-    if not sight.step[3:].any():
-        signals["|force|"] = (np.linalg.norm(sight.force, axis=1), 0.0, tuple(CHANNELS[3:]))
-    first, last = sight.traced
-    spans = [*sight.spans, *([(first, last)] if last > first else [])]
+    if not data.step[3:].any():
+        signals["|force|"] = (np.linalg.norm(data.force, axis=1), 0.0, tuple(CHANNELS[3:]))
+    first, last = data.traced
+    spans = [*data.spans, *([(first, last)] if last > first else [])]
     worst: tuple[float, str, int, int, float, int, tuple[str, ...]] | None = None
     for words, (values, step, names) in signals.items():
         if not spans:
             return
         tops = np.array([values[a:b].max() for a, b in spans])
         top = float(tops.max())
-        width = max(1.01 * float(step), 0.1 * sight.noise_n)
+        width = max(1.01 * float(step), 0.1 * data.noise_n)
         high = tops > 0.5 * top
-        if top < 10 * sight.noise_n or not high.any():
+        if top < 10 * data.noise_n or not high.any():
             continue
         at = tops > top - width
         share = float(width / (0.5 * top))
@@ -185,8 +185,8 @@ def _limited(sight: Sight) -> Iterator[Finding]:
             worst = (
                 decades,
                 words,
-                int(at[: len(sight.spans)].sum()),
-                len(sight.spans),
+                int(at[: len(data.spans)].sum()),
+                len(data.spans),
                 top,
                 int(np.argmax(tops)),
                 names,
@@ -203,19 +203,19 @@ def _limited(sight: Sight) -> Iterator[Finding]:
         "press less hard or take a sensor with a wider range; samples at the limit say nothing",
         float(max(count / max(among, 1), 0.02)),
         decades,
-        (float(sight.recording.t[a]), float(sight.recording.t[b - 1])),
+        (float(data.recording.t[a]), float(data.recording.t[b - 1])),
         names,
     )
 
 
-def _coarse(sight: Sight) -> Iterator[Finding]:
+def _coarse(data: Samples) -> Iterator[Finding]:
     """Steps of a channel against what a press makes of it; a channel whose noise hides its steps has none."""
-    depths, peaks = (np.linalg.norm(v, axis=1) for v in (sight.touches.travel, sight.touches.push))
-    if not (moved := depths > sight.step[:3].max()).any():
+    depths, peaks = (np.linalg.norm(v, axis=1) for v in (data.touches.travel, data.touches.push))
+    if not (moved := depths > data.step[:3].max()).any():
         return
     depth, peak = float(np.median(depths[moved])), float(np.median(peaks[moved]))
     # a moving tip passes its steps and averages them; a force's first rise hides within one
-    off = np.concatenate([sight.step[:3] / np.sqrt(12) / max(depth, 1e-9), sight.step[3:] / max(peak, 1e-9)])
+    off = np.concatenate([data.step[:3] / np.sqrt(12) / max(depth, 1e-9), data.step[3:] / max(peak, 1e-9)])
     coarse = [k for k in range(6) if off[k] > _COARSE]
     if not coarse:
         return
@@ -223,30 +223,30 @@ def _coarse(sight: Sight) -> Iterator[Finding]:
     step = max(coarse, key=lambda k: off[k])
     yield Finding(
         "coarse steps",
-        f"{', '.join(names)} come in steps of {_unit(step, float(sight.step[step]))}, where a press is "
+        f"{', '.join(names)} come in steps of {_unit(step, float(data.step[step]))}, where a press is "
         f"{depth * 1e3:.3g} mm deep and peaks at {peak:.3g} N (medians)",
         "certain: 98 % of the increments are multiples of the step",
         "raise the sensor's resolution, or log before rounding",
         float(1.5 * off[step]),
         np.inf,
-        _greatest(sight),
+        _greatest(data),
         names,
     )
 
 
-def _spiky(sight: Sight) -> Iterator[Finding]:
+def _spiky(data: Samples) -> Iterator[Finding]:
     """Readings that leave the running median by far and are back within 6 ms: noise hardly does, no touch is
     so short."""
-    if sight.rate_hz < 200:
+    if data.rate_hz < 200:
         return
-    width = 2 * round(_AROUND_S * sight.rate_hz / 2) + 1
-    dt = np.diff(sight.times)
-    cut = np.convolve(np.concatenate([[0], dt > _GAP / sight.rate_hz]), np.ones(2 * width + 1), "same") > 0.5
+    width = 2 * round(_AROUND_S * data.rate_hz / 2) + 1
+    dt = np.diff(data.times)
+    cut = np.convolve(np.concatenate([[0], dt > _GAP / data.rate_hz]), np.ones(2 * width + 1), "same") > 0.5
     found: list[tuple[int, int, float]] = []
     for k in range(6):
-        values = sight.values[:, k]
+        values = data.values[:, k]
         off = values - median_filter(values, size=width, mode="nearest")
-        scale = max(spread_about_zero(off), float(sight.step[k]), 1e-12)
+        scale = max(spread_about_zero(off), float(data.step[k]), 1e-12)
         away, count = label((np.abs(off) > _SPIKES * scale) & ~cut)
         if not count:
             continue
@@ -256,7 +256,7 @@ def _spiky(sight: Sight) -> Iterator[Finding]:
         top = maximum(np.abs(off), away, np.arange(1, count + 1))
         # a spike steps up and down; what swings, as a hand with a heavy tool does, only turns
         steep = np.minimum(np.abs(values[first] - values[first - 1]), np.abs(values[last] - values[last - 1]))
-        short = (length <= max(1, _SPIKE_S * sight.rate_hz)) & (first > 2) & (steep > _STEEP * top)
+        short = (length <= max(1, _SPIKE_S * data.rate_hz)) & (first > 2) & (steep > _STEEP * top)
         for i in first[short]:
             about = np.abs(off[max(i - 5 * width, 0) : i + 5 * width])
             if abs(off[i]) > _SPIKES * np.quantile(about, 0.9) / _NINE_OF_TEN:  # out of its surroundings too
@@ -265,27 +265,27 @@ def _spiky(sight: Sight) -> Iterator[Finding]:
         return
     names = tuple(CHANNELS[k] for k in sorted({k for k, _, _ in found}))
     places = np.array([i for _, i, _ in found])
-    hit = sum(bool(((places >= a) & (places < b)).any()) for a, b in sight.spans)
+    hit = sum(bool(((places >= a) & (places < b)).any()) for a, b in data.spans)
     height = float(np.median([h for _, _, h in found]))
     middle = found[len(found) // 2][1]
-    begin, end = (min(max(middle + d, 0), len(sight.t) - 1) for d in (-width, width))
+    begin, end = (min(max(middle + d, 0), len(data.t) - 1) for d in (-width, width))
     yield Finding(
         "spikes",
         f"{len(found)} readings of {', '.join(names)} jump away and back within {_SPIKE_S * 1e3:.0f} ms; "
-        f"{hit} of {len(sight.spans)} touches have one",
+        f"{hit} of {len(data.spans)} touches have one",
         f"{height:.0f} standard deviations of the channel (median)",
         "take them out by a median filter over 5 samples, and look for a loose contact",
-        float(max(0.02, 0.2 * hit / max(len(sight.spans), 1))),
+        float(max(0.02, 0.2 * hit / max(len(data.spans), 1))),
         np.inf,
-        (float(sight.recording.t[begin]), float(sight.recording.t[end])),
+        (float(data.recording.t[begin]), float(data.recording.t[end])),
         names,
     )
 
 
-def _greatest(sight: Sight) -> tuple[float, float]:
+def _greatest(data: Samples) -> tuple[float, float]:
     """The touch of the greatest force, s."""
-    middle = int(np.argmax(np.linalg.norm(sight.force, axis=1)))
-    around = round(0.5 * sight.rate_hz)
-    rows = (min(max(middle + d, 0), len(sight.t) - 1) for d in (-around, around))
-    begin, end = (float(sight.recording.t[i]) for i in rows)
+    middle = int(np.argmax(np.linalg.norm(data.force, axis=1)))
+    around = round(0.5 * data.rate_hz)
+    rows = (min(max(middle + d, 0), len(data.t) - 1) for d in (-around, around))
+    begin, end = (float(data.recording.t[i]) for i in rows)
     return begin, end

@@ -8,7 +8,7 @@ import numpy as np
 
 from mechanics.samples import runs
 from reconstruct.checks.base import Finding
-from reconstruct.checks.sight import Sight
+from reconstruct.checks.samples import Samples
 
 _TOLD = 0.02
 _GAP, _GAP_S, _PAUSE_S = 5.0, 0.05, 1.0
@@ -19,20 +19,20 @@ _RISE_SAMPLES = (8, 20)
 second and the first touch is coarse."""
 
 
-def clock(sight: Sight) -> Iterator[Finding]:
+def clock(data: Samples) -> Iterator[Finding]:
     """Rate, gaps, jitter, and how many samples a touch has."""
-    yield from _rate(sight)
-    yield from _gaps(sight)
-    yield from _jitter(sight)
-    yield from _coarse(sight)
+    yield from _rate(data)
+    yield from _gaps(data)
+    yield from _jitter(data)
+    yield from _coarse(data)
 
 
-def _rate(sight: Sight) -> Iterator[Finding]:
-    stated, own = sight.recording.sample_rate_hz, sight.rate_hz
+def _rate(data: Samples) -> Iterator[Finding]:
+    stated, own = data.recording.sample_rate_hz, data.rate_hz
     off = abs(np.log(stated / own))
-    if off < _TOLD or abs(np.log(stated * np.mean(np.diff(sight.times)))) < _TOLD:
+    if off < _TOLD or abs(np.log(stated * np.mean(np.diff(data.times)))) < _TOLD:
         return
-    dt = np.diff(sight.times)
+    dt = np.diff(data.times)
     agree = float(np.mean(np.abs(np.log(dt * stated)) < _TOLD))
     if agree > 0.5:
         return
@@ -43,34 +43,34 @@ def _rate(sight: Sight) -> Iterator[Finding]:
         f"state sample_rate_hz = {own:.4g}, or mend t",
         float(off),
         np.inf,
-        (float(sight.recording.t[0]), float(sight.recording.t[-1])),
+        (float(data.recording.t[0]), float(data.recording.t[-1])),
         ("t",),
     )
 
 
-def _gaps(sight: Sight) -> Iterator[Finding]:
-    dt = np.diff(sight.times)
-    typical = 1.0 / sight.rate_hz
+def _gaps(data: Samples) -> Iterator[Finding]:
+    dt = np.diff(data.times)
+    typical = 1.0 / data.rate_hz
     wide = np.flatnonzero(dt > max(_GAP * typical, _GAP_S))
     if not len(wide):
         return
     longest = int(wide[np.argmax(dt[wide])])
     missing = dt[wide] - typical
     lost, span = float(missing.sum()), float(typical * len(dt))
-    inside = np.array([any(a - 2 <= i <= b + 1 for a, b in sight.spans) for i in wide])
-    touched = sum(b - a for a, b in sight.spans) * typical
+    inside = np.array([any(a - 2 <= i <= b + 1 for a, b in data.spans) for i in wide])
+    touched = sum(b - a for a, b in data.spans) * typical
     # a gap matters by the touches that it cuts, and by its length where it is no pause of a moment
     share = max(
         lost / (span + lost) if lost > _PAUSE_S else 0.0, float(missing[inside].sum()) / max(touched, typical)
     )
     if share < 0.05:
         return
-    at = sight.recording.t[longest], sight.recording.t[longest + 1]
+    at = data.recording.t[longest], data.recording.t[longest + 1]
     many = "a gap" if len(wide) == 1 else f"{len(wide)} gaps"
     yield Finding(
         "gap",
         f"{many} in time, {lost:.3g} s without samples of {span + lost:.3g} s, the longest "
-        f"{dt[longest]:.3g} s after {sight.t[longest]:.2f} s; {inside.sum()} within touches",
+        f"{dt[longest]:.3g} s after {data.t[longest]:.2f} s; {inside.sum()} within touches",
         f"{dt[longest] / typical:.3g} times the usual interval",
         "record anew, or cut the recording at the gap",
         float(share),
@@ -80,53 +80,53 @@ def _gaps(sight: Sight) -> Iterator[Finding]:
     )
 
 
-def _jitter(sight: Sight) -> Iterator[Finding]:
+def _jitter(data: Samples) -> Iterator[Finding]:
     """Times within stretches of 0.1 s against their straight line: what a filter takes for even."""
-    dt = np.diff(sight.times)
-    size = max(4, round(_SPAN_S * sight.rate_hz))
-    whole = [(a, b) for a, b in runs(dt < max(_GAP / sight.rate_hz, _GAP_S)) if b - a >= size]
+    dt = np.diff(data.times)
+    size = max(4, round(_SPAN_S * data.rate_hz))
+    whole = [(a, b) for a, b in runs(dt < max(_GAP / data.rate_hz, _GAP_S)) if b - a >= size]
     off = []
     for a, b in whole:
         rows = a + np.arange((b - a) // size * size).reshape(-1, size)
-        t, index = sight.times[rows], np.arange(size) - (size - 1) / 2
+        t, index = data.times[rows], np.arange(size) - (size - 1) / 2
         t = t - t.mean(axis=1, keepdims=True)
         slope = t @ index / (index @ index)
         off.append((t - slope[:, None] * index).ravel())
     if not off:
         return
     stray = float(np.sqrt(np.mean(np.concatenate(off) ** 2)))
-    phase = 2 * np.pi * sight.cutoff_hz * stray
+    phase = 2 * np.pi * data.cutoff_hz * stray
     if phase < _PHASE_RAD:
         return
     worst = int(np.argmax(np.abs(dt - np.median(dt))))
-    middle = float(sight.recording.t[worst])
+    middle = float(data.recording.t[worst])
     yield Finding(
         "jitter",
         f"the times of samples stray by {1e3 * stray:.3g} ms (rms) from an even grid of "
-        f"{1e3 / sight.rate_hz:.3g} ms",
-        f"{phase:.2f} rad at the filter's {sight.cutoff_hz:g} Hz; up to {_PHASE_RAD} is harmless",
+        f"{1e3 / data.rate_hz:.3g} ms",
+        f"{phase:.2f} rad at the filter's {data.cutoff_hz:g} Hz; up to {_PHASE_RAD} is harmless",
         "resample to an even grid by the true times, or log the device's own clock",
         float(phase / 4),
         np.inf,
-        (middle - 10 / sight.rate_hz, middle + 10 / sight.rate_hz),
+        (middle - 10 / data.rate_hz, middle + 10 / data.rate_hz),
         ("t",),
     )
 
 
-def _coarse(sight: Sight) -> Iterator[Finding]:
+def _coarse(data: Samples) -> Iterator[Finding]:
     few, enough = _RISE_SAMPLES
-    if sight.rate_hz > 2 * sight.cutoff_hz / 0.45 and len(sight.t) > 1000:
+    if data.rate_hz > 2 * data.cutoff_hz / 0.45 and len(data.t) > 1000:
         return
-    rise = np.array([int(np.argmax(sight.size[a:b])) for a, b in sight.spans])
+    rise = np.array([int(np.argmax(data.size[a:b])) for a, b in data.spans])
     samples = float(np.median(rise)) if len(rise) else 0.0
-    if samples >= enough and sight.rate_hz > sight.cutoff_hz / 0.45:
+    if samples >= enough and data.rate_hz > data.cutoff_hz / 0.45:
         return
-    t, middle = sight.recording.t, sight.spans[len(rise) // 2] if len(rise) else None
+    t, middle = data.recording.t, data.spans[len(rise) // 2] if len(rise) else None
     yield Finding(
         "slow",
-        f"{sight.rate_hz:.3g} Hz: {len(sight.t)} samples in all, {samples:.0f} from first touch to the peak",
+        f"{data.rate_hz:.3g} Hz: {len(data.t)} samples in all, {samples:.0f} from first touch to the peak",
         f"a rise needs {enough}; below {few} its first touch cannot be fitted; the filter needs "
-        f"{sight.cutoff_hz / 0.45:.0f} Hz",
+        f"{data.cutoff_hz / 0.45:.0f} Hz",
         "record at 300 Hz or more",
         float("inf") if samples < few else float(0.2 * few / samples),
         np.inf,

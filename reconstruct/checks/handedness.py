@@ -15,7 +15,7 @@ import numpy as np
 
 from mechanics.press_sites import SITE_M, sites_of
 from reconstruct.checks.base import SURE_ODDS, Finding
-from reconstruct.checks.sight import Sight
+from reconstruct.checks.samples import Samples
 
 _LEAST_SITES = 5
 _LEAST_ANGLE_RAD = 0.15
@@ -24,16 +24,16 @@ _FLIPPED, _PRIOR = np.pi / 2, 1e-3
 _FORCE = ("fx", "fy", "fz")
 
 
-def handedness(sight: Sight) -> Iterator[Finding]:
+def handedness(data: Samples) -> Iterator[Finding]:
     """A finding where another map than the identity explains the forces' directions far better."""
-    touches = sight.touches
+    touches = data.touches
     length, force = np.linalg.norm(touches.travel, axis=1), np.linalg.norm(touches.push, axis=1)
-    good = (length > 5 * max(float(sight.step[:3].max()), 1e-6)) & (force > 0)
+    good = (length > 5 * max(float(data.step[:3].max()), 1e-6)) & (force > 0)
     if good.sum() < _LEAST_SITES:
         return
     against = -touches.travel[good] / length[good, None]
     push = touches.push[good] / force[good, None]
-    site = sites_of(sight.path[touches.start[good]], against, SITE_M)
+    site = sites_of(data.path[touches.start[good]], against, SITE_M)
     share = 1.0 / np.bincount(site)[site]
     sites = int(site.max()) + 1
     if sites < _LEAST_SITES:
@@ -53,9 +53,9 @@ def handedness(sight: Sight) -> Iterator[Finding]:
         return
     off = np.arccos(np.clip(np.einsum("ij,ij->i", push, against), -1, 1))
     worst = int(np.flatnonzero(good)[np.argmax(off)])
-    stretch = sight.touches.start[worst], sight.touches.end[worst] - 1
+    stretch = data.touches.start[worst], data.touches.end[worst] - 1
     name, words, todo = _described(best)
-    at = [float(sight.recording.t[int(i)]) for i in stretch]
+    at = [float(data.recording.t[int(i)]) for i in stretch]
     yield Finding(
         name,
         f"{words}: force and travel are {np.degrees(np.median(off)):.0f} degrees (median) from opposite, "

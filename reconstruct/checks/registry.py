@@ -18,15 +18,15 @@ from reconstruct.checks.channels import channels
 from reconstruct.checks.clock import clock
 from reconstruct.checks.handedness import handedness
 from reconstruct.checks.outcome import Result, outcome
-from reconstruct.checks.sight import Sight
+from reconstruct.checks.samples import Samples
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
-from reconstruct.geometry.known_shape import GeometryOptions, stated_geometry
-from reconstruct.steps.s1_filter.filtered import Filtered
-from reconstruct.steps.s1_filter.filtering import FilterOptions
+from reconstruct.geometry.stated import GeometryOptions, stated_geometry
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
+from reconstruct.steps.s3_contacts.first_touch import ContactSpans
 
-OF_SAMPLES: tuple[Callable[[Sight], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
+OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
 OF_RESULTS: tuple[Callable[[Result], Iterator[Finding]], ...] = (outcome,)
 REFUSALS = ("no base", "no presses")
@@ -36,16 +36,16 @@ _LEAST_SAMPLES = 100
 
 @dataclass(frozen=True)
 class CheckedSamples:
-    """What the samples alone show: findings, gravest first, and the sight that showed them (None: none was
-    needed)."""
+    """What the samples alone show: findings, gravest first, and the samples as the checks believe them
+    (None: nobody needed them)."""
 
     found: tuple[Finding, ...] = ()
-    sight: Sight | None = None
+    data: Samples | None = None
 
     @property
-    def filtered(self) -> Filtered | None:
-        """The signals that reconstruction would filter anew; None where it would see others."""
-        return self.sight.filtered if self.sight is not None and self.sight.as_stated else None
+    def spans(self) -> ContactSpans | None:
+        """The contacts that reconstruction would find anew; None where it would see others."""
+        return self.data.contacts if self.data is not None and self.data.as_stated else None
 
 
 def checked_samples(
@@ -61,10 +61,10 @@ def checked_samples(
     if len(recording.t) < _LEAST_SAMPLES:
         return CheckedSamples((_too_short(recording),) if by_hand else ())
     if not by_hand:
-        sight = Sight(recording, cutoff_hz=cutoff_hz)
-        return CheckedSamples(ordered(handedness(sight)), sight)
-    sight, found = settled(recording, cutoff_hz)
-    return CheckedSamples(ordered([*found, *(f for check in OF_SAMPLES for f in check(sight))]), sight)
+        data = Samples(recording, cutoff_hz=cutoff_hz)
+        return CheckedSamples(ordered(handedness(data)), data)
+    data, found = settled(recording, cutoff_hz)
+    return CheckedSamples(ordered([*found, *(f for check in OF_SAMPLES for f in check(data))]), data)
 
 
 def checked_presses(exploration: Exploration) -> tuple[Finding, ...]:
@@ -89,13 +89,13 @@ def looked_at(recording: Recording) -> tuple[tuple[Finding, ...], Seen]:
     found = samples.found
     if not (known or any(f.grave for f in found)):
         found = _with_presses(recording, samples)
-    return found, seen(samples.sight)
+    return found, seen(samples.data)
 
 
 def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Finding, ...]:
     found = samples.found
     try:
-        exploration = explore(recording, filtered=samples.filtered)
+        exploration = explore(recording, spans=samples.spans)
     except NoBaseError as error:
         if recording.base_model is not None:
             return found
@@ -109,27 +109,35 @@ Seen = tuple[tuple[str, float, float], ...]
 """Words with the unit, value, and what is usual (NaN: anything)."""
 
 
-def seen(sight: Sight | None) -> Seen:
+def seen(data: Samples | None) -> Seen:
     """What the checks measure on the way."""
-    if sight is None:
+    if data is None:
         return ()
-    rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(sight).items()]
-    free = np.linalg.norm(sight.air, axis=1)
+    rows = [(QUANTITIES[k].words, v, QUANTITIES[k].usual) for k, v in measured(data).items()]
+    free = np.linalg.norm(data.air, axis=1)
     return (
         *rows,
-        ("rate by the times of the samples [Hz]", sight.rate_hz, np.nan),
-        ("touches after the trace", float(len(sight.spans)), np.nan),
-        ("the force reads late [s]", sight.late.seconds if np.isfinite(sight.late.error_s) else np.nan, 0.0),
+        ("rate by the times of the samples [Hz]", data.rate_hz, np.nan),
+        ("touches after the trace", float(len(data.spans)), np.nan),
+        (
+            "the force reads late [s]",
+            data.late.seconds if np.isfinite(data.late.error_s) else np.nan,
+            0.0,
+        ),
         ("force in free air, mean [N]", float(free.mean()), np.nan),
-        ("force in free air, change over the recording [N]", float(np.ptp(sight.air, axis=0).max()), np.nan),
-        ("steps of the force [N]", float(sight.step[3:].max()), 0.0),
+        (
+            "force in free air, change over the recording [N]",
+            float(np.ptp(data.air, axis=0).max()),
+            np.nan,
+        ),
+        ("steps of the force [N]", float(data.step[3:].max()), 0.0),
     )
 
 
 class Checkup:
     """The check-up beside a reconstruction: each stage refuses what is grave, unless `force`.
 
-    found: what the stages so far have found. filtered: signals that need not be made again, None where
+    found: what the stages so far have found. spans: contacts that need not be found again, None where
     reconstruction would see others. Every stage raises RecordingError.
     """
 
@@ -142,7 +150,7 @@ class Checkup:
     ) -> None:
         self._force = force
         samples = checked_samples(recording, by_hand, cutoff_hz)
-        self.found, self.filtered = self._judged(samples.found), samples.filtered
+        self.found, self.spans = self._judged(samples.found), samples.spans
 
     def presses(self, exploration: Exploration) -> None:
         """Before a surface is made."""

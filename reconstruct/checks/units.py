@@ -16,7 +16,7 @@ from scipy.stats import norm
 
 from mechanics.recording import Recording
 from reconstruct.checks.base import SURE_ODDS, Finding, p_words, sure
-from reconstruct.checks.sight import Sight, Units
+from reconstruct.checks.samples import Samples, Units
 
 READINGS = {
     "time": {"s": 1.0, "ms": 1e3, "us": 1e6},
@@ -74,27 +74,27 @@ QUANTITIES = {
 _OF_TIME = ("duration", "rate", "speed", "extent")
 
 
-def settled(recording: Recording, cutoff_hz: float) -> tuple[Sight, tuple[Finding, ...]]:
+def settled(recording: Recording, cutoff_hz: float) -> tuple[Samples, tuple[Finding, ...]]:
     """The samples in their most probable units, and a finding for each that is far more probable than SI.
 
     The clock comes first: everything else is read through filters that need one.
     """
-    sight = Sight(recording, cutoff_hz=cutoff_hz)
-    known, odds = _best({k: v for k, v in measured(sight, of_touches=False).items() if k in _OF_TIME})
+    data = Samples(recording, cutoff_hz=cutoff_hz)
+    known, odds = _best({k: v for k, v in measured(data, of_touches=False).items() if k in _OF_TIME})
     found = []
     if known["time"] != "s" and odds["time"] > SURE_ODDS:
-        found.append(_finding(sight, "time", known["time"], odds["time"], measured(sight, of_touches=False)))
-        sight = Sight(recording, Units(time=READINGS["time"][known["time"]]), cutoff_hz)
-    seen = measured(sight)
+        found.append(_finding(data, "time", known["time"], odds["time"], measured(data, of_touches=False)))
+        data = Samples(recording, Units(time=READINGS["time"][known["time"]]), cutoff_hz)
+    seen = measured(data)
     known, odds = _best(seen)
     wrong = [
         kind for kind in ("position", "force", "tip") if known[kind] not in _PLAIN and odds[kind] > SURE_ODDS
     ]
     if wrong:
-        found += [_finding(sight, kind, known[kind], odds[kind], seen) for kind in wrong]
+        found += [_finding(data, kind, known[kind], odds[kind], seen) for kind in wrong]
         factors = {kind: READINGS[kind][known[kind]] for kind in wrong}
-        sight = Sight(recording, replace(sight.units, **factors), cutoff_hz)
-    return sight, (*found, *_beyond(measured(sight)))
+        data = Samples(recording, replace(data.units, **factors), cutoff_hz)
+    return data, (*found, *_beyond(measured(data)))
 
 
 def _beyond(seen: dict[str, float]) -> Iterator[Finding]:
@@ -144,33 +144,33 @@ def _best(seen: dict[str, float]) -> tuple[dict[str, str], dict[str, float]]:
     return dict(zip(kinds, best, strict=True)), odds
 
 
-def _finding(sight: Sight, kind: str, name: str, odds: float, seen: dict[str, float]) -> Finding:
+def _finding(data: Samples, kind: str, name: str, odds: float, seen: dict[str, float]) -> Finding:
     index, columns = list(READINGS).index(kind), COLUMNS[kind]
-    told = [(QUANTITIES[k], v) for k, v in seen.items() if QUANTITIES[k].powers[index]]
-    told.sort(key=lambda pair: -abs(pair[0].off(pair[1])))
-    shown = ", ".join(f"{q.words} {v:.3g} (usual {q.usual:.3g})" for q, v in told[:_SHOWN])
+    shown = [(QUANTITIES[k], v) for k, v in seen.items() if QUANTITIES[k].powers[index]]
+    shown.sort(key=lambda pair: -abs(pair[0].off(pair[1])))
+    listed = ", ".join(f"{q.words} {v:.3g} (usual {q.usual:.3g})" for q, v in shown[:_SHOWN])
     return Finding(
         "tip radius" if kind == "tip" else f"{kind} unit",
-        f"{', '.join(columns)} look like {name}: {shown}",
+        f"{', '.join(columns)} look like {name}: {listed}",
         f"odds {odds:.1g} to 1 over {_SI[kind]}",
         f"convert {', '.join(columns)} to {_SI[kind]}; check the stated noise, resolution and tip radius",
         float("inf"),
         float(np.log10(odds)),
-        (float(sight.recording.t[0]), float(sight.recording.t[-1])),
+        (float(data.recording.t[0]), float(data.recording.t[-1])),
         columns,
     )
 
 
-def measured(sight: Sight, of_touches: bool = True) -> dict[str, float]:
-    """The quantities of QUANTITIES that the recording has, in the units of `sight`."""
-    recording, radius = sight.recording, sight.tip_radius_m
-    every = max(1, round(0.05 * sight.rate_hz))
-    moved = np.linalg.norm(np.diff(sight.position[::every], axis=0), axis=1)
-    passed = np.diff(sight.times[::every])
-    extent = float(np.ptp(sight.position, axis=0).max())
+def measured(data: Samples, of_touches: bool = True) -> dict[str, float]:
+    """The quantities of QUANTITIES that the recording has, in the units of `data`."""
+    recording, radius = data.recording, data.tip_radius_m
+    every = max(1, round(0.05 * data.rate_hz))
+    moved = np.linalg.norm(np.diff(data.position[::every], axis=0), axis=1)
+    passed = np.diff(data.times[::every])
+    extent = float(np.ptp(data.position, axis=0).max())
     found = {
-        "duration": float(np.ptp(sight.t)),
-        "rate": sight.rate_hz / recording.sample_rate_hz,
+        "duration": float(np.ptp(data.t)),
+        "rate": data.rate_hz / recording.sample_rate_hz,
         "extent": extent,
         "tip": radius,
         "ratio": extent / radius,
@@ -179,15 +179,15 @@ def measured(sight: Sight, of_touches: bool = True) -> dict[str, float]:
         found["speed"] = float(np.percentile(moved / passed, 80))
     if not of_touches:
         return _proper(found)
-    found["noise"] = sight.noise_n
-    if recording.position_resolution_m and (sight.step[:3] > 0).all():
-        found["resolution"] = float(np.median(sight.step[:3])) / recording.position_resolution_m
+    found["noise"] = data.noise_n
+    if recording.position_resolution_m and (data.step[:3] > 0).all():
+        found["resolution"] = float(np.median(data.step[:3])) / recording.position_resolution_m
     if recording.force_noise_std_n:
-        found["noise stated"] = sight.noise_n / recording.force_noise_std_n
-    touches = sight.touches
+        found["noise stated"] = data.noise_n / recording.force_noise_std_n
+    touches = data.touches
     depth, peak = (np.linalg.norm(v, axis=1) for v in (touches.travel, touches.push))
-    rise = sight.t[touches.peak] - sight.t[touches.start]
-    good = (depth > max(3 * float(sight.step[:3].max()), _LEAST_M)) & (rise > 0)
+    rise = data.t[touches.peak] - data.t[touches.start]
+    good = (depth > max(3 * float(data.step[:3].max()), _LEAST_M)) & (rise > 0)
     if good.sum() > 3:
         plane = 4 / 3 * np.sqrt(radius) * depth[good] ** 1.5
         found |= {

@@ -1,18 +1,18 @@
 """Relaxation under a held displacement: a Prony series, whether a Kelvin-Voigt element could do the same, and
-what a press's own ramp says of its hold."""
+how many exponentials a curve needs, judged on stretches of time that were left out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import least_squares, nnls
-from scipy.special import expit
+from scipy.optimize import nnls
 
-from mechanics.effects.power_law_relaxation import prony_terms
 from mechanics.errors import RecordingError
+
+BLOCKS = 8
+_MOST_ROWS = 300
 
 
 @dataclass(frozen=True)
@@ -80,56 +80,49 @@ def _search(
     return grid[list(pick)], weights, float(norm / np.sqrt(len(t)))
 
 
-@dataclass(frozen=True)
-class Held:
-    """One press, a ramp and a hold: force (n,) N at t (n,) s from before first touch; the tip stands still
-    from sample `held` on."""
-
-    t: np.ndarray
-    force: np.ndarray
-    held: int
-
-
-def from_own_ramp(press: Held, g: np.ndarray, tau_s: np.ndarray) -> np.ndarray:
-    """(n,) N that a press reads with the memory g, tau_s (k,) whose elastic force is what its own ramp tells.
-
-    The memory is taken off the ramp, which is then read as it was; from the hold on the elastic force stays.
-    No law of the dent enters, so a piece's own shape and stiffness do not.
-    """
-    g, tau = np.asarray(g, dtype=float), np.asarray(tau_s, dtype=float)
-    steps = np.diff(press.t)
-    branch, elastic, out = np.zeros(len(g)), 0.0, np.zeros(len(press.t))
-    for n, dt in enumerate(steps, start=1):
-        fading, gain = np.exp(-dt / tau), tau / dt * -np.expm1(-dt / tau)
-        now = elastic
-        if n <= press.held:
-            now = (press.force[n] - g @ (fading * branch - gain * elastic)) / (1 + g @ gain)
-        branch = fading * branch + gain * (now - elastic)
-        elastic = now
-        out[n] = elastic + g @ branch
-    return out
+def thinned(t: np.ndarray, value: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """At most 300 samples, even in the logarithm of time since just before the first."""
+    since = t - t[0]
+    first = since[1]
+    at = np.unique(np.searchsorted(since, np.geomspace(first, since[-1], _MOST_ROWS)))
+    keep = np.unique(np.concatenate([[0], np.minimum(at, len(t) - 1)]))
+    return t[keep], value[keep]
 
 
-FORMS: dict[str, tuple[Callable[[np.ndarray], tuple[np.ndarray, np.ndarray]], tuple[float, ...]]] = {
-    "elastic": (lambda values: (np.zeros(1), np.ones(1)), ()),
-    "prony": (lambda values: (np.exp(values[:2]), np.exp(values[2:])), (0.0, 0.0, -1.0, 1.5)),
-    "power law": (lambda values: prony_terms(np.exp(values[0]), expit(values[1])), (0.0, -0.5)),
-}
-"""Forms of a memory: values to (g, tau_s), and where a fit of the values starts."""
+def held_out_relaxation(
+    t: np.ndarray, value: np.ndarray, most_terms: int = 2
+) -> tuple[dict[str, float], Relaxation]:
+    """(name -> rms error over rms value, blocks even in log time left out in turn; the fit of the best
+    number of exponentials). 'spring' does not relax, 'power' falls by a power of time, 'spectrum' has two
+    exponentials a decade, 'regression' interpolates."""
+    t, value = thinned(np.asarray(t, float), np.asarray(value, float))
+    since = np.log(t - t[0] + (t[1] - t[0]))
+    block = np.minimum((BLOCKS * (since - since[0]) / np.ptp(since)).astype(int), BLOCKS - 1)
+    predicted: dict[str, np.ndarray] = {}
+    for b in np.unique(block):
+        held, seen = block == b, block != b
+        predicted.setdefault("spring", np.zeros(len(t)))[held] = value[seen].mean()
+        line = np.polyfit(since[seen], np.log(np.maximum(value[seen], 1e-300)), 1)
+        predicted.setdefault("power", np.zeros(len(t)))[held] = np.exp(np.polyval(line, since[held]))
+        predicted.setdefault("regression", np.zeros(len(t)))[held] = np.interp(
+            since[held], since[seen], value[seen]
+        )
+        ladder = np.geomspace(t[1] - t[0], 3 * np.ptp(t), max(4, 2 * round(np.ptp(since) / np.log(10))))
+        kernel = np.column_stack([np.ones(len(t)), np.exp(-(t - t[0])[:, None] / ladder)])
+        weights = nnls(kernel[seen], value[seen])[0]
+        predicted.setdefault("spectrum", np.zeros(len(t)))[held] = kernel[held] @ weights
+        for terms in range(1, most_terms + 1):
+            out = predicted.setdefault(f"prony-{terms}", np.zeros(len(t)))
+            out[held] = _at(
+                fit_relaxation(t[seen], value[seen], terms=terms), t[seen][0], value[seen][0], t[held]
+            )
+    size = float(np.sqrt((value**2).mean()))
+    errors = {name: float(np.sqrt(((p - value) ** 2).mean())) / size for name, p in predicted.items()}
+    terms = min(range(1, most_terms + 1), key=lambda k: errors[f"prony-{k}"])
+    return errors, fit_relaxation(t, value, terms=terms)
 
 
-def fit_holds(presses: Sequence[Held], form: str) -> tuple[np.ndarray, np.ndarray]:
-    """(g, tau_s) of the form, one of FORMS, that predict the presses' holds from their own ramps best."""
-    terms, start = FORMS[form]
-    if not start:
-        return terms(np.zeros(0))
-
-    def missed(values: np.ndarray) -> np.ndarray:
-        return np.concatenate([hold_error(press, *terms(values)) for press in presses])
-
-    return terms(least_squares(missed, start, bounds=(-8.0, 8.0)).x)
-
-
-def hold_error(press: Held, g: np.ndarray, tau_s: np.ndarray) -> np.ndarray:
-    """N, predicted less measured after the ramp."""
-    return (from_own_ramp(press, g, tau_s) - press.force)[press.held + 1 :]
+def _at(fit: Relaxation, begin: float, first: float, t: np.ndarray) -> np.ndarray:
+    since = np.maximum(t - begin, 0.0)
+    decay = np.exp(-since[:, None] / np.array(fit.tau_s))
+    return first * (fit.end + decay @ np.array(fit.g))

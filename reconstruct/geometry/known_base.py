@@ -7,7 +7,7 @@ import numpy as np
 from mechanics.errors import ContactError
 from mechanics.frames import tangents
 from mechanics.model import Model
-from reconstruct.steps.s2_boundary.boundary import Boundary
+from reconstruct.steps.s2_base.outline import Boundary
 
 
 def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
@@ -25,7 +25,7 @@ def base_of_model(model: Model, tip_radius_m: float) -> Boundary:
 
 
 def base_of_rim(rim: np.ndarray, point: np.ndarray, normal: np.ndarray, tip_radius_m: float) -> Boundary:
-    """What a tracing of a rim (k, 3), in order, would have told; on the plane (point, normal), m."""
+    """What a tracing of a rim (k, 3), in order, would give; on the plane (point, normal), m."""
     after, before = np.roll(rim, -1, axis=0), np.roll(rim, 1, axis=0)
     outward = np.cross(after - before, normal)
     outward /= np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-300)

@@ -86,7 +86,7 @@ class Registration:
 
 
 def register(body: Body, touched: Touched, *, free: bool = True) -> Registration:
-    """The pose of a body that the touches speak for.
+    """The most likely pose of a body by its touches.
 
     free: False takes the body where it stands and only tells the residuals: its pose has no error then.
     """

@@ -26,8 +26,8 @@ class Parameter:
 class Shape(Protocol):
     """A shape in the support frame with free parameters.
 
-    name: as `--surface` spells it. complexity: how many ideas it needs; of two that predict held-out touches
-    alike the simpler is taken. faceted: side and top are separate faces that may err differently.
+    name: as `--surface` spells it. complexity: how many assumptions it makes; of two that predict held-out
+    touches alike the simpler is taken. faceted: side and top are separate faces that may err differently.
     """
 
     @property

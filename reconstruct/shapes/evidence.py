@@ -1,4 +1,4 @@
-"""What a hand told about a shape: where its spherical tip met the object and the support.
+"""What touches say about a shape: where its spherical tip met the object and the support.
 
 Shapes are fitted in the support frame: origin on the support below the middle of the base, z along the
 support's normal. A touch says that the tip's centre is one tip radius away from the surface; its force says

@@ -11,6 +11,7 @@ from mechanics.errors import SurfaceError
 from mechanics.nearest import distance
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import LEAN_M, Seen
+from reconstruct.shapes.points import farthest_points
 
 _OFF_M = 0.004
 _RIM_SPACING_M = 0.005
@@ -30,8 +31,6 @@ def implicit_surface(
     Raises SurfaceError where the zero level is empty.
     """
     import pyvista
-
-    from reconstruct.steps.s2_boundary.boundary import farthest_points
 
     used = slice(None) if left_out is None else ~left_out
     centres = evidence.to_support(evidence.centres)[used]

@@ -1,6 +1,6 @@
 """What a fitted shape leaves unexplained, spread over its surface with its uncertainty (a Gaussian process).
 
-The true surface lies g(p) outside the fitted one. Each touch says what g is at its foot, up to an error; g is
+The true surface lies g(p) outside the fitted one. Each touch measures g at its foot, up to an error; g is
 smooth along the surface and says little across an edge (its covariance falls with distance and with the turn
 of the normal). The shape's parameters stay uncertain beside it: their slopes enter the same covariance
 (universal kriging), so that held-out errors and the uncertainty of places that nobody touched are in closed
@@ -15,6 +15,7 @@ from functools import cached_property
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
 
+from mechanics.gaussian import matern_3_2
 from mechanics.robust import spread_about_zero
 from reconstruct.shapes.base import Shape, gradient, parameter_slopes
 from reconstruct.shapes.fit import LEAN_SPREAD_M, OUTLINE_ERROR_M, Seen, residuals
@@ -35,10 +36,10 @@ class Law:
 
     def covariance(self, p: np.ndarray, n: np.ndarray, q: np.ndarray, m: np.ndarray) -> np.ndarray:
         """(k, l) m^2 between g at points p (k, 3) with normals n and at q (l, 3) with normals m."""
-        apart = ((p[:, None] - q) ** 2).sum(axis=2) / self.length_m**2
+        apart = ((p[:, None] - q) ** 2).sum(axis=2)
         turn = ((n[:, None] - m) ** 2).sum(axis=2) / _TURN**2
-        root = np.sqrt(3 * apart)
-        return self.size(n)[:, None] * self.size(m) * (1 + root) * np.exp(-root - 0.5 * turn)
+        variance = self.size(n)[:, None] * self.size(m)
+        return matern_3_2(apart, self.length_m, variance=variance, fall=0.5 * turn)
 
     def size(self, n: np.ndarray) -> np.ndarray:
         """(k,) m, standard deviation of g where the normal is n (k, 3)."""
@@ -62,7 +63,7 @@ class Explained:
 
     @property
     def complexity(self) -> int:
-        """Ideas needed: the shape's, and three more for a free field."""
+        """Assumptions: the shape's, and three more for a free field."""
         return self.shape.complexity + 3 * self.free
 
     @property
@@ -172,7 +173,7 @@ def explain(shape: Shape, lean_m: float, seen: Seen, *, free: bool) -> Explained
     """The residual field of greatest likelihood; without one (free false) only the touches' error is sought.
 
     Touches that lie far off while all others agree are given their own error, so that a bad press neither
-    bends the surface nor speaks against a shape more than once.
+    bends the surface nor counts against a shape more than once.
     """
     found = _explain(shape, lean_m, seen, free=free)
     touches = len(seen.centres)

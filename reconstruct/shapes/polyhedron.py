@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.base import Parameter, values_of, with_values
-from reconstruct.shapes.hull import delaunay_hull
+from reconstruct.shapes.convex_bounds import delaunay_hull
 from reconstruct.shapes.outline import Outline, sides
 
 _ON_PLANE_M = 0.0005

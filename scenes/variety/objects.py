@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from mechanics.nearest import first_hits
 from mechanics.progress import Progress, silent
 from scenes.laboratory.paths import touch_forces
 from scenes.laboratory.presses import Touch, sites
@@ -70,22 +71,7 @@ def thing(number: int) -> Thing:
 
 def thickness(phantom: Phantom, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k,) mm of material under surface points (k, 3) mm along their inward normals (k, 3)."""
-    corners = 1e3 * phantom.vertices[phantom.faces]
-    first, edges = corners[:, 0], corners[:, 1:] - corners[:, :1]
-    found = np.empty(len(points))
-    for k, (point, normal) in enumerate(zip(points, normals, strict=True)):
-        # ray and triangle, Moeller & Trumbore 1997
-        across = np.cross(-normal, edges[:, 1])
-        det = (edges[:, 0] * across).sum(axis=1)
-        det = np.where(np.abs(det) < 1e-12, np.inf, det)
-        off = point - first
-        u = (off * across).sum(axis=1) / det
-        turned = np.cross(off, edges[:, 0])
-        v = -(turned @ normal) / det
-        along = (edges[:, 1] * turned).sum(axis=1) / det
-        hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (along > 0.5)
-        found[k] = along[hit].min(initial=np.inf)
-    return found
+    return first_hits(1e3 * phantom.vertices, phantom.faces, points, -normals, beyond=0.5)[0]
 
 
 def _touches(

@@ -7,14 +7,9 @@ import pytest
 from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 from mechanics.errors import ContactError
-from reconstruct.steps.s2_boundary.boundary import (
-    BoundaryOptions,
-    farthest_points,
-    find_boundary,
-    find_interval,
-    fit_plane,
-    in_its_plane,
-)
+from reconstruct.shapes.points import farthest_points, fit_plane, in_its_plane
+from reconstruct.steps.s2_base.outline import BoundaryOptions, find_boundary
+from reconstruct.steps.s2_base.tracing import find_interval
 from reconstruct.steps.s3_contacts.contacts import explore
 
 

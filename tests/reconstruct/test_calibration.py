@@ -16,7 +16,7 @@ from mechanics.calibration import Calibration, read_calibration, write_calibrati
 from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.samples import delayed
-from reconstruct.geometry.known_shape import nowhere
+from reconstruct.geometry.placed import nowhere
 from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording
 

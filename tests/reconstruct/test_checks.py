@@ -13,7 +13,7 @@ from mechanics.errors import PalpateError, RecordingError
 from reconstruct.checks.base import Finding, decades_of_tail
 from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
-from reconstruct.checks.sight import Sight
+from reconstruct.checks.samples import Samples
 
 NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")
 
@@ -80,7 +80,7 @@ def test_a_hand_that_held_still_along_one_axis_is_no_stuck_channel(cylinder):
 def test_the_delay_of_the_force_is_read_off_places_passed_twice(cylinder):
     for late_s in (-0.04, 0.0, 0.15):
         force = np.roll(cylinder[0].force_on_tool, round(late_s * 1000), axis=0)
-        seen = Sight(dataclasses.replace(cylinder[0], force_on_tool=force)).late
+        seen = Samples(dataclasses.replace(cylinder[0], force_on_tool=force)).late
         assert seen.seconds == pytest.approx(late_s, abs=0.006) and seen.error_s < 0.003
 
 

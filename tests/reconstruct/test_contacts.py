@@ -8,9 +8,9 @@ from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinde
 
 from mechanics.errors import ContactError, OptionError
 from mechanics.segments import Segment
-from reconstruct.steps.s1_filter.filtering import low_pass
+from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s1_filter.tool_weight import tool_weight
-from reconstruct.steps.s3_contacts import finding
+from reconstruct.steps.s3_contacts import single_press
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 
 
@@ -102,7 +102,7 @@ def test_the_tools_weight_and_inertia_are_taken_off():
 def test_a_rise_that_would_begin_beyond_the_deepest_travel_is_no_press(monkeypatch):
     """As where a heavy tool's weight, read late, swings while nothing is touched."""
     recording, onsets = explore_cylinder()
-    fit = finding.fit_rise
+    fit = single_press.fit_rise
     calls = []
 
     def misled(travel, force, noise_n, **options):
@@ -110,7 +110,7 @@ def test_a_rise_that_would_begin_beyond_the_deepest_travel_is_no_press(monkeypat
         calls.append(rise)
         return dataclasses.replace(rise, u0_m=travel.max() + 1e-4) if len(calls) == 4 else rise
 
-    monkeypatch.setattr(finding, "fit_rise", misled)
+    monkeypatch.setattr(single_press, "fit_rise", misled)
     exploration = explore(recording, contact_options=ContactOptions(correct_delay=False))
     assert len(exploration.presses) == len(onsets) - 1
     assert [reason for _, reason in exploration.rejected if "no rise" in reason]
@@ -221,7 +221,7 @@ def test_a_soft_object_pressed_shallowly_keeps_its_presses():
 
 def test_a_foot_traced_in_straight_pieces_with_a_bounce_is_one_phase():
     """One straight side alone tells no plane, and a bounce of 20 ms ends no tracing."""
-    from reconstruct.steps.s2_boundary.boundary import find_interval
+    from reconstruct.steps.s2_base.tracing import find_interval
 
     rate, rng = 1000, np.random.default_rng(5)
     corners = np.array([[0, 0], [0.06, 0], [0.06, 0.06], [0, 0.06], [0, 0]])

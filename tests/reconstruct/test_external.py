@@ -4,18 +4,14 @@ import csv
 
 import numpy as np
 import pytest
+from machine_moduli import fit_approach, small_strain_modulus
 
+from benchmarks._machine_curves import Elastomer, Held, fit_elastomer, fit_holds, hold_error
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError, RecordingError
-from reconstruct.external.compression import (
-    Compression,
-    Elastomer,
-    fit_elastomer,
-    read_compression,
-    small_strain_modulus,
-)
-from reconstruct.external.indentation import fit_approach, read_chiaro
-from reconstruct.external.relaxation import Held, fit_holds, fit_relaxation, hold_error
+from reconstruct.external.compression import Compression, read_compression
+from reconstruct.external.indentation import read_chiaro
+from reconstruct.external.relaxation import fit_relaxation
 
 
 @pytest.fixture

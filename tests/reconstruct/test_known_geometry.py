@@ -14,12 +14,14 @@ from mechanics.errors import ContactError, OptionError, SurfaceError
 from mechanics.press_sites import sites_of
 from palpate import cli
 from palpate.sources import given_model
-from reconstruct.geometry.known_shape import GeometryOptions, nowhere, place, stated_geometry
+from reconstruct.geometry.known_shape import place
+from reconstruct.geometry.placed import nowhere
+from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import Seen
 from reconstruct.shapes.implicit import implicit_held_out
 from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s3_contacts.slides import without_slides
+from reconstruct.steps.s3_contacts.left_out import without_slides
 from scenes.scene import Scene
 
 

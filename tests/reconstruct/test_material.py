@@ -14,7 +14,7 @@ from diagnose.specimen.rivals import held_out_rivals
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError, OptionError, RecordingError
 from palpate import cli
-from reconstruct.external.holds import held_out_relaxation
+from reconstruct.external.relaxation import held_out_relaxation
 from reconstruct.external.uniaxial import LAWS, Uniaxial, chosen, fit_law, held_out
 
 

@@ -12,11 +12,11 @@ from scipy.spatial import Delaunay
 import reconstruct.steps.s5_mesh.meshing as meshing_module
 from benchmarks._surface_truth import phantom_truth, touch
 from mechanics.errors import MeshError, SurfaceError
-from reconstruct.shapes.balance import balanced
+from reconstruct.shapes.coarse_drawing import balanced
 from reconstruct.shapes.voxels import labels, voxel_surface
 from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions, reconstruct_surface
+from reconstruct.steps.s5_mesh.element_shape import radius_edge_ratio, relaxed
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, _held, mesh_surface
-from reconstruct.steps.s5_mesh.relaxation import radius_edge_ratio, relaxed
 from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
 
 

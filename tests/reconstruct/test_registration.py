@@ -15,7 +15,7 @@ from mechanics.presses import Presses
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.tetmesh import vertex_normals
 from reconstruct.geometry.registration import Body, Registration, Touched, register
-from reconstruct.steps.s3_contacts.slides import sliding
+from reconstruct.steps.s3_contacts.left_out import sliding
 from reconstruct.steps.s7_modulus.shape_error import PoseError, compliance_covariance
 
 TIP_M = 0.004

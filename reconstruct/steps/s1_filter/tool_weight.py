@@ -16,8 +16,8 @@ from scipy.ndimage import maximum_filter1d
 from scipy.spatial.transform import Rotation
 
 from mechanics.recording import Recording
-from reconstruct.steps.s1_filter.filtering import low_pass_at
-from reconstruct.steps.s1_filter.free_noise import crowd_scale
+from reconstruct.steps.s1_filter.low_pass import low_pass_at
+from reconstruct.steps.s1_filter.noise_level import crowd_scale
 
 _SUBSAMPLE = 1200
 _TRIALS = 200

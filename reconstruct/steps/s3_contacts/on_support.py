@@ -9,8 +9,8 @@ import numpy as np
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.segments import ON_SUPPORT
-from reconstruct.steps.s2_boundary.boundary import Boundary
-from reconstruct.steps.s3_contacts.finding import Signals
+from reconstruct.steps.s1_filter.signals import Signals
+from reconstruct.steps.s2_base.outline import Boundary
 
 _SLID = 2.0
 """Tip radii: what stays within is pressed, what goes farther slides."""
@@ -30,9 +30,9 @@ def stated(recording: Recording, a: int, b: int) -> str:
     return ""
 
 
-def on_it(signals: Signals, boundary: Boundary, a: int, b: int) -> str:
-    """Why the contact of samples [a, b), whose tip comes down to the support, is no palpation; else ''."""
-    gap = float(boundary.height(signals.position[a:b]).min()) - signals.recording.tip_radius_m
+def on_it(path: np.ndarray, boundary: Boundary, tip_radius_m: float) -> str:
+    """Why a contact whose tip comes down to the support on its path (n, 3) m is no palpation; else ''."""
+    gap = float(boundary.height(path).min()) - tip_radius_m
     if gap < max(3 * boundary.flatness_m, 1e-4):
         return f"is on the support (the tip comes within {gap * 1e3:.2f} mm of it)"
     return ""
@@ -55,7 +55,7 @@ def recognised(
         if np.linalg.norm(np.ptp(here, axis=0)) < _SLID * radius:
             pushed = signals.force[a:b].sum(axis=0)
             alone = pushed @ boundary.support_normal > _ALONG * np.linalg.norm(pushed)
-            if alone and on_it(signals, boundary, a, b):
+            if alone and on_it(signals.position[a:b], boundary, radius):
                 found[a, b] = "rigid"
         elif np.median(np.abs(boundary.height(signals.position[a:b]) - radius)) < radius:
             slid.append((a, b))

@@ -17,9 +17,9 @@ from mechanics.press_sites import sites_of
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
-from reconstruct.steps.s2_boundary.boundary import Boundary
+from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, Exploration
-from reconstruct.steps.s3_contacts.unbroken import Loading, first_touches
 
 _LEAST_NOISE = 1e-3
 """Of the greatest force: noise below this is not believed."""

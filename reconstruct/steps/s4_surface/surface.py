@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -12,19 +12,24 @@ import numpy as np
 
 from mechanics.errors import SurfaceError
 from mechanics.frames import support_axes
-from mechanics.nearest import distance
 from mechanics.options import option
 from mechanics.progress import Progress, silent
-from reconstruct.shapes.balance import balanced
-from reconstruct.shapes.candidates import FITTED, HiddenOutlineError, first_guesses
+from reconstruct.shapes.candidates import FITTED, HiddenOutlineError
+from reconstruct.shapes.coarse_drawing import balanced
+from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds
 from reconstruct.shapes.drawing import draw
 from reconstruct.shapes.evidence import LEAST_TOUCHES, Evidence
-from reconstruct.shapes.fit import Seen, fit
-from reconstruct.shapes.hull import hull_surface
+from reconstruct.shapes.fit import Seen
 from reconstruct.shapes.implicit import implicit_deviation, implicit_held_out, implicit_surface
-from reconstruct.shapes.kriging import Explained, explain
 from reconstruct.shapes.polyhedron import refine
-from reconstruct.shapes.tangent import tangent_surface
+from reconstruct.steps.s4_surface.shape_choice import (
+    best_drawn,
+    held_out_error,
+    reason,
+    rivals_spread,
+    score,
+    try_shapes,
+)
 
 if TYPE_CHECKING:
     import trimesh
@@ -33,22 +38,12 @@ if TYPE_CHECKING:
 
 SURFACES = ("auto", "hull", "tangent", "implicit", *FITTED)
 
-_CORRECTED = 6
-"""So many of the best shapes are tried with a free residual field as well."""
-
-_DIRECTION_RAD, _LEAST_LIKELY = np.radians(15.0), 3.0
-"""Standard deviation of a first force's direction; what a place can cost at most, for a slip is no proof."""
-
 _POOR_M = 0.0012
 """Above this held-out error of the best shape, the implicit surface is tried as well."""
 
 _LOOSE_M, _LOOSE = 0.0006, 3.0
 """A first touch whose own error is beyond this, and so many times the median's, places no surface."""
 
-_BELOW_M = 1e-4
-"""No surface reaches this far below the support it stands on."""
-
-Drawn = tuple[np.ndarray, np.ndarray, np.ndarray]
 Redraw = Callable[[float], tuple[np.ndarray, np.ndarray]]
 
 
@@ -116,7 +111,7 @@ class Surface:
 
 
 def evidence_of(exploration: Exploration) -> Evidence:
-    """What an exploration says about the shape: of touches known by far less well than most nothing.
+    """What an exploration says about the shape; touches known far less well than most are left out.
 
     Raises SurfaceError where it has no base outline.
     """
@@ -127,16 +122,16 @@ def evidence_of(exploration: Exploration) -> Evidence:
         )
     error = presses.onset_error_m
     fourth = np.sort(error)[:LEAST_TOUCHES][-1]
-    told = error <= max(_LOOSE_M, _LOOSE * float(np.median(error)), fourth)
+    good = error <= max(_LOOSE_M, _LOOSE * float(np.median(error)), fourth)
     return Evidence(
         support_point=boundary.support_point,
         support_normal=boundary.support_normal,
         outline=boundary.outline,
         outline_centres=boundary.centres,
-        centres=presses.centre[told],
-        normals=presses.contact_normal[told],
-        centre_error_m=error[told],
-        site=presses.site[told],
+        centres=presses.centre[good],
+        normals=presses.contact_normal[good],
+        centre_error_m=error[good],
+        site=presses.site[good],
         tip_radius_m=exploration.recording.tip_radius_m,
     )
 
@@ -148,7 +143,7 @@ def reconstruct_surface(
     *,
     shaped: Callable[[Surface], object] | None = None,
 ) -> Surface:
-    """The surface that the touches and the base outline speak for.
+    """The most likely surface by the touches and the base outline.
 
     shaped: called once its shape is there and its uncertainty and bounds are not, so that a mesher can begin.
     Raises SurfaceError where no closed surface can be made.
@@ -163,11 +158,18 @@ def _found(
 ) -> Surface:
     if options.surface in ("hull", "tangent"):
         shells = {"hull": hull_surface, "tangent": tangent_surface}
-        # finer than the facets need, so that the gap between the bounds is told inside them as well
+        # finer than the facets need, so that the gap between the bounds is known inside them as well
         vertices, triangles = refine(*shells[options.surface](evidence), 2 * options.surface_spacing_m)
-        gap = _bracket_gap(evidence, vertices, options.surface)
-        return _surface(
-            evidence, vertices, triangles, gap, options.surface, "asked for", bracket=bounds(evidence)
+        gap = gap_to_other_bound(evidence, vertices, options.surface)
+        return Surface(
+            vertices=evidence.to_device(vertices),
+            triangles=triangles,
+            uncertainty_m=gap,
+            support_point=evidence.origin,
+            support_normal=evidence.axes[2],
+            method=options.surface,
+            reason="asked for",
+            bracket_m3=volume_bounds(evidence),
         )
     if options.surface == "implicit":
         return _implicit(evidence, options, "asked for")
@@ -179,7 +181,7 @@ def _found(
         return _implicit(
             evidence, options, "no point sees the whole base outline, which the other shapes need"
         )
-    best, (vertices, triangles, deviation) = _best_drawn(tried, options.surface_spacing_m)
+    best, (vertices, triangles, deviation) = best_drawn(tried, options.surface_spacing_m)
     error = held_out_error(best)
     if options.surface == "auto" and error > _POOR_M:
         why = f"no shape explains the touches ({best.name}: {1e3 * error:.2f} mm)"
@@ -193,57 +195,40 @@ def _found(
         coarse = draw(best, spacing_m)[:2]
         return evidence.to_device(balanced(coarse, (vertices, triangles))), coarse[1]
 
-    surface = _surface(
-        evidence,
-        vertices,
-        triangles,
-        deviation,
-        best.name,
-        "asked for" if options.surface != "auto" else reason(best, tried),
-        {p.label: p.value for p in best.shape.parameters},
-        {e.name: held_out_error(e) for e in sorted(tried, key=score)},
+    surface = Surface(
+        vertices=evidence.to_device(vertices),
+        triangles=triangles,
+        uncertainty_m=deviation,
+        support_point=evidence.origin,
+        support_normal=evidence.axes[2],
+        method=best.name,
+        reason="asked for" if options.surface != "auto" else reason(best, tried),
+        parameters={p.label: p.value for p in best.shape.parameters},
+        held_out_m={e.name: held_out_error(e) for e in sorted(tried, key=score)},
         redraw=redraw,
     )
     shaped(surface)
     facing = best.feet[1][: len(evidence.centres)] @ evidence.axes
     return replace(
         surface,
-        uncertainty_m=np.hypot(deviation, _spread(vertices, best, tried)),
-        bracket_m3=bounds(replace(evidence, normals=facing)),
+        uncertainty_m=np.hypot(deviation, rivals_spread(vertices, best, tried)),
+        bracket_m3=volume_bounds(replace(evidence, normals=facing)),
     )
-
-
-def _best_drawn(tried: Sequence[Explained], spacing_m: float) -> tuple[Explained, Drawn]:
-    """The shape with the best score of those that can be drawn, and its drawing (reconstruct.shapes.drawing).
-
-    A field beside a shape may run away where nothing was touched: below the support, or far beyond all that
-    was. Raises SurfaceError where every one does.
-    """
-    for each in sorted(tried, key=score, reverse=True):
-        drawn = draw(each, spacing_m)
-        touched = np.vstack([each.seen.centres, each.seen.outline])
-        size = np.ptp(touched, axis=0).max()
-        beyond = np.maximum(drawn[0] - touched.max(axis=0), touched.min(axis=0) - drawn[0]).max()
-        if beyond < size and drawn[0][:, 2].min() > -_BELOW_M:
-            return each, drawn
-    raise SurfaceError("no shape stays near what was touched: touch more places, all round the object")
 
 
 def _implicit(evidence: Evidence, options: SurfaceOptions, why: str) -> Surface:
     vertices, triangles = implicit_surface(evidence, options.surface_spacing_m)
     error = implicit_held_out(evidence, Seen.of(evidence))
-    deviation = implicit_deviation(evidence, vertices)
-    text = f"{why}; predicts touches at places left out within {1e3 * error:.2f} mm"
-    return _surface(
-        evidence,
-        vertices,
-        triangles,
-        deviation,
-        "implicit",
-        text,
-        None,
-        {"implicit": error},
-        bounds(evidence),
+    return Surface(
+        vertices=evidence.to_device(vertices),
+        triangles=triangles,
+        uncertainty_m=implicit_deviation(evidence, vertices),
+        support_point=evidence.origin,
+        support_normal=evidence.axes[2],
+        method="implicit",
+        reason=f"{why}; predicts touches at places left out within {1e3 * error:.2f} mm",
+        held_out_m={"implicit": error},
+        bracket_m3=volume_bounds(evidence),
     )
 
 
@@ -269,120 +254,3 @@ def shape_table(surface: Surface) -> dict[str, Any]:
         "held_out_m": dict(surface.held_out_m),
         "parameters": dict(surface.parameters),
     }
-
-
-def try_shapes(evidence: Evidence, which: str = "auto", progress: Progress = silent) -> list[Explained]:
-    """Every shape (or those named `which`), fitted, without and with a free residual field."""
-    seen = Seen.of(evidence)
-    guesses = [g for g in first_guesses(evidence, seen) if which in ("auto", g.name)]
-    if not guesses:
-        raise SurfaceError(f"the base outline does not allow a {which}: use --surface auto")
-    tried = []
-    for k, guess in enumerate(guesses):
-        tried.append(explain(*fit(guess, seen), seen, free=False))
-        progress("surface", (k + 1) / (len(guesses) + 3))
-    for plain in sorted(tried, key=score)[-_CORRECTED:]:
-        free = explain(plain.shape, plain.lean_m, seen, free=True)
-        # a free field follows systematic errors of the touches as well: it must predict places it has not
-        # seen
-        if held_out_error(free) < held_out_error(plain):
-            tried.append(free)
-    return tried
-
-
-def held_out_error(explained: Explained) -> float:
-    """Root mean square error (m) of touches at held-out places."""
-    return float(np.sqrt(np.mean(explained.held_out[0] ** 2)))
-
-
-def score(explained: Explained) -> float:
-    """Log density of the held-out places and of the forces' directions, less one for each idea: an idea must
-    earn its keep."""
-    return float(explained.held_out[1].sum()) + direction_score(explained) - explained.complexity
-
-
-def direction_score(explained: Explained) -> float:
-    """Log density, place by place, of the first forces' directions about the normals of the shape.
-
-    They are wrong by some 6 degrees, so they place no surface; but a wall touched near its rim pushes
-    sideways, where a shape whose top ends below that touch would have the tip on its edge and push upwards.
-    """
-    seen = explained.seen
-    along = np.einsum("ij,ij->i", seen.normals, explained.feet[1][: len(seen.normals)])
-    lost = np.minimum((np.arccos(np.clip(along, -1, 1)) / _DIRECTION_RAD) ** 2 / 2, _LEAST_LIKELY)
-    return -float(sum(lost[seen.sites == k].mean() for k in np.unique(seen.sites)))
-
-
-def reason(best: Explained, tried: list[Explained]) -> str:
-    """Why this shape, in one sentence."""
-    error = 1e3 * held_out_error(best)
-    others = [e for e in tried if e.shape.name != best.shape.name]
-    text = f"predicts touches at places left out within {error:.2f} mm"
-    if others:
-        second = max(others, key=score)
-        error = 1e3 * held_out_error(second)
-        text += f" (next best, {second.name}: {error:.2f} mm)"
-    return text
-
-
-def bounds(evidence: Evidence) -> tuple[float, float]:
-    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or
-    nan)."""
-    import trimesh
-
-    low = float(trimesh.Trimesh(*hull_surface(evidence), process=False).volume)
-    try:
-        high = float(trimesh.Trimesh(*tangent_surface(evidence), process=False).volume)
-    except SurfaceError:
-        high = float("nan")
-    return low, high
-
-
-def _spread(vertices: np.ndarray, best: Explained, tried: list[Explained]) -> np.ndarray:
-    """(n,) m: how far the other shapes lie from this one, weighted by how well they predict."""
-    square = np.zeros(len(vertices))
-    total = 1.0
-    for other in tried:
-        weight = np.exp(score(other) - score(best))
-        if other is best or weight < 0.003:
-            continue
-        shell = draw(other, 0.005)[:2]
-        square += weight * distance(*shell, vertices) ** 2
-        total += weight
-    return np.sqrt(square / total)
-
-
-def _bracket_gap(evidence: Evidence, vertices: np.ndarray, which: str) -> np.ndarray:
-    """(n,) m: half the distance to the other bound, as a standard deviation of a bound."""
-    try:
-        other = tangent_surface(evidence) if which == "hull" else hull_surface(evidence)
-    except SurfaceError:
-        return np.full(len(vertices), 0.002)
-    return distance(*other, vertices) / 2
-
-
-def _surface(
-    evidence: Evidence,
-    vertices: np.ndarray,
-    triangles: np.ndarray,
-    uncertainty: np.ndarray,
-    method: str,
-    why: str,
-    parameters: Mapping[str, float] | None = None,
-    held_out: Mapping[str, float] | None = None,
-    bracket: tuple[float, float] = (float("nan"), float("nan")),
-    redraw: Redraw | None = None,
-) -> Surface:
-    return Surface(
-        vertices=evidence.to_device(vertices),
-        triangles=triangles,
-        uncertainty_m=uncertainty,
-        support_point=evidence.origin,
-        support_normal=evidence.axes[2],
-        method=method,
-        reason=why,
-        parameters=parameters or {},
-        held_out_m=held_out or {},
-        bracket_m3=bracket,
-        redraw=redraw,
-    )

@@ -16,7 +16,7 @@ from mechanics.progress import Progress, silent
 from mechanics.tetmesh import FACES, TetMesh, lone_faces
 from reconstruct.shapes.voxels import voxel_surface
 from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s5_mesh.relaxation import radius_edge_ratio, relaxed
+from reconstruct.steps.s5_mesh.element_shape import radius_edge_ratio, relaxed
 from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
 
 _SAMPLES = 4000

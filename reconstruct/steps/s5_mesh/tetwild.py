@@ -19,6 +19,10 @@ from mechanics.files import reading, temporary_folder
 MOST_TETRAHEDRA = 150_000
 """Beyond it the factorised stiffness of quadratic elements takes more memory than a desktop has."""
 _REGULAR = 2**0.5 / 12
+_ENERGY, _PASSES = 10.0, 80
+"""The optimisation stops at this AMIPS energy (3 is ideal), or after so many passes."""
+_TIMEOUT_S = 300.0
+"""For the second try, with one thread and simplified; the first has a third of it."""
 
 _CHILD = """
 import contextlib, ctypes, os, signal, sys
@@ -45,18 +49,14 @@ def tetrahedralize(
     edge_m: float,
     envelope_m: float,
     simplify: bool = True,
-    energy: float = 10.0,
-    passes: int = 80,
     threads: int | None = None,
-    timeout_s: float = 300.0,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Nodes (n, 3) m and positive tetrahedra (m, 4), VTK order, of the solid inside a closed surface.
 
     edge_m: wanted edge length. envelope_m: greatest distance of the mesh's surface from the given one.
     simplify: merge triangles within the envelope first; a drawing as coarse as the tetrahedra needs none,
-    and comes out better in half the time. energy: the optimisation stops at this AMIPS energy (3 is ideal).
-    threads: None takes OMP_NUM_THREADS, without it all cores. timeout_s: for the second try, with one thread
-    and simplified; the first has a third of it. Raises MeshError where nothing comes back.
+    and comes out better in half the time. threads: None takes OMP_NUM_THREADS, without it all cores. Raises
+    MeshError where nothing comes back.
     """
     check_count(vertices, triangles, edge_m)
     if threads is None:
@@ -66,7 +66,7 @@ def tetrahedralize(
         done = None
         # now and then its threads wait for each other for ever, or it refines a drawing for ever that it was
         # not let simplify (seen: an L of 617 points); one thread on a simplified one does neither
-        for count, merges, limit_s in ((threads, simplify, timeout_s / 3), (1, True, timeout_s)):
+        for count, merges, limit_s in ((threads, simplify, _TIMEOUT_S / 3), (1, True, _TIMEOUT_S)):
             np.savez(
                 folder / "surface.npz",
                 vertices=np.asarray(vertices, dtype=np.float64),
@@ -74,8 +74,8 @@ def tetrahedralize(
                 edge_length_abs=edge_m,
                 epsilon=envelope_m / diagonal,
                 simplify=merges,
-                stop_energy=energy,
-                num_opt_iter=passes,
+                stop_energy=_ENERGY,
+                num_opt_iter=_PASSES,
                 num_threads=count,
             )
             with contextlib.suppress(subprocess.TimeoutExpired):
@@ -89,7 +89,7 @@ def tetrahedralize(
                 break
         if done is None:
             raise MeshError(
-                f"the mesher did not end within {timeout_s:.0f} s: use a larger --mesh-size than {edge_m} m"
+                f"the mesher did not end within {_TIMEOUT_S:.0f} s: use a larger --mesh-size than {edge_m} m"
             )
         result = folder / "mesh.npz"
         if done.returncode or not result.is_file():

@@ -1,7 +1,7 @@
 """Uniaxial models of single presses: Kelvin-Voigt and Hunt-Crossley, equations (1) to (6) of the paper.
 
 f is the force on the object along -n (N), u the depth (m), v its rate (m/s): push, depth and rate of the
-table's rows where the tip is in the object (reconstruct.steps.s6_one_d.uniaxial). The paper's estimators are
+table's rows where the tip is in the object (`profiles`). The paper's estimators are
 linear least squares, Hunt-Crossley's on logarithms (4), which weights the noisy start of a press most. The
 robust ones beside them keep every coefficient physical (k > 0, b >= 0, 0.5 <= r <= 3), weight samples equally
 in newtons and bound the pull of a bad sample.
@@ -9,6 +9,7 @@ in newtons and bound the pull of a bad sample.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -16,6 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from mechanics.presses import FITS, Presses
+from reconstruct.steps.s1_filter.low_pass import FilterOptions, low_pass
 
 EXPONENTS = (0.5, 3.0)
 _SAMPLES = 200
@@ -209,3 +211,23 @@ def columns(fits: Sequence[OneD], press_modulus_pa: np.ndarray) -> dict[str, np.
     """The table's fitted columns, (p,) each."""
     own = {n: np.array([getattr(f, n) for f in fits], dtype=float) for n in FITS if n != "e_pa"}
     return own | {"e_pa": np.asarray(press_modulus_pa, dtype=float)}
+
+
+def low_passed(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> Presses:
+    """The presses net of free air, position and force low-passed without phase shift; points without a time
+    stay as they are."""
+    net = presses.net
+    if net.quasi_static:
+        return net
+    position, force = np.array(net.position), np.array(net.force)
+    for part in net.parts:
+        if part.stop - part.start > 3:
+            position[part] = low_pass(position[part], net.sample_rate_hz, cutoff_hz)
+            force[part] = low_pass(force[part], net.sample_rate_hz, cutoff_hz)
+    return dataclasses.replace(net, position=position, force=force)
+
+
+def profiles(presses: Presses, cutoff_hz: float = FilterOptions.cutoff_hz) -> Presses:
+    """`low_passed`, from first touch to loss of touch: depth, rate and push of this view (along the table's
+    normals) are u, v and f of equations (1) to (6)."""
+    return low_passed(presses, cutoff_hz).window(0.0, 0.0)

@@ -107,9 +107,9 @@ def fit_law(
     rows = np.bincount(press, weights=used, minlength=k)
     squared = np.bincount(press, weights=used * (residual**2).sum(axis=1), minlength=k)
     scale = np.maximum(cost / np.maximum(3 * rows, 1), 1.0)
-    told = (e > 0) & (det > _NOTHING)
+    known = (e > 0) & (det > _NOTHING)
     error = np.full(k, np.inf)
-    error[told] = np.sqrt(_CORRELATED * (scale * a_uu)[told] / det[told]) / e[told]
+    error[known] = np.sqrt(_CORRELATED * (scale * a_uu)[known] / det[known]) / e[known]
     return LawFit(law, depth_m, e, error, shift, np.sqrt(squared / np.maximum(rows, 1)), cost, rows)
 
 
@@ -128,6 +128,6 @@ def far_sensitivity(
         sites.poisson_ratio,
     )
     other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, noise_n, fit)
-    told = (other.modulus_pa > 0) & (fit.modulus_pa > 0)
-    ratio = np.where(told, other.modulus_pa, 1.0) / np.where(told, fit.modulus_pa, 1.0)
+    known = (other.modulus_pa > 0) & (fit.modulus_pa > 0)
+    ratio = np.where(known, other.modulus_pa, 1.0) / np.where(known, fit.modulus_pa, 1.0)
     return np.log(ratio) / step

@@ -4,7 +4,7 @@ Moving a free surface outward by v (m) changes the compliance under a unit load 
 v dS (Hadamard; sigma : eps is twice the strain energy density of that load). With the surface's standard
 deviation place by place and a correlation length, this gives the covariance of the errors of all presses,
 without meshing again. A clamped base moved outward adds as much. With both, an object that is moved as a
-whole (a known shape whose pose is uncertain) is told too.
+whole (a known shape whose pose is uncertain) is covered too.
 """
 
 from __future__ import annotations
@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from mechanics.elasticity import barycentric_gradients, lame_parameters, shape_derivatives
+from mechanics.gaussian import squared_exponential
 from mechanics.patch import PatchSampler
 from mechanics.sites import TouchSites
 from mechanics.solver import Solver
@@ -55,7 +56,7 @@ def compliance_covariance(
     sd = np.asarray(uncertainty_m)[faces.triangles[free]].mean(axis=1)
     centres = faces.centres[free]
     squared = cdist(centres, centres, "sqeuclidean")
-    kernel = np.exp(-squared / (2 * correlation_m**2)) * np.outer(sd, sd)
+    kernel = squared_exponential(squared, correlation_m) * np.outer(sd, sd)
     local = gradient[:, free] @ kernel @ gradient[:, free].T
     if pose is None:
         return local

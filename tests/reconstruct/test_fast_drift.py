@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import explore_cylinder
 
-from reconstruct.steps.s1_filter.filtered import filtered_of
-from reconstruct.steps.s1_filter.passing import between, missed, passing
+from reconstruct.steps.s1_filter.fast_drift import follow_free_air, interpolation_error, passing
+from reconstruct.steps.s1_filter.signals import filtered_of
 
 
 def test_no_touch_is_taken_for_air_whatever_its_force_and_whether_or_not_the_tracing_is_stated():
@@ -47,8 +47,8 @@ def test_a_line_across_quiet_air_misses_what_the_noise_of_three_samples_makes():
     t = np.arange(4000) / 1000
     force = 0.01 * np.random.default_rng(0).normal(size=(4000, 3))
     air = np.ones(4000, dtype=bool)
-    assert 0.9 < missed(t, force, air) / (0.01 * np.sqrt(1.5)) < 1.1
-    assert np.isinf(missed(t, force, ~air))
+    assert 0.9 < interpolation_error(t, force, air) / (0.01 * np.sqrt(1.5)) < 1.1
+    assert np.isinf(interpolation_error(t, force, ~air))
 
 
 def test_how_far_the_air_may_have_gone_unseen_is_a_brownian_bridges():
@@ -57,7 +57,7 @@ def test_how_far_the_air_may_have_gone_unseen_is_a_brownian_bridges():
     walk = np.cumsum(np.sqrt(0.002 * per_s) * rng.normal(size=(len(t), 3)), axis=0)
     raw = walk + 0.01 * rng.normal(size=walk.shape)
     unseen = (t % 4) > 2
-    followed, loose = between(t, raw, ~unseen, lambda *_: unseen)
+    followed, loose = follow_free_air(t, raw, ~unseen, lambda *_: unseen)
     assert loose[~unseen].max() < 0.3 * loose.max()
     middle = np.abs(t % 4 - 3) < 0.1
     assert np.median(loose[middle]) == pytest.approx(np.sqrt(per_s * 2 / 4), rel=0.3)

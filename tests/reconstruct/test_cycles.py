@@ -17,12 +17,12 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.presses import CANNOT_TELL
 from mechanics.tetmesh import TetMesh
-from reconstruct.geometry.known_shape import nowhere
+from reconstruct.geometry.placed import nowhere
 from reconstruct.placing import presses_on
-from reconstruct.steps.s1_filter.filtering import low_pass, noise_gain
+from reconstruct.steps.s1_filter.low_pass import low_pass, noise_gain
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
+from reconstruct.steps.s3_contacts.cycles import free_air_seen
 from reconstruct.steps.s3_contacts.points import explore_points
-from reconstruct.steps.s3_contacts.unbroken import free_air_seen
 from render.replay import replay_error
 
 

@@ -1,4 +1,4 @@
-"""Free air told by the tip's way alone, and the force read there followed through the touches.
+"""A free-air force that changes fast: found where the tip only passes, and followed through the touches.
 
 A tool whose weight turns with it unseen (no orientation in the recording) reads in free air what no law of
 time or acceleration tells, as loud as a press. But an object is pressed where the tip turns back, and the
@@ -136,7 +136,7 @@ def _on_support(position: np.ndarray, force: np.ndarray, knots: np.ndarray, radi
     return -(position @ found[:3] + found[3]) < _FLAT * radius_m
 
 
-def slowly(t: np.ndarray, raw: np.ndarray, air: np.ndarray) -> np.ndarray | None:
+def slow_part(t: np.ndarray, raw: np.ndarray, air: np.ndarray) -> np.ndarray | None:
     """(n, 3) N: what of the force raw (n, 3) changes more slowly in `air` (n,) bool than a mass that is
     moved; None where there is too little air."""
     rate = (len(t) - 1) / (t[-1] - t[0])
@@ -145,7 +145,7 @@ def slowly(t: np.ndarray, raw: np.ndarray, air: np.ndarray) -> np.ndarray | None
     return gaussian_filter1d(_followed(t, raw, air)[0], _SLOW_S * rate, axis=0)
 
 
-def between(
+def follow_free_air(
     t: np.ndarray, raw: np.ndarray, air: np.ndarray, touching: Callable[[np.ndarray, np.ndarray], np.ndarray]
 ) -> tuple[np.ndarray, np.ndarray]:
     """(n, 3) N: the force of free air, found where the tip passes, `air` (n,) bool; and (n,) N an axis, how
@@ -166,7 +166,7 @@ def crowd_median(size: np.ndarray) -> float:
     return float(np.median(size)) / _MAXWELL
 
 
-def missed(t: np.ndarray, force: np.ndarray, air: np.ndarray) -> float:
+def interpolation_error(t: np.ndarray, force: np.ndarray, air: np.ndarray) -> float:
     """N an axis: what a line from before a touch to after it misses of the force (n, 3) in between, by what
     it misses in `air` (n,) bool; infinite where there is too little air."""
     half = max(1, round(0.5 * _TOUCH_S * (len(t) - 1) / (t[-1] - t[0])))
@@ -182,7 +182,7 @@ def _followed(t: np.ndarray, force: np.ndarray, free: np.ndarray) -> tuple[np.nd
     """(n, 3) N: the force followed through the free samples, straight from one to the next across touches;
     and (n,) N an axis, its standard deviation there, a Brownian bridge's.
 
-    A random walk of blocks, smoothed; how fast it walks is told by the force's own changes nearby, beyond
+    A random walk of blocks, smoothed; how fast it walks is read off the force's own changes nearby, beyond
     noise.
     """
     lasts = max(_BLOCK_S, 2 * float(t[-1] - t[0]) / (len(t) - 1))

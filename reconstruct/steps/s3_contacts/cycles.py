@@ -1,8 +1,7 @@
-"""Contact that never breaks: whether there is free air at all, where a contact is cut, and where its pieces
-would have touched.
+"""Contact that never breaks: whether there is free air at all, and where a contact is cut into cycles.
 
-A cycle is cut at the minima of force and depth. It has no first touch of its own in sight, so the contact
-law that its loading follows is carried on to zero force; how stiff the law is, all cycles tell together.
+A cycle is cut at the minima of force and depth. Its first touch was not recorded: it is carried back along
+the contact law, whose stiffness all cycles share (`contact_law.first_touches`).
 """
 
 from __future__ import annotations
@@ -14,9 +13,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.signal import find_peaks
 
-from mechanics.robust import spread
-from reconstruct.steps.s3_contacts.finding import Found, Signals, initial_normal
-from reconstruct.steps.s3_contacts.onset import Rise, fit_rise
+from reconstruct.steps.s1_filter.signals import Signals
+from reconstruct.steps.s3_contacts.contact_law import Loading, first_touches
+from reconstruct.steps.s3_contacts.single_press import Touch, initial_normal
 
 _STEP_RADII = 1 / 8
 """Of the tip: a way straight in or out so long without a change of the force is free air."""
@@ -30,8 +29,6 @@ _SIDEWAYS = 1.5
 """A cycle begins and ends where the tip goes so many times as far along the surface as in or out ..."""
 _RISES = 0.5
 """... and slides where its force does not rise by this share of its peak in between."""
-_ALIKE = 0.1
-"""Least spread of ln stiffness between places that is believed."""
 _ROWS = 250
 
 
@@ -107,16 +104,6 @@ def _withdrawn(signals: Signals, start: int, peak: int, low: int, after: int) ->
     return bool(way > _FALLS * max(deep[peak] - min(deep[start], deep[low]), 1e-9))
 
 
-@dataclass(frozen=True)
-class Loading:
-    """One loading: travel u (m) inwards from `origin` along -normal and push (N), both (k,)."""
-
-    u: np.ndarray
-    push: np.ndarray
-    origin: np.ndarray
-    normal: np.ndarray
-
-
 def loading(signals: Signals, piece: Piece) -> Loading | None:
     """The loading of a piece; None where the force has no direction or hardly grows."""
     normal = initial_normal(signals, piece.start, piece.peak)
@@ -157,70 +144,7 @@ def _goes_in(signals: Signals, piece: Piece, way: int) -> int:
     return piece.start if way < 0 else piece.end
 
 
-def first_touches(loadings: Sequence[Loading], noise_n: float) -> tuple[np.ndarray, np.ndarray]:
-    """(k,) m, travel at which each loading would have met the surface, and its standard error.
-
-    Each loading's own law where it has four rows; then the law that all of them share, which a single row is
-    enough for, both weighed by their errors.
-    """
-    own = [_own(each, noise_n) for each in loadings]
-    known = [r for r in own if r is not None and np.isfinite(r.u0_error_m)]
-    if not known:
-        raise ValueError("no loading has four rows")
-    # a law's two stiffnesses trade with one another, so laws are ranked by how deep they go at one force
-    force = float(np.median([each.push.max() for each in loadings]))
-    log = np.log([_depth(r, force) for r in known])
-    weight = np.array([max(r.u0_error_m, 1e-9) for r in known]) ** -2.0
-    order = np.argsort(log)
-    total = np.cumsum(weight[order])
-    law = known[order[np.searchsorted(total, 0.5 * total[-1])]]
-    differ = max(_ALIKE, float(spread(log)) if len(log) > 3 else 0.0)
-    shift, error = np.empty(len(loadings)), np.empty(len(loadings))
-    for i, (each, rise) in enumerate(zip(loadings, own, strict=True)):
-        values = [_shared(each, law, differ, noise_n)]
-        if rise is not None and np.isfinite(rise.u0_error_m):
-            values.append((rise.u0_m, max(rise.u0_error_m, 1e-9)))
-        at, sd = np.array(values).T
-        share = sd**-2.0 / (sd**-2.0).sum()
-        shift[i] = share @ at
-        # what the two disagree by is an error too
-        error[i] = np.hypot((sd**-2.0).sum() ** -0.5, float(np.sqrt(share @ (at - shift[i]) ** 2)))
-    return shift, error
-
-
-def _own(each: Loading, noise_n: float) -> Rise | None:
-    if len(each.u) < 4 or np.ptp(each.u) <= 0:
-        return None
-    top = max(float(each.push.max()), 1e-12)
-    # F^(2/3) is nearly straight: its zero is a guess
-    root = np.cbrt(np.maximum(each.push, 0) / top) ** 2
-    high = root > 0.2
-    slope, level = (
-        np.polyfit(each.u[high], root[high], 1) if high.sum() > 1 and np.ptp(each.u[high]) > 0 else (0, 0)
-    )
-    guess = -level / slope if slope > 0 else each.u.min()
-    guess = float(np.clip(guess, each.u.max() - 10 * np.ptp(each.u), each.u.max() - 0.05 * np.ptp(each.u)))
-    return fit_rise(each.u, each.push, noise_n, guess_m=guess)
-
-
-def _depth(law: Rise, push: float | np.ndarray) -> np.ndarray:
-    """m, how deep a law is at forces of N."""
-    return np.asarray((push / law.hertz) ** (2 / 3) + law.compliance * push)
-
-
-def _shared(each: Loading, law: Rise, differ: float, noise_n: float) -> tuple[float, float]:
-    """First touch by a given law, from the rows whose force is above its noise; its standard error."""
-    used = each.push > max(3 * noise_n, 0.1 * float(each.push.max()))
-    if not used.any():
-        return float(each.u.min()), float(np.ptp(each.u)) + 1e-3
-    push, u = each.push[used], each.u[used]
-    depth = _depth(law, push)
-    slope = (_depth(law, 1.01 * push) - depth) / (0.01 * push)
-    by_noise = noise_n * float(np.median(slope)) / np.sqrt(len(push))
-    return float(np.median(u - depth)), float(np.hypot(by_noise, differ * float(np.median(depth))))
-
-
-def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Found], list[tuple[int, int, str]]]:
+def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Touch], list[tuple[int, int, str]]]:
     """The cycles of one recording as presses, and the pieces that are none: (start, end, reason)."""
     kept, loadings, unused = [], [], []
     for piece in pieces:
@@ -245,5 +169,5 @@ def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Found]
         peak = signals.position[piece.peak]
         deep = -(peak - each.origin) @ each.normal - at
         centre = peak + deep * each.normal
-        found.append(Found(piece.start, piece.peak, piece.end, centre, each.normal, float(sd), True))
+        found.append(Touch(piece.start, piece.peak, piece.end, centre, each.normal, float(sd), True))
     return found, unused

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.recording import Recording
-from reconstruct.steps.s3_contacts.onset import contact_law, fit_rise
+from reconstruct.steps.s1_filter.signals import Signals
+from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_rise
 
 _LEAD_S = 0.15
 _FIT_SAMPLES = 250
@@ -17,7 +16,7 @@ _TELLS = 0.7
 free motion it explains less (half of a bump on an even way)."""
 
 
-class Found(NamedTuple):
+class Touch(NamedTuple):
     """One press where it was found; device frame, SI.
 
     start, peak, end: samples of first touch, greatest force, loss of the last force above the noise (end
@@ -34,20 +33,7 @@ class Found(NamedTuple):
     unbroken: bool = False
 
 
-@dataclass(frozen=True)
-class Signals:
-    """What a press is read from: low-passed position and force (n, 3), its magnitude, noise N an axis,
-    raw force."""
-
-    recording: Recording
-    position: np.ndarray
-    force: np.ndarray
-    magnitude: np.ndarray
-    raw_force: np.ndarray
-    noise_n: float
-
-
-def paper_contact(signals: Signals, a: int, b: int) -> Found | None:
+def paper_touch(signals: Signals, a: int, b: int) -> Touch | None:
     """First touch where the force started to rise: back from the threshold while each sample is above
     the last.
 
@@ -59,10 +45,10 @@ def paper_contact(signals: Signals, a: int, b: int) -> Found | None:
     while start > 0 and magnitude[start - 1] < magnitude[start]:
         start -= 1
     peak = a + int(np.argmax(magnitude[a:b]))
-    return Found(start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
+    return Touch(start, peak, b, signals.position[start], signals.force[peak] / magnitude[peak])
 
 
-def fitted_contact(signals: Signals, a: int, b: int) -> Found | None:
+def fitted_touch(signals: Signals, a: int, b: int) -> Touch | None:
     """First touch by fitting the contact law to the approach and rise; None where the force has no direction.
 
     a, b: samples between which the force is above its lower threshold.
@@ -96,7 +82,7 @@ def fitted_contact(signals: Signals, a: int, b: int) -> Found | None:
     law = contact_law(depth, rise.hertz, rise.compliance)
     if _explained(signals.force[first:b] @ normal, law) < _TELLS or depth.max() < rise.u0_error_m:
         return None
-    return Found(start, peak, b, centre, normal, rise.u0_error_m)
+    return Touch(start, peak, b, centre, normal, rise.u0_error_m)
 
 
 def _explained(push: np.ndarray, law: np.ndarray) -> float:

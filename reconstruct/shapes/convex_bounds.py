@@ -1,18 +1,53 @@
-"""Outer bound of a convex object: the half-spaces behind the tangent planes at all touches, and the
-base's."""
+"""Bounds of a convex object: the hull of touched points and base (the paper's surface, section 2.2) inside,
+the half-spaces behind the tangent planes at all touches outside."""
 
 from __future__ import annotations
 
 import numpy as np
 from scipy.optimize import nnls
-from scipy.spatial import HalfspaceIntersection, QhullError
+from scipy.spatial import Delaunay, HalfspaceIntersection, QhullError
 
 from mechanics.errors import SurfaceError
+from mechanics.nearest import distance
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.shapes.fit import LEAN_M
-from reconstruct.shapes.hull import delaunay_hull
+from reconstruct.shapes.points import farthest_points
 
 _SECTORS = 48
+
+
+def hull_surface(evidence: Evidence, base_spacing_m: float = 0.005) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and outward triangles (m, 3) of the hull in the support frame, base on z = 0.
+
+    Touched points below the support are lifted onto it. The hull is an inner bound of a convex object.
+    Raises SurfaceError where the points are flat.
+    """
+
+    rim = evidence.to_support(evidence.outline)
+    rim[:, 2] = 0.0
+    rim = rim[farthest_points(rim, base_spacing_m)]
+    touched = evidence.to_support(evidence.points)
+    touched[:, 2] = np.maximum(touched[:, 2], 0.0)
+    return delaunay_hull(np.vstack([rim, touched]))
+
+
+def delaunay_hull(points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices and outward triangles of the convex hull of points (n, 3)."""
+    try:
+        triangles = Delaunay(points).convex_hull
+    except QhullError as error:
+        raise SurfaceError(
+            "the touched points and the base lie in one plane: touch the object above its base"
+        ) from error
+    used = np.unique(triangles)
+    index = np.full(len(points), -1)
+    index[used] = np.arange(len(used))
+    vertices, triangles = points[used], index[triangles]
+    corner = vertices[triangles]
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    inward = np.einsum("ij,ij->i", normal, corner[:, 0] - vertices.mean(axis=0)) < 0
+    triangles[inward] = triangles[inward][:, ::-1]
+    return vertices, triangles
 
 
 def tangent_surface(evidence: Evidence, slack_m: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
@@ -69,3 +104,25 @@ def supporting_normals(points: np.ndarray, normals: np.ndarray, others: np.ndarr
         if length > 0.5:
             found[k] = projected / length
     return found
+
+
+def volume_bounds(evidence: Evidence) -> tuple[float, float]:
+    """Volumes (m^3) of the hull of the touches and of the intersection of their tangent half-spaces (or
+    nan)."""
+    import trimesh
+
+    low = float(trimesh.Trimesh(*hull_surface(evidence), process=False).volume)
+    try:
+        high = float(trimesh.Trimesh(*tangent_surface(evidence), process=False).volume)
+    except SurfaceError:
+        high = float("nan")
+    return low, high
+
+
+def gap_to_other_bound(evidence: Evidence, vertices: np.ndarray, which: str) -> np.ndarray:
+    """(n,) m: half the distance to the other bound, as a standard deviation of a bound."""
+    try:
+        other = tangent_surface(evidence) if which == "hull" else hull_surface(evidence)
+    except SurfaceError:
+        return np.full(len(vertices), 0.002)
+    return distance(*other, vertices) / 2

@@ -2,19 +2,24 @@
 
 A threshold comes late: a 5 mm tip on 16 kPa pushes back with 4 mN at 0.15 mm. The law of a sphere on a body
 that gives as a whole, u - u0 = (F / h)^(2/3) + c F (Hertz and a linear far field), is fitted to free air and
-rise alike.
+rise alike. A loading without free air is carried back along the law that all loadings share.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+
+from mechanics.robust import spread
 
 _LEAST_COMPLIANCE = 1e-12
 _NEWTON_STEPS = 8
 _LEAST_SQUARES_STEPS = 60
 _SOFT = 3.0  # standard deviations
+_ALIKE = 0.1
+"""Least spread of ln stiffness between places that is believed."""
 
 
 @dataclass(frozen=True)
@@ -106,3 +111,76 @@ def _soft(residual: np.ndarray) -> tuple[float, np.ndarray]:
     """Cost and weights (n,) of the soft L1 loss at three standard deviations."""
     root = np.sqrt(1 + (residual / _SOFT) ** 2)
     return float(np.sum(root - 1)), 1 / root
+
+
+@dataclass(frozen=True)
+class Loading:
+    """One loading: travel u (m) inwards from `origin` along -normal and push (N), both (k,)."""
+
+    u: np.ndarray
+    push: np.ndarray
+    origin: np.ndarray
+    normal: np.ndarray
+
+
+def first_touches(loadings: Sequence[Loading], noise_n: float) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) m, travel at which each loading would have met the surface, and its standard error.
+
+    Each loading's own law where it has four rows; then the law that all of them share, which a single row is
+    enough for, both weighed by their errors.
+    """
+    own = [_own(each, noise_n) for each in loadings]
+    known = [r for r in own if r is not None and np.isfinite(r.u0_error_m)]
+    if not known:
+        raise ValueError("no loading has four rows")
+    # a law's two stiffnesses trade with one another, so laws are ranked by how deep they go at one force
+    force = float(np.median([each.push.max() for each in loadings]))
+    log = np.log([_depth(r, force) for r in known])
+    weight = np.array([max(r.u0_error_m, 1e-9) for r in known]) ** -2.0
+    order = np.argsort(log)
+    total = np.cumsum(weight[order])
+    law = known[order[np.searchsorted(total, 0.5 * total[-1])]]
+    differ = max(_ALIKE, float(spread(log)) if len(log) > 3 else 0.0)
+    shift, error = np.empty(len(loadings)), np.empty(len(loadings))
+    for i, (each, rise) in enumerate(zip(loadings, own, strict=True)):
+        values = [_shared(each, law, differ, noise_n)]
+        if rise is not None and np.isfinite(rise.u0_error_m):
+            values.append((rise.u0_m, max(rise.u0_error_m, 1e-9)))
+        at, sd = np.array(values).T
+        share = sd**-2.0 / (sd**-2.0).sum()
+        shift[i] = share @ at
+        # what the two disagree by is an error too
+        error[i] = np.hypot((sd**-2.0).sum() ** -0.5, float(np.sqrt(share @ (at - shift[i]) ** 2)))
+    return shift, error
+
+
+def _own(each: Loading, noise_n: float) -> Rise | None:
+    if len(each.u) < 4 or np.ptp(each.u) <= 0:
+        return None
+    top = max(float(each.push.max()), 1e-12)
+    # F^(2/3) is nearly straight: its zero is a guess
+    root = np.cbrt(np.maximum(each.push, 0) / top) ** 2
+    high = root > 0.2
+    slope, level = (
+        np.polyfit(each.u[high], root[high], 1) if high.sum() > 1 and np.ptp(each.u[high]) > 0 else (0, 0)
+    )
+    guess = -level / slope if slope > 0 else each.u.min()
+    guess = float(np.clip(guess, each.u.max() - 10 * np.ptp(each.u), each.u.max() - 0.05 * np.ptp(each.u)))
+    return fit_rise(each.u, each.push, noise_n, guess_m=guess)
+
+
+def _depth(law: Rise, push: float | np.ndarray) -> np.ndarray:
+    """m, how deep a law is at forces of N."""
+    return np.asarray((push / law.hertz) ** (2 / 3) + law.compliance * push)
+
+
+def _shared(each: Loading, law: Rise, differ: float, noise_n: float) -> tuple[float, float]:
+    """First touch by a given law, from the rows whose force is above its noise; its standard error."""
+    used = each.push > max(3 * noise_n, 0.1 * float(each.push.max()))
+    if not used.any():
+        return float(each.u.min()), float(np.ptp(each.u)) + 1e-3
+    push, u = each.push[used], each.u[used]
+    depth = _depth(law, push)
+    slope = (_depth(law, 1.01 * push) - depth) / (0.01 * push)
+    by_noise = noise_n * float(np.median(slope)) / np.sqrt(len(push))
+    return float(np.median(u - depth)), float(np.hypot(by_noise, differ * float(np.median(depth))))

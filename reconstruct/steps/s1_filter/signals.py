@@ -9,31 +9,42 @@ from functools import cached_property
 
 import numpy as np
 
-from mechanics.errors import ContactError
 from mechanics.recording import Recording
 from mechanics.samples import runs
-from reconstruct.steps.s1_filter.baseline import free_air_force
-from reconstruct.steps.s1_filter.delay import Delay, delay_by_places
-from reconstruct.steps.s1_filter.filtering import low_pass_at, noise_gain, white_noise_std
-from reconstruct.steps.s1_filter.free_noise import crowd_scale, least_contrast, moving_spread
-from reconstruct.steps.s1_filter.passing import between, crowd_median, missed, passing, slowly
+from reconstruct.shapes.points import in_its_plane
+from reconstruct.steps.s1_filter.fast_drift import (
+    crowd_median,
+    follow_free_air,
+    interpolation_error,
+    passing,
+    slow_part,
+)
+from reconstruct.steps.s1_filter.low_pass import low_pass_at, noise_gain, white_noise_std
+from reconstruct.steps.s1_filter.noise_level import crowd_scale, least_contrast, moving_spread
+from reconstruct.steps.s1_filter.slow_drift import free_air_force
 from reconstruct.steps.s1_filter.tool_weight import ToolWeight, tool_weight
-from reconstruct.steps.s2_boundary.boundary import find_interval, in_its_plane
-from reconstruct.steps.s3_contacts.finding import Signals
 
 _LOW = 0.7
 """A touch lasts while the force stays above this share of the least contrast."""
 _RIPPLE = 1e-4
 """Of the greatest force: what the low-pass leaves in free air after a press, more where samples are missing;
 a rendered force knows no other noise."""
-_LEAST_SPAN_S = 0.05
-_SLIDE = 8.0
-"""Tip radii: touches that go further are slides."""
 _LOOSE = 0.5
 """Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
 presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0210)."""
-_TIPS_M = (1e-3, 0.02)
-"""Radii that are believed for that."""
+
+
+@dataclass(frozen=True)
+class Signals:
+    """What presses are read from: low-passed position and force (n, 3), its magnitude, noise N an axis,
+    raw force."""
+
+    recording: Recording
+    position: np.ndarray
+    force: np.ndarray
+    magnitude: np.ndarray
+    raw_force: np.ndarray
+    noise_n: float
 
 
 @dataclass(frozen=True)
@@ -60,7 +71,7 @@ class Filtered:
 
     @cached_property
     def least(self) -> float:
-        """How many spreads a touch must reach (reconstruct.steps.s1_filter.free_noise)."""
+        """How many spreads a touch must reach (reconstruct.steps.s1_filter.noise_level)."""
         return least_contrast(self.signals.recording.sample_rate_hz, self.cutoff_hz)
 
     @cached_property
@@ -71,37 +82,6 @@ class Filtered:
         if self.air is not None:
             contrast = np.where(self.air, 0.0, contrast)
         return hysteresis(contrast, _LOW * self.least, self.least, self.signals.force, gap)
-
-    @cached_property
-    def tracing(self) -> tuple[int, int]:
-        """Samples [first, last) of the tracing. Raises ContactError where none is found."""
-        recording = self.signals.recording
-        given, radius = stated_tracing(recording), recording.tip_radius_m
-        return find_interval(recording.t, self.signals.position, self.touching, given, radius)
-
-    @cached_property
-    def traced(self) -> tuple[int, int]:
-        """The tracing; (0, 0) where none is found."""
-        try:
-            return self.tracing
-        except ContactError:
-            return 0, 0
-
-    @cached_property
-    def spans(self) -> list[tuple[int, int]]:
-        """[start, end) samples of each touch after the tracing, short ones and slides left out."""
-        recording, path, touching = self.signals.recording, self.signals.position, self.touching.copy()
-        touching[: self.traced[1]] = False
-        shortest = max(3, round(_LEAST_SPAN_S * recording.sample_rate_hz))
-        found = [(a, b) for a, b in runs(touching) if b - a >= shortest and a > 0 and b < len(recording.t)]
-        reach = _SLIDE * float(np.clip(recording.tip_radius_m, *_TIPS_M))
-        return [(a, b) for a, b in found if np.ptp(path[a:b], axis=0).max() < reach]
-
-    @cached_property
-    def late(self) -> Delay:
-        """How late the force reads, by places that are passed twice."""
-        signals = self.signals
-        return delay_by_places(signals.recording.t, signals.position, signals.magnitude, self.spans)
 
 
 def filtered_of(
@@ -143,19 +123,19 @@ def filtered_of(
     if steady.spread.min() <= noise:
         return steady  # free air is as quiet as its sensor: there is nothing to follow
     air, traced = passing(t, position, steady.signals.force, recording.tip_radius_m, sliding)
-    slow = slowly(t, recording.force_on_tool - weight.force, air)
-    if slow is None or missed(t, left, air) > crowd_median(steady.signals.magnitude[air]):
+    slow = slow_part(t, recording.force_on_tool - weight.force, air)
+    if slow is None or interpolation_error(t, left, air) > crowd_median(steady.signals.magnitude[air]):
         return steady
     # mass and lateness were read from a force that turned
     again = tool_weight(recording, filtered - slow, cutoff_hz)
-    off = missed(t, filtered - again.force, air)
+    off = interpolation_error(t, filtered - again.force, air)
 
     def followed(drift: np.ndarray, loose: np.ndarray) -> Filtered:
         there = less(again, drift, lambda size: max(off, crowd_scale(size[~air])))
         return replace(there, spread=np.hypot(there.spread, _LOOSE * np.where(traced, 0.0, loose)), air=air)
 
     raw = recording.force_on_tool - again.force
-    return followed(*between(t, raw, air, lambda *seen: followed(*seen).touching))
+    return followed(*follow_free_air(t, raw, air, lambda *seen: followed(*seen).touching))
 
 
 def stated_tracing(recording: Recording) -> tuple[float, float] | None:

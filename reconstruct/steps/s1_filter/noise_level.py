@@ -6,7 +6,7 @@ import numpy as np
 from scipy.ndimage import maximum_filter1d
 from scipy.optimize import brentq
 
-from reconstruct.steps.s1_filter.filtering import low_pass
+from reconstruct.steps.s1_filter.low_pass import low_pass
 
 _FALSE_PER_S = 1e-3
 """False touches in free motion, at most so often."""
@@ -45,7 +45,7 @@ def moving_spread(size: np.ndarray, inertia: np.ndarray, spread: float, samples:
     """(n,) N an axis: the spread of what is left in free motion, where some of the inertia is left too.
 
     size: (n,) length of what is left; inertia: (n, 3) what was taken off. spread: of the whole. The share of
-    the inertia that is left is told where most was taken off. samples: it may lie so far aside.
+    the inertia that is left is found where most was taken off. samples: it may lie so far aside.
     """
     taken = maximum_filter1d(np.linalg.norm(inertia, axis=1), 2 * samples + 1)
     most = taken >= np.quantile(taken, _BRISK)  # the greatest may be one value for long

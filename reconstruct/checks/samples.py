@@ -11,9 +11,10 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.recording import Recording
-from reconstruct.steps.s1_filter.delay import Delay
-from reconstruct.steps.s1_filter.filtered import Filtered, filtered_of
-from reconstruct.steps.s1_filter.filtering import FilterOptions, white_noise_std
+from reconstruct.steps.s1_filter.low_pass import FilterOptions, white_noise_std
+from reconstruct.steps.s1_filter.signals import Filtered, filtered_of
+from reconstruct.steps.s3_contacts.first_touch import ContactSpans, RoughTouches
+from reconstruct.steps.s3_contacts.force_delay import Delay
 
 CHANNELS = ("x", "y", "z", "fx", "fy", "fz")
 _LATTICE = 0.02  # of a step: how well increments must be its multiples
@@ -33,25 +34,7 @@ class Units:
     tip: float = 1.0
 
 
-@dataclass(frozen=True)
-class Touches:
-    """k touches after the base was traced, force filtered and free air taken off.
-
-    start, peak, end: (k,) samples. travel: (k, 3) m, the tip's way from first touch to the greatest force.
-    push: (k, 3) N on the tool at the greatest force.
-    """
-
-    start: np.ndarray
-    peak: np.ndarray
-    end: np.ndarray
-    travel: np.ndarray
-    push: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.start)
-
-
-class Sight:
+class Samples:
     """A recording as the checks see it.
 
     times: (n,) s as they are; t: (n,) s, gaps cut to a second. position (n, 3) m, force (n, 3) N on the tool.
@@ -104,6 +87,11 @@ class Sight:
         )
         return filtered_of(believed, self.cutoff_hz)
 
+    @cached_property
+    def contacts(self) -> ContactSpans:
+        """Where it touches anything."""
+        return ContactSpans(self.filtered)
+
     @property
     def as_stated(self) -> bool:
         """Whether units, times and rate are believed as they stand: then reconstruction sees the same."""
@@ -143,30 +131,22 @@ class Sight:
     @property
     def traced(self) -> tuple[int, int]:
         """Samples [first, last) of the tracing; (0, 0) where none is found."""
-        return self.filtered.traced
+        return self.contacts.traced
 
     @property
     def spans(self) -> list[tuple[int, int]]:
         """[start, end) of each touch after the tracing, short ones and slides left out."""
-        return self.filtered.spans
+        return self.contacts.spans
 
     @property
     def late(self) -> Delay:
         """How late the force reads, by places that are passed twice."""
-        return self.filtered.late
+        return self.contacts.late
 
-    @cached_property
-    def touches(self) -> Touches:
-        """The touches, their force read earlier by `late`."""
-        late = round(self.late.seconds * self.rate_hz)
-        rows = []
-        for a, b in self.spans:
-            peak = a + int(np.argmax(self.size[a:b]))
-            start, top = (min(max(i - late, 0), len(self.t) - 1) for i in (a, peak))
-            rows.append((a, peak, b, *(self.path[top] - self.path[start]), *self.net[peak]))
-        table = np.array(rows, dtype=float).reshape(-1, 9)
-        start, peak, end = table[:, :3].T.astype(int)
-        return Touches(start, peak, end, table[:, 3:6], table[:, 6:])
+    @property
+    def touches(self) -> RoughTouches:
+        """The contacts' rough first touches, their force read earlier by `late`."""
+        return self.contacts.rough
 
 
 def _without_gaps(t: np.ndarray) -> np.ndarray:

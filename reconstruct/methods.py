@@ -1,0 +1,144 @@
+"""The two methods from touches to modulus, and the options of a whole reconstruction."""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from mechanics.options import option
+from mechanics.presses import Presses
+from mechanics.progress import Clock, Progress, part
+from mechanics.sites import TouchSites, touch_sites, touch_solver
+from mechanics.tetmesh import TetMesh
+from reconstruct.geometry.placed import Placed
+from reconstruct.geometry.stated import GeometryOptions
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
+from reconstruct.steps.s2_base.outline import BoundaryOptions
+from reconstruct.steps.s3_contacts.contacts import ContactOptions
+from reconstruct.steps.s4_surface.casting import CastPoints
+from reconstruct.steps.s4_surface.surface import Surface, SurfaceOptions
+from reconstruct.steps.s5_mesh.meshing import MeshingOptions, uncertainty_at
+from reconstruct.steps.s6_one_d.one_d import fit_paper, fit_robust
+from reconstruct.steps.s7_modulus.modulus import ModulusFit, ModulusOptions, fit_modulus
+from reconstruct.steps.s7_modulus.modulus_field import FieldOptions
+from reconstruct.steps.s7_modulus.modulus_paper import PaperFit, PaperOptions, fit_paper_modulus
+from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
+
+METHODS = ("finite-tip", "paper")
+
+
+@dataclass(frozen=True)
+class ReconstructOptions:
+    """What holds for the whole reconstruction; each step has options of its own."""
+
+    method: str = option(
+        "finite-tip", "finite-tip; paper: tau = 1 N, hull, point load on linear tetrahedra", choices=METHODS
+    )
+    poisson_ratio: float | None = option(
+        None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"
+    )
+    geometry: GeometryOptions = field(default_factory=GeometryOptions)
+    force: bool = option(False, "go on although the check-up finds something grave")
+    filter: FilterOptions = field(default_factory=FilterOptions)
+    boundary: BoundaryOptions = field(default_factory=BoundaryOptions)
+    contact: ContactOptions = field(default_factory=ContactOptions)
+    surface: SurfaceOptions = field(default_factory=SurfaceOptions)
+    meshing: MeshingOptions = field(default_factory=MeshingOptions)
+    modulus: ModulusOptions = field(default_factory=ModulusOptions)
+    modulus_field: FieldOptions = field(default_factory=FieldOptions)
+    paper: PaperOptions = field(default_factory=PaperOptions)
+    seed: int = 0
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a modulus is fitted to. mesh: linear. presses: on the surface; curves: low-passed, in contact."""
+
+    mesh: TetMesh
+    poisson_ratio: float
+    surface: Surface
+    placed: Placed | None
+    where: CastPoints
+    presses: Presses
+    curves: Presses
+    noise_n: float
+
+
+@dataclass(frozen=True)
+class Fitted:
+    """The modulus, Pa, by one of the methods, and the mesh (linear or quadratic) that it holds on."""
+
+    mesh: TetMesh
+    modulus_pa: float
+    ci95_pa: tuple[float, float]
+    press_modulus_pa: np.ndarray
+    sites: TouchSites | None = None
+    modulus: ModulusFit | None = None
+    paper_fit: PaperFit | None = None
+
+    @property
+    def dent_law(self) -> str:
+        return "linear" if self.modulus is None else self.modulus.press.law
+
+
+class FiniteTip:
+    """Touches by the noise, the likeliest shape, a tip of finite size on quadratic elements."""
+
+    contacts = "noise"
+    fit_one_d = staticmethod(fit_robust)
+
+    def __init__(self, options: ReconstructOptions) -> None:
+        self.options = options
+        self.surface_options, self.meshing_options = options.surface, options.meshing
+
+    def fit(self, body: Body, progress: Progress, clock: Clock) -> Fitted:
+        mesh, nu, placed = body.mesh.quadratic(), body.poisson_ratio, body.placed
+        solver = touch_solver(body.mesh, nu)
+        clock.lap("factorise")
+        sites = touch_sites(
+            mesh, body.where.points, body.where.normals, nu, solver=solver, progress=part(progress, 0.5, 0.8)
+        )
+        clock.lap("touch sites")
+        progress("modulus", 0.8)
+        local = body.surface if placed is None else placed.by_itself
+        covariance = compliance_covariance(
+            solver, sites, uncertainty_at(solver.mesh, local), pose=None if placed is None else placed.pose
+        )
+        clock.lap("shape error")
+        fit = fit_modulus(
+            body.presses,
+            sites,
+            body.noise_n,
+            self.options.modulus,
+            compliance_covariance=covariance,
+            seed=self.options.seed,
+        )
+        return Fitted(mesh, fit.modulus_pa, fit.ci95_pa, fit.press.modulus_pa, sites, fit)
+
+
+class Paper:
+    """Touches above 1 N, hull, voxels, point loads on linear elements."""
+
+    contacts = "paper"
+    fit_one_d = staticmethod(fit_paper)
+
+    def __init__(self, options: ReconstructOptions) -> None:
+        self.options = options
+        self.surface_options, self.meshing_options = options.surface, options.meshing
+        if options.surface.surface == "auto":
+            self.surface_options = dataclasses.replace(options.surface, surface="hull")
+        if options.meshing.mesh_source == "auto":
+            self.meshing_options = dataclasses.replace(options.meshing, mesh_source="voxels")
+
+    def fit(self, body: Body, progress: Progress, clock: Clock) -> Fitted:
+        progress("modulus", 0.6)
+        fit = fit_paper_modulus(
+            body.curves, body.mesh, body.poisson_ratio, self.options.paper, seed=self.options.seed
+        )
+        return Fitted(body.mesh, fit.modulus_pa, fit.ci95_pa, fit.press_modulus_pa, paper_fit=fit)
+
+
+Method = FiniteTip | Paper
+BY_NAME: dict[str, type[FiniteTip] | type[Paper]] = {"finite-tip": FiniteTip, "paper": Paper}

@@ -1,0 +1,175 @@
+"""The base: support plane and outline, in any device frame, from the path of the tracing (section 2.1)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.ndimage import distance_transform_edt, gaussian_filter1d, label
+
+from mechanics.errors import ContactError, OptionError
+from mechanics.options import option
+from reconstruct.shapes.points import FOOT, LEAST_STEPS, STEP_M, farthest_points, fit_plane, resampled
+
+
+@dataclass(frozen=True)
+class BoundaryOptions:
+    """How the base is sampled."""
+
+    base_spacing_m: float = option(
+        0.005, "threshold d of the farthest-point sampling of the base", unit="m", flag="--base-spacing"
+    )
+
+    def __post_init__(self) -> None:
+        """Raises OptionError for a spacing that is not positive."""
+        if not self.base_spacing_m > 0:
+            raise OptionError(f"--base-spacing is {self.base_spacing_m} m; it must be greater than 0")
+
+
+@dataclass(frozen=True)
+class Boundary:
+    """The object's base and the plane it stands on; device frame, m.
+
+    support_point, support_normal: (3,), the plane of the support's surface, its normal into the object.
+    outline: (k, 3) dense points of the base's rim on the plane, in order along the path; the tip's radius is
+    taken off. centres: (k, 3) where the tip's centre was. points: (j, 3) P_B of the paper, farthest-point
+    sample of the outline. interval: sample indices (first, last) of phase I; flatness_m: rms of the path off
+    the plane.
+    """
+
+    support_point: np.ndarray
+    support_normal: np.ndarray
+    outline: np.ndarray
+    centres: np.ndarray
+    points: np.ndarray
+    interval: tuple[int, int]
+    flatness_m: float
+
+    def height(self, points: np.ndarray) -> np.ndarray:
+        """Height of points (..., 3) above the support, m."""
+        return (np.asarray(points) - self.support_point) @ self.support_normal
+
+
+def find_boundary(
+    position: np.ndarray,
+    force_on_tool: np.ndarray,
+    touching: np.ndarray,
+    interval: tuple[int, int],
+    tip_radius_m: float,
+    options: BoundaryOptions,
+) -> Boundary:
+    """Support plane and base outline from the samples of phase I (low-passed position, force on the tool).
+
+    Raises ContactError where the path does not go round the object.
+    """
+    first, last = interval
+    inside = np.arange(first, last)[touching[first:last]]
+    path, force = position[inside], force_on_tool[inside]
+    centre, normal, flatness = fit_plane(path)
+    if np.mean(force @ normal) < 0:
+        normal = -normal
+    centre = centre - tip_radius_m * normal
+    height = (path - centre) @ normal - tip_radius_m
+    path = path[np.abs(height) < max(6 * flatness, 2e-4)]
+    path = path - ((path - centre) @ normal)[:, None] * normal
+    face = _enclosed(path, normal, FOOT * tip_radius_m)
+    if face is not None:
+        path = path[face.away(path) < face.reach_m]
+    strokes = _strokes(path, FOOT * tip_radius_m)
+    if sum(map(len, strokes)) < LEAST_STEPS:
+        raise ContactError("the boundary phase is shorter than 1 cm: trace the object's whole base")
+    smoothed = [gaussian_filter1d(stroke, 3.0, axis=0, mode="nearest") for stroke in strokes]
+    smooth = np.concatenate(smoothed)
+    winding = _winding(smooth, normal)
+    if face is None and abs(winding) < 0.8 * 2 * np.pi:
+        raise ContactError(
+            f"the boundary phase goes {abs(np.degrees(winding)):.0f} degrees round the object; at least "
+            "288 are needed: trace the whole base, or say when it was ([recording] boundary_phase)"
+        )
+    sideways = []
+    for stroke in smoothed:
+        tangent = np.gradient(stroke, axis=0)
+        side = np.cross(tangent / np.linalg.norm(tangent, axis=1, keepdims=True), normal)
+        step = tip_radius_m * side
+        out = (
+            np.sign(winding)
+            if face is None
+            else face.away(stroke + step).sum() - face.away(stroke - step).sum()
+        )
+        sideways.append(side * np.sign(out))
+    outline = smooth - tip_radius_m * np.concatenate(sideways)
+    chosen = farthest_points(outline, options.base_spacing_m)
+    return Boundary(
+        support_point=outline.mean(axis=0),
+        support_normal=normal,
+        outline=outline,
+        centres=smooth + tip_radius_m * normal,
+        points=outline[chosen],
+        interval=interval,
+        flatness_m=flatness,
+    )
+
+
+@dataclass(frozen=True)
+class _Face:
+    """What a path on the support closes in, on a grid in its plane: `distance` m of each cell from it."""
+
+    middle: np.ndarray
+    axes: np.ndarray
+    corner: np.ndarray
+    cell_m: float
+    distance: np.ndarray
+    reach_m: float
+
+    def away(self, points: np.ndarray) -> np.ndarray:
+        """(n,) m, how far points (n, 3) are from the face; beyond the grid as far as its rim."""
+        flat = (points - self.middle) @ self.axes.T
+        at = np.clip(((flat - self.corner) / self.cell_m).astype(int), 0, np.array(self.distance.shape) - 1)
+        return self.distance[tuple(at.T)]
+
+
+def _enclosed(path: np.ndarray, normal: np.ndarray, near_m: float) -> _Face | None:
+    """The largest face that a path (n, 3) m goes round with most of its way, gaps of up to `near_m` closed;
+    None where it is open.
+
+    Samples farther from it than `reach_m` were on the support alone: there the tip came down beside the
+    object and slid up to it, or slid away.
+    """
+    axes, middle = np.linalg.svd(normal[None])[2][1:], path.mean(axis=0)
+    flat = (path - middle) @ axes.T
+    cell = max(near_m / 4, float(np.ptp(flat, axis=0).max()) / 600)
+    wide = round(0.5 * near_m / cell)
+    corner = flat.min(axis=0) - (4 * wide + 4) * cell
+    steps = np.linalg.norm(np.diff(flat, axis=0), axis=1)
+    drawn = [flat]
+    for i in np.flatnonzero((steps > 0.5 * cell) & (steps < near_m)):
+        share = np.arange(0, 1, 0.5 * cell / steps[i])[:, None]
+        drawn.append((1 - share) * flat[i] + share * flat[i + 1])
+    at = ((np.concatenate(drawn) - corner) / cell).astype(int)
+    wall = np.zeros(at.max(axis=0) + 4 * wide + 5, dtype=bool)
+    wall[tuple(at.T)] = True
+    faces, _ = label(distance_transform_edt(~wall) > wide)
+    sizes = np.bincount(faces.ravel())
+    sizes[[0, faces[0, 0]]] = 0
+    if not sizes.any():
+        return None
+    distance = distance_transform_edt(faces != np.argmax(sizes)) * cell
+    face = _Face(middle, axes, corner, cell, distance, wide * cell + 0.5 * near_m)
+    return face if np.mean(face.away(path) < face.reach_m) > 0.5 else None
+
+
+def _strokes(path: np.ndarray, gap_m: float) -> list[np.ndarray]:
+    """The path cut where it leaps by more than `gap_m`, each piece at equal steps; pieces of less
+    than three steps are no stroke."""
+    leaps = np.flatnonzero(np.linalg.norm(np.diff(path, axis=0), axis=1) > gap_m) + 1
+    found = [resampled(piece, STEP_M) for piece in np.split(path, leaps)]
+    return [piece for piece in found if len(piece) > 3]
+
+
+def _winding(path: np.ndarray, normal: np.ndarray) -> float:
+    """Angle (rad) by which the path turns round the middle of its extent, counter-clockwise about the
+    normal."""
+    middle = (path.max(axis=0) + path.min(axis=0)) / 2
+    offset = path - middle
+    a, b = offset[:-1], offset[1:]
+    return float(np.arctan2(np.cross(a, b) @ normal, np.einsum("ij,ij->i", a, b)).sum())

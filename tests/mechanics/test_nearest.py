@@ -1,0 +1,24 @@
+"""Where rays meet a surface."""
+
+import numpy as np
+import trimesh
+
+from mechanics.nearest import first_hits
+
+
+def test_rays_meet_a_cube_where_they_must() -> None:
+    cube = trimesh.creation.box((0.02, 0.02, 0.02))
+    starts = np.array([[0.003, 0.001, 0.05], [0.003, 0.001, 0.0], [0.05, 0.05, 0.05], [0.003, 0.001, 0.05]])
+    ways = np.array([[0, 0, -1.0], [1.0, 0, 0], [0, 0, 1.0], [0, 0, 1.0]])
+    far, face = first_hits(cube.vertices, cube.faces, starts, ways)
+    assert np.allclose(far[:2], [0.04, 0.007], atol=1e-15)
+    assert np.allclose(cube.face_normals[face[:2]], [[0, 0, 1], [1, 0, 0]])
+    assert np.isinf(far[2:]).all() and (face[2:] == -1).all()
+
+
+def test_the_near_side_is_passed_over() -> None:
+    ball = trimesh.creation.icosphere(subdivisions=4, radius=0.03)
+    far, _ = first_hits(
+        ball.vertices, ball.faces, np.array([[0, 0, 0.03]]), np.array([[0, 0, -1.0]]), beyond=1e-3
+    )
+    assert abs(far[0] - 0.06) < 1e-4
