@@ -10,7 +10,7 @@ import numpy as np
 from diagnose.explore.causes import detectable_n, weigh
 from diagnose.explore.estimate import Estimate, updated
 from diagnose.explore.explorer import Suggestion
-from diagnose.explore.rows import together
+from diagnose.explore.segments import together
 from mechanics.errors import SceneError
 from palpate.robot.laboratory import LaboratoryRobot
 from scenes.laboratory.presses import Touch

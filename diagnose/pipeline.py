@@ -8,18 +8,18 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import LEAST_SITES, touches_of
 from diagnose.instrument.freeair import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
 from diagnose.instrument.retraced import move_of
 from diagnose.instrument.rigid import rigid_of
+from diagnose.options import AttributionOptions
 from diagnose.search.attribution import attribute
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.first_touch import REACH_M, reached
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
+from diagnose.search.evidence import Search
 from diagnose.search.misfit import misfit_of
 from diagnose.search.shape import site_stiffness_sd
-from diagnose.search.touches import LEAST_SITES, touches_of
+from diagnose.search.starts import REACH_M, reached
 from diagnose.search.whiten import NuisanceOptions
 from diagnose.verdict.answer import Evidence
 from diagnose.verdict.conclusion import conclude

@@ -37,7 +37,7 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "compare": ("diagnose.compare.comparison:CompareOptions",),
     "diagnose": (
         "diagnose.pipeline:DiagnoseOptions",
-        "diagnose.search.deciding:AttributionOptions",
+        "diagnose.options:AttributionOptions",
         "diagnose.search.whiten:NuisanceOptions",
     ),
     "changes": ("reconstruct.geometry.known_shape:GeometryOptions",),

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.explore.goals import Standing, surface_error, vertex_areas
-from diagnose.explore.parting import Parting
+from diagnose.explore.separating import Parting
 from mechanics.options import option
 from mechanics.tetmesh import vertex_normals
 from reconstruct.steps.s2_boundary.boundary import Boundary, farthest_points

@@ -26,16 +26,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.explore.estimate import MESH_M, Estimate, solved_sites
+from diagnose.forward.prediction import Forward
+from diagnose.forward.touches import touches_of
 from diagnose.instrument.freeair import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets
 from diagnose.instrument.rigid import rigid_of
+from diagnose.options import AttributionOptions
 from diagnose.pipeline import untold_effects
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.first_touch import first_touches, reached
 from diagnose.search.fit import Fit, fit, settings_of
-from diagnose.search.forward import Forward
 from diagnose.search.shape import site_stiffness_sd
-from diagnose.search.touches import touches_of
+from diagnose.search.starts import first_touches, reached
 from diagnose.search.whiten import NuisanceOptions, Whitener
 from mechanics.effects.base import Effect, Role
 from mechanics.effects.registry import effect, effects

@@ -15,8 +15,8 @@ from diagnose.explore.estimate import LEAST_PRESSES, Estimate, updated
 from diagnose.explore.goals import GoalOptions, Standing
 from diagnose.explore.modulus import log_sd, modulus_beside
 from diagnose.explore.orders import Order
-from diagnose.explore.parting import RIGID_S, Parting, by_support, missing, partings
-from diagnose.explore.rows import Instrument, Segment, apart, check_joined, together
+from diagnose.explore.segments import Instrument, Segment, apart, check_joined, together
+from diagnose.explore.separating import RIGID_S, Parting, by_support, missing, partings
 from mechanics.errors import (
     ContactError,
     DiagnosisError,

@@ -16,8 +16,8 @@ from scipy.stats import norm
 
 from diagnose.explore.causes import NONE, Causes, Weighing
 from diagnose.explore.estimate import Estimate, modulus_of, rows_of
+from diagnose.forward.prediction import Forward
 from diagnose.search.fit import fit, settings_of
-from diagnose.search.forward import Forward
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY
 from mechanics.presses import Presses

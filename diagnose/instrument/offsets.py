@@ -13,13 +13,13 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
+from diagnose.forward.prediction import Forward
 from diagnose.instrument.freeair import FreeAir, matrices
 from diagnose.instrument.retraced import Move
 from diagnose.instrument.rigid import Rigid
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import Forward
+from diagnose.options import AttributionOptions
+from diagnose.search.evidence import Candidate
 from diagnose.search.gaps import closed_share, gap
-from diagnose.search.judging import Candidate
 from diagnose.search.whiten import FOLLOWED, Whitener
 from diagnose.verdict.result import EffectEntry
 from mechanics.effects.force_bias import EFFECT as BIAS

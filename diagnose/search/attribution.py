@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.search.confidence_set import confidence_p
-from diagnose.search.judging import Candidate, Score, Search
+from diagnose.search.evidence import Candidate, Score, Search
 from mechanics.effects.base import Effect, Scope
 from mechanics.progress import Progress, silent
 

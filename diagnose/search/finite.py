@@ -5,8 +5,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.search.fit import Fit, settings_of
-from diagnose.search.forward import Forward
 
 # Share of the force by which full three-dimensional solves leave small-strain elasticity, against depth over
 # tip radius: fitted to labelled recordings, 1.4 % (rms) at 3-4 mm and 6 % at 4-8 mm with a tip of 5 mm.

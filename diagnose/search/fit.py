@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect
 from mechanics.effects.settings import Settings

@@ -1,7 +1,7 @@
 """Each group left out of a fit in turn, by one damped step of Gauss-Newton from the optimum of all: quick
 enough for every effect tried.
 
-The gaps that are reported are fitted again instead (diagnose.verdict.validation).
+The gaps that are reported are fitted again instead (diagnose.verdict.held_out).
 """
 
 from __future__ import annotations

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.search.fit import Fit, settings_of
-from diagnose.search.forward import Forward
 from mechanics.effects.base import Misfit
 
 LEAST_SD = 0.015

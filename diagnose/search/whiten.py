@@ -16,7 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, solve_triangular
 
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
 from mechanics.effects.settings import Settings
 from mechanics.options import option
 from mechanics.presses import Presses

@@ -6,12 +6,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.instrument.freeair import FreeAir
 from diagnose.instrument.offsets import InstrumentOffsets
 from diagnose.search.attribution import Attribution
+from diagnose.search.evidence import Search
 from diagnose.search.finite import predicted_size
-from diagnose.search.forward import Forward
-from diagnose.search.judging import Search
 from diagnose.search.shape import heterogeneity, site_factors
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects

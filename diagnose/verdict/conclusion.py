@@ -10,18 +10,18 @@ import numpy as np
 
 from diagnose.search.attribution import Attribution
 from diagnose.search.detectable import detectable
+from diagnose.search.evidence import Score, Search
 from diagnose.search.gaps import closed_share, gap
 from diagnose.search.intervals import parameter_intervals
-from diagnose.search.judging import Score, Search
 from diagnose.search.shape import repeat_scatter
 from diagnose.verdict.answer import Answer, Evidence, answer_of
 from diagnose.verdict.confusable import alike
+from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.never_worse import never_worse
 from diagnose.verdict.next_touch import next_touch
 from diagnose.verdict.result import Diagnosis, EffectEntry, NextTouch
 from diagnose.verdict.stated import stated_gap
 from diagnose.verdict.sureness import standing, sureness
-from diagnose.verdict.validation import held_out_by_refit
 from diagnose.verdict.where import locate
 from diagnose.verdict.widening import widened
 from mechanics.effects.base import Role

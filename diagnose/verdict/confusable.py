@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.search.judging import Candidate, Search
+from diagnose.search.evidence import Candidate, Search
 
 ALIKE = 0.92
 """Cosine of the angle between two effects' residual patterns from which they are called confusable."""

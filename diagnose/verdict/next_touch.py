@@ -14,9 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
+from diagnose.search.evidence import Candidate
 from diagnose.search.fit import settings_of
-from diagnose.search.forward import Forward
-from diagnose.search.judging import Candidate
 from diagnose.search.whiten import NuisanceOptions, Whitener
 from diagnose.verdict.result import NextTouch
 from mechanics.effects.settings import Settings

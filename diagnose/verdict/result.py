@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.instrument.freeair import FreeAir
 from diagnose.search.attribution import Attribution
-from diagnose.search.forward import Forward
 from diagnose.verdict.where import Where
 from mechanics.effects.registry import effect
 

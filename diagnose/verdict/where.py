@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
+from diagnose.forward.prediction import Forward
 from diagnose.instrument.freeair import FreeAir
-from diagnose.search.forward import Forward
 from mechanics.gap_bins import gap_by_bin
 from mechanics.presses import HOLDING, LOADING, UNLOADING, Presses
 

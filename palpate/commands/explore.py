@@ -18,7 +18,7 @@ import numpy as np
 from diagnose.explore.candidates import ReachOptions
 from diagnose.explore.explorer import Explorer, State, Suggestion, check_goals
 from diagnose.explore.goals import GoalOptions
-from diagnose.explore.rows import Instrument
+from diagnose.explore.segments import Instrument
 from mechanics.errors import OptionError
 from mechanics.options import check_ranges
 from mechanics.recording import POISSON, SAMPLES, read_recording

@@ -8,10 +8,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
+from diagnose.options import AttributionOptions
+from diagnose.search.evidence import Search
 from diagnose.search.whiten import FOLLOWED, NuisanceOptions, Whitener
 from mechanics.effects.registry import effect
 

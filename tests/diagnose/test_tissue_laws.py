@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
+from diagnose.options import AttributionOptions
 from diagnose.search.attribution import _best_law, _of_one
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
+from diagnose.search.evidence import Search
 from diagnose.search.whiten import NuisanceOptions
 from mechanics.effects.registry import effect, effects
 

@@ -11,11 +11,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from diagnose.apply import corrected, improved
+from diagnose.forward.prediction import Forward
 from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.search.forward import Forward
 from diagnose.search.whiten import NuisanceOptions
+from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
-from diagnose.verdict.validation import held_out_by_refit
 from mechanics.gap_bins import gap_by_bin
 from palpate.commands import demo
 from palpate.report.demo import diagnosis_words

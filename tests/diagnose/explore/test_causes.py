@@ -7,7 +7,7 @@ import pytest
 
 from diagnose.explore.causes import NONE, SIZES, Causes, Weighing, judge
 from diagnose.explore.explorer import cause_standing
-from diagnose.explore.parting import missing
+from diagnose.explore.separating import missing
 
 CAUSES, FORMS, OWN, READINGS, LOOKS = 6, 2, 3, 30, 20
 

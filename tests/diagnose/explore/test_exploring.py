@@ -10,7 +10,7 @@ import pytest
 from diagnose.explore.candidates import after_touch, modulus_after
 from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions, Standing, surface_error
-from diagnose.explore.rows import Instrument, Segment, together
+from diagnose.explore.segments import Instrument, Segment, together
 from mechanics.errors import OptionError, RecordingError
 from palpate.robot.protocol import segment_of, serve
 

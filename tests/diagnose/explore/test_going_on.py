@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.explore.rows import Instrument, Segment, apart, together
+from diagnose.explore.segments import Instrument, Segment, apart, together
 from mechanics.errors import RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.segments import Segment as Stretch

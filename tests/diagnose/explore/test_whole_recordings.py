@@ -9,7 +9,7 @@ import pytest
 from diagnose.explore.causes import NONE, causes_of
 from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions
-from diagnose.search.first_touch import REACH_M
+from diagnose.search.starts import REACH_M
 from mechanics.recording import read_recording
 
 

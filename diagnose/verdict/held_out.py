@@ -6,9 +6,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.search.evidence import Search
 from diagnose.search.fit import Descent, Fit
 from diagnose.search.gaps import gap
-from diagnose.search.judging import Search
 from mechanics.presses import Presses
 
 FOLDS = 6

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
 from diagnose.search.whiten import Whitener
 from mechanics.presses import Presses
 

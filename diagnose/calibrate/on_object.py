@@ -15,16 +15,16 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
 from diagnose.instrument.freeair import free_air_of
 from diagnose.instrument.offsets import InstrumentOffsets, find_instrument_offsets
 from diagnose.instrument.rigid import rigid_of
-from diagnose.search.deciding import AttributionOptions
+from diagnose.options import AttributionOptions
+from diagnose.search.evidence import Search
 from diagnose.search.fit import Fit, bounds_of
-from diagnose.search.forward import build_forward
 from diagnose.search.intervals import covariance
-from diagnose.search.judging import Search
 from diagnose.search.shape import site_stiffness_sd
-from diagnose.search.touches import touches_of
 from diagnose.search.whiten import NuisanceOptions
 from mechanics.calibration import Calibration
 from mechanics.effects.backlash import EFFECT as PLAY

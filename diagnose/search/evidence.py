@@ -9,12 +9,12 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import expit
 
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.first_touch import first_touches
+from diagnose.forward.prediction import Forward
+from diagnose.options import AttributionOptions
 from diagnose.search.fit import Descent, Fit, fit, settings_of
-from diagnose.search.forward import Forward
 from diagnose.search.leave_one_out import held_out, levelled
 from diagnose.search.naming import WEIGHTS, lower_closure, share_closed
+from diagnose.search.starts import first_touches
 from diagnose.search.whiten import NuisanceOptions, Whitener
 from mechanics.effects.base import Effect
 
