@@ -1,7 +1,7 @@
-"""The numbers that decide what is named, all of them.
+"""What a diagnosis can be set to: how much is tried, what decides a name, how wide our own errors are.
 
-Beside them stand the weights of evidence and closure, fitted to cases of known truth (naming.toml),
-and the widths of our own errors (`whiten.NuisanceOptions`), which say what counts as a gap at all.
+All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence and
+closure, fitted to cases of known truth (search/naming.toml).
 """
 
 from __future__ import annotations
@@ -11,6 +11,18 @@ from dataclasses import dataclass
 from scipy.special import logit
 
 from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class DiagnoseOptions:
+    """How much a diagnosis tries, and its seed."""
+
+    fast: bool = option(
+        False, "half a minute instead of three: fewer effects, one in an answer, less sampling"
+    )
+    without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
+    bootstrap: int = option(400, "resamplings of sites for intervals")
+    seed: int = option(0, "seed of flips and resamplings")
 
 
 @dataclass(frozen=True)
@@ -40,3 +52,17 @@ class AttributionOptions:
     def beyond_doubt(self) -> float:
         """Log odds beyond which one of two is taken for certain."""
         return float(logit(1 - self.doubt))
+
+
+@dataclass(frozen=True)
+class NuisanceOptions:
+    """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
+
+    onset_m: float = option(0.2e-3, "error of first touch, each press", unit="m")
+    site_stiffness: float = option(0.03, "share by which a site's stiffness may be wrong (shape, mesh)")
+    press_stiffness: float = option(0.01, "share by which repeats at a site may differ")
+    tilt: float = option(0.03, "error of a site's normal", unit="rad")
+    stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
+    law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
+    floor_share: float = option(0.01, "error of the model that no name covers, share of a sample's force")
+    floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")

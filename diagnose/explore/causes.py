@@ -27,16 +27,15 @@ import numpy as np
 
 from diagnose.explore.estimate import MESH_M, Estimate, solved_sites
 from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import touches_of
-from diagnose.instrument.freeair import free_air_of
+from diagnose.forward.touches import touches_of, unobservable_effects
+from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets
 from diagnose.instrument.rigid import rigid_of
-from diagnose.options import AttributionOptions
-from diagnose.pipeline import untold_effects
+from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.fit import Fit, fit, settings_of
 from diagnose.search.shape import site_stiffness_sd
 from diagnose.search.starts import first_touches, reached
-from diagnose.search.whiten import NuisanceOptions, Whitener
+from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect, Role
 from mechanics.effects.registry import effect, effects
 from mechanics.effects.settings import Settings
@@ -353,7 +352,7 @@ def _field(points: np.ndarray, site_sd: np.ndarray) -> np.ndarray:
 def tried(presses: Presses) -> list[Effect]:
     """Effects that may be the cause: those that a quick diagnosis searches for and such presses tell, but for
     what can take the form of others."""
-    untold = untold_effects(presses)
+    untold = unobservable_effects(presses)
     able = [e for e in effects() if e.role is Role.SEARCHED and not e.any_form and not e.costly]
     return [e for e in able if e.name not in untold]
 

@@ -12,8 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from diagnose.search.evidence import Candidate, Search
+from diagnose.search.evidence import Search
 from diagnose.search.fit import settings_of
+from diagnose.search.leave_one_out import Candidate
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from diagnose.forward.prediction import Forward
-from diagnose.instrument.freeair import FreeAir
+from diagnose.instrument.free_air import FreeAir
 from diagnose.search.attribution import Attribution
 from diagnose.verdict.where import Where
 from mechanics.effects.registry import effect
@@ -40,8 +40,8 @@ KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
 class EffectEntry:
     """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
 
-    intervals: [low, high] of each parameter at 95 %. standing: p value of the model confidence set (nan where
-    it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
+    intervals: [low, high] of each parameter at 95 %. confidence_set_p: p value of the model confidence set
+    (nan where it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
     detectable_n: N rms of its force from which these presses show it at all (nan: not told).
     """
 
@@ -54,7 +54,7 @@ class EffectEntry:
     parameters: dict[str, Any]
     gain: float = 0.0
     intervals: dict[str, Any] = field(default_factory=dict)
-    standing: float = float("nan")
+    confidence_set_p: float = float("nan")
     detectable_n: float = float("nan")
 
 
@@ -180,7 +180,7 @@ class Diagnosis:
                     "gap_closed_ci95": None if e.gap_closed_ci95 is None else list(e.gap_closed_ci95),
                     "parameters": e.parameters,
                     "parameters_ci95": e.intervals,
-                    "confidence_set_p": e.standing if np.isfinite(e.standing) else None,
+                    "confidence_set_p": e.confidence_set_p if np.isfinite(e.confidence_set_p) else None,
                     "detectable_n": e.detectable_n if np.isfinite(e.detectable_n) else None,
                 }
                 for e in self.entries

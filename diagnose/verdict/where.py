@@ -9,7 +9,7 @@ import numpy as np
 from scipy.stats import chi2
 
 from diagnose.forward.prediction import Forward
-from diagnose.instrument.freeair import FreeAir
+from diagnose.instrument.free_air import FreeAir
 from mechanics.gap_bins import gap_by_bin
 from mechanics.presses import HOLDING, LOADING, UNLOADING, Presses
 

@@ -7,11 +7,10 @@ import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from diagnose.options import AttributionOptions
+from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.detectable import SEEN, detectable
 from diagnose.search.evidence import Search
 from diagnose.search.fit import settings_of
-from diagnose.search.whiten import NuisanceOptions
 from mechanics.effects.registry import effect
 from mechanics.model import Model
 

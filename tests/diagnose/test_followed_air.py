@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of
-from diagnose.options import AttributionOptions
+from diagnose.forward.touches import FOLLOWED, touches_of
+from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.evidence import Search
-from diagnose.search.whiten import FOLLOWED, NuisanceOptions, Whitener
+from diagnose.search.whiten import Whitener
 from mechanics.effects.registry import effect
 
 

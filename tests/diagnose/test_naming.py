@@ -7,8 +7,9 @@ import pytest
 
 from diagnose.options import AttributionOptions
 from diagnose.search.attribution import _with_strain
-from diagnose.search.evidence import Score, Search
-from diagnose.search.naming import lower_closure
+from diagnose.search.evidence import Search
+from diagnose.search.gaps import lower_closure
+from diagnose.search.naming import Score
 from mechanics.effects.registry import effect
 
 

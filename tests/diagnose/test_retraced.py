@@ -14,10 +14,9 @@ from diagnose.forward.touches import touches_of
 from diagnose.instrument.offsets import InstrumentOffsets, ruled_out, with_move
 from diagnose.instrument.retraced import Move, move_of
 from diagnose.instrument.rigid import Rigid
-from diagnose.options import AttributionOptions
-from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.pipeline import diagnose
 from diagnose.search.evidence import Search
-from diagnose.search.whiten import NuisanceOptions
 from diagnose.verdict.next_touch import next_touch
 from mechanics.effects.registry import effect
 from mechanics.recording import Recording

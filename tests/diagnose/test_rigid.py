@@ -11,10 +11,9 @@ from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
 from diagnose.instrument.offsets import find_instrument_offsets, read_sideways
 from diagnose.instrument.rigid import Rigid, rigid_of
-from diagnose.options import AttributionOptions
+from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import attribute
 from diagnose.search.evidence import Search
-from diagnose.search.whiten import NuisanceOptions
 from mechanics.effects.registry import effect
 from mechanics.frames import tangents
 from mechanics.recording import Recording

@@ -10,13 +10,13 @@ import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
-from diagnose.options import AttributionOptions
-from diagnose.search.evidence import Candidate, Score, Search
+from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.search.evidence import Search
 from diagnose.search.fit import Descent, fit
 from diagnose.search.intervals import covariance, parameter_intervals
-from diagnose.search.leave_one_out import held_out
+from diagnose.search.leave_one_out import Candidate, held_out
+from diagnose.search.naming import Score
 from diagnose.search.shape import repeat_scatter
-from diagnose.search.whiten import NuisanceOptions
 from diagnose.verdict.held_out import deepest, held_out_by_refit, neighbours
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 
 from diagnose.apply import corrected, improved
 from diagnose.forward.prediction import Forward
-from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.search.whiten import NuisanceOptions
+from diagnose.options import DiagnoseOptions, NuisanceOptions
+from diagnose.pipeline import diagnose
 from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
 from mechanics.gap_bins import gap_by_bin
