@@ -359,11 +359,7 @@ def _predict(
 
 
 def _of(fem: Fem, test: np.ndarray) -> Fem:
-    s = fem.sites.sites
-    some = TouchSites(
-        s.points[test], s.normals[test], s.curvature[test], s.far[test], s.patch_width_m, s.poisson_ratio
-    )
-    return replace(fem, sites=FieldSites(some, fem.sites.ratio[test]))
+    return replace(fem, sites=FieldSites(fem.sites.sites.of(test), fem.sites.ratio[test]))
 
 
 def _one_d(presses: Presses, law: Law, moved_m: np.ndarray) -> np.ndarray:

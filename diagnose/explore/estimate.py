@@ -201,7 +201,7 @@ def solved_sites(
         )
         gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):
-            solved.far[keys[i]] = rows_of(made, slice(row, row + 1)), gradients[row]
+            solved.far[keys[i]] = made.of(slice(row, row + 1)), gradients[row]
     parts = [solved.far[key] for key in keys]
     sites = TouchSites(
         points=np.concatenate([p.points for p, _ in parts]),
@@ -212,11 +212,3 @@ def solved_sites(
         poisson_ratio=poisson_ratio,
     )
     return sites, np.array([gradient for _, gradient in parts])
-
-
-def rows_of(sites: TouchSites, rows: slice | np.ndarray) -> TouchSites:
-    """Some of the sites, in order."""
-    return TouchSites(
-        sites.points[rows], sites.normals[rows], sites.curvature[rows], sites.far[rows],
-        sites.patch_width_m, sites.poisson_ratio,
-    )  # fmt: skip

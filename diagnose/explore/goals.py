@@ -47,7 +47,7 @@ class GoalOptions:
 
 
 @dataclass(frozen=True)
-class Standing:
+class GoalState:
     """How far one goal has come. now, goal: in its own unit; inf where nothing is known yet."""
 
     name: str
@@ -81,3 +81,9 @@ def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     corner = vertices[triangles]
     size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
     return np.bincount(triangles.ravel(), np.repeat(size / 3, 3), minlength=len(vertices))
+
+
+def check_goals(goals: GoalOptions) -> None:
+    """Raises OptionError where nothing is asked for."""
+    if goals.modulus_within is None and goals.surface_within_m is None and goals.cause_at is None:
+        raise OptionError("no goal is given: ask for --modulus-within, --surface-within or --cause-at")
