@@ -38,8 +38,7 @@ class AttributionOptions:
         0.5, "smallest gap that matters, rms over contact samples, of the noise of a force 3-vector"
     )
     least_of_first: float = option(
-        0.25,
-        "least size of a further effect, of the first's: no law is exact, what it leaves is no effect",
+        0.25, "least size of a further effect, of the first's: no law is exact, what it leaves is no effect"
     )
     most: int = option(3, "effects in one answer, at most")
     z: float = option(5.0, "standard errors beyond which what free air or the support reads is no chance")

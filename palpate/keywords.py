@@ -36,9 +36,9 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "press": (*_RENDER, "render.support:SupportOptions"),
     "compare": ("diagnose.compare.comparison:CompareOptions",),
     "diagnose": (
-        "diagnose.pipeline:DiagnoseOptions",
+        "diagnose.options:DiagnoseOptions",
         "diagnose.options:AttributionOptions",
-        "diagnose.search.whiten:NuisanceOptions",
+        "diagnose.options:NuisanceOptions",
     ),
     "changes": ("reconstruct.geometry.known_shape:GeometryOptions",),
     "calibrate": ("reconstruct.geometry.known_shape:GeometryOptions",),

@@ -1,7 +1,7 @@
 """An instrument calibrated by presses on an object of known modulus.
 
-The same effects as in a diagnosis are fitted together, none left out: presses that hardly tell a bending from
-a gain say so by both intervals, while a bending left out would be taken for a gain. What is left between
+The same effects as in a diagnosis are fitted together, none left out: presses that hardly separate a bending
+from a gain say so by both intervals, while a bending left out would be taken for a gain. What is left between
 known and found modulus is the sensor's gain, or the tip's radius where the sensor is trusted, which no press
 on one material can tell apart.
 """
@@ -146,7 +146,7 @@ def _calibration(
 
 
 def _systematic(found: Fit) -> np.ndarray:
-    """(k,) standard deviations of the fit's values that no noise tells, as the effects state them."""
+    """(k,) standard deviations of the fit's values that noise does not hold, as the effects state them."""
     parts = [np.zeros(1)]
     for effect in found.effects:
         none = np.zeros(len(effect.parameters))

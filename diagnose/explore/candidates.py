@@ -42,7 +42,7 @@ class ReachOptions:
         0.18, "nor deeper than this share of the material under the tip", low=0.01, high=0.9
     )
     strongest_n: float = option(
-        5.0, "nor with more force, as far as that can be told", unit="N", flag="--strongest", low=0.01
+        5.0, "nor with more force, as far as it is known", unit="N", flag="--strongest", low=0.01
     )
     press_speed_m_per_s: float = option(0.02, "speed of a press", unit="m/s")
     air_speed_m_per_s: float = option(0.12, "speed through the air", unit="m/s")
@@ -161,10 +161,7 @@ class _Way:
 def _ways(deepest: float, deep: bool, separations: Sequence[Separation], reach: ReachOptions) -> list[_Way]:
     """How a place may be pressed: as usual, or by a plan that separates causes."""
     usual = _Way(deepest if deep else min(deepest, LIGHT_M), reach.press_speed_m_per_s, reach.hold_s)
-    return [
-        usual,
-        *(_Way(min(p.depth_m, deepest), p.plan.speed, p.plan.hold, p) for p in separations),
-    ]
+    return [usual, *(_Way(min(p.depth_m, deepest), p.plan.speed, p.plan.hold, p) for p in separations)]
 
 
 def _not_in_vain(
@@ -186,8 +183,8 @@ def after_touch(vertices: np.ndarray, deviation_m: np.ndarray, row: int) -> np.n
     variance = np.asarray(deviation_m, dtype=float) ** 2
     squared = ((vertices - vertices[row]) ** 2).sum(axis=1)
     shared = np.exp(-squared / CORRELATION_M**2)  # the square of exp(-r^2 / (2 L^2))
-    told = variance[row] / (variance[row] + TOUCH_ERROR_M**2)
-    return np.sqrt(variance * (1 - shared * told))
+    resolved = variance[row] / (variance[row] + TOUCH_ERROR_M**2)
+    return np.sqrt(variance * (1 - shared * resolved))
 
 
 def modulus_after(known: Known, point: np.ndarray, depth_m: float) -> float:

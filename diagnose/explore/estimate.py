@@ -192,12 +192,7 @@ def solved_sites(
     width = patch_width(solved.solver.mesh)
     if new:
         made = touch_sites(
-            solved.mesh,
-            points[new],
-            normals[new],
-            poisson_ratio,
-            solver=solved.solver,
-            patch_width_m=width,
+            solved.mesh, points[new], normals[new], poisson_ratio, solver=solved.solver, patch_width_m=width
         )
         gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):

@@ -19,14 +19,7 @@ from diagnose.explore.state import State, cause_goal
 from diagnose.explore.suggestion import Situation, Suggestion, suggest
 from diagnose.explore.weighing import Weighing
 from mechanics.dent import USUAL_POISSON_RATIO
-from mechanics.errors import (
-    ContactError,
-    DiagnosisError,
-    LoudAirError,
-    MeshError,
-    ModelError,
-    SurfaceError,
-)
+from mechanics.errors import ContactError, DiagnosisError, LoudAirError, MeshError, ModelError, SurfaceError
 from mechanics.nearest import distance
 from mechanics.recording import Recording, write_recording
 from reconstruct.pipeline import Clock

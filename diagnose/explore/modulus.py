@@ -18,7 +18,8 @@ from diagnose.explore.causes import NONE, Causes
 from diagnose.explore.estimate import Estimate, modulus_of
 from diagnose.explore.weighing import Weighing
 from diagnose.forward.prediction import Forward
-from diagnose.search.fit import fit, settings_of
+from diagnose.search.descent import fit
+from diagnose.search.fit import settings_of
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY
 from mechanics.presses import Presses

@@ -17,7 +17,7 @@ class State:
     for. goals: how far each is.
 
     presses: found and used; made: segments of presses that were added. seconds: of exploring so far.
-    update_s: wall time of the last update by step. causes: where they are asked for and can be told;
+    update_s: wall time of the last update by step. causes: where they are asked for and known;
     cause_at: how surely. trouble: why the last update could not be made, or "".
     """
 

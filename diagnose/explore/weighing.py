@@ -19,7 +19,8 @@ from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets
 from diagnose.instrument.rigid import rigid_of
 from diagnose.options import NuisanceOptions
-from diagnose.search.fit import Fit, fit, settings_of
+from diagnose.search.descent import fit
+from diagnose.search.fit import Fit, settings_of
 from diagnose.search.shape import site_stiffness_sd
 from diagnose.search.starts import first_touches, reached
 from diagnose.search.whiten import Whitener

@@ -113,7 +113,7 @@ def _scatter(lines: np.ndarray) -> tuple[float, float]:
 
 
 LEAST_TURN = 0.02
-"""Standard deviation of the rotation's entries from which a force that turns with the tool can be told."""
+"""Standard deviation of the rotation's entries from which a force that turns with the tool can be seen."""
 
 
 def matrices(quaternion: np.ndarray) -> np.ndarray:

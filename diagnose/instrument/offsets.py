@@ -48,10 +48,7 @@ def find_instrument_offsets(
 
 
 def ruled_out(
-    forward: Forward,
-    rigid: Rigid | None,
-    move: Move | None,
-    rules: AttributionOptions = RULES,
+    forward: Forward, rigid: Rigid | None, move: Move | None, rules: AttributionOptions = RULES
 ) -> frozenset[str]:
     """What the support shows not to be there: a spring or a move that is too small to matter even if it is
     `rules.z` standard errors greater than it was read."""

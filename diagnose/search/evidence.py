@@ -10,7 +10,8 @@ import numpy as np
 
 from diagnose.forward.prediction import Forward
 from diagnose.options import AttributionOptions, NuisanceOptions
-from diagnose.search.fit import Descent, Fit, fit, settings_of
+from diagnose.search.descent import Descent, fit
+from diagnose.search.fit import Fit, settings_of
 from diagnose.search.gaps import lower_closure, share_closed
 from diagnose.search.leave_one_out import Candidate, held_out
 from diagnose.search.naming import Score
@@ -88,18 +89,18 @@ class Search:
         over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
         fitted = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
         # predicted with what the other places alone would have added: a lump under one place is none
-        told = (fitted.sum() - fitted) / over > extra
-        per_group = np.where(told, old.held - new.held, 0.0)
+        predicted = (fitted.sum() - fitted) / over > extra
+        per_group = np.where(predicted, old.held - new.held, 0.0)
         gain = float(per_group.sum())
         if all(e.scope.between_places for e in added):
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
-        # a lump under one place is told by that place: what it closes there counts, as its evidence does
+        # a lump under one place shows at that place alone: what it closes there counts, as its evidence does
         if all(e.few_places for e in added):
             was, left = old.fitted_plain, new.fitted_plain
         else:
-            was, left = old.plain, np.where(told, new.plain, old.plain)
+            was, left = old.plain, np.where(predicted, new.plain, old.plain)
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))

@@ -20,7 +20,8 @@ from scipy.integrate import trapezoid
 from diagnose.forward.touches import LEAST_PRESSES
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from diagnose.pipeline import diagnose
-from diagnose.search.fit import Descent, settings_of
+from diagnose.search.descent import Descent
+from diagnose.search.fit import settings_of
 from diagnose.search.whiten import Whitener
 from diagnose.verdict.result import Diagnosis
 from mechanics.dent import dent_law

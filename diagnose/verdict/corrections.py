@@ -63,7 +63,7 @@ def sureness(name: str, how: str, scored: float = 1.0) -> float:
 
 @cache
 def factors() -> Mapping[str, float]:
-    """{effect: factor}; "all": of effects that too few cases tell of."""
+    """{effect: factor}; "all": of effects that too few cases hold."""
     return dict(tomllib.loads(WIDENING_FILE.read_text())["factor"])
 
 

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.instrument.free_air_offsets import InstrumentOffsets
+from diagnose.search.descent import Descent
 from diagnose.search.evidence import Search
-from diagnose.search.fit import Descent, Fit
+from diagnose.search.fit import Fit
 from diagnose.search.gaps import gap, resampled
 from diagnose.search.leave_one_out import Candidate
 from diagnose.search.whiten import Whitener

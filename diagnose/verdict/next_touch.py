@@ -1,4 +1,4 @@
-"""What would best tell two explanations apart: every candidate press is predicted under both.
+"""What would best separate two explanations: every candidate press is predicted under both.
 
 Candidates: the places already pressed, straight or dragged sideways, three depths, three speeds, a short or a
 long hold, once or twice in a row. A press is worth the whitened distance between the two predictions, after
@@ -64,7 +64,7 @@ def _separating(search: Search, scores: dict[str, Score], first: str, second: st
 def next_touch(
     forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate], options: NuisanceOptions
 ) -> NextTouch:
-    """The best press to tell `first` from `second` (name, fitted candidate)."""
+    """The best press to separate `first` from `second` (name, fitted candidate)."""
     best: tuple[float, float, Plan, int] | None = None
     for plan in plans():
         virtual = dataclasses.replace(forward, touches=pressed(forward, plan))
@@ -86,7 +86,7 @@ def next_touch(
     assert best is not None
     worth, size, plan, press = best
     again, rigid = _retrace(forward, first, second), _rigid(forward, first, second)
-    # a surface that is fitted to the presses themselves moves along with them: none of them tells a move
+    # a surface that is fitted to the presses themselves moves along with them: none of them shows a move
     hidden = forward.model.fitted_to(forward.touches)
     if again is not None and (again.sigmas**2 > worth or (hidden and again.sigmas > 1)):
         return again

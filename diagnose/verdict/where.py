@@ -89,7 +89,7 @@ def _bins(t: Presses, stated: np.ndarray) -> dict[str, list[float]]:
 
 
 def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:
-    """(p,) per press: one signed number an axis (nan where the press cannot tell)."""
+    """(p,) per press: one signed number an axis (nan where the press shows nothing of it)."""
     out = {
         name: np.full(len(t), np.nan) for name in ("depth", "rate", "phase", "direction", "order", "repeat")
     }
@@ -144,11 +144,11 @@ def family_wise(contrasts: dict[str, np.ndarray], site: np.ndarray, seed: int) -
     names = list(contrasts)
     values = np.stack([contrasts[n] for n in names], axis=1)
     fine = ~np.isnan(values)
-    sums, told = np.zeros((2, site.max() + 1, len(names)))
+    sums, counted = np.zeros((2, site.max() + 1, len(names)))
     np.add.at(sums, site, np.where(fine, values, 0.0))
-    np.add.at(told, site, fine)
-    told = told > 0
-    count = np.maximum(told.sum(axis=0), 1)
+    np.add.at(counted, site, fine)
+    counted = counted > 0
+    count = np.maximum(counted.sum(axis=0), 1)
     square = (sums**2).sum(axis=0)
 
     def t_of(total: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def family_wise(contrasts: dict[str, np.ndarray], site: np.ndarray, seed: int) -
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(FLIPS, len(sums)))
     largest = t_of(signs @ sums).max(axis=1)
     larger = (largest[:, None] >= t_of(sums.sum(axis=0)) - 1e-12).sum(axis=0)
-    p = np.where(told.sum(axis=0) < 5, 1.0, (larger + 1) / (FLIPS + 1))
+    p = np.where(counted.sum(axis=0) < 5, 1.0, (larger + 1) / (FLIPS + 1))
     return dict(zip(names, map(float, p), strict=True))
 
 

@@ -11,8 +11,8 @@ import pytest
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
 from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.search.descent import Descent, fit
 from diagnose.search.evidence import Search
-from diagnose.search.fit import Descent, fit
 from diagnose.search.intervals import covariance, parameter_intervals
 from diagnose.search.leave_one_out import Candidate, held_out
 from diagnose.search.naming import Score
