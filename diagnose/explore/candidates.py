@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.goals import GoalState, surface_error, vertex_areas
+from diagnose.explore.goals import GoalState, off_support, surface_error
 from diagnose.explore.separating import Separation
 from mechanics.dent import dent_law
 from mechanics.options import option
@@ -110,17 +110,16 @@ def ranked(known: Known, reach: ReachOptions, separations: Sequence[Separation] 
     surface = known.surface
     rows = _not_in_vain(surface.vertices, places(surface, known.tip_radius_m), known.touched, known.asked)
     normals = vertex_normals(surface.vertices, surface.triangles)
-    area = vertex_areas(surface.vertices, surface.triangles)
-    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
+    free, area = off_support(surface)
     missing = {s.name: s for s in known.goals if s.missing > 0}
-    own = surface_error(surface.uncertainty_m[free], area[free])
+    own = surface_error(surface.uncertainty_m[free], area)
     made = []
     for row in rows:
         point, normal = surface.vertices[row], normals[row]
         gains = {"surface": 0.0}
         if "surface" in missing:
             after = after_touch(surface.vertices, surface.uncertainty_m, row)
-            gains["surface"] = float(np.log(own / surface_error(after[free], area[free])))
+            gains["surface"] = float(np.log(own / surface_error(after[free], area)))
         deepest = press_depth(known, point, reach)
         for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), separations, reach):
             if "modulus" in missing:

@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnose.explore.goals import surface_error, vertex_areas
+from diagnose.explore.goals import off_support, surface_error
 from mechanics.nearest import distance
 from mechanics.presses import Presses
 from mechanics.recording import Recording
@@ -167,9 +167,8 @@ def _surface(
 
 def free_error(surface: Surface) -> float:
     """m, within which 95 % of the surface off the support lies, by its own word."""
-    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
-    area = vertex_areas(surface.vertices, surface.triangles)
-    return surface_error(surface.uncertainty_m[free], area[free])
+    free, area = off_support(surface)
+    return surface_error(surface.uncertainty_m[free], area)
 
 
 def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:

@@ -209,7 +209,8 @@ class Explorer:
 
     def suggest(self) -> Suggestion:
         """The touch that makes the most progress a second, or the word to stop, each with its reason."""
-        order = self._order
+        order, rng = self._order, self._rng
+        choose = None if order is None else lambda p, t, h: order(p, t, h, rng)
         found = suggest(
             Situation(
                 state=self.state,
@@ -225,9 +226,7 @@ class Explorer:
                 causes=self._causes,
                 here=self.segments[-1].position[-1] if self.segments else np.zeros(3),
                 asked=np.array(self._asked).reshape(-1, 3),
-                choose=None
-                if order is None
-                else lambda places, touched, here: order(places, touched, here, self._rng),
+                choose=choose,
             )
         )
         if found.point is not None and self._estimate.surface is not None:

@@ -11,6 +11,7 @@ from scipy.special import erf
 from mechanics.errors import OptionError
 from mechanics.options import option
 from reconstruct.shapes.evidence import LEAST_TOUCHES
+from reconstruct.steps.s4_surface.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -74,6 +75,12 @@ def surface_error(deviation_m: np.ndarray, area: np.ndarray, share: float = 0.95
         return float(weight @ erf(x / (deviation * np.sqrt(2)))) - share
 
     return float(brentq(short, 0.0, 10 * float(deviation.max())))
+
+
+def off_support(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """((n,) bool, the vertices of a surface that are off the support; (k,) m^2 of those)."""
+    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
+    return free, vertex_areas(surface.vertices, surface.triangles)[free]
 
 
 def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:

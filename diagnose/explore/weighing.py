@@ -21,6 +21,7 @@ from diagnose.instrument.rigid import rigid_of
 from diagnose.options import NuisanceOptions
 from diagnose.search.descent import fit
 from diagnose.search.fit import Fit, settings_of
+from diagnose.search.gaps import modulus_share
 from diagnose.search.shape import site_stiffness_sd
 from diagnose.search.starts import first_touches, reached
 from diagnose.search.whiten import Whitener
@@ -163,7 +164,7 @@ def changed(forward: Forward, found: Fit, act: Act | None) -> np.ndarray:
 
 
 def _size(change: np.ndarray, plain: np.ndarray) -> float:
-    beyond = change - (change * plain).sum() / max((plain**2).sum(), 1e-300) * plain
+    beyond = change - modulus_share(change, plain) * plain
     return float(np.sqrt((beyond**2).sum(axis=1).mean()))
 
 

@@ -113,18 +113,9 @@ def attribute(
     rivals = tuple(n for n in rivals_of(search, picked, sets, asked) if n not in seen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
-        base,
-        ideal,
-        deep,
-        steps[0],
-        tuple(order),
-        rivals,
-        current,
-        tuple(steps),
-        tuple(name for _, name in picked),
-        float(strain_gain),
-        sets[0],
-    )
+        base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
+        tuple(name for _, name in picked), float(strain_gain), sets[0],
+    )  # fmt: skip
 
 
 def _likeliest(passing: Sequence[Score], beyond_doubt: float) -> Score:

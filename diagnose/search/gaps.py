@@ -14,6 +14,11 @@ def gap(plain: np.ndarray, counts: np.ndarray, added: float) -> float:
     return float(np.sqrt(plain.sum() / counts.sum() + added))
 
 
+def modulus_share(change: np.ndarray, force: np.ndarray) -> float:
+    """The share of a force (n, 3) N that is nearest to its change (n, 3) N: what another modulus takes up."""
+    return float((change * force).sum() / max((force**2).sum(), 1e-300))
+
+
 def closed_share(
     before: np.ndarray,
     after: np.ndarray,

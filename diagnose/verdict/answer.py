@@ -12,6 +12,7 @@ from diagnose.instrument.offsets import InstrumentOffsets
 from diagnose.search.attribution import Attribution
 from diagnose.search.evidence import Search
 from diagnose.search.fit import Fit, settings_of
+from diagnose.search.gaps import modulus_share
 from diagnose.search.shape import heterogeneity, site_factors
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
@@ -212,6 +213,5 @@ def stated_gap(findings: Findings, answer: Answer) -> np.ndarray:
     settings = settings_of(findings.forward, law.effects, law.values, final.found.likeliest)
     without = np.nan_to_num(findings.forward.predict(settings))
     gap = t.local_force - final.residual - without
-    plain = without[t.counted]
-    gap -= (gap[t.counted] * plain).sum() / max((plain**2).sum(), 1e-300) * without
+    gap -= modulus_share(gap[t.counted], without[t.counted]) * without
     return (gap**2).sum(axis=1)

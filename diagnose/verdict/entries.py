@@ -44,19 +44,12 @@ def entries_of(
         fitted = found.final.found if name in found.chosen else score.candidate.found
         entries.append(
             EffectEntry(
-                name,
-                own.domain,
-                sure(name, score.probability),
-                gap(score.candidate.plain, counts, added),
-                closed,
-                interval,
-                own.report(fitted.of(name), forward, fitted.modulus),
-                score.gain,
-                parameter_intervals(fitted, name, forward, search.dof, rng),
-                found.confidence_set_p[name],
+                name, own.domain, sure(name, score.probability), gap(score.candidate.plain, counts, added),
+                closed, interval, own.report(fitted.of(name), forward, fitted.modulus), score.gain,
+                parameter_intervals(fitted, name, forward, search.dof, rng), found.confidence_set_p[name],
                 limits.get(name, float("nan")),
             )
-        )
+        )  # fmt: skip
     if found.finite_strain_gain > -search.options.beyond_doubt or strain.name in answer.names:
         left = gap(found.deep.plain, counts, added)
         closed, interval = closed_by(found.deep.plain, draws)

@@ -67,7 +67,7 @@ def locate(
     contrasts = _contrasts(t, residual)
     p_values = family_wise(contrasts, t.site, seed)
     p_values["space"] = _space(t, residual, site_sd)
-    p_values["free_air"] = _free_p(free)
+    p_values["free_air"] = 1.0 if free is None else free.p
     shares = _shares(t, residual)
     shares["free_air"] = _free_share(t, residual, free)
     axes = tuple(Axis(a, float(np.clip(shares.get(a, 0.0), 0, 1)), float(p_values.get(a, 1.0))) for a in AXES)
@@ -180,17 +180,6 @@ def _space(t: Presses, residual: np.ndarray, site_sd: np.ndarray) -> float:
     weight = 1 / (prior**2 + se**2 + 0.01**2)
     centred = level - (weight @ level) / weight.sum()
     return float(chi2.sf((weight * centred**2).sum(), t.sites - 1))
-
-
-def _free_p(free: FreeAir | None) -> float:
-    if free is None:
-        return 1.0
-    z = max(
-        np.abs(free.bias_n).max() / free.bias_se_n,
-        np.abs(free.rate_n_per_s).max() / free.rate_se_n_per_s,
-        abs(free.mass_kg) / free.mass_se_kg,
-    )
-    return float(min(1.0, 7 * chi2.sf(z**2, 1)))
 
 
 def _free_share(t: Presses, residual: np.ndarray, free: FreeAir | None) -> float:
