@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 
 from diagnose.forward.prediction import build_forward
-from diagnose.forward.touches import touches_of, unobservable_effects
+from diagnose.forward.touches import REACH_M, reached, touches_of, unobservable_effects
 from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
 from diagnose.instrument.retraced import move_of
@@ -16,7 +16,7 @@ from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOption
 from diagnose.search.attribution import attribute
 from diagnose.search.evidence import Search
 from diagnose.search.shape import site_stiffness_sd
-from diagnose.search.starts import REACH_M, misfit_of, reached
+from diagnose.search.starts import misfit_of
 from diagnose.verdict.answer import Findings
 from diagnose.verdict.conclusion import conclude
 from diagnose.verdict.result import Diagnosis

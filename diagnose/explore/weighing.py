@@ -14,7 +14,7 @@ import numpy as np
 from diagnose.explore.estimate import MESH_M, Estimate, solved_sites
 from diagnose.explore.forms import Act, balls, forms_of, softer
 from diagnose.forward.prediction import Forward
-from diagnose.forward.touches import touches_of
+from diagnose.forward.touches import reached, touches_of
 from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets
 from diagnose.instrument.rigid import rigid_of
@@ -23,7 +23,7 @@ from diagnose.search.descent import fit
 from diagnose.search.fit import Fit, settings_of
 from diagnose.search.gaps import modulus_share
 from diagnose.search.shape import site_stiffness_sd
-from diagnose.search.starts import first_touches, reached
+from diagnose.search.starts import first_touches
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effects

@@ -13,12 +13,21 @@ from mechanics.errors import DiagnosisError
 from mechanics.leads import leads
 from mechanics.presses import LEAD_S, STEP_S, Presses
 
+REACH_M = 2.4e-3
+"""Most by which a first touch is moved."""
 LEAST_PRESSES, LEAST_SITES = 6, 4
 LEAST_S = 0.08
 LEAST_ROWS = 12
 LEAST_POINTS = 3
 FOLLOWED = "followed"
 """Column of touches whose free air was followed from before to after them: (n, 3) N, what was taken off."""
+
+
+def reached(presses: Presses) -> np.ndarray:
+    """(p,) bool: presses that met the surface that was fitted to them, or can be moved there. The others lie
+    on a shape that the surface has not got, or are no presses: a heavy tool that was swung."""
+    passed = np.einsum("pi,pi->p", presses.centre - presses.point, presses.normal) - presses.tip_radius_m
+    return np.abs(passed) < REACH_M
 
 
 def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:

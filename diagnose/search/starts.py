@@ -6,22 +6,13 @@ from __future__ import annotations
 import numpy as np
 
 from diagnose.forward.prediction import Forward
+from diagnose.forward.touches import REACH_M
 from diagnose.search.fit import Fit, settings_of
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Misfit
-from mechanics.presses import Presses
 
-REACH_M = 2.4e-3
-"""Most by which a first touch is moved."""
 LEAST_SD = 0.015
 """Share by which a press's stiffness is off at least, beside noise and shape."""
-
-
-def reached(presses: Presses) -> np.ndarray:
-    """(p,) bool: presses that met the surface that was fitted to them, or can be moved there. The others lie
-    on a shape that the surface has not got, or are no presses: a heavy tool that was swung."""
-    passed = np.einsum("pi,pi->p", presses.centre - presses.point, presses.normal) - presses.tip_radius_m
-    return np.abs(passed) < REACH_M
 
 
 def first_touches(forward: Forward, whitener: Whitener, modulus: float) -> np.ndarray:
