@@ -37,9 +37,6 @@ def _plain(value: Any) -> Any:
     return list(value) if isinstance(value, tuple) else value
 
 
-KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
-
-
 @dataclass(frozen=True)
 class EffectEntry:
     """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
