@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from diagnose.apply import corrected, improved, with_effects, with_replayed_modulus
-from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.options import DiagnoseOptions
+from diagnose.pipeline import diagnose
 from mechanics.effects.registry import effect
 from mechanics.errors import RecordingError
 from mechanics.files import atomic_file

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.search.attribution import Attribution
-from diagnose.search.forward import Forward
 
 
 def best_by_bic(found: Attribution) -> str:

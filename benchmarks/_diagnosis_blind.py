@@ -163,8 +163,9 @@ def verdict_path(case: Case, work: Path) -> Path:
 def judge(case: dict[str, Any], fast: bool, work: str, laboratory: int) -> dict[str, Any]:
     """Diagnose; the truth stays shut. Errors are a verdict too. The answer is written."""
     from benchmarks._baselines import best_by_bic, regressed_gap
-    from diagnose.pipeline import DiagnoseOptions, diagnose
-    from diagnose.verdict.widening import factors
+    from diagnose.options import DiagnoseOptions
+    from diagnose.pipeline import diagnose
+    from diagnose.verdict.corrections import factors
     from mechanics.model_files import read_model
     from mechanics.recording import read_recording
 

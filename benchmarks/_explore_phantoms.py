@@ -7,10 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.explore.causes import detectable_n, weigh
+from diagnose.explore.causes import least_that_matters, projected
 from diagnose.explore.estimate import Estimate, updated
 from diagnose.explore.explorer import Suggestion
-from diagnose.explore.rows import together
+from diagnose.explore.segments import join
+from diagnose.explore.weighing import Weighing, weigh
+from diagnose.search.detectable import SEEN
 from mechanics.errors import SceneError
 from palpate.robot.laboratory import LaboratoryRobot
 from scenes.laboratory.presses import Touch
@@ -122,9 +124,9 @@ def limits_of(it: Sealed) -> dict[str, float]:
         depth = 1e-3 * DEPTH * touch.reach
         to = Suggestion("press", "", 1e-3 * touch.point, touch.normal, depth, speed_m_per_s=0.02, hold_s=0.2)
         segments.append(robot.carry_out(to))
-    recording = together(robot.instrument, segments)
+    recording = join(robot.instrument, segments)
     weighing = weigh(updated(recording, Estimate(), robot.phantom.poisson_ratio, it.seed))
-    return detectable_n(weighing) if weighing else {}
+    return _detectable_n(weighing) if weighing else {}
 
 
 def size_at(it: Sealed, strength: float) -> float:
@@ -141,3 +143,14 @@ def size_at(it: Sealed, strength: float) -> float:
     )
     sizes: dict[str, Any] = made.truth["sizes"]
     return float(sizes[it.cause]["rms_after_best_scale_n"])
+
+
+def _detectable_n(weighing: Weighing) -> dict[str, float]:
+    """{cause: N rms over contact samples beside the modulus} of the smallest size that shows in these
+    presses, in the form that shows best, and matters."""
+    _, curve, _ = projected(weighing)
+    inflation = weighing.forward.touches.noise.variance_inflation
+    shows = SEEN * np.sqrt(inflation) * weighing.sizes / np.sqrt(np.maximum(curve, 1e-300))
+    matters = least_that_matters(weighing.forward)
+    names = dict.fromkeys(weighing.names)
+    return {n: max(matters, float(shows[[m == n for m in weighing.names]].min())) for n in names}

@@ -89,14 +89,13 @@ def _support(recording: Recording, model: Model) -> dict[str, float]:
 
 def _limits(recording: Recording, model: Model) -> dict[str, float]:
     """{effect: N} of what the diagnosis searches for."""
-    from diagnose.search.deciding import AttributionOptions
+    from diagnose.forward.prediction import build_forward
+    from diagnose.forward.touches import touches_of
+    from diagnose.options import AttributionOptions, NuisanceOptions
     from diagnose.search.detectable import detectable
-    from diagnose.search.forward import build_forward
-    from diagnose.search.judging import Search
-    from diagnose.search.misfit import misfit_of
+    from diagnose.search.evidence import Search
     from diagnose.search.shape import site_stiffness_sd
-    from diagnose.search.touches import touches_of
-    from diagnose.search.whiten import NuisanceOptions
+    from diagnose.search.starts import misfit_of
     from mechanics.effects.base import Role
     from mechanics.effects.registry import effects
     from reconstruct.placing import presses_on

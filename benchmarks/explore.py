@@ -20,12 +20,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks._explore_phantoms import Sealed, robot_of, sealed, strengthened
+from benchmarks._orders import ORDERS
 from benchmarks._rates import wilson
 from benchmarks.timing import table
 from diagnose.explore.causes import NONE
 from diagnose.explore.explorer import Explorer, State
 from diagnose.explore.goals import GoalOptions
-from diagnose.explore.orders import ORDERS
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file, cache_folder
 from mechanics.nearest import distance, sample
@@ -137,7 +137,7 @@ def _step(explorer: Explorer, state: State, it: Sealed, robot: Any, update_s: fl
         "presses": state.presses,
         "seconds": state.seconds,
         "update_s": update_s,
-        "met": [s.name for s in state.standing if s.met],
+        "met": [s.name for s in state.goals if s.met],
         "trouble": state.trouble,
     }
     surface = explorer.estimate.surface
@@ -150,7 +150,7 @@ def _step(explorer: Explorer, state: State, it: Sealed, robot: Any, update_s: fl
         step["covered"] = bool(low <= it.young_modulus_pa <= high)
         step["surface_m"] = _off(surface, robot) if {"surface"} <= set(step["met"]) else None
     if state.causes is not None:
-        step["standing"] = state.causes.standing(state.cause_at)
+        step["standing"] = state.causes.not_ruled_out(state.cause_at)
         step["ratio"] = {k: v for k, v in state.causes.ratio.items() if v > 1e-4}
         step["misfit"] = state.causes.misfit
     return step

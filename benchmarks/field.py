@@ -23,16 +23,8 @@ from scipy.interpolate import RBFInterpolator
 
 from benchmarks._tissue import Tissue, tissue
 from benchmarks.timing import table
-from diagnose.compare.comparison import (
-    HOMOGENEOUS,
-    RIVALS,
-    CompareOptions,
-    Comparison,
-    Prepared,
-    as_touched,
-    compare_presses,
-    prepare,
-)
+from diagnose.compare.comparison import CompareOptions, Comparison, compare_presses
+from diagnose.compare.models import HOMOGENEOUS, RIVALS, Prepared, as_touched, prepare
 from palpate.arguments import progress_bar
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field, map_sd, with_field
 

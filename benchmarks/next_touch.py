@@ -24,7 +24,8 @@ from benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from benchmarks._diagnosis_scores import answer_of
 from benchmarks._rates import wilson
 from benchmarks.timing import table
-from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.options import DiagnoseOptions
+from diagnose.pipeline import diagnose
 from diagnose.verdict.result import Diagnosis, NextTouch
 from mechanics.errors import PalpateError
 from mechanics.model_files import read_model

@@ -3,46 +3,30 @@
 from __future__ import annotations
 
 import dataclasses
-from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.instrument.freeair import free_air_of
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import REACH_M, reached, touches_of, unobservable_effects
+from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets, read_sideways, ruled_out, with_move
 from diagnose.instrument.retraced import move_of
 from diagnose.instrument.rigid import rigid_of
+from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from diagnose.search.attribution import attribute
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.first_touch import REACH_M, reached
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.misfit import misfit_of
+from diagnose.search.evidence import Search
 from diagnose.search.shape import site_stiffness_sd
-from diagnose.search.touches import LEAST_SITES, touches_of
-from diagnose.search.whiten import NuisanceOptions
-from diagnose.verdict.answer import Evidence
+from diagnose.search.starts import misfit_of
+from diagnose.verdict.answer import Findings
 from diagnose.verdict.conclusion import conclude
 from diagnose.verdict.result import Diagnosis
-from mechanics.effects.base import Role, Scope
+from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
 from mechanics.model import Model
-from mechanics.options import option
 from mechanics.presses import Presses
 from mechanics.progress import Clock, Progress, silent
 from mechanics.recording import Recording
 from reconstruct.placing import presses_on
-
-
-@dataclass(frozen=True)
-class DiagnoseOptions:
-    """What a diagnosis may be told."""
-
-    fast: bool = option(
-        False, "half a minute instead of three: fewer effects, one in an answer, less sampling"
-    )
-    without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
-    bootstrap: int = option(400, "resamplings of sites for intervals")
-    seed: int = option(0, "seed of flips and resamplings")
 
 
 def diagnose(
@@ -60,6 +44,7 @@ def diagnose(
     nuisance = nuisance or NuisanceOptions()
     rules = attribution or AttributionOptions(most=1 if options.fast else 3)
     clock = Clock()
+
     progress("touches", 0.02)
     presses = presses_on(recording, model)
     model = with_tip_of(model, presses)
@@ -67,19 +52,20 @@ def diagnose(
     own = model.fitted_to(presses)
     met = reached(presses) if own else np.ones(len(presses), dtype=bool)
     touches = touches_of(presses.of(met))
-    free = free_air_of(recording, presses)
     clock.lap("touches")
     progress("sites", 0.05)
     forward = build_forward(touches, model)
     clock.lap("sites")
-    untold = untold_effects(presses)
-    excluded = {n.strip() for n in options.without.split(",") if n.strip()} | untold
-    allowed = effects(without=excluded)
+
+    unobservable = unobservable_effects(presses)
+    excluded = {n.strip() for n in options.without.split(",") if n.strip()} | unobservable
+    free = free_air_of(recording, presses)
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, excluded, rules)
     centre = touches.point.mean(axis=0)
     move = move_of(recording, presses, model.support.normal, centre) if own else None
     offsets = with_move(offsets, forward, move, excluded, rules)
+
     settled = {*offsets.names, *ruled_out(forward, rigid, move, rules)}
     site_sd = site_stiffness_sd(touches, model, nuisance)
     if touches.sites != presses.of(met).sites:
@@ -91,7 +77,8 @@ def diagnose(
     )  # fmt: skip
     left_out = {e.name for e in effects() if e.hints.expensive and options.fast}
     hidden = {e.name for e in effects() if e.hints.by_first_touches and own}
-    tried = [e for e in allowed if e.role is Role.SEARCHED and e.name not in (left_out | settled | hidden)]
+    able = [e for e in effects(without=excluded) if e.role is Role.SEARCHED]
+    tried = [e for e in able if e.name not in (left_out | settled | hidden)]
     progress("baseline", 0.12)
     base = search.judge([search.finite_strain])
     misfit = misfit_of(forward, base.found, site_sd)
@@ -105,16 +92,17 @@ def diagnose(
         offsets = dataclasses.replace(offsets, reasons=(*offsets.reasons, lost))
     found = attribute(search, tried, seen=seen, progress=lambda s, x: progress(s, 0.15 + 0.7 * x))
     clock.lap("effects")
-    evidence = Evidence(
+
+    findings = Findings(
         forward, search, found, free, offsets, site_sd, frozenset(excluded),
         options.bootstrap, options.seed, refit=not options.fast,
     )  # fmt: skip
-    result = conclude(evidence, clock.lap)
+    result = conclude(findings, clock.lap)
     progress("done", 1.0)
     return dataclasses.replace(
         result,
         seconds={name: round(s, 2) for name, s in clock.laps.items()},
-        left_out=tuple(sorted(left_out | untold | hidden - settled)),
+        left_out=tuple(sorted(left_out | unobservable | hidden - settled)),
     )
 
 
@@ -124,18 +112,3 @@ def with_tip_of(model: Model, presses: Presses) -> Model:
         return model
     tool = dataclasses.replace(model.tool, tip_radius_m=presses.tip_radius_m)
     return model.replaced(tool=tool)
-
-
-def untold_effects(presses: Presses) -> set[str]:
-    """Names of the effects that presses of this kind say nothing of: points have no time, one axis has
-    nothing sideways, one place has no other place, and what never leaves the object has no free air."""
-    told_nothing: set[Scope] = set()
-    if presses.quasi_static:
-        told_nothing |= {Scope.TIME, Scope.READING}
-    if presses.sites < LEAST_SITES:
-        told_nothing |= {Scope.PLACES}
-    names = {e.name for e in effects() if e.scope in told_nothing}
-    if not presses.local_force[:, 1:].any():
-        # a machine of one axis: nothing sideways, and no axis beside another
-        names |= {e.name for e in effects() if e.hints.slips or e.hints.common_factor > 0}
-    return names - {e.name for e in effects() if e.role is Role.KNOWN}

@@ -46,6 +46,13 @@ class TouchSites:
     def __len__(self) -> int:
         return len(self.points)
 
+    def of(self, rows: slice | np.ndarray) -> TouchSites:
+        """Some of the sites, in order."""
+        return TouchSites(
+            self.points[rows], self.normals[rows], self.curvature[rows], self.far[rows], self.patch_width_m,
+            self.poisson_ratio,
+        )  # fmt: skip
+
     def __post_init__(self) -> None:
         for name in ("points", "normals", "curvature", "far"):
             array = np.array(

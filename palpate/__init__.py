@@ -14,8 +14,8 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from diagnose.explore.explorer import Explorer as Explorer
-    from diagnose.explore.rows import Instrument as Instrument
-    from diagnose.explore.rows import Segment as Segment
+    from diagnose.explore.segments import Instrument as Instrument
+    from diagnose.explore.segments import Segment as Segment
     from mechanics.errors import CacheError as CacheError
     from mechanics.errors import ContactError as ContactError
     from mechanics.errors import DeviceError as DeviceError
@@ -73,7 +73,7 @@ _DOOR = {
         "press compare changes diagnose calibrate simulate export batch"
     ),
     "diagnose.explore.explorer": "Explorer",
-    "diagnose.explore.rows": "Instrument Segment",
+    "diagnose.explore.segments": "Instrument Segment",
     "palpate.keywords": "options",
     "palpate.results.recording": "Recording",
     "palpate.results.imported": "Imported",

@@ -102,7 +102,8 @@ def run_demo(
         servo = run_headless(model, options.renderer, seconds=options.seconds, seed=seed, progress=progress)
     diagnosis = None
     if options.diagnosis:
-        from diagnose.pipeline import DiagnoseOptions, diagnose
+        from diagnose.options import DiagnoseOptions
+        from diagnose.pipeline import diagnose
 
         with stage("diagnose") as progress:
             diagnosis = diagnose(recording, model, DiagnoseOptions(fast=True, seed=seed), progress)

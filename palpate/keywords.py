@@ -36,9 +36,9 @@ _KINDS: dict[str, tuple[str, ...]] = {
     "press": (*_RENDER, "render.support:SupportOptions"),
     "compare": ("diagnose.compare.comparison:CompareOptions",),
     "diagnose": (
-        "diagnose.pipeline:DiagnoseOptions",
-        "diagnose.search.deciding:AttributionOptions",
-        "diagnose.search.whiten:NuisanceOptions",
+        "diagnose.options:DiagnoseOptions",
+        "diagnose.options:AttributionOptions",
+        "diagnose.options:NuisanceOptions",
     ),
     "changes": ("reconstruct.geometry.stated:GeometryOptions",),
     "calibrate": ("reconstruct.geometry.stated:GeometryOptions",),

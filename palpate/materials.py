@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from diagnose.search.touches import touches_of
+from diagnose.forward.touches import touches_of
 from diagnose.specimen.bench import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
 from diagnose.specimen.rivals import held_out_rivals
 from mechanics.effects.finite_strain import EFFECT as FINITE

@@ -469,7 +469,7 @@ ROBOT = {
 @pytest.mark.parametrize("name", ROBOT)
 def test_a_robots_hostile_line_is_answered_in_one_and_nothing_of_it_kept(name):
     from diagnose.explore.explorer import Explorer
-    from diagnose.explore.rows import Instrument
+    from diagnose.explore.segments import Instrument
     from palpate.robot.protocol import serve
 
     line, words = ROBOT[name]

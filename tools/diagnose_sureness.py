@@ -18,7 +18,7 @@ from scipy.special import expit
 from benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from benchmarks.timing import table
 from diagnose.search.naming import WEIGHTS
-from diagnose.verdict.sureness import FILE, UNNAMED, standing
+from diagnose.verdict.corrections import SURENESS_FILE, UNNAMED, how_named
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
 
@@ -27,7 +27,7 @@ SUMMARY = "how often names and candidates are true, from judged cases of known t
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
-    add_opened_arguments(parser, FILE)
+    add_opened_arguments(parser, SURENESS_FILE)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -58,7 +58,7 @@ def stood(opened: dict[str, Any]) -> list[tuple[str, str, bool, float]]:
         there = name in case["effects"]
         if not there and name in case["beside"]:
             continue
-        how = standing(name, verdict["effects"], verdict["candidates"], verdict["kind"])
+        how = how_named(name, verdict["effects"], verdict["candidates"], verdict["kind"])
         weight = 1.0
         if how == UNNAMED and name in verdict.get("scores", {}):
             # a law without a number has none of its score

@@ -17,7 +17,7 @@ import numpy as np
 
 from benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from benchmarks.timing import table
-from diagnose.verdict.widening import FILE
+from diagnose.verdict.corrections import WIDENING_FILE
 from mechanics.errors import OptionError
 
 SUMMARY = "factors by which parameters' intervals are widened, from judged cases of known truth"
@@ -29,7 +29,7 @@ LEAST = 39
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""
-    add_opened_arguments(parser, FILE)
+    add_opened_arguments(parser, WIDENING_FILE)
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:

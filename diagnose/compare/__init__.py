@@ -1,1 +1,2 @@
-"""Comparisons: FEM against interpolated 1D models on presses left out, and two recordings of one object."""
+"""Comparisons: FEM against interpolated 1D models on presses left out (`comparison`, `models`, `regions`),
+and two recordings of one object (`before_after`)."""

@@ -120,13 +120,13 @@ def changes(before: Side, after: Side) -> Changes:
     """Weigh two sides against one another."""
     log = float(np.log(after.modulus_pa / before.modulus_pa))
     sd = float(np.hypot(before.log_sd, after.log_sd))
-    between = (float(np.exp(log - _95 * sd)), float(np.exp(log + _95 * sd)))
+    between = _ratio95(log, sd)
     spread = float(np.hypot(before.modulus_pa * before.log_sd, after.modulus_pa * after.log_sd))
     gap = after.modulus_pa - before.modulus_pa
     beside, reasons = None, []
     if before.diagnosis is not None and after.diagnosis is not None:
         left = float(np.log(after.beside_effects_pa / before.beside_effects_pa))
-        beside = float(np.exp(left)), (float(np.exp(left - _95 * sd)), float(np.exp(left + _95 * sd)))
+        beside = float(np.exp(left)), _ratio95(left, sd)
     own = [n for n in (*before.named, *after.named) if (n in before.named) != (n in after.named)]
     shifted = _shifted(before, after)
     causes = [*dict.fromkeys([*own, *shifted])]
@@ -153,6 +153,11 @@ def changes(before: Side, after: Side) -> Changes:
         before, after, float(np.exp(log)), between, gap, (gap - _95 * spread, gap + _95 * spread), beside,
         _places(before, after), tuple(explained), shifted, tuple(reasons),
     )  # fmt: skip
+
+
+def _ratio95(log: float, sd: float) -> tuple[float, float]:
+    """95 % interval of a ratio from its logarithm and its standard deviation."""
+    return float(np.exp(log - _95 * sd)), float(np.exp(log + _95 * sd))
 
 
 def _shifted(before: Side, after: Side) -> dict[str, dict[str, Any]]:
@@ -184,7 +189,7 @@ def _places(before: Side, after: Side) -> tuple[Place, ...]:
     logs = np.array([two[1][k] - one[1][i] for i, k in pairs])
     sds = np.array([np.hypot(two[2][k], one[2][i]) for i, k in pairs])
     return tuple(
-        Place(one[0][i], float(np.exp(x)), (float(np.exp(x - _95 * s)), float(np.exp(x + _95 * s))))
+        Place(one[0][i], float(np.exp(x)), _ratio95(x, s))
         for (i, _), x, s in zip(pairs, logs, sds, strict=True)
     )
 

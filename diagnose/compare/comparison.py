@@ -1,61 +1,32 @@
 """FEM against the interpolated 1D models on presses that none of them has seen: folds over sites, whole
 regions.
 
-Every model is fitted to the same training presses and predicts the same held-out paths, measured from the
-same first touches, at the same places with the same normals; of the model only the geometry is used.
-
-- fem: the finite-element model with what the training presses ask for: Young's modulus (least squares; the
-  force of a path is proportional to it), the dent law, linear or neo-Hookean, that fits them best, and a
-  smooth field of the modulus where they ask for one (reconstruct.steps.s7_modulus.modulus_field).
-- fem-homogeneous: the same with one modulus whatever they ask for.
-- kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
-  interpolated to the held-out place by radial basis functions (render.one_d), force along the normal.
+Every model (diagnose.compare.models) is fitted to the same training presses and predicts the same held-out
+paths, measured from the same first touches, at the same places with the same normals; of the model only the
+geometry is used.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
-from functools import partial
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from diagnose.compare.models import MODELS, RIVALS, Fem, Prepared, predicted, prepare, rms
 from diagnose.compare.regions import Region, regions
 from mechanics.errors import ContactError
 from mechanics.model import Model
 from mechanics.options import option
-from mechanics.places import Places
-from mechanics.press_making import of_paths
-from mechanics.press_sites import sites_of
-from mechanics.presses import MARGIN_S, Presses
+from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
-from mechanics.sites import TouchSites, touch_sites
 from mechanics.smooth_field import SmoothField
-from mechanics.touch import forces_at
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.placing import presses_on
-from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
-from reconstruct.steps.s7_modulus.modulus_field import (
-    LAW_ERROR,
-    FieldSites,
-    PressModuli,
-    asked_for,
-    fit_field,
-    places_at,
-    press_moduli,
-    with_field,
-)
-from render.one_d import Law, spread_law
 
-RIVALS = ("kelvin-voigt", "hunt-crossley")
-HOMOGENEOUS = "fem-homogeneous"
-MODELS = ("fem", *RIVALS, HOMOGENEOUS)
-LAWS = ("linear", "neo-hookean")
-MOST_MOVED, MOVES = 2.5, 21
-"""Standard errors by which a held-out first touch may be moved, and places that are tried."""
-LASTING = 10
-"""Rows of a press that a lasting error of a law binds together."""
+Predict = Callable[[np.ndarray, np.ndarray], tuple[dict[str, np.ndarray], Fem]]
+"""(training presses, held-out presses) to each model's forces (rows of the held-out, 3), N, and the FEM."""
 
 
 @dataclass(frozen=True)
@@ -77,23 +48,6 @@ class CompareOptions:
         "of held-out presses: as read, or moved by what its stated error allows, for every model alike",
         choices=("read", "moved"),
     )
-
-
-@dataclass(frozen=True)
-class Prepared:
-    """The contact samples of the presses, net of free air, and what each model needs of them.
-
-    unit: dent law -> (n, 3) m^2, force for unit modulus, the object of one modulus. laws: 1D name -> Law of
-    each press's own fit. sites, places: where the presses are. own: dent law -> each press's own modulus;
-    none: fields are not asked about.
-    """
-
-    presses: Presses
-    unit: dict[str, np.ndarray]
-    laws: dict[str, Law]
-    sites: TouchSites
-    places: Places
-    own: dict[str, PressModuli]
 
 
 @dataclass(frozen=True)
@@ -169,56 +123,74 @@ def compare_presses(
         table, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f), field=options.field
     )
     presses = prepared.presses
-    sites = np.unique(presses.site)
-    folds = min(options.folds, len(sites))
-    if folds < 2:
-        raise ContactError(
-            f"{len(sites)} site was palpated: a comparison holds some out and needs 2 at least"
-        )
-    fold_of_site = np.random.default_rng(seed).permutation(np.arange(len(sites)) % folds)
-    fold = fold_of_site[np.searchsorted(sites, presses.site)]
-    predicted = {name: np.zeros_like(presses.force) for name in MODELS}
-    fitted: list[Fem] = []
-    for k in range(folds):
-        progress("folds", 0.8 + 0.1 * k / folds)
-        held = np.flatnonzero(fold == k)
-        rows = presses.rows(held)
-        forces, fem = _predict(prepared, np.flatnonzero(fold != k), held, options)
-        fitted.append(fem)
-        for name in MODELS:
-            predicted[name][rows] = forces[name]
-    found = []
-    for region in regions(model, presses.point, presses.normal):
-        progress(region.name, 0.95)
-        held = np.flatnonzero(region.members)
-        forces, _ = _predict(prepared, np.flatnonzero(~region.members), held, options)
-        measured = presses.force[presses.rows(held)]
-        found.append(
-            RegionResult(
-                region,
-                {m: _rms(f - measured) for m, f in forces.items()},
-                {m: _rms(f - measured) / _rms(measured) for m, f in forces.items()},
-                {m: float((f * measured).sum() / (measured**2).sum() - 1) for m, f in forces.items()},
-            )
-        )
-    error = {m: predicted[m] - presses.force for m in MODELS}
+
+    def predict(train: np.ndarray, test: np.ndarray) -> tuple[dict[str, np.ndarray], Fem]:
+        return predicted(prepared, train, test, options.interpolation, options.first_touch)
+
+    fold = _folds(presses.site, options.folds, seed)
+    forces, fitted = _by_fold(presses, fold, predict, progress)
+    held_out = tuple(_by_region(presses, model, predict, progress))
+    error = {m: forces[m] - presses.force for m in MODELS}
     each = {
-        m: np.array([_rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))])
-        for m in MODELS
+        m: np.array([rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))]) for m in MODELS
     }
     return Comparison(
         prepared=prepared,
         model=model,
-        rmse_n={m: _rms(error[m]) for m in MODELS},
-        relative_rmse={m: _rms(error[m]) / _rms(presses.force) for m in MODELS},
+        rmse_n={m: rms(error[m]) for m in MODELS},
+        relative_rmse={m: rms(error[m]) / rms(presses.force) for m in MODELS},
         press_rmse_n=each,
         fold=fold,
         moduli_pa=np.array([fem.modulus_pa for fem in fitted]),
         fields=tuple(fem.field for fem in fitted),
         noise_n=presses.noise.raw_n * np.sqrt(3.0),
-        predicted=predicted,
-        regions=tuple(found),
+        predicted=forces,
+        regions=held_out,
     )
+
+
+def _folds(site: np.ndarray, most: int, seed: int) -> np.ndarray:
+    """(p,) the fold of each press; presses of one site are held out together."""
+    sites = np.unique(site)
+    folds = min(most, len(sites))
+    if folds < 2:
+        raise ContactError(
+            f"{len(sites)} site was palpated: a comparison holds some out and needs 2 at least"
+        )
+    fold_of_site = np.random.default_rng(seed).permutation(np.arange(len(sites)) % folds)
+    return fold_of_site[np.searchsorted(sites, site)]
+
+
+def _by_fold(
+    presses: Presses, fold: np.ndarray, predict: Predict, progress: Progress
+) -> tuple[dict[str, np.ndarray], list[Fem]]:
+    """({model: (n, 3) N, every press predicted when its fold was held out}, the FEM of each fold)."""
+    forces = {name: np.zeros_like(presses.force) for name in MODELS}
+    fitted = []
+    folds = int(fold.max()) + 1
+    for k in range(folds):
+        progress("folds", 0.8 + 0.1 * k / folds)
+        held = np.flatnonzero(fold == k)
+        found, fem = predict(np.flatnonzero(fold != k), held)
+        fitted.append(fem)
+        for name in MODELS:
+            forces[name][presses.rows(held)] = found[name]
+    return forces, fitted
+
+
+def _by_region(presses: Presses, model: Model, predict: Predict, progress: Progress) -> list[RegionResult]:
+    """Each region held out as a whole."""
+    made = []
+    for region in regions(model, presses.point, presses.normal):
+        progress(region.name, 0.95)
+        held = np.flatnonzero(region.members)
+        forces, _ = predict(np.flatnonzero(~region.members), held)
+        measured = presses.force[presses.rows(held)]
+        error = {m: rms(f - measured) for m, f in forces.items()}
+        relative = {m: e / rms(measured) for m, e in error.items()}
+        bias = {m: float((f * measured).sum() / (measured**2).sum() - 1) for m, f in forces.items()}
+        made.append(RegionResult(region, error, relative, bias))
+    return made
 
 
 def verdict(result: Comparison) -> str:
@@ -240,196 +212,3 @@ def verdict(result: Comparison) -> str:
     elif not any(wins.values()):
         words += "; a 1D model wins nowhere here"
     return words
-
-
-def of_one_modulus(model: Model) -> Model:
-    """Its geometry, base and Poisson's ratio: what varies in it is refitted."""
-    return model.with_material(field=None, gradient=None, skin=None, inclusions={})
-
-
-def prepare(
-    table: Presses,
-    model: Model,
-    site_m: float | None = None,
-    progress: Progress = silent,
-    *,
-    field: str = "auto",
-) -> Prepared:
-    """Contact samples and what each model needs; the touch sites are solved here. site_m: None keeps the
-    table's sites. field: as in CompareOptions."""
-    model = of_one_modulus(model)
-    if site_m is not None:
-        table = replace(table, site=sites_of(table.point, table.normal, site_m))
-    solved = touch_sites(
-        model.mesh, table.point, table.normal, model.material.poisson_ratio, progress=progress
-    )
-    smooth = low_passed(table)
-    presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
-    unit = {
-        law: forces_at(
-            solved,
-            presses.displacement,
-            presses.starts,
-            young_modulus_pa=1.0,
-            tip_radius_m=presses.tip_radius_m,
-            law=law,
-        )
-        for law in LAWS
-    }
-    fitted = columns(fit_robust(smooth.window(0.0, 0.0), table.noise.raw_n), np.zeros(len(table)))
-    one, none = np.ones(len(table)), np.zeros(len(table))
-    places, own = places_at(model, table, solved), {}
-    if field != "homogeneous":
-        own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
-    return Prepared(
-        presses,
-        unit,
-        {
-            "kelvin-voigt": Law(fitted["k_kv"], fitted["b_kv"], one, none),
-            "hunt-crossley": Law(fitted["k_hc"], fitted["b_hc"], fitted["r_hc"], fitted["r_hc"]),
-        },
-        solved,
-        places,
-        own,
-    )
-
-
-@dataclass(frozen=True)
-class Fem:
-    """The finite-element model of some presses: dent law, modulus Pa, touch sites, and the field in them;
-    None: of one modulus."""
-
-    law: str
-    modulus_pa: float
-    sites: FieldSites
-    field: SmoothField | None = None
-
-    def forces(self, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
-        """(n, 3) N of every path. moved_m: (p,) by how much earlier each press meets the surface."""
-        return self.modulus_pa * self.sites.unit_forces(presses, self.law, moved_m)
-
-
-def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
-    """Of one modulus, and the dent law that fits the presses `train` best."""
-    seen = prepared.presses.rows(train)
-    measured = prepared.presses.force[seen]
-    fits = []
-    for law, unit in prepared.unit.items():
-        modulus = _scale(unit[seen], measured)
-        fits.append((_rms(modulus * unit[seen] - measured), modulus, law))
-    _, modulus, law = min(fits)
-    return Fem(law, modulus, with_field(prepared.sites, prepared.places, None))
-
-
-def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
-    """With a field where the presses `train` ask for one."""
-    plain = _homogeneous(prepared, train)
-    if not prepared.own:
-        return plain
-    law = min(prepared.own, key=lambda name: prepared.own[name].fit.cost[train].sum())
-    found = fit_field(prepared.own[law], train)
-    if found is None or not asked_for(found):
-        return plain
-    fem = Fem(law, 1.0, with_field(prepared.sites, prepared.places, found.field), found.field)
-    presses = prepared.presses
-    seen = presses.rows(train)
-    # first touches of what is fitted are where that fit has them
-    shift = np.zeros(len(presses))
-    shift[train] = -prepared.own[law].fit.onset_shift_m[train]
-    return replace(fem, modulus_pa=_scale(fem.forces(presses, shift)[seen], presses.force[seen]))
-
-
-def _predict(
-    prepared: Prepared, train: np.ndarray, test: np.ndarray, options: CompareOptions
-) -> tuple[dict[str, np.ndarray], Fem]:
-    """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM."""
-    presses = prepared.presses.of(np.isin(np.arange(len(prepared.presses)), test))
-    plain, fem = _homogeneous(prepared, train), _fem(prepared, train)
-    models: dict[str, Callable[[np.ndarray], np.ndarray]] = {
-        "fem": lambda moved: _of(fem, test).forces(presses, moved),
-        HOMOGENEOUS: lambda moved: _of(plain, test).forces(presses, moved),
-    }
-    whole = prepared.presses
-    for name, fitted in prepared.laws.items():
-        own = Law(*(column[train] for column in fitted))
-        at = spread_law(whole.point[train], whole.site[train], own, whole.point[test], options.interpolation)
-        models[name] = partial(_one_d, presses, at)
-    return {name: as_touched(models[name], presses, options.first_touch) for name in MODELS}, fem
-
-
-def _of(fem: Fem, test: np.ndarray) -> Fem:
-    s = fem.sites.sites
-    some = TouchSites(
-        s.points[test], s.normals[test], s.curvature[test], s.far[test], s.patch_width_m, s.poisson_ratio
-    )
-    return replace(fem, sites=FieldSites(some, fem.sites.ratio[test]))
-
-
-def _one_d(presses: Presses, law: Law, moved_m: np.ndarray) -> np.ndarray:
-    """(n, 3) N of a 1D law's parameters (p,) of each press."""
-    k, b, r, s = (column[presses.press] for column in law)
-    u = np.maximum(presses.depth + moved_m[presses.press], 0.0)
-    inside = u > 0
-    safe = np.where(inside, u, 1.0)
-    push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate, 0.0), 0.0)
-    return push[:, None] * presses.normal[presses.press]
-
-
-def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, first_touch: str) -> np.ndarray:
-    """(n, 3) N along the paths as read, or with each first touch where the force then meets what was measured
-    best, at the price of its stated error."""
-    stated = presses.onset_error_m
-    found = force(np.zeros(len(presses)))
-    if first_touch == "read" or not (stated > 0).any():
-        return found
-    variance = presses.noise.raw_n**2 + LAW_ERROR**2 * (presses.force**2).sum(axis=1) / 3
-    least = np.full(len(presses), np.inf)
-    for z in np.linspace(-MOST_MOVED, MOST_MOVED, MOVES):
-        tried = force(z * stated)
-        missed = ((tried - presses.force) ** 2).sum(axis=1) / variance / LASTING
-        cost = np.bincount(presses.press, weights=missed, minlength=len(presses)) + z**2
-        better = cost < least
-        found = np.where(better[presses.press][:, None], tried, found)
-        least = np.minimum(cost, least)
-    return found
-
-
-def _scale(unit: np.ndarray, measured: np.ndarray) -> float:
-    return float((unit * measured).sum() / (unit**2).sum())
-
-
-def _rms(forces: np.ndarray) -> float:
-    return float(np.sqrt((forces**2).sum(axis=1).mean()))
-
-
-def stiffness_along(
-    prepared: Prepared,
-    train: np.ndarray,
-    places: np.ndarray,
-    normals: np.ndarray,
-    model: Model,
-    depth_m: float,
-) -> dict[str, np.ndarray]:
-    """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
-    model = of_one_modulus(model)
-    solved = touch_sites(model.mesh, places, normals, model.material.poisson_ratio)
-    steps = np.linspace(0.0, depth_m, 60)
-    path = (-steps[None, :, None] * solved.normals[:, None, :]).reshape(-1, 3)
-    starts = np.arange(len(places) + 1) * len(steps)
-    centres = places + model.tool.tip_radius_m * solved.normals
-    pressed = of_paths(
-        starts, np.repeat(centres, len(steps), axis=0) + path, np.zeros_like(path), centres, solved.normals,
-        tip_radius_m=model.tool.tip_radius_m, sample_rate_hz=prepared.presses.sample_rate_hz,
-    )  # fmt: skip
-    result = {}
-    for name, fem in (("fem", _fem(prepared, train)), (HOMOGENEOUS, _homogeneous(prepared, train))):
-        there = places_at(model, pressed, solved)
-        force = replace(fem, sites=with_field(solved, there, fem.field)).forces(pressed)
-        deepest = force.reshape(len(places), len(steps), 3)[:, -1]
-        result[name] = (deepest * solved.normals).sum(axis=1)
-    presses = prepared.presses
-    for name, fitted in prepared.laws.items():
-        own = Law(*(c[train] for c in fitted))
-        at = spread_law(presses.point[train], presses.site[train], own, places)
-        result[name] = at.k * depth_m**at.r
-    return result

@@ -1,1 +1,3 @@
-"""Guided exploration: what is known so far, which touch to make next, when to stop."""
+"""Guided exploration: what was felt (`segments`), what is known of shape and modulus (`estimate`), of causes
+(`forms`, `weighing`, `causes`), how far each goal is (`state`), and what to touch next (`candidates`,
+`separating`, `suggestion`); `explorer` runs it."""

@@ -1,10 +1,10 @@
-"""Where the tip can go next, and what each touch is expected to tell for each second it takes.
+"""Where the tip can go next, and which touch makes the most progress a second.
 
 Two uncertainties are predicted forward: the surface's standard deviation (a touch takes away what it shares
 with its surroundings, by the correlation length of shape errors), and the modulus's (presses are replicates
-with a part that neighbours share and a part of their own). The worth of a touch is how much it brings the
-goals that are still missed nearer, in logarithms, a second. A shallow press tells little of the modulus: an
-error of first touch is a greater share of its depth.
+with a part that neighbours share and a part of their own). The worth of a touch is its progress a second, in
+logarithms, towards all goals that are still missed. A shallow press shows little of the modulus: an error of
+first touch is a greater share of its depth.
 """
 
 from __future__ import annotations
@@ -14,8 +14,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.goals import Standing, surface_error, vertex_areas
-from diagnose.explore.parting import Parting
+from diagnose.explore.goals import GoalState, off_support, surface_error
+from diagnose.explore.separating import Separation
+from mechanics.dent import dent_law
 from mechanics.gaussian import squared_exponential
 from mechanics.options import option
 from mechanics.tetmesh import vertex_normals
@@ -43,7 +44,7 @@ class ReachOptions:
         0.18, "nor deeper than this share of the material under the tip", low=0.01, high=0.9
     )
     strongest_n: float = option(
-        5.0, "nor with more force, as far as that can be told", unit="N", flag="--strongest", low=0.01
+        5.0, "nor with more force, as far as it is known", unit="N", flag="--strongest", low=0.01
     )
     press_speed_m_per_s: float = option(0.02, "speed of a press", unit="m/s")
     air_speed_m_per_s: float = option(0.12, "speed through the air", unit="m/s")
@@ -55,7 +56,7 @@ class ReachOptions:
 @dataclass(frozen=True)
 class Candidate:
     """A touch that could be made: surface point (3,), outward unit normal (3,), depth m, seconds it takes,
-    worth a second, and which goal gains most; how it is pressed, and what causes that would part."""
+    worth a second, and which goal gains most; how it is pressed, and which causes that would separate."""
 
     point: np.ndarray
     normal: np.ndarray
@@ -65,7 +66,7 @@ class Candidate:
     for_goal: str
     speed_m_per_s: float = 0.02
     hold_s: float = 0.2
-    parting: Parting | None = None
+    separation: Separation | None = None
 
 
 def places(surface: Surface, tip_radius_m: float) -> np.ndarray:
@@ -83,52 +84,54 @@ def places(surface: Surface, tip_radius_m: float) -> np.ndarray:
     return reachable[farthest_points(surface.vertices[reachable], SPACING_M)]
 
 
-def weighed(
-    surface: Surface,
-    standing: list[Standing],
-    touched: np.ndarray,
-    depths_m: np.ndarray,
-    here: np.ndarray,
-    modulus_sd: float,
-    modulus_bias: float,
-    modulus_pa: float,
-    tip_radius_m: float,
-    reach: ReachOptions,
-    partings: Sequence[Parting] = (),
-    asked: np.ndarray | None = None,
-) -> list[Candidate]:
-    """All touches, the best first. touched: (k, 3) m, places pressed so far, depths_m (k,); here: (3,) m,
-    where the tip is. asked: (a, 3) m, places that were suggested: where one was not reached, so as not to ask
-    in vain again, no place nearby counts as new.
+@dataclass(frozen=True)
+class Known:
+    """What the worth of a touch depends on.
 
-    modulus_sd: of its logarithm, of which modulus_bias no touch takes away. modulus_pa: nan where unknown.
-    partings: what each way of pressing would tell of causes, at the places pressed so far.
+    touched: (k, 3) m, places pressed so far, depths_m: (k,); here: (3,) m, where the tip is. asked: (a, 3) m,
+    places that were suggested: where one was not reached, no place nearby is suggested again. modulus_pa: nan
+    where unknown; modulus_sd: of its logarithm, of which modulus_bias no touch takes away.
     """
-    rows = _not_in_vain(surface.vertices, places(surface, tip_radius_m), touched, asked)
+
+    surface: Surface
+    goals: tuple[GoalState, ...]
+    touched: np.ndarray
+    depths_m: np.ndarray
+    here: np.ndarray
+    asked: np.ndarray
+    modulus_pa: float
+    modulus_sd: float
+    modulus_bias: float
+    poisson_ratio: float
+    tip_radius_m: float
+
+
+def ranked(known: Known, reach: ReachOptions, separations: Sequence[Separation] = ()) -> list[Candidate]:
+    """All touches, the best first. separations: what each way of pressing would show of causes, at the places
+    pressed so far."""
+    surface = known.surface
+    rows = _not_in_vain(surface.vertices, places(surface, known.tip_radius_m), known.touched, known.asked)
     normals = vertex_normals(surface.vertices, surface.triangles)
-    area = vertex_areas(surface.vertices, surface.triangles)
-    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
-    missing = {s.name: s for s in standing if s.missing > 0}
-    own = surface_error(surface.uncertainty_m[free], area[free])
+    free, area = off_support(surface)
+    missing = {s.name: s for s in known.goals if s.missing > 0}
+    own = surface_error(surface.uncertainty_m[free], area)
     made = []
     for row in rows:
         point, normal = surface.vertices[row], normals[row]
-        deepest = press_depth(surface, point, modulus_pa, tip_radius_m, reach)
-        gain = 0.0
+        gains = {"surface": 0.0}
         if "surface" in missing:
             after = after_touch(surface.vertices, surface.uncertainty_m, row)
-            gain = float(np.log(own / surface_error(after[free], area[free])))
-        for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), partings, reach):
-            gains = {"surface": gain}
+            gains["surface"] = float(np.log(own / surface_error(after[free], area)))
+        deepest = press_depth(known, point, reach)
+        for way in _ways(deepest, bool({"modulus", "cause"} & missing.keys()), separations, reach):
             if "modulus" in missing:
-                sd = modulus_after(touched, depths_m, point, way.depth_m, modulus_sd, modulus_bias)
-                gains["modulus"] = (
-                    missing["modulus"].missing - Standing("", 1.96 * sd, missing["modulus"].goal).missing
-                )
+                sd = modulus_after(known, point, way.depth_m)
+                left = GoalState("", 1.96 * sd, missing["modulus"].goal)
+                gains["modulus"] = missing["modulus"].missing - left.missing
             if "cause" in missing:
-                gains["cause"] = UNTOLD if way.parting is None else way.parting.near(point)
+                gains["cause"] = UNKNOWN_GAIN if way.separation is None else way.separation.near(point)
             seconds = (
-                float(np.linalg.norm(point - here)) / reach.air_speed_m_per_s
+                float(np.linalg.norm(point - known.here)) / reach.air_speed_m_per_s
                 + 2 * reach.clearance_m / reach.air_speed_m_per_s
                 + 2 * way.depth_m / way.speed_m_per_s
                 + way.hold_s
@@ -138,13 +141,13 @@ def weighed(
             made.append(
                 Candidate(
                     point, normal, way.depth_m, seconds, sum(gains.values()) / seconds, best,
-                    way.speed_m_per_s, way.hold_s, way.parting,
+                    way.speed_m_per_s, way.hold_s, way.separation,
                 )
             )  # fmt: skip
     return sorted(made, key=lambda c: -c.worth)
 
 
-UNTOLD = 1e-3
+UNKNOWN_GAIN = 1e-3
 """Log evidence of a press whose worth for the cause is not known: any is better than none."""
 
 
@@ -153,23 +156,20 @@ class _Way:
     depth_m: float
     speed_m_per_s: float
     hold_s: float
-    parting: Parting | None = None
+    separation: Separation | None = None
 
 
-def _ways(deepest: float, deep: bool, partings: Sequence[Parting], reach: ReachOptions) -> list[_Way]:
-    """How a place may be pressed: as usual, or by a plan that parts causes."""
+def _ways(deepest: float, deep: bool, separations: Sequence[Separation], reach: ReachOptions) -> list[_Way]:
+    """How a place may be pressed: as usual, or by a plan that separates causes."""
     usual = _Way(deepest if deep else min(deepest, LIGHT_M), reach.press_speed_m_per_s, reach.hold_s)
-    return [
-        usual,
-        *(_Way(min(p.depth_m, deepest), p.plan.speed, p.plan.hold, p) for p in partings),
-    ]
+    return [usual, *(_Way(min(p.depth_m, deepest), p.plan.speed, p.plan.hold, p) for p in separations)]
 
 
 def _not_in_vain(
-    vertices: np.ndarray, rows: np.ndarray, touched: np.ndarray, asked: np.ndarray | None
+    vertices: np.ndarray, rows: np.ndarray, touched: np.ndarray, asked: np.ndarray
 ) -> np.ndarray:
     """Those of `rows` that do not lie where a suggestion was made and nothing near it was touched."""
-    if asked is None or not len(asked) or not len(touched):
+    if not len(asked) or not len(touched):
         return rows
     away = np.linalg.norm(asked[:, None] - touched[None], axis=2).min(axis=1)
     vain = asked[away > SPACING_M]
@@ -184,18 +184,16 @@ def after_touch(vertices: np.ndarray, deviation_m: np.ndarray, row: int) -> np.n
     variance = np.asarray(deviation_m, dtype=float) ** 2
     squared = ((vertices - vertices[row]) ** 2).sum(axis=1)
     shared = squared_exponential(2 * squared, CORRELATION_M)  # the square of exp(-r^2 / (2 L^2))
-    told = variance[row] / (variance[row] + TOUCH_ERROR_M**2)
-    return np.sqrt(variance * (1 - shared * told))
+    resolved = variance[row] / (variance[row] + TOUCH_ERROR_M**2)
+    return np.sqrt(variance * (1 - shared * resolved))
 
 
-def modulus_after(
-    touched: np.ndarray, depths_m: np.ndarray, point: np.ndarray, depth_m: float, sd: float, bias: float
-) -> float:
-    """Standard deviation of log E with one more press, `depth_m` deep at `point`; `bias` is what presses do
-    not lessen."""
+def modulus_after(known: Known, point: np.ndarray, depth_m: float) -> float:
+    """Standard deviation of log E with one more press, `depth_m` deep at `point`."""
+    sd, bias = known.modulus_sd, known.modulus_bias
     rest = max(sd**2 - bias**2, 0.0)
-    after = _mean_variance(np.vstack([touched, point]), np.append(depths_m, depth_m))
-    return float(np.sqrt(bias**2 + rest * after / _mean_variance(touched, depths_m)))
+    after = _mean_variance(np.vstack([known.touched, point]), np.append(known.depths_m, depth_m))
+    return float(np.sqrt(bias**2 + rest * after / _mean_variance(known.touched, known.depths_m)))
 
 
 def _mean_variance(points: np.ndarray, depths_m: np.ndarray) -> float:
@@ -209,16 +207,18 @@ def _mean_variance(points: np.ndarray, depths_m: np.ndarray) -> float:
     return float(1 / np.linalg.solve(covariance, np.ones(len(points))).sum())
 
 
-def press_depth(
-    surface: Surface, point: np.ndarray, modulus_pa: float, tip_radius_m: float, reach: ReachOptions
-) -> float:
-    """m: as deep as is allowed there; the force is that of a half-space (Hertz)."""
+def press_depth(known: Known, point: np.ndarray, reach: ReachOptions) -> float:
+    """m: as deep as is allowed there; the force is that of a half-space of the object's Poisson's ratio
+    (Hertz)."""
+    surface = known.surface
     thick = float((point - surface.support_point) @ surface.support_normal)
     span = float(np.ptp(surface.vertices, axis=0).min())
     depth = min(reach.deepest_m, reach.deepest_share * max(min(thick, span), 0.005))
-    if np.isfinite(modulus_pa):
-        stiff = 4 / 3 * modulus_pa / (1 - 0.49**2) * np.sqrt(tip_radius_m)
-        depth = min(depth, (reach.strongest_n / stiff) ** (2 / 3))
+    if np.isfinite(known.modulus_pa):
+        hertz = dent_law("hertz").force(
+            np.array([depth]), known.modulus_pa, known.poisson_ratio, known.tip_radius_m
+        )
+        depth *= min(1.0, (reach.strongest_n / float(hertz[0])) ** (2 / 3))
     return float(depth)
 
 

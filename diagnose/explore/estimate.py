@@ -13,7 +13,7 @@ from functools import cached_property
 
 import numpy as np
 
-from diagnose.explore.goals import surface_error, vertex_areas
+from diagnose.explore.goals import off_support, surface_error
 from mechanics.nearest import distance
 from mechanics.presses import Presses
 from mechanics.progress import Clock
@@ -167,9 +167,8 @@ def _surface(
 
 def free_error(surface: Surface) -> float:
     """m, within which 95 % of the surface off the support lies, by its own word."""
-    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
-    area = vertex_areas(surface.vertices, surface.triangles)
-    return surface_error(surface.uncertainty_m[free], area[free])
+    free, area = off_support(surface)
+    return surface_error(surface.uncertainty_m[free], area)
 
 
 def _solved(surface: Surface, before: Estimate, poisson_ratio: float) -> Solved:
@@ -201,7 +200,7 @@ def solved_sites(
         )
         gradients = shape_gradients(solved.solver, made)
         for row, i in enumerate(new):
-            solved.far[keys[i]] = rows_of(made, slice(row, row + 1)), gradients[row]
+            solved.far[keys[i]] = made.of(slice(row, row + 1)), gradients[row]
     parts = [solved.far[key] for key in keys]
     sites = TouchSites(
         points=np.concatenate([p.points for p, _ in parts]),
@@ -212,11 +211,3 @@ def solved_sites(
         poisson_ratio=poisson_ratio,
     )
     return sites, np.array([gradient for _, gradient in parts])
-
-
-def rows_of(sites: TouchSites, rows: slice | np.ndarray) -> TouchSites:
-    """Some of the sites, in order."""
-    return TouchSites(
-        sites.points[rows], sites.normals[rows], sites.curvature[rows], sites.far[rows],
-        sites.patch_width_m, sites.poisson_ratio,
-    )  # fmt: skip

@@ -11,6 +11,7 @@ from scipy.special import erf
 from mechanics.errors import OptionError
 from mechanics.options import option
 from reconstruct.shapes.evidence import LEAST_TOUCHES
+from reconstruct.steps.s4_surface.surface import Surface
 
 
 @dataclass(frozen=True)
@@ -47,7 +48,7 @@ class GoalOptions:
 
 
 @dataclass(frozen=True)
-class Standing:
+class GoalState:
     """How far one goal has come. now, goal: in its own unit; inf where nothing is known yet."""
 
     name: str
@@ -76,8 +77,20 @@ def surface_error(deviation_m: np.ndarray, area: np.ndarray, share: float = 0.95
     return float(brentq(short, 0.0, 10 * float(deviation.max())))
 
 
+def off_support(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
+    """((n,) bool, the vertices of a surface that are off the support; (k,) m^2 of those)."""
+    free = (surface.vertices - surface.support_point) @ surface.support_normal > 1e-6
+    return free, vertex_areas(surface.vertices, surface.triangles)[free]
+
+
 def vertex_areas(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """(n,) m^2: a third of the triangles around each vertex."""
     corner = vertices[triangles]
     size = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1) / 2
     return np.bincount(triangles.ravel(), np.repeat(size / 3, 3), minlength=len(vertices))
+
+
+def check_goals(goals: GoalOptions) -> None:
+    """Raises OptionError where nothing is asked for."""
+    if goals.modulus_within is None and goals.surface_within_m is None and goals.cause_at is None:
+        raise OptionError("no goal is given: ask for --modulus-within, --surface-within or --cause-at")

@@ -14,10 +14,12 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.stats import norm
 
-from diagnose.explore.causes import NONE, Causes, Weighing
-from diagnose.explore.estimate import Estimate, modulus_of, rows_of
-from diagnose.search.fit import fit, settings_of
-from diagnose.search.forward import Forward
+from diagnose.explore.causes import NONE, Causes
+from diagnose.explore.estimate import Estimate, modulus_of
+from diagnose.explore.weighing import Weighing
+from diagnose.forward.prediction import Forward
+from diagnose.search.descent import fit
+from diagnose.search.fit import settings_of
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY
 from mechanics.presses import Presses
@@ -80,8 +82,8 @@ def _beside(estimate: Estimate, w: Weighing, causes: Causes, name: str, seed: in
     change = np.nan_to_num(w.forward.predict(settings) - w.forward.predict(w.forward.ideal(fitted.modulus)))
     kept, presses = without(e.presses_placed, w.forward, change)
     covariance = e.covariance[np.ix_(kept, kept)]
-    made = modulus_of(presses, rows_of(e.sites, kept), e.exploration.noise_n, covariance, seed)
-    over = w.forward.touches.noise.variance_inflation * max(1.0, causes.misfit)
+    made = modulus_of(presses, e.sites.of(kept), e.exploration.noise_n, covariance, seed)
+    over = w.inflation(causes.misfit)
     hessian = fitted.gram.sum(axis=0)[1:, 1:] + np.diag(fitted.prior)
     # what the cause's own parameters leave open of the modulus
     more = max(float(np.linalg.pinv(hessian)[0, 0]) - 1 / float(hessian[0, 0]), 0.0)

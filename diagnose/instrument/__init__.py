@@ -1,1 +1,2 @@
-"""The instrument's own share, told by free air, the rigid support, a second tracing, a known object."""
+"""The instrument's own share of the gap, before any press is looked at: what free air, the rigid support and
+a second tracing of the base show of it."""

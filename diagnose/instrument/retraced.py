@@ -21,11 +21,11 @@ from mechanics.recording import Recording
 GROUPS = 10
 """Stretches of either tracing that are left out in turn for standard errors."""
 AROUND_M = 0.01
-"""Of a place on the first tracing, within which its neighbours tell how the outline runs there."""
+"""Of a place on the first tracing, whose points say how the outline runs there."""
 LEAST_BLOCKS = 30
 ROUNDS = 30
 TURNED, OFF_M = 0.03, 0.5e-3
-"""rad, m: how far an object turns on its base, where that is round and tells nothing of it, against how far
+"""rad, m: how far an object turns on its base, where that is round and shows nothing of it, against how far
 the outline is off over a stretch."""
 STRETCH = 6
 """Blocks of a stretch: a hand leans in and out once or twice a second."""
@@ -49,7 +49,7 @@ class Move:
 
 
 def move_of(recording: Recording, presses: Presses, normal: np.ndarray, centre: np.ndarray) -> Move | None:
-    """Read the move off the two tracings; None where one of them is missing or too short to tell.
+    """Read the move off the two tracings; None where one of them is missing or too short.
 
     normal: (3,) of the support, outward. centre: (3,) m, what a turn is about.
     """

@@ -2,7 +2,7 @@
 
 While the base is traced (or something rigid is pressed) the tip's centre lies in a plane, a tip radius above
 the support. A spring between position sensor and tip puts the reading off that plane by the force over its
-stiffness, so a plane fitted to readings with the force as one more column tells the spring before any press
+stiffness, so a plane fitted to readings with the force as one more column shows the spring before any press
 is looked at. Segments of one kind share a plane's height; its tilt is the support's.
 
 Sideways the support answers with friction, against the motion, and the object's foot pushes across it: both
@@ -77,7 +77,7 @@ def rigid_of(recording: Recording, presses: Presses, normal: np.ndarray) -> Rigi
     """Read the instrument off its contact with the support; normal (3,): about the support's, outward.
 
     Each kind of contact has a plane of its own: the frame may have moved in between. None where the support
-    was touched for too short a time to tell.
+    was touched for too short a time.
     """
     rows = on_support(recording, presses, normal)
     if rows is None:

@@ -10,8 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.search.confidence_set import confidence_p
-from diagnose.search.judging import Candidate, Score, Search
+from diagnose.search.evidence import Search
+from diagnose.search.leave_one_out import Candidate
+from diagnose.search.naming import Score
+from diagnose.search.rivals import confidence_set_p, of_one_phenomenon, rivals_of
 from mechanics.effects.base import Effect, Scope
 from mechanics.progress import Progress, silent
 
@@ -23,8 +25,8 @@ class Attribution:
     base: what effects were added to (finite strain in it where the data prefer it). ideal: linear elasticity
     alone; deep: neo-Hookean alone. scores: of every single effect on the base. chosen: names, strongest
     first. rivals: names not told apart from a chosen one. final: the chosen set. steps, picked: what each
-    step looked like and what it took. finite_strain_gain: log likelihood, in the final set. standing: p value
-    by which each effect, and 'none', is in the first step's model confidence set.
+    step looked like and what it took. finite_strain_gain: log likelihood, in the final set. confidence_set_p:
+    p value by which each effect, and 'none', is in the first step's model confidence set.
     """
 
     base: Candidate
@@ -37,7 +39,7 @@ class Attribution:
     steps: tuple[dict[str, Score], ...]
     picked: tuple[str, ...]
     finite_strain_gain: float
-    standing: dict[str, float]
+    confidence_set_p: dict[str, float]
 
 
 def attribute(
@@ -61,9 +63,9 @@ def attribute(
     for step in range(search.options.most):
         scores: dict[str, Score] = {}
         for i, effect in enumerate(effects):
-            if effect.name in current.found.names or _of_one(effect, current.found.effects):
+            if effect.name in current.found.names or of_one_phenomenon(effect, current.found.effects):
                 continue
-            if _of_one(effect, effects[:i]):
+            if of_one_phenomenon(effect, effects[:i]):
                 continue  # of the laws of one phenomenon the first stands for all until it is picked
             progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
             candidate = search.judge([*current.found.effects, effect], like=current)
@@ -93,10 +95,12 @@ def attribute(
             break
         best = _likeliest(passing, search.options.beyond_doubt)
         for effect in effects:
-            if _of_one(effect, [best.effect]) and effect.name not in scores:
+            if of_one_phenomenon(effect, [best.effect]) and effect.name not in scores:
                 candidate = search.judge([*current.found.effects, effect], like=current)
                 scores[effect.name] = search.score([effect], candidate, current)
-        best = _best_law(search, [s for s in scores.values() if _of_one(s.effect, [best.effect])], best)
+        best = _best_law(
+            search, [s for s in scores.values() if of_one_phenomenon(s.effect, [best.effect])], best
+        )
         chosen.append(best.name)
         search.renew(best.candidate.found)
         current, strain_gain = _with_strain(search, best.candidate.found.effects)
@@ -104,30 +108,14 @@ def attribute(
     current, chosen = _without_idle(search, chosen, current, seen)
     for effect in current.found.effects:
         current = _refined(search, effect, current)
-    sets = [standing(scores) for scores in steps]
+    sets = [confidence_set_p(scores) for scores in steps]
     asked = [n for n in chosen if n not in seen]
-    rivals = tuple(n for n in _rivals(search, picked, sets, asked) if n not in seen)
+    rivals = tuple(n for n in rivals_of(search, picked, sets, asked) if n not in seen)
     order = _strongest_first(search, current, chosen)
     return Attribution(
-        base,
-        ideal,
-        deep,
-        steps[0],
-        tuple(order),
-        rivals,
-        current,
-        tuple(steps),
-        tuple(name for _, name in picked),
-        float(strain_gain),
-        sets[0],
-    )
-
-
-def _of_one(effect: Effect, others: Sequence[Effect]) -> bool:
-    """Whether one of the others is another law of the same phenomenon."""
-    return bool(effect.hints.phenomenon) and any(
-        o.hints.phenomenon == effect.hints.phenomenon and o.name != effect.name for o in others
-    )
+        base, ideal, deep, steps[0], tuple(order), rivals, current, tuple(steps),
+        tuple(name for _, name in picked), float(strain_gain), sets[0],
+    )  # fmt: skip
 
 
 def _likeliest(passing: Sequence[Score], beyond_doubt: float) -> Score:
@@ -240,37 +228,6 @@ def _without_idle(
             chosen.remove(name)
             current = without
     return current, chosen
-
-
-def standing(scores: dict[str, Score]) -> dict[str, float]:
-    """p value of each effect of a step, and of 'none', in the model confidence set over sites."""
-    names = [*scores, "none"]
-    losses = np.array([-s.per_group for s in scores.values()])
-    losses = np.vstack([losses, np.zeros(losses.shape[1])])
-    return dict(zip(names, confidence_p(losses, np.random.default_rng(0)), strict=True))
-
-
-def _rivals(
-    search: Search,
-    picked: list[tuple[dict[str, Score], str]],
-    sets: list[dict[str, float]],
-    chosen: list[str],
-) -> tuple[str, ...]:
-    """Effects that would be named themselves and that the sites do not tell from the one picked in the same
-    step; the likeliest first."""
-    found: dict[str, float] = {}
-    for (scores, name), p in zip(picked, sets, strict=False):
-        if name not in chosen:
-            continue
-        first = scores[name]
-        for score in scores.values():
-            if score.name in chosen or _of_one(score.effect, first.added):
-                continue
-            if score.effect.hints.any_form and first.effect.scope.between_places and score.gain < first.gain:
-                continue
-            if p[score.name] > search.options.doubt and search.passes(score):
-                found.setdefault(score.name, first.log_odds - score.log_odds)
-    return tuple(sorted(found, key=lambda n: found[n]))
 
 
 def _strongest_first(search: Search, final: Candidate, chosen: list[str]) -> list[str]:

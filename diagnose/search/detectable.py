@@ -12,8 +12,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from diagnose.search.evidence import Search
 from diagnose.search.fit import settings_of
-from diagnose.search.judging import Candidate, Search
+from diagnose.search.gaps import modulus_share
+from diagnose.search.leave_one_out import Candidate
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect
 
@@ -56,7 +58,7 @@ def detectable(search: Search, base: Candidate, effects: Sequence[Effect]) -> di
     inflation = forward.touches.noise.variance_inflation
     for i, name in enumerate(names, start=1):
         change = changes[i][counted]
-        own = change - (change * plain).sum() / max((plain**2).sum(), 1e-300) * plain
+        own = change - modulus_share(change, plain) * plain
         size = float(np.sqrt((own**2).sum(axis=1).mean()))
         left = (gram[i, i] - gram[i, 0] ** 2 / max(gram[0, 0], 1e-300)) / inflation
         limit = SEEN * size / np.sqrt(left) if left > 1e-12 else np.inf

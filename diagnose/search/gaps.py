@@ -6,10 +6,17 @@ from collections.abc import Callable, Sequence
 
 import numpy as np
 
+RESAMPLES = 400
+
 
 def gap(plain: np.ndarray, counts: np.ndarray, added: float) -> float:
     """N, rms of the 3-vector. plain: (g,) N^2; counts: (g,) samples; added: N^2, noise thinned off."""
     return float(np.sqrt(plain.sum() / counts.sum() + added))
+
+
+def modulus_share(change: np.ndarray, force: np.ndarray) -> float:
+    """The share of a force (n, 3) N that is nearest to its change (n, 3) N: what another modulus takes up."""
+    return float((change * force).sum() / max((force**2).sum(), 1e-300))
 
 
 def closed_share(
@@ -51,3 +58,29 @@ def resampled(
     # scipy.stats.bootstrap gives the same numbers ten times slower, and warns of resamples without a value
     drawn = rng.integers(0, len(sites[0]), (resamples, len(sites[0])))
     return statistic(*(values[drawn] for values in sites), axis=-1)
+
+
+def share_closed(
+    before: np.ndarray, after: np.ndarray, counts: np.ndarray, noise: float, least: float, axis: int = -1
+) -> np.ndarray:
+    """The share of the held-out gap that is closed.
+
+    before, after: (..., g) N^2, sums of squares of each place; counts: (..., g) samples; noise: N^2, mean
+    square of a sample's noise; least: N^2, what a gap that matters exceeds it by: a smaller one is not closed
+    by less.
+    """
+    n = counts.sum(axis=axis)
+    gap = np.maximum(before.sum(axis=axis) / n - noise, least)
+    return (before - after).sum(axis=axis) / n / gap
+
+
+def lower_closure(
+    before: np.ndarray, after: np.ndarray, counts: np.ndarray, noise: float, least: float, doubt: float
+) -> float:
+    """`share_closed` in all but a share `doubt` of the resamplings of the places, at least."""
+
+    def share(old: np.ndarray, new: np.ndarray, number: np.ndarray, axis: int = -1) -> np.ndarray:
+        return share_closed(old, new, number, noise, least, axis)
+
+    draws = resampled((before, after, counts), share, RESAMPLES, np.random.default_rng(0))
+    return float(np.quantile(draws, doubt))

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
+from diagnose.forward.prediction import Forward
 from diagnose.search.fit import Fit
-from diagnose.search.forward import Forward
 
 DRAWS = 200
 
@@ -34,8 +34,8 @@ def parameter_intervals(
 ) -> dict[str, list[Any]]:
     """{key: [low, high]} at 95 % for every number (or list of numbers) that the effect reports.
 
-    An effect's `systematic` (standard deviations of its parameters that no noise tells) is added. Where the
-    bounds cut the draws off, the interval ends at the bound.
+    An effect's `systematic` (standard deviations of its parameters that noise does not hold) is added. Where
+    the bounds cut the draws off, the interval ends at the bound.
     """
     effect = next(e for e in found.effects if e.name == name)
     k = len(effect.parameters)

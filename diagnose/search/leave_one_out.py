@@ -1,18 +1,53 @@
 """Each group left out of a fit in turn, by one damped step of Gauss-Newton from the optimum of all: quick
 enough for every effect tried.
 
-The gaps that are reported are fitted again instead (diagnose.verdict.validation).
+The gaps that are reported are fitted again instead (diagnose.verdict.held_out).
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
-from diagnose.search.fit import Descent, Fit
+from diagnose.search.descent import Descent
+from diagnose.search.fit import Fit
 
 DAMPINGS = (1e-9, 1e-3, 1e-2, 0.1, 1.0)
 """Of a step, as shares of the curvature, the least first: where two branches of one time are thrown by the
 linear answer is no place that the other groups would choose."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
+    base."""
+
+    found: Fit
+    held: np.ndarray
+    plain: np.ndarray
+    dof: float
+
+    @property
+    def residual(self) -> np.ndarray:
+        """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
+        return levelled(self.found)[0]
+
+    @property
+    def fitted_plain(self) -> np.ndarray:
+        """(g,) N^2, sums of squares of the places as fitted, with the modulus of the plain fit."""
+        return levelled(self.found)[1]
+
+    @property
+    def chi(self) -> float:
+        """Whitened mean square per component: about 1 where the noise model holds."""
+        return float(self.found.gram[:, 0, 0].sum() / self.dof)
+
+    def chi_but_for_one(self, counts: np.ndarray) -> tuple[float, int]:
+        """(chi without the site that misses most, that site); counts: (g,) samples of each site."""
+        each = self.found.gram[:, 0, 0]
+        worst = int(np.argmax(each / counts))
+        return float((each.sum() - each[worst]) / (3.0 * (counts.sum() - counts[worst]))), worst
 
 
 def held_out(found: Fit, descent: Descent) -> tuple[np.ndarray, np.ndarray]:

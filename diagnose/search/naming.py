@@ -14,10 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from scipy.special import expit
 
-from diagnose.search.gaps import resampled
-
-RESAMPLES = 400
+from diagnose.search.leave_one_out import Candidate
+from mechanics.effects.base import Effect
 
 
 @dataclass(frozen=True)
@@ -40,27 +40,59 @@ WEIGHTS = Weights(**tomllib.loads(FILE.read_text())["weights"])
 """Fitted to judged cases; the file says which."""
 
 
-def share_closed(
-    before: np.ndarray, after: np.ndarray, counts: np.ndarray, noise: float, least: float, axis: int = -1
-) -> np.ndarray:
-    """The share of the held-out gap that is closed.
+@dataclass(frozen=True)
+class Score:
+    """How much better a candidate is than what it was added to.
 
-    before, after: (..., g) N^2, sums of squares of each place; counts: (..., g) samples; noise: N^2, mean
-    square of a sample's noise; least: N^2, what a gap that matters exceeds it by: a smaller one is not closed
-    by less.
+    added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
+    per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
+    share: of the old held-out excess over the noise (of a lump, of the fitted one). closes: the same, at
+    least, over resampled sites.
     """
-    n = counts.sum(axis=axis)
-    gap = np.maximum(before.sum(axis=axis) / n - noise, least)
-    return (before - after).sum(axis=axis) / n / gap
 
+    added: tuple[Effect, ...]
+    gain: float
+    size_n: float
+    share: float
+    closes: float
+    per_group: np.ndarray
+    candidate: Candidate
 
-def lower_closure(
-    before: np.ndarray, after: np.ndarray, counts: np.ndarray, noise: float, least: float, doubt: float
-) -> float:
-    """`share_closed` in all but a share `doubt` of the resamplings of the places, at least."""
+    @property
+    def effect(self) -> Effect:
+        """The effect that is scored; the first of a pair."""
+        return self.added[0]
 
-    def share(old: np.ndarray, new: np.ndarray, number: np.ndarray, axis: int = -1) -> np.ndarray:
-        return share_closed(old, new, number, noise, least, axis)
+    @property
+    def name(self) -> str:
+        """Its name; of a pair both."""
+        return "+".join(e.name for e in self.added)
 
-    draws = resampled((before, after, counts), share, RESAMPLES, np.random.default_rng(0))
-    return float(np.quantile(draws, doubt))
+    @property
+    def evidence(self) -> float:
+        """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
+        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
+        if self.effect.hints.few_places:
+            return self.gain - float(np.log(len(self.per_group)))
+        return self.gain - max(float(self.per_group.max()), 0.0)
+
+    @property
+    def closure(self) -> float:
+        """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
+        places, as it is."""
+        return self.share if self.effect.hints.few_places else self.closes
+
+    @property
+    def log_odds(self) -> float:
+        """That it is there, rather than an error of our own law."""
+        return WEIGHTS.log_odds(self.evidence, self.closure)
+
+    @property
+    def probability(self) -> float:
+        """The same as a probability."""
+        return float(expit(self.log_odds))
+
+    @property
+    def may_be(self) -> bool:
+        """Whether it would be as likely as not if it closed the whole gap."""
+        return WEIGHTS.log_odds(self.evidence, 1.0) > 0

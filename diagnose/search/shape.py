@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial import cKDTree
 
+from diagnose.options import NuisanceOptions
 from diagnose.search.fit import Fit
-from diagnose.search.whiten import NuisanceOptions
 from mechanics.model import Model
 from mechanics.presses import Presses
 

@@ -16,29 +16,14 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.linalg import cho_factor, solve_triangular
 
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
+from diagnose.forward.touches import FOLLOWED
+from diagnose.options import NuisanceOptions
 from mechanics.effects.settings import Settings
-from mechanics.options import option
 from mechanics.presses import Presses
 
-FOLLOWED = "followed"
-"""Column of touches whose free air was followed from before to after them: (n, 3) N, what was taken off."""
 _MODES = 2
 """Of a Brownian bridge, that hold 76 % of its variance; the rest counts as noise."""
-
-
-@dataclass(frozen=True)
-class NuisanceOptions:
-    """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
-
-    onset_m: float = option(0.2e-3, "error of first touch, each press", unit="m")
-    site_stiffness: float = option(0.03, "share by which a site's stiffness may be wrong (shape, mesh)")
-    press_stiffness: float = option(0.01, "share by which repeats at a site may differ")
-    tilt: float = option(0.03, "error of a site's normal", unit="rad")
-    stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
-    law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
-    floor_share: float = option(0.01, "error of the model that no name covers, share of a sample's force")
-    floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")
 
 
 @dataclass

@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 from scipy.integrate import trapezoid
 
-from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.fit import Descent, settings_of
-from diagnose.search.touches import LEAST_PRESSES
-from diagnose.search.whiten import NuisanceOptions, Whitener
+from diagnose.forward.touches import LEAST_PRESSES
+from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.pipeline import diagnose
+from diagnose.search.descent import Descent
+from diagnose.search.fit import settings_of
+from diagnose.search.whiten import Whitener
 from diagnose.verdict.result import Diagnosis
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError

@@ -1,4 +1,4 @@
-"""What would best tell two explanations apart: every candidate press is predicted under both.
+"""What would best separate two explanations: every candidate press is predicted under both.
 
 Candidates: the places already pressed, straight or dragged sideways, three depths, three speeds, a short or a
 long hold, once or twice in a row. A press is worth the whitened distance between the two predictions, after
@@ -10,41 +10,29 @@ from __future__ import annotations
 
 import dataclasses
 import itertools
-from dataclasses import dataclass
 
 import numpy as np
 
+from diagnose.forward.planned import DEEPEST_M, Plan, pressed
+from diagnose.forward.prediction import Forward
+from diagnose.options import NuisanceOptions
+from diagnose.search.attribution import Attribution
+from diagnose.search.evidence import Search
 from diagnose.search.fit import settings_of
-from diagnose.search.forward import Forward
-from diagnose.search.judging import Candidate
-from diagnose.search.whiten import NuisanceOptions, Whitener
+from diagnose.search.leave_one_out import Candidate
+from diagnose.search.naming import Score
+from diagnose.search.whiten import Whitener
 from diagnose.verdict.result import NextTouch
 from mechanics.effects.settings import Settings
-from mechanics.leads import leads
-from mechanics.presses import Presses
 
 DEPTHS = (0.35, 0.8, 1.2)
 SPEEDS = (0.004, 0.02, 0.08)
 HOLDS = (0.3, 1.5)
 DRAG_M = 1.5e-3
-DEEPEST_M = 0.009
-CLEARANCE_M = 2e-3
-STEP_S = 0.01
 RIGID_N, RIGID_M = 4.0, 5e-5
 """Force of a press on the support, and how far readings on something rigid scatter."""
 RETRACED_M = 3e-4
 """By how much an outline that is traced twice is off, over a stretch."""
-
-
-@dataclass(frozen=True)
-class Plan:
-    """One way of pressing. depth: of the greatest so far, 1. speed: m/s. hold: s. drag: m. times: 1 or 2."""
-
-    depth: float
-    speed: float
-    hold: float
-    drag: float
-    times: int
 
 
 def plans() -> list[Plan]:
@@ -54,10 +42,29 @@ def plans() -> list[Plan]:
     return [*once, *dragged, Plan(0.8, 0.02, 0.3, 0.0, 2)]
 
 
+def proposed(search: Search, found: Attribution, candidates: list[str]) -> NextTouch | None:
+    """The press that best separates the two explanations that are closest; None where there are not two."""
+    for scores, name in zip(found.steps, found.picked, strict=False):
+        rival = next((c for c in candidates if c in scores and c != name), None)
+        if rival is not None:
+            return _separating(search, scores, name, rival)
+    ranked = sorted(found.scores.values(), key=lambda s: -s.gain)
+    if len(ranked) < 2:
+        return None
+    first = found.picked[0] if found.picked else ranked[0].name
+    second = next(s.name for s in ranked if s.name != first)
+    return _separating(search, found.scores, first, second)
+
+
+def _separating(search: Search, scores: dict[str, Score], first: str, second: str) -> NextTouch | None:
+    pair = ((first, scores[first].candidate), (second, scores[second].candidate))
+    return next_touch(search.forward, *pair, search.nuisance)
+
+
 def next_touch(
     forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate], options: NuisanceOptions
 ) -> NextTouch:
-    """The best press to tell `first` from `second` (name, fitted candidate)."""
+    """The best press to separate `first` from `second` (name, fitted candidate)."""
     best: tuple[float, float, Plan, int] | None = None
     for plan in plans():
         virtual = dataclasses.replace(forward, touches=pressed(forward, plan))
@@ -79,7 +86,7 @@ def next_touch(
     assert best is not None
     worth, size, plan, press = best
     again, rigid = _retrace(forward, first, second), _rigid(forward, first, second)
-    # a surface that is fitted to the presses themselves moves along with them: none of them tells a move
+    # a surface that is fitted to the presses themselves moves along with them: none of them shows a move
     hidden = forward.model.fitted_to(forward.touches)
     if again is not None and (again.sigmas**2 > worth or (hidden and again.sigmas > 1)):
         return again
@@ -87,25 +94,17 @@ def next_touch(
         return rigid
     t = forward.touches
     direction = -t.normal[press]
-    depth = _depth(t, plan)
+    depth = min(plan.depth_m(t), DEEPEST_M)
     if plan.drag:
-        direction = direction + plan.drag / depth * _sideways(forward, press)
+        direction = direction + plan.drag / depth * t.frame[press][1]
         direction = direction / np.linalg.norm(direction)
     x, y, z = map(float, t.point[press])
     towards = (float(direction[0]), float(direction[1]), float(direction[2]))
+    why = _why(plan, first[0], second[0], size, np.sqrt(worth))
     return NextTouch(
-        x,
-        y,
-        z,
-        direction=towards,
-        depth_m=float(depth),
-        speed_m_per_s=plan.speed,
-        hold_s=plan.hold,
-        separates=(first[0], second[0]),
-        why=_why(plan, first[0], second[0], size, np.sqrt(worth)),
-        difference_n=size,
-        sigmas=float(np.sqrt(worth)),
-    )
+        x, y, z, towards, float(depth), plan.speed, plan.hold, (first[0], second[0]), why, size,
+        float(np.sqrt(worth)),
+    )  # fmt: skip
 
 
 def _rigid(forward: Forward, first: tuple[str, Candidate], second: tuple[str, Candidate]) -> NextTouch | None:
@@ -173,59 +172,3 @@ def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str
         f"{first.replace('_', ' ')} from {second.replace('_', ' ')} most: {size * 1e3:.0f} mN rms, "
         f"{sigmas:.0f} times what noise and our own errors would do"
     )
-
-
-def _depth(t: Presses, plan: Plan) -> float:
-    return min(plan.depth * float(t.deepest.max()), DEEPEST_M)
-
-
-def _sideways(forward: Forward, press: int) -> np.ndarray:
-    return forward.touches.frame[press][1]
-
-
-def pressed(forward: Forward, plan: Plan) -> Presses:
-    """Every known press done over by a plan, each a site of its own."""
-    t = forward.touches
-    into, along = _path(_depth(t, plan), plan)
-    n, p = len(into), len(t)
-    local = np.column_stack([into, along, np.zeros(n)])
-    clock = STEP_S * np.arange(n)
-    contact = np.flatnonzero(into > 0)
-    centre = t.point + forward.tip_radius * t.normal
-    position = (centre[:, None] - np.einsum("pij,ni->pnj", t.frame, local)).reshape(-1, 3)
-    lead = np.concatenate([leads(clock, position[i * n : (i + 1) * n]) for i in range(p)])
-    turned = None if t.quaternion is None else np.repeat(t.quaternion[t.starts[:-1]], n, axis=0)
-    none = np.zeros_like(position)
-    return dataclasses.replace(
-        t,
-        starts=n * np.arange(p + 1),
-        t=np.tile(clock, p),
-        position=position,
-        force=none,
-        free_air=none,
-        quaternion=turned,
-        columns={"lead": lead},
-        site=np.arange(p),
-        onset_s=np.full(p, clock[contact[0]]),
-        peak_s=np.full(p, clock[int(np.argmax(into))]),
-        end_s=np.full(p, clock[contact[-1]]),
-    )
-
-
-def _path(depth: float, plan: Plan) -> tuple[np.ndarray, np.ndarray]:
-    """(n,) m travel into the object and sideways, from the air to the air."""
-    times, into, side = [0.0], [-CLEARANCE_M], [0.0]
-
-    def go(seconds: float, to: float, across: float) -> None:
-        times.append(times[-1] + seconds)
-        into.append(to)
-        side.append(across)
-
-    way = (depth + CLEARANCE_M) / plan.speed
-    for _ in range(plan.times):
-        go(way, depth, 0.0)
-        go(plan.hold, depth, plan.drag)
-        go(way, -CLEARANCE_M, plan.drag)
-        go(0.3, -CLEARANCE_M, 0.0)
-    clock = np.arange(0.0, times[-1], STEP_S)
-    return np.interp(clock, times, into), np.interp(clock, times, side)

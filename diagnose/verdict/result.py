@@ -3,14 +3,14 @@ report."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
 
-from diagnose.instrument.freeair import FreeAir
+from diagnose.forward.prediction import Forward
+from diagnose.instrument.free_air import FreeAir
 from diagnose.search.attribution import Attribution
-from diagnose.search.forward import Forward
 from diagnose.verdict.where import Where
 from mechanics.effects.registry import effect
 
@@ -33,16 +33,17 @@ def _listed(names: tuple[str, ...]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-KINDS = ("none", "effect", "ambiguous", "unknown", "effect+unknown")
+def _plain(value: Any) -> Any:
+    return list(value) if isinstance(value, tuple) else value
 
 
 @dataclass(frozen=True)
 class EffectEntry:
     """One effect's line: probability that it is part of the cause, held-out gap with it alone, parameters.
 
-    intervals: [low, high] of each parameter at 95 %. standing: p value of the model confidence set (nan where
-    it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
-    detectable_n: N rms of its force from which these presses show it at all (nan: not told).
+    intervals: [low, high] of each parameter at 95 %. confidence_set_p: p value of the model confidence set
+    (nan where it was not part of the comparison): below 0.1 the sites rule it out as the one effect to add.
+    detectable_n: N rms of its force from which these presses show it at all (nan: unknown).
     """
 
     name: str
@@ -54,8 +55,26 @@ class EffectEntry:
     parameters: dict[str, Any]
     gain: float = 0.0
     intervals: dict[str, Any] = field(default_factory=dict)
-    standing: float = float("nan")
+    confidence_set_p: float = float("nan")
     detectable_n: float = float("nan")
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys; null where a number is not known."""
+        names = (
+            "name",
+            "domain",
+            "probability",
+            "gap_after_n",
+            "gap_closed",
+            "gap_closed_ci95",
+            "parameters",
+        )
+        return {
+            **{name: _plain(getattr(self, name)) for name in names},
+            "parameters_ci95": self.intervals,
+            "confidence_set_p": self.confidence_set_p if np.isfinite(self.confidence_set_p) else None,
+            "detectable_n": self.detectable_n if np.isfinite(self.detectable_n) else None,
+        }
 
 
 @dataclass(frozen=True)
@@ -64,7 +83,7 @@ class NextTouch:
     presses of the bare support or the base traced once more ("retrace").
 
     difference_n: rms by which predictions of a press differ; sigmas: by how many times noise and our own
-    errors what is told apart differs.
+    errors what is separated differs.
     """
 
     x: float
@@ -79,6 +98,10 @@ class NextTouch:
     difference_n: float = 0.0
     sigmas: float = 0.0
     kind: str = "press"
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, which are the fields."""
+        return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
 
 @dataclass(frozen=True)
@@ -170,36 +193,9 @@ class Diagnosis:
                 "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
                 "bins": self.where.bins,
             },
-            "effects": [
-                {
-                    "name": e.name,
-                    "domain": e.domain,
-                    "probability": e.probability,
-                    "gap_after_n": e.gap_after_n,
-                    "gap_closed": e.gap_closed,
-                    "gap_closed_ci95": None if e.gap_closed_ci95 is None else list(e.gap_closed_ci95),
-                    "parameters": e.parameters,
-                    "parameters_ci95": e.intervals,
-                    "confidence_set_p": e.standing if np.isfinite(e.standing) else None,
-                    "detectable_n": e.detectable_n if np.isfinite(e.detectable_n) else None,
-                }
-                for e in self.entries
-            ],
+            "effects": [e.as_json() for e in self.entries],
             "young_modulus_pa": self.young_modulus_pa,
-            "next_touch": None
-            if self.next_touch is None
-            else {
-                **{k: getattr(self.next_touch, k) for k in ("x", "y", "z")},
-                "direction": list(self.next_touch.direction),
-                "depth_m": self.next_touch.depth_m,
-                "speed_m_per_s": self.next_touch.speed_m_per_s,
-                "hold_s": self.next_touch.hold_s,
-                "separates": list(self.next_touch.separates),
-                "why": self.next_touch.why,
-                "difference_n": self.next_touch.difference_n,
-                "sigmas": self.next_touch.sigmas,
-                "kind": self.next_touch.kind,
-            },
+            "next_touch": None if self.next_touch is None else self.next_touch.as_json(),
             "errors_n": dict(self.errors_n),
             "held_out": {k: {"gap_before_n": a, "gap_after_n": b} for k, (a, b) in self.held_out_n.items()},
             "reasons": list(self.reasons),

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.stats import chi2
 
-from diagnose.instrument.freeair import FreeAir
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
+from diagnose.instrument.free_air import FreeAir
 from mechanics.gap_bins import gap_by_bin
 from mechanics.presses import HOLDING, LOADING, UNLOADING, Presses
 
@@ -67,7 +67,7 @@ def locate(
     contrasts = _contrasts(t, residual)
     p_values = family_wise(contrasts, t.site, seed)
     p_values["space"] = _space(t, residual, site_sd)
-    p_values["free_air"] = _free_p(free)
+    p_values["free_air"] = 1.0 if free is None else free.p
     shares = _shares(t, residual)
     shares["free_air"] = _free_share(t, residual, free)
     axes = tuple(Axis(a, float(np.clip(shares.get(a, 0.0), 0, 1)), float(p_values.get(a, 1.0))) for a in AXES)
@@ -89,7 +89,7 @@ def _bins(t: Presses, stated: np.ndarray) -> dict[str, list[float]]:
 
 
 def _contrasts(t: Presses, residual: np.ndarray) -> dict[str, np.ndarray]:
-    """(p,) per press: one signed number an axis (nan where the press cannot tell)."""
+    """(p,) per press: one signed number an axis (nan where the press shows nothing of it)."""
     out = {
         name: np.full(len(t), np.nan) for name in ("depth", "rate", "phase", "direction", "order", "repeat")
     }
@@ -144,11 +144,11 @@ def family_wise(contrasts: dict[str, np.ndarray], site: np.ndarray, seed: int) -
     names = list(contrasts)
     values = np.stack([contrasts[n] for n in names], axis=1)
     fine = ~np.isnan(values)
-    sums, told = np.zeros((2, site.max() + 1, len(names)))
+    sums, counted = np.zeros((2, site.max() + 1, len(names)))
     np.add.at(sums, site, np.where(fine, values, 0.0))
-    np.add.at(told, site, fine)
-    told = told > 0
-    count = np.maximum(told.sum(axis=0), 1)
+    np.add.at(counted, site, fine)
+    counted = counted > 0
+    count = np.maximum(counted.sum(axis=0), 1)
     square = (sums**2).sum(axis=0)
 
     def t_of(total: np.ndarray) -> np.ndarray:
@@ -158,7 +158,7 @@ def family_wise(contrasts: dict[str, np.ndarray], site: np.ndarray, seed: int) -
     signs = np.random.default_rng(seed).choice([-1.0, 1.0], size=(FLIPS, len(sums)))
     largest = t_of(signs @ sums).max(axis=1)
     larger = (largest[:, None] >= t_of(sums.sum(axis=0)) - 1e-12).sum(axis=0)
-    p = np.where(told.sum(axis=0) < 5, 1.0, (larger + 1) / (FLIPS + 1))
+    p = np.where(counted.sum(axis=0) < 5, 1.0, (larger + 1) / (FLIPS + 1))
     return dict(zip(names, map(float, p), strict=True))
 
 
@@ -180,17 +180,6 @@ def _space(t: Presses, residual: np.ndarray, site_sd: np.ndarray) -> float:
     weight = 1 / (prior**2 + se**2 + 0.01**2)
     centred = level - (weight @ level) / weight.sum()
     return float(chi2.sf((weight * centred**2).sum(), t.sites - 1))
-
-
-def _free_p(free: FreeAir | None) -> float:
-    if free is None:
-        return 1.0
-    z = max(
-        np.abs(free.bias_n).max() / free.bias_se_n,
-        np.abs(free.rate_n_per_s).max() / free.rate_se_n_per_s,
-        abs(free.mass_kg) / free.mass_se_kg,
-    )
-    return float(min(1.0, 7 * chi2.sf(z**2, 1)))
 
 
 def _free_share(t: Presses, residual: np.ndarray, free: FreeAir | None) -> float:

@@ -101,10 +101,8 @@ def diagnose(
     fast: fewer effects, one in an answer. options: see `pp.options("diagnose")`. Raises DiagnosisError where
     the data cannot carry it.
     """
-    from diagnose.pipeline import DiagnoseOptions
+    from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
     from diagnose.pipeline import diagnose as diagnosed
-    from diagnose.search.deciding import AttributionOptions
-    from diagnose.search.whiten import NuisanceOptions
     from palpate.results.base import dressed
     from palpate.results.diagnosis import Diagnosis
     from palpate.results.model import model_of

@@ -43,7 +43,8 @@ def calibrate(
     Raises OptionError unless one of rigid and modulus_pa is given, ContactError or DiagnosisError where
     presses are too few.
     """
-    from diagnose.instrument.calibrate import calibrate_on_object, calibrate_on_plate
+    from diagnose.calibrate.on_object import calibrate_on_object
+    from diagnose.calibrate.on_plate import calibrate_on_plate
     from palpate.results.base import dressed
     from palpate.results.calibration import Calibration
     from reconstruct.geometry.placed import nowhere

@@ -16,9 +16,9 @@ import sys
 import numpy as np
 
 from diagnose.explore.candidates import ReachOptions
-from diagnose.explore.explorer import Explorer, State, Suggestion, check_goals
-from diagnose.explore.goals import GoalOptions
-from diagnose.explore.rows import Instrument
+from diagnose.explore.explorer import Explorer, State, Suggestion
+from diagnose.explore.goals import GoalOptions, check_goals
+from diagnose.explore.segments import Instrument
 from mechanics.errors import OptionError
 from mechanics.options import check_ranges
 from mechanics.quantities import POISSON_RATIO
@@ -227,7 +227,7 @@ def _line(suggestion: Suggestion, state: State) -> str:
             f"surface within {1e3 * state.surface_error_m:.1f} mm"
         )
     if state.causes is not None:
-        likeliest, *others = state.causes.standing(state.cause_at)
+        likeliest, *others = state.causes.not_ruled_out(state.cause_at)
         known += f", cause: {likeliest}" + (f" or {len(others)} others" if others else "")
     if suggestion.point is None:
         return f"{known}; {suggestion.kind}: {suggestion.why}"

@@ -13,7 +13,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from diagnose.compare.comparison import RIVALS
+from diagnose.compare.models import RIVALS
 from palpate.batching.run import Batch
 from palpate.batching.steps import THUMBNAIL
 from palpate.batching.summary import Entry

@@ -9,7 +9,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogFormatter
 
-from diagnose.compare.comparison import HOMOGENEOUS, MODELS, RIVALS, Comparison, stiffness_along, verdict
+from diagnose.compare.comparison import Comparison, verdict
+from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS, stiffness_along
 from mechanics.recording import Recording
 from palpate.report.object3d import draw_object, spread_over
 from palpate.report.page import Page

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from diagnose.compare import comparison as room
+from diagnose.compare.models import HOMOGENEOUS
 from palpate.results.base import Result
 from palpate.results.recording import Recording
 
@@ -66,7 +67,7 @@ class Comparison(Result, room.Comparison):
                 }
                 for r in self.regions
             ],
-            "wins": {name: self.wins(name) for name in room.MODELS if name != room.HOMOGENEOUS},
+            "wins": {name: self.wins(name) for name in room.MODELS if name != HOMOGENEOUS},
             "noise_n": self.noise_n,
             "young_modulus_pa": self.moduli_pa,
             "folds_with_a_field": sum(field is not None for field in self.fields),

@@ -17,7 +17,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 
 from diagnose.explore.explorer import Suggestion
-from diagnose.explore.rows import Instrument, Segment
+from diagnose.explore.segments import Instrument, Segment
 from mechanics.errors import SceneError
 from mechanics.nearest import closest, first_hits
 from mechanics.options import option

@@ -13,7 +13,7 @@ from collections.abc import Callable, Iterable
 from typing import Any
 
 from diagnose.explore.explorer import Explorer
-from diagnose.explore.rows import Segment
+from diagnose.explore.segments import Segment
 from mechanics.errors import RecordingError
 
 MOST_CHARACTERS = 64_000_000

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnose.explore.explorer import Explorer, State, Suggestion
-from diagnose.explore.rows import Segment
+from diagnose.explore.segments import Segment
 from mechanics.model import Model
 from palpate.servo import Servo
 from palpate.window.ghost import Ghost

@@ -10,7 +10,8 @@ import pytest
 
 import mechanics.surface_compliance as made
 from diagnose.apply import improved, with_effects, with_replayed_modulus
-from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.options import DiagnoseOptions
+from diagnose.pipeline import diagnose
 from mechanics.effects.registry import effect
 from mechanics.material import Ball
 from mechanics.model_files import read_model, write_model

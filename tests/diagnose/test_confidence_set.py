@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from diagnose.search.confidence_set import confidence_p
+from diagnose.search.rivals import confidence_p
 
 
 def test_equal_explanations_stay_and_a_worse_one_goes() -> None:

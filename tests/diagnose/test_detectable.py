@@ -5,13 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.search.deciding import AttributionOptions
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
+from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.detectable import SEEN, detectable
+from diagnose.search.evidence import Search
 from diagnose.search.fit import settings_of
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
-from diagnose.search.whiten import NuisanceOptions
 from mechanics.effects.registry import effect
 from mechanics.model import Model
 

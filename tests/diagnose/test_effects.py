@@ -6,9 +6,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
 from diagnose.search.fit import settings_of
-from diagnose.search.forward import build_forward
-from diagnose.search.touches import touches_of
 from mechanics.effects.base import DOMAINS, Role, Scope
 from mechanics.effects.registry import NAMES, effect, effects
 from mechanics.errors import OptionError

@@ -8,11 +8,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
-from diagnose.search.whiten import FOLLOWED, NuisanceOptions, Whitener
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import FOLLOWED, touches_of
+from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.search.evidence import Search
+from diagnose.search.whiten import Whitener
 from mechanics.effects.registry import effect
 
 

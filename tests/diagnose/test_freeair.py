@@ -9,11 +9,12 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from diagnose.apply import corrected
-from diagnose.instrument.freeair import free_air_of
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
+from diagnose.instrument.free_air import free_air_of
 from diagnose.instrument.offsets import find_instrument_offsets
-from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.search.forward import build_forward
-from diagnose.search.touches import touches_of
+from diagnose.options import DiagnoseOptions
+from diagnose.pipeline import diagnose
 from reconstruct.steps.s3_contacts.contacts import explore
 
 from ..reconstruct.exploration_of_cylinder import explore_cylinder

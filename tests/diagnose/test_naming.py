@@ -5,10 +5,11 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.options import AttributionOptions
 from diagnose.search.attribution import _with_strain
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.judging import Score, Search
-from diagnose.search.naming import lower_closure
+from diagnose.search.evidence import Search
+from diagnose.search.gaps import lower_closure
+from diagnose.search.naming import Score
 from mechanics.effects.registry import effect
 
 

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 
 from diagnose.verdict.answer import Answer
-from diagnose.verdict.conclusion import Gaps, _never_worse
-from diagnose.verdict.never_worse import never_worse
+from diagnose.verdict.held_out import Gaps, never_worse, without_what_makes_it_worse
 
 COUNTS = np.full(20, 100.0)
 BEFORE = np.random.default_rng(0).uniform(8.0, 12.0, 20)
@@ -97,5 +96,7 @@ def test_where_nothing_is_left_to_explain_nothing_is_a_candidate(explained, kind
         seed=0,
     )
     answer = Answer(["a"], [])
-    _never_worse(evidence, answer, Gaps(np.full(12, 1.0), np.full(12, 2.0), {}), np.full(12, 10))
+    without_what_makes_it_worse(
+        evidence, answer, Gaps(np.full(12, 1.0), np.full(12, 2.0), {}), np.full(12, 10)
+    )
     assert (answer.kind, answer.names, answer.candidates) == (kind, [], candidates)

@@ -15,7 +15,7 @@ import pytest
 
 import mechanics.surface_compliance as made
 from diagnose.apply import with_effects
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
 from mechanics.compliance import load_or_condense
 from mechanics.effects.registry import effect, effects
 from mechanics.far_field import energy_fields, far_with_weights

@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from diagnose.apply import improved
-from diagnose.pipeline import DiagnoseOptions, diagnose
+from diagnose.options import DiagnoseOptions
+from diagnose.pipeline import diagnose
 from mechanics.dent import dent_law, grid
 from mechanics.effects import registry
 from palpate.report.diagnosis_words import meaning

@@ -9,15 +9,14 @@ import pytest
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
 from diagnose.instrument.offsets import InstrumentOffsets, ruled_out, with_move
 from diagnose.instrument.retraced import Move, move_of
 from diagnose.instrument.rigid import Rigid
-from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
-from diagnose.search.whiten import NuisanceOptions
+from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.pipeline import diagnose
+from diagnose.search.evidence import Search
 from diagnose.verdict.next_touch import next_touch
 from mechanics.effects.registry import effect
 from mechanics.recording import Recording

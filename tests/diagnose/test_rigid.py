@@ -7,14 +7,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
 from diagnose.instrument.offsets import find_instrument_offsets, read_sideways
 from diagnose.instrument.rigid import Rigid, rigid_of
+from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import attribute
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
-from diagnose.search.whiten import NuisanceOptions
+from diagnose.search.evidence import Search
 from mechanics.effects.registry import effect
 from mechanics.frames import tangents
 from mechanics.recording import Recording

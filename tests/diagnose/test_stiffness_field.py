@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.search.forward import build_forward
-from diagnose.search.touches import touches_of
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
 from mechanics.effects.registry import effect
 from mechanics.far_field import _far, _sampler, _unit_loads, energy_fields
 from mechanics.field_response import far_of, shares_in_elements

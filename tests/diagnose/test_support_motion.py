@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.search.forward import build_forward
-from diagnose.search.touches import touches_of
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
 from mechanics.far_field import energy_fields
 from mechanics.frames import tangents
 from mechanics.patch import PatchSampler

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from diagnose.verdict import sureness as module
-from diagnose.verdict.sureness import (
+from diagnose.verdict import corrections as module
+from diagnose.verdict.corrections import (
     ALONE,
     BOTH,
     CANDIDATE,
@@ -13,7 +13,7 @@ from diagnose.verdict.sureness import (
     RIVALLED,
     UNNAMED,
     counts,
-    standing,
+    how_named,
     sureness,
 )
 from tools.diagnose_sureness import stood
@@ -31,7 +31,7 @@ from tools.diagnose_sureness import stood
     ],
 )
 def test_how_an_effect_stands(named, candidates, kind, how):
-    assert standing("backlash", named, candidates, kind) == how
+    assert how_named("backlash", named, candidates, kind) == how
 
 
 def test_a_share_of_few_cases_leans_on_that_of_all(monkeypatch):

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.search.attribution import _best_law, _of_one
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.forward import build_forward
-from diagnose.search.judging import Search
-from diagnose.search.touches import touches_of
-from diagnose.search.whiten import NuisanceOptions
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
+from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.search.attribution import _best_law
+from diagnose.search.evidence import Search
+from diagnose.search.rivals import of_one_phenomenon
 from mechanics.effects.registry import effect, effects
 
 RADIUS, SHARE, DIFFUSIVITY = 0.005, 0.4, 4e-5
@@ -90,7 +90,7 @@ def test_a_power_of_time_is_named_by_its_two_numbers(bench):
 
 def test_laws_of_one_phenomenon_are_no_rivals():
     pairs = {
-        frozenset((a.name, b.name)) for a in effects() for b in effects() if _of_one(a, [b])
+        frozenset((a.name, b.name)) for a in effects() for b in effects() if of_one_phenomenon(a, [b])
     }  # fmt: skip
     assert pairs == {
         frozenset(("viscoelasticity", "power_law_relaxation")),

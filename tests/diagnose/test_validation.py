@@ -8,16 +8,16 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.fit import Descent, fit
-from diagnose.search.forward import build_forward
+from diagnose.forward.prediction import build_forward
+from diagnose.forward.touches import touches_of
+from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.search.descent import Descent, fit
+from diagnose.search.evidence import Search
 from diagnose.search.intervals import covariance, parameter_intervals
-from diagnose.search.judging import Candidate, Score, Search
-from diagnose.search.leave_one_out import held_out
+from diagnose.search.leave_one_out import Candidate, held_out
+from diagnose.search.naming import Score
 from diagnose.search.shape import repeat_scatter
-from diagnose.search.touches import touches_of
-from diagnose.search.whiten import NuisanceOptions
-from diagnose.verdict.validation import deepest, held_out_by_refit, neighbours
+from diagnose.verdict.held_out import deepest, held_out_by_refit, neighbours
 from mechanics.effects.registry import effect
 from mechanics.effects.time_delay import EFFECT as DELAY
 

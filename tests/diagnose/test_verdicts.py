@@ -11,11 +11,11 @@ import pytest
 from matplotlib.figure import Figure
 
 from diagnose.apply import corrected, improved
-from diagnose.pipeline import DiagnoseOptions, diagnose
-from diagnose.search.forward import Forward
-from diagnose.search.whiten import NuisanceOptions
+from diagnose.forward.prediction import Forward
+from diagnose.options import DiagnoseOptions, NuisanceOptions
+from diagnose.pipeline import diagnose
+from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
-from diagnose.verdict.validation import held_out_by_refit
 from mechanics.gap_bins import gap_by_bin
 from palpate.commands import demo
 from palpate.report.demo import diagnosis_words
@@ -216,9 +216,9 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
         worse = 4.0 if "time_delay" in found.names else 1.0
         return dataclasses.replace(honest, plain=worse * honest.plain + (worse - 1.0))
 
-    monkeypatch.setattr("diagnose.verdict.conclusion.held_out_by_refit", grown)
-    dear = "poisson_ratio,unbonded_base,compliant_base,inclusion,skin_layer,modulus_gradient"
-    options = dataclasses.replace(FAST, fast=False, without=dear)
+    monkeypatch.setattr("diagnose.verdict.held_out.held_out_by_refit", grown)
+    costly = "poisson_ratio,unbonded_base,compliant_base,inclusion,skin_layer,modulus_gradient"
+    options = dataclasses.replace(FAST, fast=False, without=costly)
     result = diagnose(*bench.record(_late), options)
     assert result.effects == () and "time_delay" in result.candidates
     assert result.kind == "unknown" and result.gap_after_n == result.gap_before_n

@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from diagnose.verdict import widening
-from diagnose.verdict.widening import factors, widened
+from diagnose.verdict import corrections
+from diagnose.verdict.corrections import factors, widened
 from tools.diagnose_widening import chosen_factors, distances
 
 
 def test_ends_move_away_from_the_value_and_stay_within_what_the_key_allows(monkeypatch):
-    monkeypatch.setattr(widening, "factors", lambda: {"all": 2.0, "force_bias": 3.0})
+    monkeypatch.setattr(corrections, "factors", lambda: {"all": 2.0, "force_bias": 3.0})
     wider = widened(
         "force_bias", {"bias_n": [0.1, 0.0, 0.0]}, {"bias_n": [[0.0, -0.1, -0.2], [0.3, 0.1, 0.2]]}
     )

@@ -11,7 +11,8 @@ from flat_contact import recorded
 from flat_ground import MODULUS_PA, TIP_M, raster
 
 import palpate as pp
-from diagnose.instrument.calibrate import STIFFEST, calibrate_on_plate, instrument_of
+from diagnose.calibrate.on_object import STIFFEST, instrument_of
+from diagnose.calibrate.on_plate import calibrate_on_plate
 from mechanics.calibration import Calibration, read_calibration, write_calibration
 from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording

@@ -10,7 +10,8 @@ from flat_contact import cyclic, points, pushed, recorded
 from flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster
 
 import palpate as pp
-from diagnose.pipeline import untold_effects, with_tip_of
+from diagnose.forward.touches import unobservable_effects
+from diagnose.pipeline import with_tip_of
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import ContactError, OptionError
 from mechanics.material import Material
@@ -122,7 +123,7 @@ def test_a_model_of_another_recording_needs_no_tracing(slab, made):
     assert np.abs(found.point[:, 2]).max() < 1e-6
     # the tip is the recording's, in places and in the law alike
     assert with_tip_of(slab, found).tool.tip_radius_m == TIP_M == found.tip_radius_m
-    assert untold_effects(found) >= ({"time_delay", "viscoelasticity"} if made is points else set())
+    assert unobservable_effects(found) >= ({"time_delay", "viscoelasticity"} if made is points else set())
 
 
 def test_a_replay_of_contact_that_is_never_left_counts_all_of_it(slab):

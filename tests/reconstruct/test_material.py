@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from diagnose.search.touches import touches_of
+from diagnose.forward.touches import touches_of
 from diagnose.specimen.bench import Curve, Similarity, approach_of, bench_of
 from diagnose.specimen.rivals import held_out_rivals
 from mechanics.dent import dent_law

@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from diagnose.compare.comparison import HOMOGENEOUS, RIVALS, CompareOptions, as_touched, compare_presses
+from diagnose.compare.comparison import CompareOptions, compare_presses
+from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
 from mechanics.press_making import PathErrors, of_paths
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 

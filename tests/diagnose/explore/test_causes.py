@@ -5,9 +5,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from diagnose.explore.causes import NONE, SIZES, Causes, Weighing, judge
-from diagnose.explore.explorer import cause_standing
-from diagnose.explore.parting import missing
+from diagnose.explore.causes import NONE, SIZES, Causes, judge
+from diagnose.explore.state import cause_goal
+from diagnose.explore.weighing import Weighing
 
 CAUSES, FORMS, OWN, READINGS, LOOKS = 6, 2, 3, 30, 20
 
@@ -44,7 +44,7 @@ def test_none_is_ruled_out_in_no_more_than_two_of_a_hundred_explorations_with_a_
     columns = _columns(rng)
     explorations = 100
     false = sum(
-        any(NONE not in c.standing(0.95) for c in _explored(rng, columns)) for _ in range(explorations)
+        any(NONE not in c.not_ruled_out(0.95) for c in _explored(rng, columns)) for _ in range(explorations)
     )
     assert false <= 2
 
@@ -56,21 +56,21 @@ def test_the_true_cause_stays_and_stands_alone_in_the_end():
     for k in range(12):
         told = _explored(rng, columns, cause=(k % CAUSES) * FORMS, size=0.5)
         name = f"cause {k % CAUSES}"
-        lost += any(name not in c.standing(0.95) for c in told)
-        alone += told[-1].standing(0.95) == [name]
+        lost += any(name not in c.not_ruled_out(0.95) for c in told)
+        alone += told[-1].not_ruled_out(0.95) == [name]
     assert lost <= 1 and alone >= 11
 
 
-def test_the_standing_is_of_ratios_to_the_mean_of_all():
+def test_what_is_ruled_out_follows_from_ratios_to_the_mean_of_all():
     causes = Causes({NONE: 0.0, "time_delay": 3.0, "backlash": -9.0}, 0.01, 1.0)
     ratio = causes.ratio
     mean = 0.5 + 0.25 * np.exp(3.0) + 0.25 * np.exp(-9.0)
     assert ratio["time_delay"] == pytest.approx(np.exp(3.0) / mean)
     assert sum(causes.probability.values()) == pytest.approx(1.0)
-    assert causes.standing(0.95) == ["time_delay", NONE]
-    assert missing(causes, "backlash", 0.95) == 0.0 and missing(causes, NONE, 0.95) > 1.0
-    standing = cause_standing(causes, 0.95)
-    assert not standing.met and standing.missing == pytest.approx(missing(causes, NONE, 0.95))
+    assert causes.not_ruled_out(0.95) == ["time_delay", NONE]
+    assert causes.missing("backlash", 0.95) == 0.0 and causes.missing(NONE, 0.95) > 1.0
+    goal = cause_goal(causes, 0.95)
+    assert not goal.met and goal.missing == pytest.approx(causes.missing(NONE, 0.95))
 
 
 def test_sizes_that_are_weighed_span_what_can_be_felt():

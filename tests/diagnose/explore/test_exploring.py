@@ -3,14 +3,16 @@
 import io
 import json
 from itertools import pairwise
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import trimesh
 
-from diagnose.explore.candidates import after_touch, modulus_after
+from diagnose.explore.candidates import Known, ReachOptions, after_touch, modulus_after, press_depth
 from diagnose.explore.explorer import Explorer
-from diagnose.explore.goals import GoalOptions, Standing, surface_error
-from diagnose.explore.rows import Instrument, Segment, together
+from diagnose.explore.goals import GoalOptions, GoalState, surface_error
+from diagnose.explore.segments import Instrument, Segment, join
 from mechanics.errors import OptionError, RecordingError
 from palpate.robot.protocol import segment_of, serve
 
@@ -31,12 +33,42 @@ def test_a_touch_tells_of_its_surroundings_and_not_of_the_far_side():
     assert (np.diff(after) >= 0).all() and after[-1] == pytest.approx(1e-3, rel=1e-3)
 
 
+def _known(**given):
+    """A block of 40 x 40 x 60 mm on the support, of 30 kPa."""
+    block = trimesh.creation.box(extents=[0.04, 0.04, 0.06])
+    block.apply_translation([0.0, 0.0, 0.03])
+    surface = SimpleNamespace(
+        vertices=block.vertices, support_point=np.zeros(3), support_normal=np.array([0.0, 0.0, 1.0])
+    )
+    usual = {
+        "surface": surface, "goals": (), "touched": np.zeros((0, 3)), "depths_m": np.zeros(0),
+        "here": np.zeros(3), "asked": np.zeros((0, 3)), "modulus_pa": 3e4, "modulus_sd": 0.05,
+        "modulus_bias": 0.02, "poisson_ratio": 0.49, "tip_radius_m": 0.005,
+    }  # fmt: skip
+    return Known(**{**usual, **given})
+
+
+@pytest.mark.parametrize("nu", [0.0, 0.3, 0.49])
+def test_a_press_is_as_deep_as_the_strongest_force_allows_for_the_objects_own_poissons_ratio(nu):
+    reach = ReachOptions(deepest_m=0.02, deepest_share=0.9, strongest_n=1.0)
+    depth = press_depth(_known(poisson_ratio=nu), np.array([0.0, 0.0, 0.06]), reach)
+    hertz = 4 / 3 * 3e4 / (1 - nu**2) * np.sqrt(0.005) * depth**1.5
+    assert hertz == pytest.approx(1.0, rel=1e-9)
+    # it never goes deeper for it than it may
+    light = press_depth(_known(poisson_ratio=nu, modulus_pa=1.0), np.array([0.0, 0.0, 0.06]), reach)
+    assert (
+        light
+        == pytest.approx(0.02)
+        == press_depth(_known(modulus_pa=float("nan")), np.array([0.0, 0.0, 0.06]), reach)
+    )
+
+
 def test_a_press_far_from_the_others_and_a_deep_one_tell_more_of_the_modulus():
     touched = np.array([[0.0, 0, 0], [0.005, 0, 0], [0, 0.005, 0]])
-    depths = np.full(3, 0.005)
+    known = _known(touched=touched, depths_m=np.full(3, 0.005), modulus_sd=0.05, modulus_bias=0.02)
 
     def after(point, depth):
-        return modulus_after(touched, depths, np.array(point), depth, 0.05, 0.02)
+        return modulus_after(known, np.array(point), depth)
 
     assert after([0.1, 0, 0], 0.005) < after([0.004, 0.004, 0], 0.005) < 0.05
     assert after([0.1, 0, 0], 0.005) < after([0.1, 0, 0], 0.001)
@@ -44,8 +76,8 @@ def test_a_press_far_from_the_others_and_a_deep_one_tell_more_of_the_modulus():
 
 
 def test_goals_are_met_from_above():
-    assert Standing("modulus", 0.04, 0.05).met and Standing("modulus", 0.04, 0.05).missing == 0
-    assert not Standing("surface", float("inf"), 0.002).met
+    assert GoalState("modulus", 0.04, 0.05).met and GoalState("modulus", 0.04, 0.05).missing == 0
+    assert not GoalState("surface", float("inf"), 0.002).met
     with pytest.raises(OptionError, match="--most"):
         GoalOptions(most=2)
 
@@ -56,7 +88,7 @@ def _rows(kind="press", n=400, late=0.0):
 
 
 def test_segments_are_joined_end_to_end():
-    made = together(Instrument(0.005), [_rows("trace", late=7.0), _rows(late=100.0)])
+    made = join(Instrument(0.005), [_rows("trace", late=7.0), _rows(late=100.0)])
     assert len(made.t) == 800
     np.testing.assert_allclose(np.diff(made.t), 1e-3)
     assert made.boundary_phase == pytest.approx((0.0, 0.399))

@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.explore.rows import Instrument, Segment, apart, together
+from diagnose.explore.segments import Instrument, Segment, join, split
 from mechanics.errors import RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.segments import Segment as Stretch
@@ -26,7 +26,7 @@ def explored():
         _rows("rigid", 300, 0.2),
         _rows("press", 500, 0.3),
     ]
-    return together(Instrument(0.004, 1000.0, about), segments), segments
+    return join(Instrument(0.004, 1000.0, about), segments), segments
 
 
 def test_what_was_joined_comes_apart_again_also_from_its_file(explored, tmp_path):
@@ -34,13 +34,13 @@ def test_what_was_joined_comes_apart_again_also_from_its_file(explored, tmp_path
     again = read_recording(write_recording(tmp_path / "so-far.csv.gz", recording))
     assert [s.kind for s in again.segments] == ["trace", "press", "rigid", "press"]
     for source in (recording, again):
-        instrument, parts = apart(source)
+        instrument, parts = split(source)
         assert instrument.tip_radius_m == 0.004 and instrument.about["poisson_ratio"] == 0.45
         assert [s.kind for s in parts] == [s.kind for s in segments]
         for made, given in zip(parts, segments, strict=True):
             np.testing.assert_allclose(made.position, given.position, atol=1e-9)
     # and joined once more, it is the same recording
-    np.testing.assert_allclose(together(instrument, parts).t, recording.t, atol=1e-3)
+    np.testing.assert_allclose(join(instrument, parts).t, recording.t, atol=1e-3)
 
 
 def test_a_recording_says_what_is_wrong_with_its_segments(explored):
@@ -50,4 +50,4 @@ def test_a_recording_says_what_is_wrong_with_its_segments(explored):
     with pytest.raises(RecordingError, match="start must come before"):
         dataclasses.replace(recording, segments=(Stretch("press", 2.0, 1.0),))
     with pytest.raises(RecordingError, match="order of time"):
-        apart(dataclasses.replace(recording, segments=recording.segments[::-1]))
+        split(dataclasses.replace(recording, segments=recording.segments[::-1]))

@@ -9,7 +9,7 @@ import pytest
 from diagnose.explore.causes import NONE, causes_of
 from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions
-from diagnose.search.first_touch import REACH_M
+from diagnose.search.starts import REACH_M
 from mechanics.recording import read_recording
 
 
@@ -42,7 +42,7 @@ TRUE_PA = {"time-delay": 35e3, "viscoelasticity": 24e3}
 def test_the_labelled_cause_stands_alone_and_the_modulus_beside_it_is_the_true_one(shared_recordings, name):
     recording = read_recording(shared_recordings / f"example-{name}.toml")
     state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
-    assert state.causes.standing(0.95) == [name.replace("-", "_")]
+    assert state.causes.not_ruled_out(0.95) == [name.replace("-", "_")]
     low, high = state.modulus_ci95_pa
     assert low < TRUE_PA[name] < high and high < 1.25 * low
 
@@ -53,7 +53,7 @@ def test_a_sound_object_under_a_sensor_with_a_bias_and_a_drift_has_no_cause(shar
     zero = np.array([0.2, -0.1, 0.3]) + np.outer(recording.t / recording.t[-1], [0.0, 0.1, 0.1])
     recording = dataclasses.replace(recording, force_on_tool=recording.force_on_tool + zero)
     state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
-    assert "none" in state.causes.standing(0.95), state.causes.ratio
+    assert "none" in state.causes.not_ruled_out(0.95), state.causes.ratio
     assert state.causes.misfit < 1.5
 
 
@@ -74,7 +74,7 @@ def test_a_surface_that_passes_one_touch_is_no_cause(shared_recordings):
     explorer = Explorer.going_on(recording, GoalOptions(most=60))
     for by_m in (1.5e-3, 6e-3):
         causes, weighing = causes_of(_passed(explorer.estimate, 3, by_m))
-        assert NONE in causes.standing(0.95), causes.ratio
+        assert NONE in causes.not_ruled_out(0.95), causes.ratio
         left_out = len(explorer.estimate.presses_placed) - len(weighing.forward.touches)
         assert left_out == (by_m > REACH_M)
 
@@ -88,4 +88,4 @@ def test_a_surface_that_passes_one_touch_is_no_cause(shared_recordings):
 def test_nothing_but_finite_strain_rules_none_out(shared_recordings, name):
     recording = read_recording(shared_recordings / f"{name}.toml")
     state = Explorer.going_on(recording, GoalOptions(most=60, cause_at=0.95)).state
-    assert "none" in state.causes.standing(0.95), state.causes.ratio
+    assert "none" in state.causes.not_ruled_out(0.95), state.causes.ratio

@@ -12,7 +12,7 @@ from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
 from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions
-from diagnose.explore.rows import Instrument
+from diagnose.explore.segments import Instrument
 from mechanics.model import Model
 from mechanics.recording import read_recording
 from palpate.window.guide import Guide

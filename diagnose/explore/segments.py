@@ -84,14 +84,14 @@ def check_joined(instrument: Instrument, segments: list[Segment], segment: Segme
     """Raises RecordingError where a segment makes what no exploration can be (mechanics.recording)."""
     from mechanics.recording import check_sane
 
-    check_sane(together(instrument, [*segments, segment]))
+    check_sane(join(instrument, [*segments, segment]))
 
 
-def together(instrument: Instrument, segments: list[Segment]) -> Recording:
+def join(instrument: Instrument, segments: list[Segment]) -> Recording:
     """The recording of all segments in order; their clocks are joined end to end.
 
     Phase I is the tracing where there is one; what each segment was stands in the recording. Raises
-    RecordingError where there is no segment, or where some tell the tool's orientation and others do not.
+    RecordingError where there is no segment, or where some hold the tool's orientation and others do not.
     """
     if not segments:
         raise RecordingError("nothing was felt yet: add a segment first")
@@ -131,8 +131,8 @@ ABOUT = (
 """Fields of a recording that stay true when it goes on."""
 
 
-def apart(recording: Recording) -> tuple[Instrument, list[Segment]]:
-    """What `together` joined: the instrument, and the segments in order. A recording that states none is cut
+def split(recording: Recording) -> tuple[Instrument, list[Segment]]:
+    """The opposite of `join`: the instrument, and the segments in order. A recording that states none is cut
     half way between the presses that are found in it.
 
     Raises RecordingError where the stated segments do not follow one another, ContactError where nothing can

@@ -6,6 +6,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
+from scipy.stats import chi2
 
 from diagnose.instrument.jackknife import all_but_one, covariance
 from mechanics.kinematics import acceleration
@@ -17,6 +19,8 @@ BLOCK_S = 0.25
 MIN_BLOCKS = 8
 STRETCHES = 8
 """Of time, left out in turn for standard errors: what wanders is no bias and no drift."""
+LEAST_TURN = 0.02
+"""Standard deviation of the rotation's entries from which a force that turns with the tool can be seen."""
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,16 @@ class FreeAir:
     mass_kg: float
     mass_se_kg: float
     turning: Turning | None = None
+
+    @property
+    def p(self) -> float:
+        """That bias, drift and mass (seven numbers) are all chance (Bonferroni)."""
+        z = max(
+            np.abs(self.bias_n).max() / self.bias_se_n,
+            np.abs(self.rate_n_per_s).max() / self.rate_se_n_per_s,
+            abs(self.mass_kg) / self.mass_se_kg,
+        )
+        return float(min(1.0, 7 * chi2.sf(z**2, 1)))
 
 
 @dataclass(frozen=True)
@@ -112,14 +126,8 @@ def _scatter(lines: np.ndarray) -> tuple[float, float]:
     return float(spread[0]), float(spread[1])
 
 
-LEAST_TURN = 0.02
-"""Standard deviation of the rotation's entries from which a force that turns with the tool can be told."""
-
-
 def matrices(quaternion: np.ndarray) -> np.ndarray:
     """(n, 3, 3) rotations, tool to device, of unit quaternions (n, 4) scalar first."""
-    from scipy.spatial.transform import Rotation
-
     return Rotation.from_quat(quaternion, scalar_first=True).as_matrix()
 
 

@@ -1,112 +1,23 @@
-"""Weighing: a set of effects fitted, judged on sites that it has not seen, and scored against another set."""
+"""Where evidence is weighed: a set of effects is fitted, judged on sites that it has not seen, and scored
+against another set."""
 
 from __future__ import annotations
 
 import copy
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from scipy.special import expit
 
-from diagnose.search.deciding import AttributionOptions
-from diagnose.search.first_touch import first_touches
-from diagnose.search.fit import Descent, Fit, fit, settings_of
-from diagnose.search.forward import Forward
-from diagnose.search.leave_one_out import held_out, levelled
-from diagnose.search.naming import WEIGHTS, lower_closure, share_closed
-from diagnose.search.whiten import NuisanceOptions, Whitener
+from diagnose.forward.prediction import Forward
+from diagnose.options import AttributionOptions, NuisanceOptions
+from diagnose.search.descent import Descent, fit
+from diagnose.search.fit import Fit, settings_of
+from diagnose.search.gaps import lower_closure, share_closed
+from diagnose.search.leave_one_out import Candidate, held_out
+from diagnose.search.naming import Score
+from diagnose.search.starts import first_touches
+from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """A set of effects judged: its fit, losses and plain sums of squares of held-out groups, and gains on the
-    base."""
-
-    found: Fit
-    held: np.ndarray
-    plain: np.ndarray
-    dof: float
-
-    @property
-    def residual(self) -> np.ndarray:
-        """(n, 3) N, measured less predicted, with the modulus of the plain fit."""
-        return levelled(self.found)[0]
-
-    @property
-    def fitted_plain(self) -> np.ndarray:
-        """(g,) N^2, sums of squares of the places as fitted, with the modulus of the plain fit."""
-        return levelled(self.found)[1]
-
-    @property
-    def chi(self) -> float:
-        """Whitened mean square per component: about 1 where the noise model holds."""
-        return float(self.found.gram[:, 0, 0].sum() / self.dof)
-
-    def chi_but_for_one(self, counts: np.ndarray) -> tuple[float, int]:
-        """(chi without the site that misses most, that site); counts: (g,) samples of each site."""
-        each = self.found.gram[:, 0, 0]
-        worst = int(np.argmax(each / counts))
-        return float((each.sum() - each[worst]) / (3.0 * (counts.sum() - counts[worst]))), worst
-
-
-@dataclass(frozen=True)
-class Score:
-    """How much better a candidate is than what it was added to.
-
-    added: the effects in which the two differ. gain: log likelihood, deflated by its own lack of fit.
-    per_group: (g,) the gain of each site, deflated likewise. size_n: rms change of the predicted force, N.
-    share: of the old held-out excess over the noise (of a lump, of the fitted one). closes: the same, at
-    least, over resampled sites.
-    """
-
-    added: tuple[Effect, ...]
-    gain: float
-    size_n: float
-    share: float
-    closes: float
-    per_group: np.ndarray
-    candidate: Candidate
-
-    @property
-    def effect(self) -> Effect:
-        """The effect that is scored; the first of a pair."""
-        return self.added[0]
-
-    @property
-    def name(self) -> str:
-        """Its name; of a pair both."""
-        return "+".join(e.name for e in self.added)
-
-    @property
-    def evidence(self) -> float:
-        """The gain that counts: without the site that gains most, as one place that slipped, or whose surface
-        is wrong, speaks for whatever bends it. A lump lives in few places: all, less the price of which."""
-        if self.effect.hints.few_places:
-            return self.gain - float(np.log(len(self.per_group)))
-        return self.gain - max(float(self.per_group.max()), 0.0)
-
-    @property
-    def closure(self) -> float:
-        """The share of the held-out gap that counts: at least so much; of a lump, which closes it in few
-        places, as it is."""
-        return self.share if self.effect.hints.few_places else self.closes
-
-    @property
-    def log_odds(self) -> float:
-        """That it is there, rather than an error of our own law."""
-        return WEIGHTS.log_odds(self.evidence, self.closure)
-
-    @property
-    def probability(self) -> float:
-        """The same as a probability."""
-        return float(expit(self.log_odds))
-
-    @property
-    def may_be(self) -> bool:
-        """Whether it would be as likely as not if it closed the whole gap."""
-        return WEIGHTS.log_odds(self.evidence, 1.0) > 0
 
 
 class Search:
@@ -178,18 +89,18 @@ class Search:
         over = max(1.0, new.chi) * self.forward.touches.noise.variance_inflation
         fitted = 0.5 * (old.found.gram[:, 0, 0] - new.found.gram[:, 0, 0])
         # predicted with what the other places alone would have added: a lump under one place is none
-        told = (fitted.sum() - fitted) / over > extra
-        per_group = np.where(told, old.held - new.held, 0.0)
+        predicted = (fitted.sum() - fitted) / over > extra
+        per_group = np.where(predicted, old.held - new.held, 0.0)
         gain = float(per_group.sum())
         if all(e.scope.between_places for e in added):
             # a few places hold the evidence: leaving them out leaves nothing, so the sample pays a price
             per_group = fitted
             gain = old.found.loss - new.found.loss - 0.5 * np.log(len(fitted)) * extra
-        # a lump under one place is told by that place: what it closes there counts, as its evidence does
+        # a lump under one place shows at that place alone: what it closes there counts, as its evidence does
         if all(e.hints.few_places for e in added):
             was, left = old.fitted_plain, new.fitted_plain
         else:
-            was, left = old.plain, np.where(told, new.plain, old.plain)
+            was, left = old.plain, np.where(predicted, new.plain, old.plain)
         t = self.forward.touches
         before, after = old.residual[t.counted], new.residual[t.counted]
         size = float(np.sqrt(((after - before) ** 2).sum(axis=1).mean()))

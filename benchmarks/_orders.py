@@ -1,13 +1,10 @@
-"""Orders of touching to compare guidance with: where a hand goes that is not told."""
+"""Orders of touching to compare guidance with: where a hand goes that is not guided."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-Order = Callable[[np.ndarray, np.ndarray, np.ndarray, np.random.Generator], int]
-"""(places (p, 3) m, touched (k, 3) m, here (3,) m, random numbers) to the number of the next place."""
+from diagnose.explore.explorer import Order
 
 NEAR_M = 0.025
 """How far a person's next press usually is from the last."""

@@ -7,22 +7,35 @@ import dataclasses
 
 import numpy as np
 
+from mechanics.effects.base import Role, Scope
+from mechanics.effects.registry import effects
 from mechanics.errors import DiagnosisError
 from mechanics.leads import leads
 from mechanics.presses import LEAD_S, STEP_S, Presses
 
+REACH_M = 2.4e-3
+"""Most by which a first touch is moved."""
 LEAST_PRESSES, LEAST_SITES = 6, 4
 LEAST_S = 0.08
 LEAST_ROWS = 12
 LEAST_POINTS = 3
+FOLLOWED = "followed"
+"""Column of touches whose free air was followed from before to after them: (n, 3) N, what was taken off."""
+
+
+def reached(presses: Presses) -> np.ndarray:
+    """(p,) bool: presses that met the surface that was fitted to them, or can be moved there. The others lie
+    on a shape that the surface has not got, or are no presses: a heavy tool that was swung."""
+    passed = np.einsum("pi,pi->p", presses.centre - presses.point, presses.normal) - presses.tip_radius_m
+    return np.abs(passed) < REACH_M
 
 
 def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
     """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (mechanics.leads).
 
-    Presses of fewer places than 4 are a group each: they are held out press by press, and from place to place
-    nothing is told (diagnose.pipeline). Raises DiagnosisError with fewer than 6 presses: nothing can be held
-    out.
+    Presses of fewer places than 4 are a group each: they are held out press by press, and show nothing from
+    place to place (`unobservable_effects`). Raises DiagnosisError with fewer than 6 presses: nothing can be
+    held out.
     """
     if len(presses) < LEAST_PRESSES:
         raise DiagnosisError(
@@ -65,3 +78,18 @@ def place_of(touches: Presses) -> np.ndarray:
         return touches.site
     place = touches.columns["place"][np.minimum(touches.starts[:-1], len(touches.t) - 1)]
     return np.ascontiguousarray(np.round(place), dtype=touches.site.dtype)
+
+
+def unobservable_effects(presses: Presses) -> set[str]:
+    """Names of the effects that presses of this kind cannot show: points have no time, one axis has nothing
+    sideways, one place has no other place, and what never leaves the object has no free air."""
+    hidden: set[Scope] = set()
+    if presses.quasi_static:
+        hidden |= {Scope.TIME, Scope.READING}
+    if presses.sites < LEAST_SITES:
+        hidden |= {Scope.PLACES}
+    names = {e.name for e in effects() if e.scope in hidden}
+    if not presses.local_force[:, 1:].any():
+        # a machine of one axis: nothing sideways, and no axis beside another
+        names |= {e.name for e in effects() if e.hints.slips or e.hints.common_factor > 0}
+    return names - {e.name for e in effects() if e.role is Role.KNOWN}

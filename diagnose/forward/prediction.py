@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.search import kernel
-from diagnose.search.touches import place_of
+from diagnose.forward import kernel
+from diagnose.forward.touches import place_of
 from mechanics.dent import effective_radius
 from mechanics.effects.path import new_memory, path_numbers
 from mechanics.effects.settings import Settings

@@ -1,4 +1,4 @@
-"""How much a press would tell two causes apart, by the way in which it is made.
+"""How well a press would separate two causes, by the way in which it is made.
 
 Every place that was pressed is pressed once more in thought, by each plan, under the likeliest form of the
 likeliest cause and of its rivals. What is left of the difference beside noise, first touch, stiffness of the
@@ -12,20 +12,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from diagnose.explore.causes import (
-    FALSE_ALARMS,
-    NONE,
-    NUISANCE,
-    SUPPORT_GIVES,
-    Causes,
-    Weighing,
-    changed,
-    likeliest,
-)
+from diagnose.explore.causes import Causes, likeliest
+from diagnose.explore.weighing import NUISANCE, SUPPORT_GIVES, Weighing, changed
+from diagnose.forward.planned import Plan, pressed
 from diagnose.search.whiten import Whitener
-from diagnose.verdict.next_touch import Plan, pressed
 from mechanics.effects.tool_compliance import EFFECT as TOOL_COMPLIANCE
-from mechanics.presses import Presses
 
 PLANS = (
     Plan(0.8, 0.02, 0.2, 0.0, 1),
@@ -42,8 +33,8 @@ SPRING = TOOL_COMPLIANCE.name
 
 
 @dataclass(frozen=True)
-class Parting:
-    """What a plan would tell. gain: (p,) expected log evidence of the likeliest cause against its rivals, at
+class Separation:
+    """What a plan would show. gain: (p,) expected log evidence of the likeliest cause against its rivals, at
     each place that was pressed (point (p, 3) m, device frame), never more than is missing."""
 
     plan: Plan
@@ -58,20 +49,14 @@ class Parting:
         return float(self.gain[np.argmin(((self.point - point) ** 2).sum(axis=1))])
 
 
-def missing(causes: Causes, name: str, at: float) -> float:
-    """Log by which a hypothesis must still fall to be ruled out; 0 where it is."""
-    least = min(1 - at, FALSE_ALARMS) if name == NONE else 1 - at
-    return max(0.0, float(np.log(max(causes.ratio[name], 1e-300) / least)))
-
-
-def partings(weighing: Weighing, causes: Causes, at: float) -> list[Parting]:
-    """What each plan would tell of the likeliest cause against those that still stand beside it."""
-    first, *others = causes.standing(at)
+def separations(weighing: Weighing, causes: Causes, at: float) -> list[Separation]:
+    """What each plan would show of the likeliest cause against those that are not ruled out beside it."""
+    first, *others = causes.not_ruled_out(at)
     rivals = others[:RIVALS]
     if not rivals:
         return []
     w, made = weighing, []
-    over = w.forward.touches.noise.variance_inflation * max(1.0, causes.misfit)
+    over = w.inflation(causes.misfit)
     forms = {name: likeliest(w, name, causes.least_n) for name in (first, *rivals)}
     for plan in PLANS:
         virtual = dataclasses.replace(w.forward, touches=pressed(w.forward, plan))
@@ -88,26 +73,21 @@ def partings(weighing: Weighing, causes: Causes, at: float) -> list[Parting]:
             both = np.stack([change[first] - change[rival], before], axis=2)
             gram = whitener.gram(both)
             left = gram[:, 0, 0] - gram[:, 0, 1] ** 2 / np.maximum(gram[:, 1, 1], 1e-12)
-            gain += np.minimum(0.5 * left / over, missing(causes, rival, at))
+            gain += np.minimum(0.5 * left / over, causes.missing(rival, at))
         touches = w.forward.touches
-        made.append(Parting(plan, depth_of(touches, plan), touches.point, gain, first, rivals[0]))
+        made.append(Separation(plan, plan.depth_m(touches), touches.point, gain, first, rivals[0]))
     return made
 
 
-def depth_of(touches: Presses, plan: Plan) -> float:
-    """m, of a plan."""
-    return plan.depth * float(touches.deepest.max())
-
-
-def by_support(weighing: Weighing, causes: Causes, at: float) -> tuple[float, str, str]:
+def support_gain(weighing: Weighing, causes: Causes, at: float) -> tuple[float, str, str]:
     """(expected log evidence, likeliest cause, rival) of three presses on the bare support; 0 where no
     yielding tool is in question."""
-    first, *others = causes.standing(at)
+    first, *others = causes.not_ruled_out(at)
     pair = [n for n in (first, *others[:RIVALS]) if n != SPRING]
     if len(pair) > RIVALS or not pair or not others:
         return 0.0, first, first
     act, size = likeliest(weighing, SPRING, causes.least_n) or (None, 0.0)
     yields = size * weighing.springs[weighing.acts.index(act)] if act is not None else 0.0
     gain = 0.5 * (yields / SUPPORT_GIVES) ** 2
-    out = min(missing(causes, name, at) for name in (pair if first == SPRING else [SPRING]))
+    out = min(causes.missing(name, at) for name in (pair if first == SPRING else [SPRING]))
     return float(min(gain, out)), first, others[0] if first == SPRING else SPRING

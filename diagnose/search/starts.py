@@ -1,22 +1,18 @@
-"""Where each press first met the surface, before anything is fitted: a search over shifts."""
+"""Where fits start from: where each press first met the surface, and what a first fit leaves at every press,
+from which effects seek their own starts."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
+from diagnose.forward.touches import REACH_M
+from diagnose.search.fit import Fit, settings_of
 from diagnose.search.whiten import Whitener
-from mechanics.presses import Presses
+from mechanics.effects.hints import Misfit
 
-REACH_M = 2.4e-3
-"""Most by which a first touch is moved."""
-
-
-def reached(presses: Presses) -> np.ndarray:
-    """(p,) bool: presses that met the surface that was fitted to them, or can be moved there. The others lie
-    on a shape that the surface has not got, or are no presses: a heavy tool that was swung."""
-    passed = np.einsum("pi,pi->p", presses.centre - presses.point, presses.normal) - presses.tip_radius_m
-    return np.abs(passed) < REACH_M
+LEAST_SD = 0.015
+"""Share by which a press's stiffness is off at least, beside noise and shape."""
 
 
 def first_touches(forward: Forward, whitener: Whitener, modulus: float) -> np.ndarray:
@@ -49,3 +45,26 @@ def first_touches(forward: Forward, whitener: Whitener, modulus: float) -> np.nd
     left, mid, right = cost[inner - 1, rows], cost[inner, rows], cost[inner + 1, rows]
     curve = np.maximum(left - 2 * mid + right, 1e-12)
     return shifts[inner] + np.clip(0.5 * (left - right) / curve, -0.5, 0.5) * (shifts[1] - shifts[0])
+
+
+def misfit_of(forward: Forward, base: Fit, site_sd: np.ndarray) -> Misfit:
+    """Each press's factor on the force, and how it answers to compliance. site_sd: (p,) of the shape."""
+    t = forward.touches
+    keep = t.counted[:, None]
+    predicted = np.where(keep, t.local_force - base.residual, 0.0)[:, 0]
+    residual = np.where(keep, base.residual, 0.0)[:, 0]
+
+    def sums(a: np.ndarray) -> np.ndarray:
+        return np.bincount(t.press, weights=a, minlength=len(t))
+
+    power = np.maximum(sums(predicted**2), 1e-12)
+    settings = settings_of(forward, base.effects, base.values, base.likeliest)
+    step = 1.0
+    settings.far = settings.far.copy()
+    settings.far[:, 0, 0] += step
+    moved = np.where(t.counted, forward.predict(settings)[:, 0], 0.0)
+    return Misfit(
+        level=sums(predicted * residual) / power,
+        answer=sums(predicted * (moved - predicted)) / power / step,
+        weight=1 / (site_sd**2 + t.noise_n**2 / power + LEAST_SD**2),
+    )

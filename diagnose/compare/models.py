@@ -1,0 +1,257 @@
+"""The models that are compared: each is fitted to training presses and predicts others that it has not seen.
+
+- fem: the finite-element model with what the training presses ask for: Young's modulus (least squares; the
+  force of a path is proportional to it), the dent law, linear or neo-Hookean, that fits them best, and a
+  smooth field of the modulus where they ask for one (reconstruct.steps.s7_modulus.modulus_field).
+- fem-homogeneous: the same with one modulus whatever they ask for.
+- kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
+  interpolated to the held-out place by radial basis functions (render.one_d), force along the normal.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from mechanics.model import Model
+from mechanics.places import Places
+from mechanics.press_making import of_paths
+from mechanics.press_sites import sites_of
+from mechanics.presses import MARGIN_S, Presses
+from mechanics.progress import Progress, silent
+from mechanics.sites import TouchSites, touch_sites
+from mechanics.smooth_field import SmoothField
+from mechanics.touch import forces_at
+from reconstruct.steps.s6_one_d.one_d import columns, fit_robust
+from reconstruct.steps.s6_one_d.uniaxial import low_passed
+from reconstruct.steps.s7_modulus.modulus_field import (
+    LAW_ERROR,
+    FieldSites,
+    PressModuli,
+    asked_for,
+    fit_field,
+    places_at,
+    press_moduli,
+    with_field,
+)
+from render.one_d import Law, spread_law
+
+RIVALS = ("kelvin-voigt", "hunt-crossley")
+HOMOGENEOUS = "fem-homogeneous"
+MODELS = ("fem", *RIVALS, HOMOGENEOUS)
+LAWS = ("linear", "neo-hookean")
+MOST_MOVED, MOVES = 2.5, 21
+"""Standard errors by which a held-out first touch may be moved, and places that are tried."""
+LASTING = 10
+"""Rows of a press that a lasting error of a law binds together."""
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """The contact samples of the presses, net of free air, and what each model needs of them.
+
+    unit: dent law -> (n, 3) m^2, force for unit modulus, the object of one modulus. laws: 1D name -> Law of
+    each press's own fit. sites, places: where the presses are. own: dent law -> each press's own modulus;
+    none: fields are not asked about.
+    """
+
+    presses: Presses
+    unit: dict[str, np.ndarray]
+    laws: dict[str, Law]
+    sites: TouchSites
+    places: Places
+    own: dict[str, PressModuli]
+
+
+def of_one_modulus(model: Model) -> Model:
+    """Its geometry, base and Poisson's ratio: what varies in it is refitted."""
+    return model.with_material(field=None, gradient=None, skin=None, inclusions={})
+
+
+def prepare(
+    table: Presses,
+    model: Model,
+    site_m: float | None = None,
+    progress: Progress = silent,
+    *,
+    field: str = "auto",
+) -> Prepared:
+    """Contact samples and what each model needs; the touch sites are solved here. site_m: None keeps the
+    table's sites. field: as in CompareOptions."""
+    model = of_one_modulus(model)
+    if site_m is not None:
+        table = replace(table, site=sites_of(table.point, table.normal, site_m))
+    solved = touch_sites(
+        model.mesh, table.point, table.normal, model.material.poisson_ratio, progress=progress
+    )
+    smooth = low_passed(table)
+    presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
+    unit = {
+        law: forces_at(
+            solved,
+            presses.displacement,
+            presses.starts,
+            young_modulus_pa=1.0,
+            tip_radius_m=presses.tip_radius_m,
+            law=law,
+        )
+        for law in LAWS
+    }
+    fitted = columns(fit_robust(smooth.window(0.0, 0.0), table.noise.raw_n), np.zeros(len(table)))
+    one, none = np.ones(len(table)), np.zeros(len(table))
+    places, own = places_at(model, table, solved), {}
+    if field != "homogeneous":
+        own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
+    return Prepared(
+        presses,
+        unit,
+        {
+            "kelvin-voigt": Law(fitted["k_kv"], fitted["b_kv"], one, none),
+            "hunt-crossley": Law(fitted["k_hc"], fitted["b_hc"], fitted["r_hc"], fitted["r_hc"]),
+        },
+        solved,
+        places,
+        own,
+    )
+
+
+@dataclass(frozen=True)
+class Fem:
+    """The finite-element model of some presses: dent law, modulus Pa, touch sites, and the field in them;
+    None: of one modulus."""
+
+    law: str
+    modulus_pa: float
+    sites: FieldSites
+    field: SmoothField | None = None
+
+    def forces(self, presses: Presses, moved_m: np.ndarray | None = None) -> np.ndarray:
+        """(n, 3) N of every path. moved_m: (p,) by how much earlier each press meets the surface."""
+        return self.modulus_pa * self.sites.unit_forces(presses, self.law, moved_m)
+
+    def at(self, rows: np.ndarray) -> Fem:
+        """At some of its sites."""
+        return replace(self, sites=FieldSites(self.sites.sites.of(rows), self.sites.ratio[rows]))
+
+
+def _homogeneous(prepared: Prepared, train: np.ndarray) -> Fem:
+    """Of one modulus, and the dent law that fits the presses `train` best."""
+    seen = prepared.presses.rows(train)
+    measured = prepared.presses.force[seen]
+    fits = []
+    for law, unit in prepared.unit.items():
+        modulus = _scale(unit[seen], measured)
+        fits.append((rms(modulus * unit[seen] - measured), modulus, law))
+    _, modulus, law = min(fits)
+    return Fem(law, modulus, with_field(prepared.sites, prepared.places, None))
+
+
+def _fem(prepared: Prepared, train: np.ndarray) -> Fem:
+    """With a field where the presses `train` ask for one."""
+    plain = _homogeneous(prepared, train)
+    if not prepared.own:
+        return plain
+    law = min(prepared.own, key=lambda name: prepared.own[name].fit.cost[train].sum())
+    found = fit_field(prepared.own[law], train)
+    if found is None or not asked_for(found):
+        return plain
+    fem = Fem(law, 1.0, with_field(prepared.sites, prepared.places, found.field), found.field)
+    presses = prepared.presses
+    seen = presses.rows(train)
+    # first touches of what is fitted are where that fit has them
+    shift = np.zeros(len(presses))
+    shift[train] = -prepared.own[law].fit.onset_shift_m[train]
+    return replace(fem, modulus_pa=_scale(fem.forces(presses, shift)[seen], presses.force[seen]))
+
+
+def predicted(
+    prepared: Prepared, train: np.ndarray, test: np.ndarray, interpolation: str, first_touch: str
+) -> tuple[dict[str, np.ndarray], Fem]:
+    """Forces (rows of test, 3) of each model fitted to the presses `train`, and the FEM. interpolation,
+    first_touch: as in CompareOptions."""
+    whole = prepared.presses
+    presses = whole.of(np.isin(np.arange(len(whole)), test))
+    plain, fem = _homogeneous(prepared, train), _fem(prepared, train)
+    models: dict[str, Callable[[np.ndarray], np.ndarray]] = {
+        "fem": partial(fem.at(test).forces, presses),
+        HOMOGENEOUS: partial(plain.at(test).forces, presses),
+    }
+    for name, fitted in prepared.laws.items():
+        own = Law(*(column[train] for column in fitted))
+        at = spread_law(whole.point[train], whole.site[train], own, whole.point[test], interpolation)
+        models[name] = partial(_one_d, presses, at)
+    return {name: as_touched(models[name], presses, first_touch) for name in MODELS}, fem
+
+
+def _one_d(presses: Presses, law: Law, moved_m: np.ndarray) -> np.ndarray:
+    """(n, 3) N of a 1D law's parameters (p,) of each press."""
+    k, b, r, s = (column[presses.press] for column in law)
+    u = np.maximum(presses.depth + moved_m[presses.press], 0.0)
+    inside = u > 0
+    safe = np.where(inside, u, 1.0)
+    push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate, 0.0), 0.0)
+    return push[:, None] * presses.normal[presses.press]
+
+
+def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, first_touch: str) -> np.ndarray:
+    """(n, 3) N along the paths as read, or with each first touch where the force then meets what was measured
+    best, at the price of its stated error."""
+    stated = presses.onset_error_m
+    found = force(np.zeros(len(presses)))
+    if first_touch == "read" or not (stated > 0).any():
+        return found
+    variance = presses.noise.raw_n**2 + LAW_ERROR**2 * (presses.force**2).sum(axis=1) / 3
+    least = np.full(len(presses), np.inf)
+    for z in np.linspace(-MOST_MOVED, MOST_MOVED, MOVES):
+        tried = force(z * stated)
+        missed = ((tried - presses.force) ** 2).sum(axis=1) / variance / LASTING
+        cost = np.bincount(presses.press, weights=missed, minlength=len(presses)) + z**2
+        better = cost < least
+        found = np.where(better[presses.press][:, None], tried, found)
+        least = np.minimum(cost, least)
+    return found
+
+
+def _scale(unit: np.ndarray, measured: np.ndarray) -> float:
+    return float((unit * measured).sum() / (unit**2).sum())
+
+
+def rms(forces: np.ndarray) -> float:
+    """Of 3-vectors (n, 3)."""
+    return float(np.sqrt((forces**2).sum(axis=1).mean()))
+
+
+def stiffness_along(
+    prepared: Prepared,
+    train: np.ndarray,
+    places: np.ndarray,
+    normals: np.ndarray,
+    model: Model,
+    depth_m: float,
+) -> dict[str, np.ndarray]:
+    """Force (q,) N of each model at one depth, at places (q, 3) with normals (q, 3); fitted on `train`."""
+    model = of_one_modulus(model)
+    solved = touch_sites(model.mesh, places, normals, model.material.poisson_ratio)
+    steps = np.linspace(0.0, depth_m, 60)
+    path = (-steps[None, :, None] * solved.normals[:, None, :]).reshape(-1, 3)
+    starts = np.arange(len(places) + 1) * len(steps)
+    centres = places + model.tool.tip_radius_m * solved.normals
+    pressed = of_paths(
+        starts, np.repeat(centres, len(steps), axis=0) + path, np.zeros_like(path), centres, solved.normals,
+        tip_radius_m=model.tool.tip_radius_m, sample_rate_hz=prepared.presses.sample_rate_hz,
+    )  # fmt: skip
+    result = {}
+    for name, fem in (("fem", _fem(prepared, train)), (HOMOGENEOUS, _homogeneous(prepared, train))):
+        there = places_at(model, pressed, solved)
+        force = replace(fem, sites=with_field(solved, there, fem.field)).forces(pressed)
+        deepest = force.reshape(len(places), len(steps), 3)[:, -1]
+        result[name] = (deepest * solved.normals).sum(axis=1)
+    presses = prepared.presses
+    for name, fitted in prepared.laws.items():
+        own = Law(*(c[train] for c in fitted))
+        at = spread_law(presses.point[train], presses.site[train], own, places)
+        result[name] = at.k * depth_m**at.r
+    return result

@@ -1,0 +1,254 @@
+"""What evidence is weighed from: every form of a cause as a change of force, beside noise and our own errors.
+
+The likelihood is Gaussian and linear about the ideal model: the modulus is free; first touches, places and
+the law's own errors (those of one place and those that all places share) have widths of their own
+(diagnose.search.whiten, COMMON); every form of a cause is a column, the change of force that it brings about.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from diagnose.explore.estimate import MESH_M, Estimate, solved_sites
+from diagnose.explore.forms import Act, balls, forms_of, softer
+from diagnose.forward.prediction import Forward
+from diagnose.forward.touches import reached, touches_of
+from diagnose.instrument.free_air import free_air_of
+from diagnose.instrument.offsets import find_instrument_offsets
+from diagnose.instrument.rigid import rigid_of
+from diagnose.options import NuisanceOptions
+from diagnose.search.descent import fit
+from diagnose.search.fit import Fit, settings_of
+from diagnose.search.gaps import modulus_share
+from diagnose.search.shape import site_stiffness_sd
+from diagnose.search.starts import first_touches
+from diagnose.search.whiten import Whitener
+from mechanics.effects.base import Role
+from mechanics.effects.registry import effects
+from mechanics.effects.settings import Settings
+from mechanics.gaussian import squared_exponential
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
+from mechanics.places import Places
+from mechanics.presses import Presses
+from reconstruct.steps.s5_mesh.meshing import uncertainty_at
+
+LEAST_PRESSES = 6
+SUPPORT_GIVES = 1.5e-5
+"""m/N, standard deviation of what a support or its tracing seems to yield by itself."""
+COMMON = {
+    "bend": 0.03, "sideways": 0.15, "late": 0.0005, "onset": 0.05e-3, "strain": 0.6, "turned": 0.02,
+    "upward": 0.03,
+}  # fmt: skip
+"""Standard deviations of errors of our own that all places share: share by which the law of depth bends
+wrongly; share of the sideways force; s by which the force is late; m of all first touches; share of finite
+strain; rad by which forces are turned about each axis of the device; share of the push that goes up or down
+along the surface."""
+TAILS = 3.0
+"""Degrees of freedom of the running shape's error at a touch."""
+NUISANCE = NuisanceOptions(floor_share=0.0)
+"""As a diagnosis has them, but that 'none' holds what is small against the force already."""
+FIELD_M = 0.03
+"""Distance over which neighbours share what a place's stiffness may be off by."""
+LITTLE = 0.1
+"""1/m, of compliance for unit modulus, small against a place's own (some 10)."""
+
+
+@dataclass(frozen=True)
+class Weighing:
+    """What the evidence comes from: forward model, its nuisances, base fit; acts, names, sizes (f,): of the
+    forms, what each does, its cause, and N, rms of its change of force beside the modulus. gram (k, k):
+    whitened and summed over sites, of the residual, the modulus, `own` common errors, then the forms. dof:
+    readings. site_sd: (p,) share by which each place's stiffness may be off. springs: (f,) m/N by which a
+    form lets the tool yield; on_support: the same as read off the rigid support, and its standard error."""
+
+    forward: Forward
+    whitener: Whitener
+    found: Fit
+    acts: tuple[Act, ...]
+    names: tuple[str, ...]
+    sizes: np.ndarray
+    gram: np.ndarray
+    own: int
+    dof: float
+    site_sd: np.ndarray
+    springs: np.ndarray
+    on_support: tuple[float, float] | None
+
+    def inflation(self, misfit: float) -> float:
+        """By how much a log likelihood counts too much: slow noise, and a lack of fit above 1."""
+        return self.forward.touches.noise.variance_inflation * max(1.0, misfit)
+
+
+def weigh(estimate: Estimate) -> Weighing | None:
+    """All columns of evidence at the present estimate."""
+    scene = forward_of(estimate)
+    if scene is None:
+        return None
+    forward, site_sd = scene
+    assert estimate.fit is not None
+    modulus = estimate.fit.modulus_pa
+    whitener = Whitener(forward, forward.ideal(modulus), NUISANCE, site_sd)
+    onset = first_touches(forward, whitener, modulus)
+    found = fit(forward, whitener, [], modulus=modulus, onset=onset, iterations=6)
+    settings = settings_of(forward, (), found.values, found.onset)
+    onset_sd = first_touch_sd(found.onset, NUISANCE.onset_m)
+    whitener = Whitener(forward, settings, NUISANCE, site_sd, onset_sd)
+    before = np.nan_to_num(forward.predict(settings))
+    residual = forward.touches.local_force - before
+    residual = residual + whitener.onset_column * found.onset[forward.touches.press][:, None]
+    own = common_errors(forward, found, before, site_sd)
+    names, acts, changes, springs = [], [], [], []
+    for name, act in forms_of(forward):
+        change = changed(forward, found, act) - before
+        if np.abs(change).max() > 0:
+            names.append(name)
+            acts.append(act)
+            changes.append(change)
+            springs.append(_spring(forward, found, act))
+    little = np.full(len(forward.touches), LITTLE)
+    answer = (changed(forward, found, softer(little)) - before) / LITTLE
+    for compliance in balls(forward):
+        # small against the whole: as much of one press's answer as there is more compliance
+        names.append("inclusion")
+        acts.append(softer(compliance))
+        changes.append(answer * compliance[forward.touches.press][:, None])
+        springs.append(0.0)
+    columns = np.stack([residual, before, *own, *changes], axis=2)
+    gram = whitener.gram(columns).sum(axis=0)
+    counted = forward.touches.counted
+    plain = before[counted]
+    sizes = np.array([_size(c[counted], plain) for c in changes])
+    dof = 3.0 * float(counted.sum())
+    return Weighing(
+        forward, whitener, found, tuple(acts), tuple(names), sizes, gram, len(own), dof, site_sd,
+        np.array(springs), _on_support(estimate),
+    )  # fmt: skip
+
+
+def first_touch_sd(onset: np.ndarray, usual_m: float) -> np.ndarray:
+    """(p,) m, standard deviation of each first touch, given where it lies (p,) m from its place: of Student's
+    t, as a mixture of Gaussians, the one that it then came from.
+
+    A running shape passes single touches by millimetres (an edge, a face that nobody touched yet); as
+    Gaussians of the usual width these would rule out every hypothesis but one that moves them.
+    """
+    return np.sqrt((TAILS * usual_m**2 + onset**2) / (TAILS + 1))
+
+
+def _spring(forward: Forward, found: Fit, act: Act) -> float:
+    """m/N, by which a form lets the tool yield."""
+    settings = settings_of(forward, (), found.values, found.onset)
+    act(settings, forward)
+    return float(settings.tool_compliance)
+
+
+def _on_support(estimate: Estimate) -> tuple[float, float] | None:
+    """(m/N by which the tip yields against the rigid support, standard error), where that was touched."""
+    exploration, surface = estimate.exploration, estimate.surface
+    if exploration is None or surface is None:
+        return None
+    rigid = rigid_of(exploration.recording, exploration.presses, surface.support_normal)
+    if rigid is None:
+        return None
+    return rigid.compliance, float(np.hypot(rigid.error, SUPPORT_GIVES))
+
+
+def changed(forward: Forward, found: Fit, act: Act | None) -> np.ndarray:
+    """(n, 3) N, local frames: the prediction at a fit, with a form of a cause or without."""
+    settings = settings_of(forward, (), found.values, found.onset)
+    if act is not None:
+        act(settings, forward)
+    return np.nan_to_num(forward.predict(settings))
+
+
+def _size(change: np.ndarray, plain: np.ndarray) -> float:
+    beyond = change - modulus_share(change, plain) * plain
+    return float(np.sqrt((beyond**2).sum(axis=1).mean()))
+
+
+def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
+    """(forward model of the presses so far, (p,) share by which each place's stiffness may be off); on the
+    running estimate's own mesh and solved places. Presses that the running surface passes by more than a
+    first touch can be moved are left out: they lie on a shape that is not there yet."""
+    e = estimate
+    if e.solved is None or e.presses_placed is None or e.fit is None or e.surface is None:
+        return None
+    placed = e.presses_placed
+    placed = placed.of(reached(placed))
+    if len(placed) < LEAST_PRESSES:
+        return None
+    touches = touches_of(placed)
+    model = _model(estimate, touches)
+    sites, _ = solved_sites(e.solved, touches.point, touches.normal, model.material.poisson_ratio)
+    far = np.einsum("pij,pjk,plk->pil", touches.frame, sites.far, touches.frame)
+    places = Places(
+        model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature
+    )
+    forward = Forward(touches, places)
+    if e.exploration is not None:
+        # bias, drift and the tool's weight are read in free air, not in presses
+        free = free_air_of(e.exploration.recording, e.presses_placed)
+        find_instrument_offsets(forward, free, None, set())
+    return forward, site_stiffness_sd(touches, model, NUISANCE)
+
+
+def _model(e: Estimate, presses: Presses) -> Model:
+    assert e.solved is not None and e.surface is not None and e.sites is not None and e.fit is not None
+    mesh = e.solved.mesh.quadratic()
+    return Model(
+        mesh=mesh,
+        material=Material(e.fit.modulus_pa, e.sites.poisson_ratio),
+        support=Support(e.surface.support_point, e.surface.support_normal),
+        tool=Tool(presses.tip_radius_m),
+        mesh_size_m=MESH_M,
+        shape_uncertainty_m=uncertainty_at(mesh, e.surface),
+        presses=presses,
+    )
+
+
+def common_errors(forward: Forward, found: Fit, before: np.ndarray, site_sd: np.ndarray) -> list[np.ndarray]:
+    """(n, 3) N each: one standard deviation of what our own law gets wrong at all places alike, or at
+    neighbours; site_sd: (p,) share by which each place's stiffness may be off."""
+    t = forward.touches
+    deepest = np.maximum(t.deepest[t.press], 1e-4)
+    bend = np.clip(t.travel[:, 0], 0, None) / deepest - 0.7
+    sideways = before.copy()
+    sideways[:, 0] = 0.0
+
+    def moved(change: Settings) -> np.ndarray:
+        return np.nan_to_num(forward.predict(change)) - before
+
+    settings = settings_of(forward, (), found.values, found.onset)
+    settings.onset = settings.onset + COMMON["onset"]
+    late = np.zeros_like(before)
+    for part in t.parts:
+        if part.stop - part.start > 2:
+            late[part] = -np.gradient(before[part], t.t[part], axis=0)
+    strain = settings_of(forward, (), found.values, found.onset)
+    known = next(e for e in effects() if e.role is Role.KNOWN)
+    known.act(strain, known.ideal, forward)
+    frame = t.frame[t.press]
+    device = np.einsum("nji,nj->ni", frame, before)
+    turned = [np.einsum("nij,nj->ni", frame, np.cross(axis, device)) for axis in np.eye(3)]
+    up = np.einsum("nij,j->ni", frame, forward.model.support.normal)
+    up[:, 0] = 0.0
+    field = np.linalg.cholesky(_field(t.point, site_sd) + 1e-9 * np.eye(len(t)))
+    return [
+        before * (bend * COMMON["bend"])[:, None],
+        sideways * COMMON["sideways"],
+        late * COMMON["late"],
+        moved(settings),
+        moved(strain) * COMMON["strain"],
+        *(COMMON["turned"] * each for each in turned),
+        COMMON["upward"] * up * before[:, :1],
+        *(before * column[t.press][:, None] for column in field.T),
+    ]
+
+
+def _field(points: np.ndarray, site_sd: np.ndarray) -> np.ndarray:
+    """(p, p) covariance of the share by which the stiffness of places (p, 3) m is off."""
+    squared = ((points[:, None] - points[None]) ** 2).sum(axis=2)
+    return np.outer(site_sd, site_sd) * squared_exponential(squared, FIELD_M)

@@ -1,0 +1,67 @@
+"""What a diagnosis can be set to: how much is tried, what decides a name, how wide our own errors are.
+
+All numbers that decide a name are in `AttributionOptions`; beside them stand the weights of evidence and
+closure, fitted to cases of known truth (search/naming.toml).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from scipy.special import logit
+
+from mechanics.options import option
+
+
+@dataclass(frozen=True)
+class DiagnoseOptions:
+    """How much a diagnosis tries, and its seed."""
+
+    fast: bool = option(
+        False, "half a minute instead of three: fewer effects, one in an answer, less sampling"
+    )
+    without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
+    bootstrap: int = option(400, "resamplings of sites for intervals")
+    seed: int = option(0, "seed of flips and resamplings")
+
+
+@dataclass(frozen=True)
+class AttributionOptions:
+    """When something is named: chances, and sizes that matter; docs/diagnosis.md says what each does."""
+
+    sure: float = option(0.5, "probability from which an effect is named")
+    doubt: float = option(
+        0.1,
+        "chance that is too small to count: of odds, of a model confidence set, of what resamplings close",
+    )
+    smallest: float = option(
+        0.5, "smallest gap that matters, rms over contact samples, of the noise of a force 3-vector"
+    )
+    least_of_first: float = option(
+        0.25, "least size of a further effect, of the first's: no law is exact, what it leaves is no effect"
+    )
+    most: int = option(3, "effects in one answer, at most")
+    z: float = option(5.0, "standard errors beyond which what free air or the support reads is no chance")
+    shape_gain: float = option(
+        12.0, "gain in log likelihood from which sites differ by more than their shape may"
+    )
+    unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
+
+    @property
+    def beyond_doubt(self) -> float:
+        """Log odds beyond which one of two is taken for certain."""
+        return float(logit(1 - self.doubt))
+
+
+@dataclass(frozen=True)
+class NuisanceOptions:
+    """One standard deviation of what the baseline may get wrong, before it counts as a gap."""
+
+    onset_m: float = option(0.2e-3, "error of first touch, each press", unit="m")
+    site_stiffness: float = option(0.03, "share by which a site's stiffness may be wrong (shape, mesh)")
+    press_stiffness: float = option(0.01, "share by which repeats at a site may differ")
+    tilt: float = option(0.03, "error of a site's normal", unit="rad")
+    stick: float = option(0.25, "share by which the tangential force may be wrong, each press")
+    law: float = option(0.02, "share by which a site's depth law may bend wrongly over the depth reached")
+    floor_share: float = option(0.01, "error of the model that no name covers, share of a sample's force")
+    floor_n: float = option(0.002, "error of the model that no name covers, each thinned component", unit="N")
