@@ -17,7 +17,7 @@ from mechanics.progress import Clock, Progress, part, silent
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites
 from reconstruct.checks.base import Finding
-from reconstruct.checks.outcome import result_of
+from reconstruct.checks.outcome import outcome_of
 from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import place
@@ -111,7 +111,7 @@ def _reconstructed(
     progress("factorise", 0.5)
     body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n)
     fitted = method.fit(body, progress, clock)
-    interval = checkup.interval(result_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
+    interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
     progress("model", 0.95)
     meshing = mesher.judged()
