@@ -16,7 +16,7 @@ from mechanics.model import Model, Support, Tool, read_model
 from mechanics.progress import Clock, Progress, part, silent
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.outcome import outcome_of
 from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
@@ -28,7 +28,7 @@ from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.left_out import on_base, without_slides
-from reconstruct.steps.s3_contacts.points import explore_points, is_points
+from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.background import BackgroundMesher

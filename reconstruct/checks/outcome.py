@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.presses import Presses
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 
 LEAST_PA, MOST_PA = 500.0, 5e6

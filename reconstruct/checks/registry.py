@@ -13,9 +13,9 @@ import numpy as np
 from mechanics.errors import ContactError, NoBaseError, RecordingError
 from mechanics.recording import Recording
 from reconstruct.checks.air import air, delay
-from reconstruct.checks.base import Finding
 from reconstruct.checks.channels import channels
 from reconstruct.checks.clock import clock
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.handedness import handedness
 from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.samples import Samples

@@ -10,7 +10,7 @@ from exploration_of_cylinder import explore_cylinder
 
 from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
-from reconstruct.checks.base import Finding, decades_of_tail
+from reconstruct.checks.finding import Finding, decades_of_tail
 from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
 from reconstruct.checks.samples import Samples
