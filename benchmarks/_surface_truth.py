@@ -40,7 +40,7 @@ def phantom_truth(name: str) -> Truth:
 
 def _stack(name: str, outline: np.ndarray, levels: list[tuple[float, float]]) -> Truth:
     """Outline (n, 2) scaled and lifted by each (scale, z), fanned to the middle below and above."""
-    from reconstruct.shapes.base import rings_to_mesh
+    from reconstruct.shapes.shape import rings_to_mesh
 
     rings = np.array([np.column_stack([s * outline, np.full(len(outline), z)]) for s, z in levels])
     return Truth(name, *rings_to_mesh(rings, np.array([0, 0, levels[-1][1]])))

@@ -23,7 +23,7 @@ from benchmarks._quick_touches import varied
 from benchmarks.timing import table
 from mechanics.errors import ContactError, PalpateError
 from mechanics.recording import Recording, read_recording
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.registry import REFUSALS, check
 from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording

@@ -19,8 +19,8 @@ from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording import Recording, base_model_of
 from mechanics.sites import TouchSites
 from mechanics.toml_text import plain
-from reconstruct.checks.base import Finding
-from reconstruct.checks.outcome import result_of
+from reconstruct.checks.finding import Finding
+from reconstruct.checks.outcome import outcome_of
 from reconstruct.checks.registry import Checkup
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import place
@@ -31,7 +31,7 @@ from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.left_out import on_base, without_slides
-from reconstruct.steps.s3_contacts.points import explore_points, is_points
+from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.background import BackgroundMesher
@@ -96,12 +96,12 @@ def _reconstructed(
     geometry = stated_geometry(recording, options.geometry)
     _check_points(recording, geometry, options)
     checkup = Checkup(recording, options.force, not geometry.known, options.filter.cutoff_hz)
-    touched = _Touched(recording, method, checkup, mesher, clock)
+    run = _Run(recording, method, checkup, mesher, clock)
     placed: Placed | None
     if geometry.known:
-        exploration, surface, placed = _on_known(touched, geometry, progress)
+        exploration, surface, placed = _with_known_geometry(run, geometry, progress)
     else:
-        exploration, surface, placed = _explored(touched, progress)
+        exploration, surface, placed = _with_traced_base(run, progress)
     progress("meshing", 0.3)
     found = exploration.presses
     where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal)
@@ -114,7 +114,7 @@ def _reconstructed(
     progress("factorise", 0.5)
     body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n)
     fitted = method.fit(body, progress, clock)
-    interval = checkup.interval(result_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
+    interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
     progress("model", 0.95)
     meshing = mesher.judged()
@@ -151,7 +151,7 @@ def _reconstructed(
 
 
 @dataclass(frozen=True)
-class _Touched:
+class _Run:
     """A recording on its way to a surface, and what goes on beside it."""
 
     recording: Recording
@@ -177,36 +177,36 @@ class _Touched:
         )
 
 
-def _explored(touched: _Touched, progress: Progress) -> tuple[Exploration, Surface, None]:
+def _with_traced_base(run: _Run, progress: Progress) -> tuple[Exploration, Surface, None]:
     """Palpations and the surface through them. Where the recording traces no base, that of [object] model
     = PATH stands in."""
-    recording = touched.recording
+    recording = run.recording
     try:
-        exploration = touched.presses()
+        exploration = run.presses()
     except NoBaseError:
         if recording.base_model is None:
             raise
         base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
-        exploration = touched.presses(base)
-    touched.checkup.presses(exploration)
-    touched.clock.lap("contacts")
+        exploration = run.presses(base)
+    run.checkup.presses(exploration)
+    run.clock.lap("contacts")
     surface = reconstruct_surface(
         evidence_of(exploration),
-        touched.method.surface_options,
+        run.method.surface_options,
         part(progress, 0.1, 0.3),
-        shaped=touched.mesher.begin,
+        shaped=run.mesher.begin,
     )
-    touched.clock.lap("surface")
+    run.clock.lap("surface")
     return exploration, surface, None
 
 
-def _on_known(
-    touched: _Touched, geometry: GeometryOptions, progress: Progress
+def _with_known_geometry(
+    run: _Run, geometry: GeometryOptions, progress: Progress
 ) -> tuple[Exploration, Surface, Placed]:
-    """Touches found without a support place the geometry, whose base then tells which lie on the support."""
-    recording, options, within = touched.recording, touched.method.options, part(progress, 0.02, 0.3)
+    """Touches found without a support place the geometry, whose base then shows which lie on the support."""
+    recording, options, within = run.recording, run.method.options, part(progress, 0.02, 0.3)
     least = options.contact.least_palpations
-    first = without_slides(touched.presses(nowhere(recording), unbroken=True), least)
+    first = without_slides(run.presses(nowhere(recording), unbroken=True), least)
     within("contacts", 0.3)
     placed = place(
         recording,
@@ -217,11 +217,11 @@ def _on_known(
         progress=part(within, 0.3, 0.8),
     )
     exploration = on_base(first, placed.base, least)
-    touched.checkup.presses(exploration)
-    touched.clock.lap("contacts and registration")
+    run.checkup.presses(exploration)
+    run.clock.lap("contacts and registration")
     if placed.mesh is not None:
-        touched.mesher.known(placed.mesh)
-    touched.mesher.begin(placed.surface)
+        run.mesher.known(placed.mesh)
+    run.mesher.begin(placed.surface)
     return exploration, placed.surface, placed
 
 

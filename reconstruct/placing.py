@@ -10,7 +10,7 @@ from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.left_out import without_slides
-from reconstruct.steps.s3_contacts.points import explore_points, is_points
+from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s4_surface.casting import cast
 
 _ANY = ContactOptions(least_palpations=1)

@@ -56,7 +56,7 @@ def replay(
     """
     from palpate.results.model import model_of
     from palpate.results.replay import ReplayResult
-    from reconstruct.steps.s3_contacts.points import is_points
+    from reconstruct.steps.s3_contacts.quasi_static import is_points
     from render.replay import replay_error, replay_recording
 
     make = _renderer("replay", model, renderer, options)

@@ -14,7 +14,7 @@ from mechanics.recording import Recording
 from palpate.report.exploration_figures import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.report.page import Page, save_figures
 from palpate.report.quantities import readable
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.samples import CHANNELS
 
 if TYPE_CHECKING:

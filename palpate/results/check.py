@@ -10,7 +10,7 @@ import numpy as np
 
 from palpate.results.base import Result
 from palpate.results.recording import Recording
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

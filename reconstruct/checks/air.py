@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.samples import Samples
 from reconstruct.steps.s1_filter.low_pass import noise_gain
 

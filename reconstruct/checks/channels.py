@@ -13,7 +13,7 @@ from scipy.ndimage import label, maximum, median_filter
 from mechanics.robust import spread_about_zero
 from mechanics.samples import runs
 from mechanics.segments import within
-from reconstruct.checks.base import Finding, decades_of_tail, p_words, sure
+from reconstruct.checks.finding import Finding, decades_of_tail, p_words, sure
 from reconstruct.checks.samples import CHANNELS, Samples
 
 _NINE_OF_TEN = 1.645

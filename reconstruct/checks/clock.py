@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mechanics.samples import runs
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.samples import Samples
 
 _TOLD = 0.02

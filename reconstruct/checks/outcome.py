@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.presses import Presses
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 
 LEAST_PA, MOST_PA = 500.0, 5e6
@@ -16,7 +16,7 @@ _MISFIT = 0.5
 
 
 @dataclass(frozen=True)
-class Result:
+class Outcome:
     """What is looked at of a reconstruction: modulus and its 95 % interval, Pa; of each press (k,) the misfit
     rms (NaN where unknown) and the force rms, N, and first touch, s."""
 
@@ -27,18 +27,18 @@ class Result:
     onset_s: np.ndarray
 
 
-def result_of(
+def outcome_of(
     presses: Presses, modulus_pa: float, ci95_pa: tuple[float, float], fit: ModulusFit | None
-) -> Result:
+) -> Outcome:
     """Of fitted presses; the paper's method (no fit) states no misfit."""
     net, touched = presses.net, presses.press[presses.counted]
     squared = np.bincount(touched, (net.force[presses.counted] ** 2).sum(axis=1), len(presses))
     force = np.sqrt(squared / np.maximum(np.bincount(touched, minlength=len(presses)), 1))
     misfit = np.full(len(presses), np.nan) if fit is None else fit.press.rms_n
-    return Result(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
+    return Outcome(modulus_pa, ci95_pa, misfit, force, presses.onset_s)
 
 
-def outcome(result: Result) -> Iterator[Finding]:
+def outcome(result: Outcome) -> Iterator[Finding]:
     """A modulus or interval that is none; a modulus beyond soft objects; a misfit as large as the force."""
     modulus, (low, high) = result.modulus_pa, result.ci95_pa
     numbers = np.array([modulus, low, high])

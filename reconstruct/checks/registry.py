@@ -13,11 +13,11 @@ import numpy as np
 from mechanics.errors import ContactError, NoBaseError, RecordingError
 from mechanics.recording import Recording
 from reconstruct.checks.air import air, delay
-from reconstruct.checks.base import Finding
 from reconstruct.checks.channels import channels
 from reconstruct.checks.clock import clock
+from reconstruct.checks.finding import Finding
 from reconstruct.checks.handedness import handedness
-from reconstruct.checks.outcome import Result, outcome
+from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.samples import Samples
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
@@ -28,7 +28,7 @@ from reconstruct.steps.s3_contacts.first_touch import ContactSpans
 
 OF_SAMPLES: tuple[Callable[[Samples], Iterator[Finding]], ...] = (channels, clock, delay, handedness, air)
 OF_PRESSES: tuple[Callable[[Exploration], Iterator[Finding]], ...] = (support, dropped)
-OF_RESULTS: tuple[Callable[[Result], Iterator[Finding]], ...] = (outcome,)
+OF_RESULTS: tuple[Callable[[Outcome], Iterator[Finding]], ...] = (outcome,)
 REFUSALS = ("no base", "no presses")
 """Findings that say where reconstruction itself stops, fault or not."""
 _LEAST_SAMPLES = 100
@@ -72,7 +72,7 @@ def checked_presses(exploration: Exploration) -> tuple[Finding, ...]:
     return ordered(f for check in OF_PRESSES for f in check(exploration))
 
 
-def checked_results(result: Result) -> tuple[Finding, ...]:
+def checked_results(result: Outcome) -> tuple[Finding, ...]:
     """What the modulus and its misfit show."""
     return ordered(f for check in OF_RESULTS for f in check(result))
 
@@ -156,7 +156,7 @@ class Checkup:
         """Before a surface is made."""
         self.found = ordered([*self.found, *self._judged(checked_presses(exploration))])
 
-    def interval(self, result: Result) -> tuple[float, float]:
+    def interval(self, result: Outcome) -> tuple[float, float]:
         """Before the modulus is believed: its 95 % interval, Pa, as wide as the findings make it."""
         self.found = ordered([*self.found, *self._judged(checked_results(result))])
         return widened(result.modulus_pa, result.ci95_pa, self.found)

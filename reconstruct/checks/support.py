@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from mechanics.robust import spread_about_zero, weighted_median
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s3_contacts.on_support import supported
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.stats import norm
 
 from mechanics.recording import Recording
-from reconstruct.checks.base import SURE_ODDS, Finding, p_words, sure
+from reconstruct.checks.finding import SURE_ODDS, Finding, p_words, sure
 from reconstruct.checks.samples import Samples, Units
 
 READINGS = {

@@ -6,7 +6,6 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mechanics.errors import SurfaceError
-from reconstruct.shapes.base import Shape
 from reconstruct.shapes.cap import Cap
 from reconstruct.shapes.crown import Crown
 from reconstruct.shapes.cushion import Cushion
@@ -17,6 +16,7 @@ from reconstruct.shapes.fit import Seen
 from reconstruct.shapes.outline import Outline, circle, polygon, seeing_centre, smooth_curve
 from reconstruct.shapes.polyhedron import Polyhedron
 from reconstruct.shapes.prism import Prism
+from reconstruct.shapes.shape import Shape
 
 FITTED = (
     "cylinder",

@@ -8,9 +8,9 @@ import numpy as np
 from scipy.spatial import ConvexHull, HalfspaceIntersection, QhullError
 
 from mechanics.errors import SurfaceError
-from reconstruct.shapes.base import Parameter, values_of, with_values
 from reconstruct.shapes.convex_bounds import delaunay_hull
 from reconstruct.shapes.outline import Outline, sides
+from reconstruct.shapes.shape import Parameter, values_of, with_values
 
 _ON_PLANE_M = 0.0005
 _TOPS_AT_MOST = 5

@@ -10,8 +10,8 @@ from exploration_of_cylinder import explore_cylinder
 
 from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
-from reconstruct.checks.base import Finding, decades_of_tail
-from reconstruct.checks.outcome import Result, outcome
+from reconstruct.checks.finding import Finding, decades_of_tail
+from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
 from reconstruct.checks.samples import Samples
 
@@ -113,9 +113,9 @@ def test_lesser_findings_widen_the_interval():
 )
 def test_an_outcome_that_is_none_is_an_error(modulus, interval, misfit, name):
     ones = np.ones(5)
-    found = list(outcome(Result(modulus, interval, misfit * ones, ones, ones)))
+    found = list(outcome(Outcome(modulus, interval, misfit * ones, ones, ones)))
     assert [f.name for f in found] == [name] and found[0].grave
-    assert not list(outcome(Result(30e3, (29e3, 31e3), 0.02 * ones, ones, ones)))
+    assert not list(outcome(Outcome(30e3, (29e3, 31e3), 0.02 * ones, ones, ones)))
 
 
 def test_the_probability_of_a_tail_is_the_binomial_one():

@@ -23,7 +23,7 @@ from reconstruct.placing import presses_on
 from reconstruct.steps.s1_filter.low_pass import low_pass, noise_gain
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.cycles import free_air_seen
-from reconstruct.steps.s3_contacts.points import explore_points
+from reconstruct.steps.s3_contacts.quasi_static import explore_points
 from render.replay import replay_error
 
 

@@ -5,11 +5,15 @@ from __future__ import annotations
 import dataclasses
 
 import numpy as np
+import pytest
 
+from mechanics.errors import ContactError
 from mechanics.recording import Recording
 from mechanics.segments import Segment
 from reconstruct.checks.support import support
-from reconstruct.steps.s3_contacts.contacts import explore
+from reconstruct.geometry.placed import nowhere
+from reconstruct.steps.s3_contacts.contacts import Exploration, explore
+from reconstruct.steps.s3_contacts.left_out import on_base
 
 
 def _with_more(recording: Recording, position: np.ndarray, force: np.ndarray) -> Recording:
@@ -63,22 +67,46 @@ def test_half_a_round_is_no_tracing(cylinder):
     assert [f for f in support(found) if f.name == "below the support"]
 
 
-def test_presses_on_the_bare_support_are_recognised_as_rigid(cylinder):
-    recording, _ = cylinder
-    plain = explore(recording)
+def _with_rigid(recording: Recording, plain: Exploration, yields_m: float = 0.0) -> Recording:
+    """The recording with three presses on the bare support, 30 mm beside the base, into which a tool that
+    yields goes so deep."""
     base, normal = plain.boundary, plain.boundary.support_normal
     middle = base.centres.mean(axis=0)
     out = base.centres[0] - middle
     place = base.centres[0] + 0.03 * out / np.linalg.norm(out)
     rate = recording.sample_rate_hz
     reach, held = round(0.4 * rate), round(0.8 * rate)
-    height = np.concatenate([np.linspace(0.03, 0, reach), np.zeros(held), np.linspace(0, 0.03, reach)])
+    deep = -yields_m * np.hanning(held) ** (2 / 3)
+    height = np.concatenate([np.linspace(0.03, 0, reach), deep, np.linspace(0, 0.03, reach)])
     push = np.concatenate([np.zeros(reach), 4 * np.hanning(held), np.zeros(reach)])
     position = place + np.tile(height, 3)[:, None] * normal
-    again = _with_more(recording, position, np.tile(push, 3)[:, None] * normal)
+    return _with_more(recording, position, np.tile(push, 3)[:, None] * normal)
+
+
+def test_presses_on_the_bare_support_are_recognised_as_rigid(cylinder):
+    recording, _ = cylinder
+    plain = explore(recording)
+    again = _with_rigid(recording, plain)
     found = explore(again)
     assert len(found.presses) == len(plain.presses)
     assert [s.kind for s in found.presses.segments].count("rigid") == 3
     stated = Segment("rigid", float(recording.t[-1]), float(again.t[-1]))
     told = explore(dataclasses.replace(again, segments=(stated,))).presses.segments
     assert [s for s in told if s.kind == "rigid"] == [stated]
+
+
+def test_a_base_that_the_touches_placed_leaves_out_those_on_its_support(cylinder):
+    """As a search over that base would; the others stay as they were found."""
+    recording, _ = cylinder
+    plain = explore(recording)
+    again = _with_rigid(recording, plain, yields_m=1e-3)
+    first = explore(again, boundary=nowhere(again), unbroken=True)
+    base = dataclasses.replace(plain.boundary, interval=(0, 0))
+    kept, anew = on_base(first, base, 4), explore(again, boundary=base, unbroken=True)
+    assert len(first.presses) >= len(kept.presses) + 3
+    assert kept.boundary is base
+    assert np.array_equal(kept.presses.onset_s, anew.presses.onset_s)
+    assert np.allclose(kept.presses.centre, anew.presses.centre, atol=1e-12)
+    assert sum("on the support" in why for _, why in kept.rejected) >= 3
+    with pytest.raises(ContactError, match="on the support of the known geometry"):
+        on_base(first, base, len(kept.presses) + 1)
