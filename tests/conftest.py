@@ -14,6 +14,11 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 
 import mechanics  # noqa: E402, F401  where compiled kernels are kept, before a test decorates one
 
+from .support.once import compile_one_at_a_time  # noqa: E402
+
+if "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix":
+    compile_one_at_a_time()
+
 REPOSITORY = Path(__file__).resolve().parents[1]
 
 

@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 from mechanics.errors import ContactError
 from reconstruct.steps.s2_boundary.boundary import (
@@ -16,6 +15,8 @@ from reconstruct.steps.s2_boundary.boundary import (
     in_its_plane,
 )
 from reconstruct.steps.s3_contacts.contacts import explore
+
+from .exploration_of_cylinder import RADIUS, TILTED, explore_cylinder
 
 
 @pytest.mark.parametrize("clockwise", [False, True])

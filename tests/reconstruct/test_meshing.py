@@ -128,10 +128,10 @@ def test_a_mesh_beyond_its_bound_is_made_anew_and_the_best_is_kept(surface, monk
         return radius_edge_ratio(mesh.points[mesh.tetrahedra]).max()
 
     # no mesh is that regular: all tries are made
-    found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.015, radius_edge_ratio=0.9))
+    found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.025, radius_edge_ratio=0.9))
     assert len(made) == 3 and worst(found) == min(map(worst, made))
     made.clear()
-    found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.015, radius_edge_ratio=50.0))
+    found = meshing_module.fill(surface, MeshingOptions(mesh_size_m=0.025, radius_edge_ratio=50.0))
     assert len(made) == 1 and found is made[0]
 
 

@@ -7,13 +7,14 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import explore_cylinder
 
 from benchmarks._surface_truth import OWN, phantom_truth, touch
 from benchmarks.surface import deviation
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.steps.s4_surface.surface import SurfaceOptions, reconstruct_surface
+
+from .exploration_of_cylinder import explore_cylinder
 
 MEAN_M, P95_M, VOLUME = 0.0012, 0.003, 0.04
 

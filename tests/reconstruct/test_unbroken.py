@@ -6,8 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from flat_contact import cyclic, points, pushed, recorded
-from flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster
 
 import palpate as pp
 from diagnose.pipeline import untold_effects, with_tip_of
@@ -24,6 +22,9 @@ from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.points import explore_points
 from reconstruct.steps.s3_contacts.unbroken import free_air_seen
 from render.replay import replay_error
+
+from .flat_contact import cyclic, points, pushed, recorded
+from .flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster
 
 
 def seen(recording):
