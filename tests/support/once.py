@@ -36,6 +36,8 @@ def compile_one_at_a_time() -> None:
     from numba import config
     from numba.core.compiler_lock import global_compiler_lock as lock
 
+    if not config.CACHE_DIR:  # nothing that could be shared
+        return
     folder = Path(config.CACHE_DIR)
     folder.mkdir(parents=True, exist_ok=True)
     file = open(folder / ".compiling", "wb")
