@@ -1,4 +1,4 @@
-"""Fixtures that every room's tests share."""
+"""Fixtures that all tests share, and one thread of linear algebra a process."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from pathlib import Path
 
 import pytest
 
-import mechanics  # noqa: F401  where compiled kernels are kept, before a test decorates one
+# Set before numpy is imported, and inherited by every child. Workers side by side, each with a thread a core,
+# spend more time waiting for one another in a loop than on the small systems of the tests.
+for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(_threads, "1")
+
+import mechanics  # noqa: E402, F401  where compiled kernels are kept, before a test decorates one
+
+from .support.once import compile_one_at_a_time  # noqa: E402
+
+if "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix":
+    compile_one_at_a_time()
 
 REPOSITORY = Path(__file__).resolve().parents[1]
 

@@ -21,11 +21,10 @@ from mechanics.errors import DeviceError, PalpateError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from palpate.child import module_command, module_environment
-from palpate.servo import report as reports
 from palpate.servo.layout import BEAT, ENABLE, STOP, SharedArrays, SharedBlock
 from palpate.servo.options import ServoOptions
 from palpate.servo.process import Job
-from palpate.servo.report import ServoReport, ServoSnapshot
+from palpate.servo.report import ServoReport, ServoSnapshot, report, ring_rows, snapshot
 from palpate.servo.source import ModelFolder, ModelSource, RendererChange, RendererSource
 
 START_TIMEOUT_S = 600.0
@@ -207,19 +206,19 @@ class Servo:
     def snapshot(self) -> ServoSnapshot | None:
         """The newest tick; None before the first."""
         self.beat()
-        return reports.snapshot(self.arrays)
+        return snapshot(self.arrays)
 
     def history(self, since: int = 0) -> tuple[np.ndarray, int]:
         """Rows (palpate.servo.layout.ROW) after the first `since` that the ring still holds (7 s at 1 kHz),
         and the number to pass next time."""
         self.beat()
-        return reports.ring_rows(self.arrays, since)
+        return ring_rows(self.arrays, since)
 
     def report(self) -> ServoReport:
         """What happened so far."""
         wall = time.perf_counter() - self._started_s
         cpu = _cpu_time_s(self._process.pid) - self._cpu_start_s if self._process else float("nan")
-        return reports.report(self.arrays, self.options.period_ns, self.words, cpu, wall)
+        return report(self.arrays, self.options.period_ns, self.words, cpu, wall)
 
     def stop(self) -> int:
         """Zero force, close the device, end the process; returns its exit code. Harmless when repeated."""

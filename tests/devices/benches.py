@@ -6,7 +6,6 @@ import ctypes
 import os
 import shutil
 import subprocess
-import time
 from collections.abc import Callable
 from pathlib import Path
 
@@ -26,21 +25,12 @@ from devices.pid_ffb import make as make_pid
 from devices.simulated import SimulatedHand
 from devices.spacemouse import make as make_spacemouse
 
+from ..support.waiting import eventually
 from .fake_hid import OTHER_IDS, FakeHid, SpaceMouseUnit, StickUnit
 from .fake_inverse import Chain, FakeInverse
 from .kernel.uhid import KernelUnit
 
 STUBS = Path(__file__).parent / "vendor_stubs.c"
-
-
-def eventually(condition: Callable[[], bool], seconds: float = 10.0) -> bool:
-    """Whether a condition comes true before a generous limit that only a broken driver meets."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end:
-        if condition():
-            return True
-        time.sleep(0.002)
-    return condition()
 
 
 class Bench:

@@ -16,6 +16,7 @@ from devices.base import DeviceSpec, ForceSink, PositionSource, host_clock
 from devices.safety import Reading, SafetyOptions
 from mechanics.errors import DeviceError
 
+from ..support.waiting import PATIENCE_S
 from .benches import FORCEFUL, MAKERS, Bench, eventually
 from .filtering import SafetyFilter
 
@@ -123,7 +124,7 @@ def test_never_blocks_while_the_hardware_hangs(bench: Bench) -> None:
         done.set()
 
     threading.Thread(target=use, daemon=True).start()
-    assert done.wait(5.0), "read or send_force waited for hardware that hangs"
+    assert done.wait(PATIENCE_S), "read or send_force waited for hardware that hangs"
 
 
 def test_force_only_after_enable(forceful: Bench) -> None:

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import (
+
+from mechanics.dent import dent_force, dent_law, dent_laws, effective_radius, grid
+from mechanics.errors import OptionError
+
+from .closed_forms import (
     bonded_punch_sideways_force,
     flat_punch_force,
     hertz_force,
     plane_strain_modulus,
     sphere_force,
 )
-
-from mechanics.dent import dent_force, dent_law, dent_laws, effective_radius, grid
-from mechanics.errors import OptionError
 
 E, NU, R = 29e3, 0.49, 5e-3
 

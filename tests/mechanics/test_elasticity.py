@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
-from closed_forms import uniaxial_strain_of_stress, volume_strain_of_pressure
 
 from benchmarks.elements import compliance, mixed_compliance
 from mechanics.elasticity import element_stiffness, lame_parameters, stiffness, strain
@@ -13,6 +12,8 @@ from mechanics.errors import MeshError
 from mechanics.pardiso import available
 from mechanics.patch import PatchSampler
 from mechanics.solver import Solver
+
+from .closed_forms import uniaxial_strain_of_stress, volume_strain_of_pressure
 
 
 def solve_with(mesh, nu, held, values, forces=None, **options):

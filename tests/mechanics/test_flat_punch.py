@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import boussinesq_displacement, flat_punch_force
 from scipy.optimize import brentq
 
 from mechanics.box_mesh import box_mesh
 from mechanics.elasticity import stiffness
 from mechanics.pardiso import Pardiso, available
 from mechanics.tetmesh import TetMesh
+
+from .closed_forms import boussinesq_displacement, flat_punch_force
 
 A, NU = 0.01, 0.45
 

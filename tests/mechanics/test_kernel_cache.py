@@ -4,7 +4,6 @@ import os
 import shutil
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import pytest
@@ -124,13 +123,7 @@ def test_old_folders_go_and_the_newest_stay(tmp_path: Path) -> None:
     assert {p.name for p in kernels.iterdir()} == {source_key(ROOT), "old0", "old1", "old2", "old3", "old4"}
 
 
-def test_hashing_costs_a_few_milliseconds_and_leaves_other_sources_alone(tmp_path: Path) -> None:
-    seconds = []
-    for _ in range(20):
-        start = time.perf_counter()
-        source_key(ROOT)
-        seconds.append(time.perf_counter() - start)
-    assert min(seconds) < 0.03  # 6 ms on an idle machine
+def test_only_sources_of_kernels_and_what_they_import_count(tmp_path: Path) -> None:
     for package in PACKAGES:
         ignored = shutil.ignore_patterns("__pycache__", "*.gz", "*.npz")
         shutil.copytree(ROOT / package, tmp_path / package, ignore=ignored)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import boussinesq_displacement, cerruti_displacement
 
 from mechanics.elasticity import stiffness
 from mechanics.errors import MeshError
@@ -12,6 +11,8 @@ from mechanics.pardiso import Pardiso, available
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.sites import patch_compliance, patch_width
 from mechanics.solver import Solver
+
+from .closed_forms import boussinesq_displacement, cerruti_displacement
 
 NU = 0.49
 

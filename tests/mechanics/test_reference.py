@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-import closed_forms as reference
 import numpy as np
 import pytest
+
+from . import closed_forms as reference
 
 E, NU = 30e3, 0.45
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import hertz_force
 
 from mechanics.errors import MeshError
 from mechanics.pardiso import available
@@ -12,6 +11,8 @@ from mechanics.refine import refined_around, refined_near_surface, typical_edge
 from mechanics.sites import mean_curvature, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import touch_force
+
+from .closed_forms import hertz_force
 
 UP = np.array([0.0, 0.0, 1.0])
 

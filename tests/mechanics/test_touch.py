@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from closed_forms import bonded_punch_sideways_force, hertz_force
 
 from mechanics.dent import dent_law
 from mechanics.frames import local_frames, support_axes, tangents
 from mechanics.touch import STATE_SIZE, TouchedPlaces, moduli, touch_force, touch_forces, touch_step
+
+from .closed_forms import bonded_punch_sideways_force, hertz_force
 
 E, NU, R = 29e3, 0.49, 5e-3
 UP = np.array([0.0, 0.0, 1.0])

@@ -3,19 +3,15 @@
 from __future__ import annotations
 
 import json
-import sys
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "reconstruct"))
-
-from exploration_of_cylinder import explore_cylinder
-
 import palpate as pp
 from mechanics.recording import write_recording
 from palpate import cli
+
+from ..reconstruct.exploration_of_cylinder import explore_cylinder
 
 
 @pytest.fixture(scope="module")

@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import sys
-from pathlib import Path
-
 import numpy as np
 import pytest
 
-sys.path.insert(0, str(Path(__file__).parent))
-
-from exploration_of_cylinder import explore_cylinder
-
 from mechanics.recording import Recording
+
+from .exploration_of_cylinder import explore_cylinder
 
 
 @pytest.fixture(scope="session")

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from flat_ground import MODULUS_PA, NOISE_N, TIP_M
 
 from mechanics.dent import dent_law
 from mechanics.recording import Recording
+
+from .flat_ground import MODULUS_PA, NOISE_N, TIP_M
 
 
 def pushed(depth: np.ndarray) -> np.ndarray:

@@ -7,8 +7,6 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from flat_contact import recorded
-from flat_ground import MODULUS_PA, TIP_M, raster
 
 import palpate as pp
 from diagnose.calibrate.on_object import STIFFEST, instrument_of
@@ -20,6 +18,9 @@ from mechanics.samples import delayed
 from reconstruct.geometry.placed import nowhere
 from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording
+
+from .flat_contact import recorded
+from .flat_ground import MODULUS_PA, TIP_M, raster
 
 
 def on_plate(stiffness: float, play_m: float, delay_s: float, bias: np.ndarray, seed: int = 0):

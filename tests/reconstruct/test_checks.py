@@ -6,7 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import explore_cylinder
 
 from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
@@ -14,6 +13,8 @@ from reconstruct.checks.finding import Finding, decades_of_tail
 from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
 from reconstruct.checks.samples import Samples
+
+from .exploration_of_cylinder import explore_cylinder
 
 NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")
 

@@ -6,11 +6,12 @@ import json
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import explore_cylinder
 
 from mechanics.model_files import read_model
 from mechanics.recording import write_recording
 from palpate import cli
+
+from .exploration_of_cylinder import explore_cylinder
 
 
 @pytest.fixture(scope="module")

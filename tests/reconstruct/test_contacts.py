@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 from mechanics.errors import ContactError, OptionError
 from mechanics.segments import Segment
@@ -12,6 +11,8 @@ from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s1_filter.tool_weight import tool_weight
 from reconstruct.steps.s3_contacts import single_press
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
+
+from .exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 
 def distance_to_cylinder(points: np.ndarray) -> np.ndarray:

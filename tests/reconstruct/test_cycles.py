@@ -6,8 +6,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from flat_contact import cyclic, points, pushed, recorded
-from flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster
 
 import palpate as pp
 from diagnose.forward.touches import unobservable_effects
@@ -25,6 +23,9 @@ from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.cycles import free_air_seen
 from reconstruct.steps.s3_contacts.quasi_static import explore_points
 from render.replay import replay_error
+
+from .flat_contact import cyclic, points, pushed, recorded
+from .flat_ground import MODULUS_PA, NOISE_N, TIP_M, raster
 
 
 def seen(recording):

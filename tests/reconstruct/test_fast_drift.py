@@ -4,10 +4,11 @@ import dataclasses
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import explore_cylinder
 
 from reconstruct.steps.s1_filter.fast_drift import follow_free_air, interpolation_error, passing
 from reconstruct.steps.s1_filter.signals import filtered_of
+
+from .exploration_of_cylinder import explore_cylinder
 
 
 def test_no_touch_is_taken_for_air_whatever_its_force_and_whether_or_not_the_tracing_is_stated():

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore, read_earlier
+
+from .exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,6 @@ from argparse import Namespace
 import numpy as np
 import pytest
 import trimesh
-from flat_ground import MODULUS_PA, TIP_M, raster
 
 import palpate as pp
 from mechanics.errors import ContactError, OptionError, SurfaceError
@@ -23,6 +22,8 @@ from reconstruct.shapes.implicit import implicit_held_out
 from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s3_contacts.left_out import without_slides
 from scenes.scene import Scene
+
+from .flat_ground import MODULUS_PA, TIP_M, raster
 
 
 @pytest.mark.parametrize(("pitch_m", "count"), [(0.005, 5), (0.003, 15), (0.002, 9)])

@@ -4,7 +4,6 @@ import dataclasses
 
 import numpy as np
 import pytest
-from boxes import box
 
 from mechanics.press_making import PathErrors, of_paths
 from mechanics.press_sites import sites_of
@@ -16,6 +15,8 @@ from mechanics.touch import forces_at
 from reconstruct.steps.s7_modulus.modulus import ModulusOptions, between_sites, combine, fit_modulus
 from reconstruct.steps.s7_modulus.press_fit import fit_law, press_data
 from reconstruct.steps.s7_modulus.shape_error import compliance_covariance
+
+from .boxes import box
 
 E, NU, TIP = 20e3, 0.45, 0.005
 NOISE = 0.012

@@ -2,7 +2,6 @@
 
 import numpy as np
 import pytest
-from boxes import box
 
 from mechanics.errors import ContactError
 from mechanics.press_making import of_paths
@@ -14,6 +13,8 @@ from reconstruct.steps.s7_modulus.modulus_paper import (
     fit_paper_modulus,
     least_squares_modulus,
 )
+
+from .boxes import box
 
 E, NU = 16e3, 0.49
 MESH = box((0.06, 0.06, 0.04), (5, 5, 4))

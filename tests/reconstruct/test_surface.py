@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import cache
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import explore_cylinder
 
 from benchmarks._surface_truth import OWN, phantom_truth, touch
 from benchmarks.surface import deviation
 from mechanics.errors import SurfaceError
 from reconstruct.shapes.evidence import Evidence
 from reconstruct.steps.s4_surface.surface import SurfaceOptions, reconstruct_surface
+
+from .exploration_of_cylinder import explore_cylinder
 
 MEAN_M, P95_M, VOLUME = 0.0012, 0.003, 0.04
 
@@ -24,11 +26,17 @@ def reconstructed(truth, seed=0, surface="auto", change=lambda e: e, **hand):
     return found, deviation(truth, back(found.vertices), found.triangles)
 
 
+@cache
+def known(name, surface="auto"):
+    """`reconstructed` of a phantom, made once for all tests of this file."""
+    return reconstructed(phantom_truth(name), surface=surface)
+
+
 @pytest.mark.parametrize(
     ("name", "method"), [("cylinder", "cylinder"), ("block", "block"), ("half-sphere", "sphere")]
 )
 def test_the_papers_shapes_are_recognised(name, method):
-    found, error = reconstructed(phantom_truth(name))
+    found, error = known(name)
     assert found.method.rstrip("+") == method
     assert error["mean_m"] < 0.0003
     assert abs(error["volume_error"]) < 0.01
@@ -36,9 +44,8 @@ def test_the_papers_shapes_are_recognised(name, method):
 
 
 def test_a_sharp_shape_beats_the_hull_at_its_rims():
-    truth = phantom_truth("cylinder")
-    _, own = reconstructed(truth)
-    _, hull = reconstructed(truth, surface="hull")
+    _, own = known("cylinder")
+    _, hull = known("cylinder", "hull")
     assert own["p95_m"] < 0.1 * hull["p95_m"]
     assert hull["volume_error"] < -0.05
 
@@ -99,7 +106,7 @@ def test_bad_presses_do_not_bend_the_surface():
 
 def test_the_hull_lies_inside_a_convex_object_and_the_tangent_planes_outside():
     truth = phantom_truth("block")
-    found, _ = reconstructed(truth)
+    found, _ = known("block")
     low, high = found.bracket_m3
     assert low < truth.volume_m3
     assert low < found.volume_m3 < 1.02 * high
@@ -124,7 +131,7 @@ def test_the_frame_of_the_device_does_not_matter():
 
 
 def test_the_base_lies_on_the_support():
-    found, _ = reconstructed(phantom_truth("dome"))
+    found, _ = known("dome")
     height = (found.vertices - found.support_point) @ found.support_normal
     assert height.min() == pytest.approx(0, abs=1e-9)
     assert (np.abs(height) < 1e-9).sum() > 50

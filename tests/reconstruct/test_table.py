@@ -5,11 +5,12 @@ import dataclasses
 
 import numpy as np
 import pytest
-from exploration_of_cylinder import TILTED, TIP, Frame, explore_cylinder
 from scipy.spatial.transform import Rotation
 
 from mechanics.recording import Recording
 from reconstruct.steps.s3_contacts.contacts import explore
+
+from .exploration_of_cylinder import TILTED, TIP, Frame, explore_cylinder
 
 STEEP = Frame(
     Rotation.from_euler("xyz", [30, 0, -110], degrees=True).as_matrix(), np.array([-0.2, 0.31, 0.5])

@@ -123,10 +123,10 @@ def test_before_that_the_touch_sites_tell_it(folder):
     assert felt_surface(folder, sites).stiffness_from == PRESSES  # the better stays
 
 
-def test_a_press_by_the_command_leaves_the_stiffness_in_the_folder(folder, tmp_path):
-    plain = replace(folder, presses=no_presses(0.005))
+def test_a_press_by_the_command_leaves_the_stiffness_in_the_folder(tmp_path):
+    plain = shapes.model(shapes.block((0.05, 0.05, 0.025), (3, 3, 2)), presses=no_presses(0.005))
     path = write_model(tmp_path / "plain", plain)
-    words = ["--at", "0,0,0.05", "--direction", "0,0,-1", "--depth", "0.001", "--json", str(tmp_path / "j")]
+    words = ["--at", "0,0,0.025", "--direction", "0,0,-1", "--depth", "0.001", "--json", str(tmp_path / "j")]
     assert main(["press", str(path), *words]) == 0
     assert json.loads((tmp_path / "j").read_text())["peak_force_n"] > 0
     assert felt_surface(read_model(path)).stiffness_from == PRESSES

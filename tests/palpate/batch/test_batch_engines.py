@@ -11,7 +11,6 @@ import socket
 import subprocess
 import sys
 import threading
-import time
 from collections.abc import Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -28,7 +27,8 @@ from palpate.tasks.graph import Graph, Task
 from palpate.tasks.local import LocalExecutor
 from scenes.embedded import embedded_recording
 
-from .test_batch_local import alive, wait_for
+from ...support.waiting import eventually
+from .test_batch_local import alive
 
 pytestmark = pytest.mark.slow
 
@@ -103,10 +103,7 @@ def test_a_killed_worker_and_a_restarted_scheduler_lose_nothing_and_double_nothi
 
     def harm() -> None:
         def wait_until(count: int) -> None:
-            until = time.monotonic() + 120
-            while len(list(root.glob("*.second"))) < count:
-                assert time.monotonic() < until, "the batch stands still"
-                time.sleep(0.02)
+            assert eventually(lambda: len(list(root.glob("*.second"))) >= count), "the batch stands still"
 
         wait_until(8)
         cluster.kill(cluster.workers[0])  # in the middle of a task: it always has one
@@ -196,11 +193,11 @@ def test_an_interruption_ends_what_the_cluster_does_for_this_run_and_for_no_othe
     neighbour.start()
     with pytest.raises(KeyboardInterrupt), DaskExecutor(cluster.address) as executor:
         run(runs[0], executor, tmp_path, tell=stop_when_both_work)
-    wait_for(lambda: not any(map(alive, processes(said[0]))))
+    assert eventually(lambda: not any(map(alive, processes(said[0]))))
     assert all(map(alive, processes(said[1])))
     ended.set()
     neighbour.join(10)
-    wait_for(lambda: not any(map(alive, processes(said[1]))))
+    assert eventually(lambda: not any(map(alive, processes(said[1]))))
 
 
 def test_both_engines_and_any_number_of_workers_give_the_same_bits_from_the_model_on(tmp_path, cluster):

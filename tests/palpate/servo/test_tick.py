@@ -39,6 +39,8 @@ from render.passivity import DISSIPATED, PassivityOptions, passivity_parameters
 from render.scene import TouchScene, in_the_air
 from render.support import SupportParameters, no_support
 
+from ...support.waiting import PATIENCE_S
+
 PERIOD = 1_000_000
 START = 10**9
 
@@ -289,12 +291,12 @@ def test_the_loop_of_other_platforms_runs_swaps_and_stops(monkeypatch):
     assert loop.wake_descriptor == -1
     loop.start()
     try:
-        assert loop.ticked.wait(20.0)
+        assert loop.ticked.wait(PATIENCE_S)
         stiffer = servo.program._replace(scene=in_the_air(ElasticPlane(800.0)))
-        assert loop.swap(stiffer, timeout_s=20.0) and loop.program is stiffer
+        assert loop.swap(stiffer, timeout_s=PATIENCE_S) and loop.program is stiffer
         before = int(servo.shared.counts[TICKS])
         loop.ticked.clear()
-        assert loop.ticked.wait(20.0)
+        assert loop.ticked.wait(PATIENCE_S)
         assert servo.shared.counts[TICKS] >= before
     finally:
         servo.shared.control[STOP] = 1

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from importlib.util import module_from_spec, spec_from_file_location
 from pathlib import Path
 
 import numpy as np
@@ -16,10 +15,7 @@ from palpate.report.page import Page
 from palpate.report.quantities import DEPTH, ERROR, MODULUS, ORDER, UNCERTAINTY
 from palpate.report.view3d import Colouring, Line, Thing, Traces, View, facing, scripts
 
-_spec = spec_from_file_location("browser", Path(__file__).with_name("browser.py"))
-assert _spec is not None and _spec.loader is not None
-browser = module_from_spec(_spec)
-_spec.loader.exec_module(browser)
+from . import browser
 
 needs_browser = pytest.mark.skipif(
     browser.browser_found() is None, reason="needs a browser: chromium or google-chrome on the PATH"

@@ -7,15 +7,22 @@ from pathlib import Path
 
 import pytest
 
-from mechanics.model import Model
+from mechanics.model import Model, read_model
+from render.felt import with_own_stiffness
+from render.registry import create
 
+from ...support.once import folder_made_once
 from .small import block_model
 
 
 @pytest.fixture(scope="session")
 def block(tmp_path_factory: pytest.TempPathFactory) -> Model:
-    """A block of 20 kPa as a MODEL folder."""
-    return block_model(tmp_path_factory.mktemp("model"))
+    """A block of 20 kPa as a MODEL folder, condensed, with the stiffness of its surface; only to be read."""
+
+    def make(folder: Path) -> None:
+        with_own_stiffness(create("fem", block_model(folder)))
+
+    return read_model(folder_made_once(tmp_path_factory, "window-block", make) / "block")
 
 
 @pytest.fixture

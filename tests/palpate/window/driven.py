@@ -11,6 +11,7 @@ import numpy as np
 from palpate.window.frames import Frame
 from palpate.window.window import CHARTS_SHARE, TouchWindow
 
+from ...support.waiting import PATIENCE_S
 from .small import SIZE
 
 FRAME_S = 0.005
@@ -22,14 +23,7 @@ SIDES = [
     np.array([-1.0, 0, 0]),
 ]
 TRACING_M_PER_S = 0.03
-
-
-def eventually(condition: Callable[[], bool], seconds: float = 20.0) -> bool:
-    """Whether a condition comes true before a generous limit; no frame goes by meanwhile."""
-    end = time.monotonic() + seconds
-    while time.monotonic() < end and not condition():
-        time.sleep(0.005)
-    return condition()
+RESTING_S = 0.02
 
 
 class Driven:
@@ -75,24 +69,43 @@ class Driven:
         self.interactor.InvokeEvent("KeyPressEvent")
         self.session.worker.wait()
 
-    def until(self, condition: Callable[[Frame], bool], frames: int = 4000) -> Frame:
+    def until(self, condition: Callable[[Frame], bool]) -> Frame:
         """Frames go by until `condition(frame)`; a frame that never comes fails the test."""
-        frame = None
-        for _ in range(frames):
+        frame, end = None, time.monotonic() + PATIENCE_S
+        while time.monotonic() < end:
             frame = self.window.tick()
             if frame is not None and condition(frame):
                 return frame
             self._pause.wait(FRAME_S)
         raise AssertionError(f"the window never came to this; its last frame: {frame}")
 
-    def wait(self, seconds: float) -> None:
-        """Frames go by for a time."""
-        end = time.perf_counter() + seconds
-        self.until(lambda frame: time.perf_counter() > end, frames=1_000_000)
+    def frame(self) -> Frame:
+        """The next frame."""
+        return self.until(lambda frame: True)
+
+    def wait(self, seconds: float) -> Frame:
+        """Frames go by until the servo's clock has gone on by so many seconds, however long that takes."""
+        end = self.frame().time_s + seconds
+        return self.until(lambda frame: frame.time_s > end)
+
+    def pressed(self, depth_m: float) -> Frame:
+        """The frame in which the tip rests as deep as this: the forces have come to rest as well."""
+        last: tuple[float, np.ndarray] = (0.0, np.zeros(0))
+
+        def rests(frame: Frame) -> bool:
+            nonlocal last
+            forces = np.array([view.force_n for view in frame.views])
+            if not (frame.touching and abs(frame.depth_m - depth_m) < 2e-6):
+                return False
+            if forces.shape != last[1].shape or not np.allclose(forces, last[1], rtol=1e-4, atol=1e-5):
+                last = frame.time_s, forces
+            return frame.time_s > last[0] + RESTING_S
+
+        return self.until(rests)
 
     def inclusion_settled(self) -> None:
         """Frames go by until the inclusion is felt where it is wanted."""
-        self.until(lambda frame: self.session.inclusion_felt and not self.session.worker.busy, frames=20_000)
+        self.until(lambda frame: self.session.inclusion_felt and not self.session.worker.busy)
         assert self.session.worker.failure == ""
 
     def look_from(self, azimuth: float) -> None:
@@ -150,10 +163,10 @@ def along_the_foot(driven: Driven, side: np.ndarray) -> None:
     driven.until(lambda f: np.linalg.norm(f.tip_m - driven.window.pointer.tip_m) < 1e-4)
     driven.wait(0.3)
     driven.button(True)
-    driven.wait(0.6)
-    start, duration = time.perf_counter(), 2 * reach / TRACING_M_PER_S
-    while (share := (time.perf_counter() - start) / duration) < 1.0:
+    start, duration = driven.wait(0.6).time_s, 2 * reach / TRACING_M_PER_S
+    share = 0.0
+    while share < 1.0:
         driven.mouse_at(HALF * side + 0.004 * side + (2 * share - 1) * reach * right)
-        driven.wait(0.01)
+        share = (driven.wait(0.01).time_s - start) / duration
     driven.button(False)
     driven.wait(0.4)

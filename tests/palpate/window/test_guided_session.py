@@ -38,7 +38,7 @@ def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
     driven.button(True)
     driven.wait(s.depth_m / 0.02 + 0.8)
     driven.button(False)
-    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy, frames=20_000)
+    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy)
 
 
 @pytest.mark.slow

@@ -19,6 +19,8 @@ from mechanics.recording import read_recording
 from palpate.cli import main
 from palpate.window.tracing import BaseTracing
 
+from ...support.waiting import PATIENCE_S, eventually
+
 
 def test_headless_session_with_a_recording(
     block: Model, tmp_path: Path, capsys: pytest.CaptureFixture
@@ -118,11 +120,8 @@ def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -
             ["xdotool", *words], env=environment, capture_output=True, text=True, check=False
         ).stdout.strip()
 
-    end = time.monotonic() + 180
-    while not (window := pointer("search", "--name", "^Palpate")) and time.monotonic() < end:
-        time.sleep(0.5)
-    assert window, "no window opened"
-    window = window.splitlines()[-1]
+    assert eventually(lambda: pointer("search", "--name", "^Palpate"), 600.0), "no window opened"
+    window = pointer("search", "--name", "^Palpate").splitlines()[-1]
     time.sleep(5.0)
     pointer("mousemove", "--window", window, "320", "280")
     time.sleep(3.0)
@@ -133,7 +132,7 @@ def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -
         time.sleep(2.0)
     pointer("windowfocus", window)
     pointer("key", "q")
-    words, _ = program.communicate(timeout=60)
+    words, _ = program.communicate(timeout=PATIENCE_S)
     assert program.returncode == 0 and "ticks" in words
     force = np.linalg.norm(read_recording(path).force_on_tool, axis=1)
     touching = force > 0.05

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 import threading
-import time
 
 import pytest
 
 from mechanics.errors import SceneError
 from palpate.window.waiting import ClosedError, WaitingWindow
+
+from ...support.waiting import PATIENCE_S
 
 
 @pytest.fixture
@@ -31,7 +32,7 @@ def test_it_draws_how_far_a_job_has_come_and_returns_what_it_made(waiting: Waiti
 
     def job(tell) -> str:
         tell("mesh", 0.5)
-        assert seen.wait(10.0)
+        assert seen.wait(PATIENCE_S)
         go_on.set()
         return "model"
 
@@ -48,10 +49,19 @@ def test_a_job_that_fails_fails_where_it_was_asked_for(waiting: WaitingWindow) -
 
 
 def test_closing_it_ends_the_wait(waiting: WaitingWindow) -> None:
-    ended = threading.Event()
-    threading.Timer(0.1, waiting._gone).start()
-    began = time.monotonic()
+    begun, go_on, ended = threading.Event(), threading.Event(), threading.Event()
+
+    def job(tell) -> None:
+        begun.set()
+        go_on.wait(PATIENCE_S)
+        ended.set()
+
+    def close() -> None:
+        begun.wait(PATIENCE_S)
+        waiting._gone()
+
+    threading.Thread(target=close).start()
     with pytest.raises(ClosedError):
-        waiting.run(lambda tell: ended.wait(5.0))
-    assert time.monotonic() - began < 4.0
-    ended.set()
+        waiting.run(job)
+    assert not ended.is_set(), "the job was not waited for"
+    go_on.set()

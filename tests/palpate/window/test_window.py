@@ -21,7 +21,8 @@ from palpate.window.session import TouchSession
 from palpate.window.window import CHARTS_SHARE, TouchWindow
 from scenes.scene import Scene
 
-from .driven import Driven, eventually
+from ...support.waiting import eventually
+from .driven import Driven
 
 SIZE = (640, 480)
 
@@ -49,8 +50,7 @@ def sizes(frame) -> list[float]:
 def press(driven: Driven):
     driven.mouse(0.5, 0.55)
     driven.button(True)
-    depth = driven.window.pointer.press_depth_m
-    return driven.until(lambda f: f.touching and abs(f.depth_m - depth) < 2e-6)
+    return driven.pressed(driven.window.pointer.press_depth_m)
 
 
 def release(driven: Driven):
@@ -81,11 +81,9 @@ def test_the_picture_shows_tip_arrow_and_plot(driven: Driven) -> None:
     arrow = (27, 79, 156)
     before, hovering = like(arrow), like((217, 95, 2))
     press(driven)
-    for _ in range(3):
-        driven.window.tick()
+    driven.until(lambda f: like(arrow) > before + 30)  # an arrow appears
     assert hovering > 50, "the tip is drawn"
-    assert like(arrow) > before + 30, "an arrow appears"
-    assert len(driven.session.trace.curves()) > 100
+    driven.until(lambda f: len(driven.session.trace.curves()) > 100)
     assert driven.session.trace.curves()[:, 1].max() > 0.1
     release(driven)
 
@@ -104,7 +102,7 @@ def test_the_slider_sets_the_depth_and_presses_nothing(driven: Driven) -> None:
     look, panel = window._slider.GetSliderRepresentation(), window._slider.GetCurrentRenderer()
     ends = [look.GetPoint1Coordinate(), look.GetPoint2Coordinate()]
     left, right = (np.array(end.GetComputedDisplayValue(panel), dtype=float) for end in ends)
-    driven.wait(0.05)
+    driven.frame()
     before = pointer.press_depth_m
     share = (1e3 * before - look.GetMinimumValue()) / (look.GetMaximumValue() - look.GetMinimumValue())
     driven.pixel(*(left + share * (right - left)))
@@ -114,7 +112,7 @@ def test_the_slider_sets_the_depth_and_presses_nothing(driven: Driven) -> None:
     driven.button(False)
     assert pointer.press_depth_m > before + 0.002
     pointer.go_deep(1e3 * before)
-    driven.wait(0.05)
+    driven.frame()
     assert look.GetValue() == pytest.approx(1e3 * before), "the slider follows the wheel and the keys"
     driven.mouse(0.5, 0.55)
 
@@ -123,6 +121,7 @@ def test_keys_change_modulus_and_friction(driven: Driven) -> None:
     soft = press(driven)
     driven.key("plus")
     stiff = driven.until(lambda f: sizes(f)[0] > 1.2 * sizes(soft)[0])
+    stiff = driven.pressed(stiff.depth_m)
     assert sizes(stiff)[0] == pytest.approx(1.25 * sizes(soft)[0], rel=0.01)
     driven.key("minus")
     driven.until(lambda f: sizes(f)[0] == pytest.approx(sizes(soft)[0], rel=0.01))
@@ -256,13 +255,13 @@ def test_a_guided_person_is_asked_for_one_thing_at_a_time(driven: Driven, monkey
     window = driven.window
     guide = SimpleNamespace(suggestion=SimpleNamespace(kind="press"))
     monkeypatch.setattr(window, "game", Game([Ball((0.0, 0.0, 0.02), 0.005, 8.0)], np.array([0.0, 0.0, 1.0])))
-    driven.wait(0.05)
+    driven.frame()
     assert "a nodule is hidden" in window._status.input
     monkeypatch.setattr(window, "guide", guide)
-    driven.wait(0.05)
+    driven.frame()
     assert "a nodule is hidden" not in window._status.input
     guide.suggestion.kind = "stop"
-    driven.wait(0.05)
+    driven.frame()
     assert "a nodule is hidden" in window._status.input
 
 
@@ -290,6 +289,7 @@ def test_help_and_screenshot(driven: Driven, tmp_path: Path, monkeypatch: pytest
 
 def test_the_servo_never_waits_for_the_window(driven: Driven) -> None:
     """While the window draws nothing, the loop in the other process runs on."""
-    before = driven.session.report().ticks
+    before, drawn = driven.session.report().ticks, driven.window.frames
     assert eventually(lambda: driven.session.report().ticks > before + 500)
+    assert driven.window.frames == drawn
     assert driven.session.servo.alive

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -30,8 +31,18 @@ CONTRACT = set(
 )
 
 
-def _run(effects: dict[str, float] | None = None, seed: int = 3, **options):
+def _made(effects: dict[str, float] | None = None, seed: int = 3, **options):
     return simulate(phantom("cylinder"), effects, SimulateOptions(protocol="sparse", **options), seed=seed)
+
+
+@cache
+def _kept(effects: tuple[tuple[str, float], ...], seed: int, options: tuple[tuple[str, object], ...]):
+    return _made(dict(effects), seed, **dict(options))
+
+
+def _run(effects: dict[str, float] | None = None, seed: int = 3, **options):
+    """What `_made` returns, made once for all tests of this file: all of them have the fixture `springs`."""
+    return _kept(tuple((effects or {}).items()), seed, tuple(options.items()))
 
 
 def test_every_effect_of_the_contract_is_there_and_some_beyond() -> None:
@@ -40,7 +51,7 @@ def test_every_effect_of_the_contract_is_there_and_some_beyond() -> None:
 
 
 def test_same_seed_same_recording_and_another_seed_another_hand(springs) -> None:
-    first, again, other = _run(), _run(), _run(seed=4)
+    first, again, other = _run(), _made(), _run(seed=4)
     assert np.array_equal(first.recording.force_on_tool, again.recording.force_on_tool)
     assert len(first.recording.t) != len(other.recording.t)
     assert first.truth["effects"] == []
@@ -206,7 +217,7 @@ def test_where_the_true_gap_is_follows_what_acts(springs) -> None:
     with pytest.MonkeyPatch.context() as patch:
         gain = replace(REGISTRY["force_gain"], parameters=lambda strength, bench: same)
         patch.setitem(REGISTRY, "force_gain", gain)
-        factor = _run({"force_gain": 1}).truth
+        factor = _made({"force_gain": 1}).truth
     assert factor["sizes"]["force_gain"]["rms_n"] > 0.1
     assert max(factor["where"]["press_n"]) < 1e-6
     assert max(_run({"force_bias": 2}).truth["where"]["press_n"]) < 1e-6
