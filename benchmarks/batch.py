@@ -36,7 +36,7 @@ from palpate.child import module_environment
 from palpate.tasks.driver import run as run_graph
 from palpate.tasks.engine import executor
 from palpate.tasks.graph import Graph, Task
-from palpate.tasks.words import Status
+from palpate.tasks.driver import Status
 
 SUMMARY = "cost of a recording, throughput of 1 and 2 workers, tasks a second of both engines"
 _MANY = 10_000
@@ -177,7 +177,7 @@ def empty_graph(count: int, root: Path) -> Graph:
 
 
 def _told(bar: Progress, status: Status) -> None:
-    bar("tasks", status.done / status.whole)
+    bar("tasks", status.ended.total() / status.total.total())
 
 
 def tasks(counts: Sequence[int], place: Path, engines: Sequence[str]) -> dict[str, Any]:
