@@ -33,10 +33,10 @@ from palpate.arguments import progress_bar
 from palpate.batching.plan import Choice
 from palpate.batching.run import Batch, batch
 from palpate.child import module_environment
+from palpate.tasks.driver import Status
 from palpate.tasks.driver import run as run_graph
 from palpate.tasks.engine import executor
 from palpate.tasks.graph import Graph, Task
-from palpate.tasks.driver import Status
 
 SUMMARY = "cost of a recording, throughput of 1 and 2 workers, tasks a second of both engines"
 _MANY = 10_000

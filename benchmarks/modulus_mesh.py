@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.errors import ContactError
 from mechanics.recording import read_recording
@@ -61,4 +62,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     print(table(["recording", "method", "l [mm]", "nodes", "modulus [kPa]", "from", "to"], rows))
     changes = [[name, f"{100 * value['change']:.2f} %"] for name, value in result.items()]
     print("", table(["recording, method", "change over the meshes"], changes), sep="\n")
-    return result
+    figures = [
+        Figure(f"{name}, change of the modulus over the meshes", 100 * row["change"], unit="%").at_most(3.0)
+        for name, row in result.items()
+        if len(row["young_modulus_pa"]) > 1
+    ]
+    return {**result, "figures": figures}

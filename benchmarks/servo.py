@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.servo.free_air import FreeAir
 from palpate.servo.report import ring_rows, snapshot
@@ -75,6 +76,19 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         from benchmarks._mujoco_peer import compare
 
         result["peer"] = compare()
+    result["figures"] = [
+        Figure(
+            f"{row['contacts']} contacts, {row['touchable_nodes']} nodes, CPU of a tick, {name}",
+            value,
+            unit="us",
+        )
+        for row in result["compute"]
+        for name, value in ((q, row["cpu_us"][q]) for q in ("median", "p99.9"))
+    ]
+    for k, figure in enumerate(result["figures"]):
+        contacts = result["compute"][k // 2]["contacts"]
+        if k % 2 and contacts in AIMS_US:
+            result["figures"][k] = figure.at_most(AIMS_US[contacts])
     return result
 
 

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.nearest import distance, sample
 from palpate.arguments import progress_bar
@@ -99,4 +100,11 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         "s",
     ]
     print(table(header, rows))
-    return {"shapes": found}
+    own, peer = (np.array([1e3 * row["mean_m"] for row in rows]) for rows in (
+        list(found.values()), [row["hull"] for row in found.values()]))  # fmt: skip
+    figures = [
+        Figure(f"{words}, mean distance to the true shape, median of all shapes", float(np.median(each)),
+               (float(each.min()), float(each.max())), "mm")
+        for words, each in (("surface", own), ("the paper's hull", peer))
+    ]  # fmt: skip
+    return {"shapes": found, "figures": figures}

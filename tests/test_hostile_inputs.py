@@ -1028,7 +1028,7 @@ NAMED = re.compile(r"`([A-Z]+)\[((?:[^\]\\]|\\.)+)\]`|`(test_\w+)`")
 
 @pytest.mark.parametrize(("page", "least"), [("robustness.md", 120), ("safety.md", 15)])
 def test_every_row_of_the_docs_names_tests_that_exist(page, least):
-    from benchmarks._faults import FAULTS
+    from .support.faults import FAULTS
 
     root, defined = Path(__file__).resolve().parents[1], set()
     for file in (root / "tests").rglob("test_*.py"):

@@ -8,12 +8,13 @@ import numpy as np
 import pytest
 from exploration_of_cylinder import explore_cylinder
 
-from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
 from reconstruct.checks.base import Finding, decades_of_tail
 from reconstruct.checks.outcome import Result, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
 from reconstruct.checks.sight import Sight
+
+from ..support.faults import FAULTS
 
 NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")
 

@@ -21,7 +21,6 @@ from mechanics.sites import patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import forces_at
 
-SUMMARY = "predicted against recorded forces where shape and modulus are known"
 WAYS = (
     ("hertz", False),
     ("sphere", False),
