@@ -47,11 +47,11 @@ class Figure:
 
     def at_most(self, limit: float, whose: str = "") -> Figure:
         """The figure with a limit that its value must not exceed; whose: "the paper's", if that is so."""
-        return self._with(f"at most {limit:g} {self.unit}", whose, self.value <= limit)
+        return self._with(f"at most {limit:g} {self.unit}", whose, bool(self.value <= limit))
 
     def at_least(self, limit: float, whose: str = "") -> Figure:
         """The figure with a limit that its value must reach."""
-        return self._with(f"at least {limit:g} {self.unit}", whose, self.value >= limit)
+        return self._with(f"at least {limit:g} {self.unit}", whose, bool(self.value >= limit))
 
     def _with(self, target: str, whose: str, met: bool) -> Figure:
         words = target.removesuffix(" 1") + (f" ({whose})" if whose else "")
@@ -71,7 +71,7 @@ class Evidence:
 
 
 def measured(command: str, figures: Sequence[Figure], clone: Path) -> Evidence:
-    """Evidence of here and now. clone: the folder of the project's clone. Raises ValueError for no figures."""
+    """Evidence of here and now. clone: the project's folder. Raises ValueError for no figures."""
     if not figures:
         raise ValueError(f"'{command}' gave no figures to keep")
     today = datetime.datetime.now(datetime.UTC).strftime("%Y-%m-%d")
@@ -94,7 +94,7 @@ def commit_of(clone: Path) -> str:
 
 
 def processor() -> str:
-    """Name of the processor, the cores that this process may use, and the load, since others may share them."""
+    """Name of the processor, the cores that this process may use, and the load: others may share them."""
     name = platform.processor() or platform.machine()
     cpuinfo = Path("/proc/cpuinfo")  # where Linux alone names the model
     if cpuinfo.is_file():
@@ -110,8 +110,17 @@ def write(path: Path | str, evidence: Evidence) -> Path:
     path = Path(path)
     path.parent.mkdir(parents=True, exist_ok=True)
     with atomic_file(path, JSON) as temporary:
-        temporary.write_text(json.dumps(asdict(evidence), indent=1) + "\n", encoding="utf-8")
+        temporary.write_text(json.dumps(_rounded(asdict(evidence)), indent=1) + "\n", encoding="utf-8")
     return path
+
+
+def _rounded(value: Any) -> Any:
+    """Numbers to six significant digits."""
+    if isinstance(value, dict):
+        return {key: _rounded(each) for key, each in value.items()}
+    if isinstance(value, list | tuple):
+        return [_rounded(each) for each in value]
+    return float(f"{value:.6g}") if isinstance(value, float) else value
 
 
 def read(path: Path | str) -> Evidence:
@@ -135,7 +144,7 @@ def read(path: Path | str) -> Evidence:
 
 
 def _check(held: Any, kind: type, types: dict[str, Any]) -> None:
-    """Raise ValueError unless `held` has the keys of `kind`, each a string where `types` says nothing else."""
+    """Raise ValueError unless `held` has the keys of `kind`, each a string or of what `types` says."""
     wanted = [field.name for field in fields(kind)]
     if not isinstance(held, dict) or sorted(held) != sorted(wanted):
         raise ValueError(f"it must hold {', '.join(wanted)}, not {', '.join(map(str, held))}")

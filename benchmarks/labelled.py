@@ -1,4 +1,4 @@
-"""The paper's three silicones from recordings whose truth is known: modulus, surface, replay (README's table).
+"""The paper's three silicones, whose truth is known: modulus, surface, replay (README's table).
 
 Each recording is reconstructed with default options; the modulus stands beside the known one, the surface's
 mean distance from the true shape beside that of the paper's convex hull, and the force replayed along the

@@ -100,11 +100,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         "s",
     ]
     print(table(header, rows))
-    own, peer = (np.array([1e3 * row["mean_m"] for row in rows]) for rows in (
-        list(found.values()), [row["hull"] for row in found.values()]))  # fmt: skip
-    figures = [
-        Figure(f"{words}, mean distance to the true shape, median of all shapes", float(np.median(each)),
-               (float(each.min()), float(each.max())), "mm")
-        for words, each in (("surface", own), ("the paper's hull", peer))
-    ]  # fmt: skip
+    figures = []
+    for words, measured in (
+        ("surface", found),
+        ("the paper's hull", {n: r["hull"] for n, r in found.items()}),
+    ):
+        away = np.array([1e3 * row["mean_m"] for row in measured.values()])
+        what = f"{words}, mean distance to the true shape, median of {len(away)}"
+        figures.append(Figure(what, float(np.median(away)), (float(away.min()), float(away.max())), "mm"))
     return {"shapes": found, "figures": figures}

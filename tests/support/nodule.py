@@ -121,8 +121,8 @@ def press_on_axis(solver: Solver, height_m: float, depth_m: float) -> float:
 
 
 def felt(press: AxisPress, mesh_size_m: float = 0.01) -> dict[str, float]:
-    """Contrast (the force over that without the nodule, less 1) on the paper's cylinder, linear dent law, beside
-    the reference's; and the force without the nodule over the reference's."""
+    """Contrast (the force over that without the nodule, less 1) on the paper's cylinder, linear dent law,
+    beside the reference's; and the force without the nodule over the reference's."""
     mesh = sample_mesh("cylinder", mesh_size_m)
     plain = press_on_axis(touch_solver(mesh, NU), press.height_m, press.depth_m)
     known_plain = replace(press, modulus_ratio=1.0).force()
