@@ -19,8 +19,16 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._mujoco_peer import DEPTHS_M, POISSON, TIP_RADIUS_M, YOUNG_PA, hertz_n
-from benchmarks._peers import PEERS, Peer, lines_of
+from benchmarks._peers import (
+    DEPTHS_M,
+    PEERS,
+    POISSON,
+    TIP_RADIUS_M,
+    YOUNG_PA,
+    Peer,
+    hertz_n,
+    lines_of,
+)
 from benchmarks.compliance import block
 from benchmarks.timing import table
 from mechanics.recording import read_recording

@@ -30,7 +30,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contacts", type=int, nargs="+", default=[1, 4, 16, 32])
     parser.add_argument("--ticks", type=int, default=20_000, help="ticks a compute-time figure")
     parser.add_argument("--seconds", type=float, default=10.0, help="of each real-time loop, in 1 s slices")
-    parser.add_argument("--no-peer", action="store_true", help="leave MuJoCo's flex out")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -72,10 +71,6 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 }
             )
     _print_late(result["late"])
-    if not arguments.no_peer:
-        from benchmarks._mujoco_peer import compare
-
-        result["peer"] = compare()
     result["figures"] = [_kept(row, name) for row in result["compute"] for name in ("median", "p99.9")]
     return result
 

@@ -14,11 +14,12 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import Delaunay
 from skfem import Basis, BilinearForm, ElementTriP2, ElementVector, MeshTri
 
-from benchmarks._sample_shapes import sample_mesh
 from mechanics.material import Ball
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import touch_force
+
+from .sample_shapes import sample_mesh
 
 NU, TIP, UP = 0.49, 0.005, np.array([0.0, 0.0, 1.0])
 

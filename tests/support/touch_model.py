@@ -13,13 +13,14 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks._sample_shapes import sample_mesh
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.recording import Recording, read_recording
 from mechanics.sites import patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import forces_at
+
+from .sample_shapes import sample_mesh
 
 WAYS = (
     ("hertz", False),

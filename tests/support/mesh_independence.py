@@ -13,13 +13,13 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks._sample_shapes import PLACES, sample_mesh, sample_places
-from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import touch_force
+
+from .sample_shapes import PLACES, sample_mesh, sample_places
 
 SUMMARY = "force of a press on meshes of 10, 7 and 5 mm"
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005
@@ -80,12 +80,7 @@ def run(arguments: argparse.Namespace) -> dict:
             result[sample + ", point load"] = _report(
                 sample, arguments, sizes, points, np.array(paper), "point load"
             )
-    figures = [
-        Figure(f"{name}, change of the force over the meshes, median of places", float(100 * np.median(each)),
-               (float(100 * each.min()), float(100 * each.max())), "%")
-        for name, each in ((name, row["change"]) for name, row in result.items())
-    ]  # fmt: skip
-    return {**result, "figures": figures}
+    return result
 
 
 def _report(
