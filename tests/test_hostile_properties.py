@@ -1,6 +1,6 @@
 """Whatever stands in a recording, MODEL, scene or message of a device is understood or refused in one line.
 
-`palpate bench fuzz` tries the same at length, with whole commands.
+`python -m tests.support fuzz` tries the same at length, with whole commands.
 """
 
 from __future__ import annotations

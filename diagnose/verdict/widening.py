@@ -3,7 +3,7 @@
 A fit's covariance knows noise and the sites' scatter; it does not know what the law, the surface and the
 search's own choice leave. Conformal factors make up for that: of judged cases the distance of the truth
 from the value, in half intervals, and of these the quantile that 95 % do not exceed. They stand in
-widening.toml with the seeds that they come from (`palpate bench diagnose-widening`).
+widening.toml with the seeds that they come from (`python -m tools.diagnose_widening`).
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The commands that the benchmark of interrupts runs are commands."""
+"""The commands that are interrupted at random are commands."""
 
 from __future__ import annotations
 
