@@ -1,4 +1,4 @@
-"""Whole commands with damaged input, and ended at random moments: `python -m tests.support fuzz` at length."""
+"""Whole commands with damaged input, and ended at random moments (`python -m tests.support fuzz`)."""
 
 from __future__ import annotations
 

@@ -1,8 +1,8 @@
 """How sure a name is: how often one that stood like it was right where the truth was known.
 
 Counts of judged cases, by the effect's role and by how the name stands, are in sureness.toml with the seeds
-that they come from (`python -m tools.diagnose_sureness`). What is not named is there less often than its score
-says, as something else explained the gap better.
+that they come from (`python -m tools.diagnose_sureness`). What is not named is there less often than its
+score says, as something else explained the gap better.
 """
 
 from __future__ import annotations

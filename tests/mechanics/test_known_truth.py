@@ -28,7 +28,7 @@ def test_the_force_of_a_press_does_not_depend_on_the_mesh():
 
 
 def test_forces_on_true_shapes_of_true_modulus_are_the_recorded_ones(shared_recordings):
-    """Nothing is fitted: within 2 % of the force, and twice the noise, by the law that reconstruction uses."""
+    """Nothing is fitted: within 2 % of the force, and twice the noise, by the finite-strain dent."""
     found = run(touch_model, "--recordings", str(shared_recordings))
     own = {name: row for name, row in found.items() if name.endswith("neo-hookean, refined")}
     assert len(own) == 3
