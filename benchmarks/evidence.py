@@ -12,10 +12,12 @@ import math
 import os
 import platform
 import subprocess
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
+
+from scipy.stats import binomtest
 
 from mechanics.errors import FileError
 from mechanics.files import JSON, atomic_file, read_text
@@ -56,6 +58,24 @@ class Figure:
     def _with(self, target: str, whose: str, met: bool) -> Figure:
         words = target.removesuffix(" 1") + (f" ({whose})" if whose else "")
         return Figure(self.what, self.value, self.spread, self.unit, words, met)
+
+
+def wilson(hits: int, of: int) -> tuple[float, float, float]:
+    """(rate, low, high): Wilson's 95 % interval; all nan for none."""
+    if of == 0:
+        return (float("nan"),) * 3
+    interval = binomtest(hits, of).proportion_ci(0.95, "wilson")
+    return hits / of, float(interval.low), float(interval.high)
+
+
+def rates(counted: Mapping[str, tuple[int, int]]) -> list[Figure]:
+    """A figure in % for each (hits, of), with Wilson's 95 % interval; none where nothing was counted."""
+    found = []
+    for what, (hits, of) in counted.items():
+        if of:
+            rate, low, high = (100 * x for x in wilson(hits, of))
+            found.append(Figure(f"{what}, {hits} of {of} (95 % interval)", rate, (low, high), "%"))
+    return found
 
 
 @dataclass(frozen=True)

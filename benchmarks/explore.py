@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks._explore_phantoms import Sealed, robot_of, sealed, strengthened
-from benchmarks._rates import wilson
+from benchmarks.evidence import wilson
 from benchmarks.timing import table
 from diagnose.explore.causes import NONE
 from diagnose.explore.explorer import Explorer, State

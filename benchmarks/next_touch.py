@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks._diagnosis_blind import opened_case, verdict_path
 from benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from benchmarks._diagnosis_scores import answer_of
-from benchmarks._rates import wilson
+from benchmarks.evidence import wilson
 from benchmarks.timing import table
 from diagnose.pipeline import DiagnoseOptions, diagnose
 from diagnose.verdict.result import Diagnosis, NextTouch

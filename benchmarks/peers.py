@@ -30,6 +30,7 @@ from benchmarks._peers import (
     lines_of,
 )
 from benchmarks.compliance import block
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.recording import read_recording
 
@@ -67,6 +68,17 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                     ["peer", "held-out error [mN]", "presses"], [list(r.values()) for r in result["held_out"]]
                 )
             )
+    result["figures"] = [
+        Figure(f"{found['peer']}, {what}", value, unit=unit)
+        for found in result["block"] if "failed" not in found
+        for what, value, unit in (
+            (f"force over Hertz at {1e3 * DEPTHS_M[-1]:g} mm", found["over_hertz"][-1], "1"),
+            ("CPU of a step", 1e6 * found["step_s"], "us"),
+        )
+    ] + [
+        Figure(f"{row['peer']}, held-out error, rms of {row['presses']} presses", row["rmse_mn"], unit="mN")
+        for row in result.get("held_out", []) if row["presses"]
+    ]  # fmt: skip
     return result
 
 
