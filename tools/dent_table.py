@@ -19,11 +19,11 @@ import numpy as np
 import scipy.sparse as sp
 from pypardiso import PyPardisoSolver
 
-from benchmarks._script import script
 from mechanics.dent import dent_law, grid
 from mechanics.effects.strain_stiffening import hardening
 from mechanics.elasticity import lame_parameters
 from mechanics.files import atomic_file
+from tools.script import script
 
 SUMMARY = "recompute the tables of the sticking dent (finite strain, linear)"
 

@@ -16,13 +16,13 @@ from typing import Any
 import numpy as np
 from scipy.special import expit
 
-from benchmarks._script import script
 from benchmarks.timing import table
 from diagnose.search.naming import WEIGHTS
 from diagnose.verdict.sureness import FILE, UNNAMED, standing
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
+from tools.script import script
 
 SUMMARY = "how often names and candidates are true, from judged cases of known truth"
 

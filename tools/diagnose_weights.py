@@ -18,12 +18,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks._script import script
 from benchmarks.timing import table
 from diagnose.search.naming import FILE, WEIGHTS
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
+from tools.script import script
 
 SUMMARY = "weights of evidence and closure in naming an effect, fitted to judged cases"
 

@@ -16,11 +16,11 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._script import script
 from benchmarks.timing import table
 from diagnose.verdict.widening import FILE
 from mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
+from tools.script import script
 
 SUMMARY = "factors by which parameters' intervals are widened, from judged cases of known truth"
 

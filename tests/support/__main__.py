@@ -2,8 +2,8 @@
 
 NAME: fuzz (hostile files, options and bytes; interrupts), check_up (faults found in recordings), soak (a long
 session of the servo), effects_in_servo (each effect is felt), elements (locking), mesh_independence (of a
-press), touch_model and large_presses (predicted forces where the truth is known), drag (what a dragged press
-feels).
+press), modulus_mesh (of the modulus), touch_model and large_presses (predicted forces where the truth is
+known), drag (what a dragged press feels).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import importlib
 import sys
 
-from benchmarks._script import script
+from tools.script import script
 
 NAMES = (
     "check_up",
@@ -21,6 +21,7 @@ NAMES = (
     "fuzz",
     "large_presses",
     "mesh_independence",
+    "modulus_mesh",
     "soak",
     "touch_model",
 )

@@ -21,7 +21,6 @@ from mechanics.touch import touch_force
 
 from .sample_shapes import PLACES, sample_mesh, sample_places
 
-SUMMARY = "force of a press on meshes of 10, 7 and 5 mm"
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005
 
 

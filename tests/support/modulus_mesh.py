@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.errors import ContactError
 from mechanics.recording import read_recording
@@ -19,8 +18,6 @@ from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 from scenes.embedded import embedded_recording
-
-SUMMARY = "the modulus of a recording on meshes of 10, 7 and 5 mm"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -62,9 +59,4 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     print(table(["recording", "method", "l [mm]", "nodes", "modulus [kPa]", "from", "to"], rows))
     changes = [[name, f"{100 * value['change']:.2f} %"] for name, value in result.items()]
     print("", table(["recording, method", "change over the meshes"], changes), sep="\n")
-    figures = [
-        Figure(f"{name}, change of the modulus over the meshes", 100 * row["change"], unit="%").at_most(3.0)
-        for name, row in result.items()
-        if len(row["young_modulus_pa"]) > 1
-    ]
-    return {**result, "figures": figures}
+    return result
