@@ -39,7 +39,6 @@ from palpate.tasks.driver import run as run_graph
 from palpate.tasks.engine import executor
 from palpate.tasks.graph import Graph, Task
 
-SUMMARY = "cost of a recording, throughput of 1 and 2 workers, tasks a second of both engines"
 _MANY = 10_000
 
 

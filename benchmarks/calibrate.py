@@ -19,7 +19,6 @@ from mechanics.recording import Recording
 from mechanics.samples import delayed
 from palpate import api
 
-SUMMARY = "calibration of instruments whose faults were drawn at random"
 TIP_M, RATE_HZ, NOISE_N = 0.004, 500.0, 0.005
 STIFF = "stiffness_n_per_m"
 

@@ -25,8 +25,6 @@ from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from palpate.tasks.worker import high_water_bytes
 
-SUMMARY = "condensed compliance against the dense inverse and column solves"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Sizes, element, repeats."""

@@ -30,8 +30,6 @@ from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import add_engine, run_with_bar
 from palpate.tasks.graph import Graph, Task
 
-SUMMARY = "blind diagnosis of sealed recordings: detection, names, false alarms, gap closed"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Size, work folder, seed."""

@@ -18,8 +18,6 @@ from benchmarks._apply_replay import corrected_again, one
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 
-SUMMARY = "improved models: error on presses that were not fitted"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Recordings, where they are cut, and what is left out."""

@@ -33,7 +33,6 @@ from mechanics.store import content_key
 from palpate.arguments import progress_bar
 from scenes.laboratory.specimen import VERSION as LABORATORY
 
-SUMMARY = "guided exploration against other orders: presses and seconds until the goals are met"
 VERSION = 4
 """Of what an exploration does: raised when kept ones say nothing of the program any more."""
 PHANTOMS = 3

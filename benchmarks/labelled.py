@@ -26,7 +26,6 @@ from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.replay import replay_error, replay_recording
 
-SUMMARY = "modulus, surface and replay of the three silicones whose truth is known"
 SAMPLES = {
     "silicone-1-cylinder": "cylinder",
     "silicone-2-block": "block",

@@ -17,8 +17,6 @@ from mechanics.recording import read_recording
 from scenes.laboratory.comparison import block_shape, by_depth, compare, cylinder_shape
 from scenes.phantoms import phantom
 
-SUMMARY = "the virtual laboratory against another simulator"
-
 KNOWN = {
     "silicone-1-cylinder": ("cylinder", cylinder_shape(40.0, 80.0)),
     "silicone-2-block": ("block", block_shape(105.0, 47.0)),

@@ -32,7 +32,6 @@ from mechanics.tetmesh import TetMesh
 from mechanics.touch import touch_forces
 from render.fem import FemRenderer
 
-SUMMARY = "compressed compliance of 5,000 to 20,000 touchable nodes"
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005
 
 

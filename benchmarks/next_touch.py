@@ -37,7 +37,6 @@ from scenes.variety.objects import Thing, thing
 from scenes.variety.recorded import explored, frame
 from scenes.variety.writing import write
 
-SUMMARY = "the touch that a diagnosis proposes, made: how often does it settle what was open?"
 WAYS = ("proposed", "by chance")
 
 

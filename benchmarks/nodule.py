@@ -21,7 +21,6 @@ from mechanics.sites import patch_width
 from mechanics.solver import Solver
 from mechanics.surface_compliance import patch_blocks
 
-SUMMARY = "moving a stiff nodule against a full recompute"
 NU = 0.49
 
 

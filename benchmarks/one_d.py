@@ -10,7 +10,6 @@ from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s6_one_d.one_d import fit_paper, fit_robust
 from reconstruct.steps.s6_one_d.uniaxial import profiles
 
-SUMMARY = "Kelvin-Voigt and Hunt-Crossley fits of every press"
 PAPER_S = 0.5
 
 

@@ -34,7 +34,6 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.recording import read_recording
 
-SUMMARY = "MuJoCo flex, Newton, scikit-fem by hand, the paper's method, a spring-damper map: the same presses"
 SHARES = np.array([0.25, 0.6, 1.0])
 """Of a press's greatest depth, for which a peer is asked; between them force over depth is straight in the
 root of the depth, which Hertz and a spring both are."""

@@ -14,7 +14,6 @@ from benchmarks.timing import table
 from reconstruct.pipeline import METHODS, ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 
-SUMMARY = "the whole reconstruction, step by step"
 PAPER_S = 45.0
 
 

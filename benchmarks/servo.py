@@ -20,7 +20,6 @@ from benchmarks.timing import table
 from palpate.servo.free_air import FreeAir
 from palpate.servo.report import ring_rows, snapshot
 
-SUMMARY = "the 1 kHz tick: compute time by contacts and nodes, late ticks against an empty loop"
 AIMS_US = {1: 100.0, 16: 300.0}
 
 

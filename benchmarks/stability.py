@@ -25,7 +25,6 @@ from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from palpate.servo.elastic_plane import ElasticPlane
 from render.passivity import PassivityOptions
 
-SUMMARY = "energy given back by the closed loop over hands, moduli, rates, quantisation and delay"
 AIM_J = 1e-3
 TIP_RADIUS_M, TYPICAL_DEPTH_M = 0.005, 0.003
 IMPEDANCES = ((0.0, 0.0), (2.0, 200.0), (12.0, 600.0), (5.0, 2000.0))

@@ -18,7 +18,6 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.child import module_command, module_environment
 
-SUMMARY = "user CPU of `palpate --help` and `palpate press --help` beside importing NumPy"
 HELP_S, OVER_NUMPY_S = 0.15, 0.3
 
 

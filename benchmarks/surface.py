@@ -21,8 +21,6 @@ from mechanics.nearest import distance, sample
 from palpate.arguments import progress_bar
 from reconstruct.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
 
-SUMMARY = "distance of reconstructed surfaces from known shapes, against the hull"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which shapes, how often, which surface."""

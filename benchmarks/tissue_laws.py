@@ -25,7 +25,6 @@ from mechanics.errors import RecordingError
 from reconstruct.external.compression import Compression, fit_elastomer, read_compression
 from reconstruct.external.relaxation import FORMS, Held, fit_holds, hold_error
 
-SUMMARY = "laws of tissue: silicones that soften and holds of beef, on unseen curves"
 FROM_STRAIN = 0.02
 SILICONES, BEEF = "tissue_phantom_compression", "meat_indentation_relaxation"
 

@@ -38,7 +38,6 @@ from scenes.variety.draws import Draw, draw
 from scenes.variety.objects import solved, thing
 from scenes.variety.recorded import Varied, record
 
-SUMMARY = "recordings as varied as the world: how many are reconstructed, and how well, by each nuisance"
 ROOMS = ("mechanics", "reconstruct")
 _WITHIN_S = 0.15
 """A press is found where a first touch is told within a true touch, or this close to it."""

@@ -25,8 +25,6 @@ from mechanics.elasticity import lame_parameters
 from mechanics.files import atomic_file
 from tools.script import script
 
-SUMMARY = "recompute the tables of the sticking dent (finite strain, linear)"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Law, resolution, where to write."""

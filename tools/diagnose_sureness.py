@@ -24,8 +24,6 @@ from mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
 
-SUMMARY = "how often names and candidates are true, from judged cases of known truth"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Where the judged cases are."""

@@ -25,8 +25,6 @@ from mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
 
-SUMMARY = "weights of evidence and closure in naming an effect, fitted to judged cases"
-
 RIDGE = (5.0, 15.0)
 """One standard deviation of the two weights' prior."""
 FOUND = 10.0

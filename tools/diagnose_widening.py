@@ -22,8 +22,6 @@ from mechanics.errors import OptionError
 from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
 from tools.script import script
 
-SUMMARY = "factors by which parameters' intervals are widened, from judged cases of known truth"
-
 COVERED = 0.95
 LEAST = 39
 """Values from which an effect has a factor of its own: with fewer the quantile is the farthest of them."""
