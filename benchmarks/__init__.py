@@ -1,6 +1,7 @@
-"""Benchmarks: one module a subject, run by `palpate bench NAME`.
+"""Benchmarks: one module a subject, run by `palpate bench NAME` from inside the clone.
 
-Each module has `SUMMARY`, `add_arguments(parser)` and `run(arguments) -> dict`; the dict is printed as
-JSON on demand, the module prints its own table. Figures are ratios against a peer or limit measured in the
-same run.
+Each has `add_arguments(parser)` and `run(arguments) -> dict`; the dict is printed as JSON with `--json`, and
+its "figures", a list of `evidence.Figure`, are kept by `--evidence`. They lie beside the product, not in the
+wheel: what shows speed, scale, or truth beside a peer. What must hold is a test (tests/), what fits data a
+tool (tools/).
 """

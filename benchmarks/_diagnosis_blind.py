@@ -12,8 +12,7 @@ from typing import Any
 from benchmarks._diagnosis_cases import FINITE, Case
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file
-from palpate.tasks.graph import Task
-from palpate.tasks.record import finished
+from palpate.tasks.graph import Task, finished
 from scenes.laboratory.specimen import VERSION
 
 _HERE = "benchmarks._diagnosis_blind"

@@ -13,7 +13,7 @@ from scipy.stats import chi2
 
 from benchmarks._diagnosis_cases import ALIKE
 from benchmarks._diagnosis_where import Located, localisation, located
-from benchmarks._rates import wilson
+from benchmarks.evidence import wilson
 from mechanics.effects.registry import effect, effects
 
 FAMILIES = {"plasticity": ("mullins_softening",)}

@@ -25,6 +25,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
@@ -33,12 +34,11 @@ from palpate.arguments import progress_bar
 from palpate.batching.plan import Choice
 from palpate.batching.run import Batch, batch
 from palpate.child import module_environment
+from palpate.tasks.driver import Status
 from palpate.tasks.driver import run as run_graph
 from palpate.tasks.engine import executor
 from palpate.tasks.graph import Graph, Task
-from palpate.tasks.words import Status
 
-SUMMARY = "cost of a recording, throughput of 1 and 2 workers, tasks a second of both engines"
 _MANY = 10_000
 
 
@@ -71,7 +71,26 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             made["workers"] = workers(sources, place, arguments.repeats, arguments.engines)
         if "tasks" in parts:
             made["tasks"] = tasks(arguments.tasks, place, arguments.engines)
-    return made
+    return {**made, "figures": _kept(made)}
+
+
+def _kept(made: dict[str, Any]) -> list[Figure]:
+    found = []
+    for words in ("with reports", "without"):
+        for step in ("reconstruct", "compare", "diagnose"):
+            if (key := f"{step}, {words}") in made.get("cost", {}):
+                cpu = made["cost"][key]["cpu_s"]
+                spread = (min(cpu), max(cpu))
+                found.append(Figure(f"{step}, {words}, CPU, median", float(np.median(cpu)), spread, "s"))
+    for engine, of in made.get("workers", {}).items():
+        ratio = of["ratio"]
+        spread = (min(ratio), max(ratio))
+        found.append(Figure(f"2 workers over 1, {engine}", float(np.median(ratio)), spread).at_least(1.8))
+    for name, of in made.get("tasks", {}).items():
+        count = int(name.split()[1])
+        found.append(Figure(f"tasks that do nothing, {name}", count / of["seconds"], unit="tasks/s"))
+        found.append(Figure(f"driver's CPU a task, {name}", 1e3 * of["driver_cpu_s"] / count, unit="ms"))
+    return found
 
 
 def copies(folder: Path, count: int) -> list[Path]:
@@ -177,7 +196,7 @@ def empty_graph(count: int, root: Path) -> Graph:
 
 
 def _told(bar: Progress, status: Status) -> None:
-    bar("tasks", status.done / status.whole)
+    bar("tasks", status.ended.total() / status.total.total())
 
 
 def tasks(counts: Sequence[int], place: Path, engines: Sequence[str]) -> dict[str, Any]:

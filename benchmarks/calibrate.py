@@ -13,12 +13,12 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.evidence import rates
 from benchmarks.timing import table
 from mechanics.recording import Recording
 from mechanics.samples import delayed
 from palpate import api
 
-SUMMARY = "calibration of instruments whose faults were drawn at random"
 TIP_M, RATE_HZ, NOISE_N = 0.004, 500.0, 0.005
 STIFF = "stiffness_n_per_m"
 
@@ -58,7 +58,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         error, width = ("" if f[key] is None else f[key] for key in ("median_error", "median_width"))
         cells.append([name, f["cases"], f["told"], error, width, f"{f['covered']} of {f['of']}"])
     print(table(head, cells))
-    return {"rows": rows, "parameters": found}
+    covered95 = {f"{name}: interval holds the truth": (f["covered"], f["of"]) for name, f in found.items()}
+    return {"rows": rows, "parameters": found, "figures": rates(covered95)}
 
 
 def _judged(name: str, true: float, value: float | None, interval: Any, unit: float) -> dict[str, Any]:

@@ -12,10 +12,10 @@ from __future__ import annotations
 import argparse
 import multiprocessing
 from multiprocessing.queues import Queue
-from pathlib import Path
 
 import numpy as np
 
+from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
 from mechanics.box_mesh import box_mesh
 from mechanics.compliance import condense, inverse
@@ -23,8 +23,7 @@ from mechanics.errors import OptionError
 from mechanics.pardiso import Pardiso, available
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
-
-SUMMARY = "condensed compliance against the dense inverse and column solves"
+from palpate.tasks.worker import high_water_bytes
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,22 +46,14 @@ def block(touchable: int, order: int) -> TetMesh:
     return mesh if order == 1 else mesh.quadratic()
 
 
-def _peak_resident() -> float:
-    """Bytes: the greatest resident set of this program so far (ru_maxrss would carry over a parent's)."""
-    for line in Path("/proc/self/status").read_text().splitlines():
-        if line.startswith("VmHWM"):
-            return 1024.0 * float(line.split()[1])
-    raise OptionError("peak memory is read from /proc, which is not here: use --no-memory")
-
-
 def memory_of(touchable: int, order: int) -> tuple[float, float]:
     """(peak beyond the start, result and factor), bytes, of one condensation in this process."""
     mesh = block(touchable, order)
     factor = Pardiso(Solver(block(200, order), 0.49).matrix)  # loads the library before the start is read
     factor.free()
-    before = _peak_resident()
+    before = high_water_bytes()
     result = condense(mesh, 0.49)
-    peak = _peak_resident() - before
+    peak = high_water_bytes() - before
     need = result.matrix.nbytes + 8.0 * Pardiso(Solver(mesh, 0.49).matrix).factor_nonzeros
     return peak, need
 
@@ -131,4 +122,13 @@ def run(arguments: argparse.Namespace) -> dict:
             row |= {"peak_gb": peak / 1e9, "peak_over_need": peak / need}
         results.append(row)
         print(table([k.replace("_", " ") for k in row], [list(row.values())]), flush=True)
-    return {"order": arguments.order, "sizes": results}
+    figures = []
+    for row in results:
+        nodes = f"{row['touchable_nodes']:.0f} touchable nodes"
+        figures += [
+            Figure(
+                f"condensed compliance over the dense inverse's limit, CPU, {nodes}", row["cpu_over_limit"]
+            ),
+            Figure(f"column solves over it, CPU, {nodes}", row["cpu_columns_over_schur"]).at_least(1.0),
+        ]
+    return {"order": arguments.order, "sizes": results, "figures": figures}

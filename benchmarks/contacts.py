@@ -8,7 +8,6 @@ from typing import Any
 from benchmarks._recording import add_recording, recording_of, timed
 from reconstruct.steps.s3_contacts.contacts import explore
 
-SUMMARY = "contacts, base and support of a 110 s recording"
 PAPER_S = 10.0
 
 

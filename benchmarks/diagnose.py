@@ -22,14 +22,13 @@ import numpy as np
 from benchmarks._diagnosis_blind import opened_case, tasks_of, unfinished, verdict_path
 from benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from benchmarks._diagnosis_scores import summarise
-from benchmarks._diagnosis_tables import pictures, show
+from benchmarks._diagnosis_tables import TARGETS, pictures, show
+from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import add_engine, run_with_bar
 from palpate.tasks.graph import Graph, Task
-
-SUMMARY = "blind diagnosis of sealed recordings: detection, names, false alarms, gap closed"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -105,10 +104,24 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     summary = summarise(done)
     summary["size"] = {"asked": len(counted), "done": len(done), "fast": fast}
     summary["failed_tasks"] = {o.task.label: o.reason for o in outcomes.values() if o.state == "failed"}
+    summary["figures"] = [
+        _against(figure, TARGETS.get(name, ""))
+        for name, rate in summary["rates"].items()
+        for figure in rates({name: (rate["hits"], rate["of"])})
+    ]
     show(summary)
     if arguments.picture and done:
         print(f"picture: {pictures(summary, arguments.picture)}")
     return summary
+
+
+def _against(figure: Figure, target: str) -> Figure:
+    """The figure, in %, with a target such as "at most 2 %" or "at least 5 of 6"."""
+    if not target:
+        return figure
+    first, *of = (float(word) for word in target.split() if word.isdigit())
+    limit = 100 * first / of[0] if of else first
+    return figure.at_most(limit) if target.startswith("at most") else figure.at_least(limit)
 
 
 def _chosen(own: list[Case], work: Path, arguments: argparse.Namespace, fast: bool) -> list[Task]:

@@ -1,12 +1,10 @@
-"""Improved models: what they cost at 1 kHz, whether the effect is felt, and what they are worth on unseen
-presses.
+"""Improved models: what they are worth on unseen presses.
 
-First table: the embedded example's model with each effect at the contract's strength 1, written, read back
-and run through the servo process along a scripted path, beside the plain model in the same run. Second table,
-with recordings: the first part of each is reconstructed and diagnosed, the rest replayed through the
+First table: the first part of each recording is reconstructed and diagnosed, the rest replayed through the
 renderer, by the ideal model (its modulus refitted), by the improved one as `--apply` writes it, and by one
-with the effects of [truth], where the recording states it. Third table (--correct): effects of the instrument
-are taken off the recording, which is diagnosed again. Kept in --work: a run that is stopped goes on.
+with the effects of [truth], where the recording states it. Second table (--correct): effects of the
+instrument are taken off the recording, which is diagnosed again. Kept in --work: a run that is stopped goes
+on. (That effects are felt through the servo is a test: tests/support/effects_in_servo.py.)
 """
 
 from __future__ import annotations
@@ -16,9 +14,9 @@ import tempfile
 from pathlib import Path
 from typing import Any
 
+from benchmarks._apply_replay import corrected_again, one
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
-
-SUMMARY = "improved models: cost of a step, effect felt, error on presses that were not fitted"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -28,9 +26,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--correct", nargs="*", default=[], metavar="REC", help="recordings to correct and diagnose again"
     )
     parser.add_argument("--share", type=float, default=0.7, help="of phase II that is fitted (default: 0.7)")
-    parser.add_argument("--no-servo", action="store_true", help="leave the servo's table out")
-    parser.add_argument("--effects", nargs="*", default=[], help="of the servo's table (default: all)")
-    parser.add_argument("--scene", default="silicone-1", help="whose model is improved (default: silicone-1)")
     parser.add_argument(
         "--work", metavar="FOLDER", help="keeps models and rows (default: a temporary folder)"
     )
@@ -41,29 +36,22 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as temporary:
         work = Path(arguments.work or temporary)
         work.mkdir(parents=True, exist_ok=True)
-        result: dict[str, Any] = {"servo": [], "recordings": [], "corrected": []}
-        if not arguments.no_servo:
-            from benchmarks import _apply_servo
-            from scenes.build import model_of
-            from scenes.scene import load_scene
-
-            model = model_of(load_scene(arguments.scene))
-            result["servo"] = _apply_servo.run_all(model, work, arguments.effects)
-            _apply_servo.show(result["servo"])
+        result: dict[str, Any] = {"recordings": [], "corrected": []}
         if arguments.recordings:
-            from benchmarks._apply_replay import one
-
             for path in arguments.recordings:
                 result["recordings"].append(one(Path(path), arguments.share, work))
                 _show(result["recordings"][-1:])
             _show(result["recordings"])
         for path in arguments.correct:
-            from benchmarks._apply_replay import corrected_again
-
             result["corrected"].append(corrected_again(Path(path), work))
             _show_corrected(result["corrected"][-1:])
         if arguments.correct:
             _show_corrected(result["corrected"])
+    result["figures"] = [
+        Figure(f"{row['recording']}, unseen presses, {words}", 1e3 * row[f"{key}_n"], unit="mN")
+        for row in result["recordings"]
+        for key, words in (("ideal", "ideal model"), ("improved", "improved model"), ("noise", "noise"))
+    ]
     return result
 
 

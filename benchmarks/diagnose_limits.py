@@ -20,8 +20,6 @@ from mechanics.model import Model
 from mechanics.model_files import read_model
 from mechanics.recording import Recording, read_recording
 
-SUMMARY = "what recordings can show: the instrument on the support, the smallest effect of each kind"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Recordings, their models, and whether the sizes are asked for."""

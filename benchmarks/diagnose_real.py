@@ -23,7 +23,6 @@ from mechanics.errors import RecordingError
 from palpate import api
 from palpate.results.material import CEILING, FLOORS, Material
 
-SUMMARY = "measured data of other instruments: held-out curves beside floor and ceiling"
 BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005
 
 

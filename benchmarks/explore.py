@@ -21,7 +21,7 @@ import numpy as np
 
 from benchmarks._explore_phantoms import Sealed, robot_of, sealed, strengthened
 from benchmarks._orders import ORDERS
-from benchmarks._rates import wilson
+from benchmarks.evidence import wilson
 from benchmarks.timing import table
 from diagnose.explore.causes import NONE
 from diagnose.explore.explorer import Explorer, State
@@ -33,7 +33,6 @@ from mechanics.store import content_key
 from palpate.arguments import progress_bar
 from scenes.laboratory.specimen import VERSION as LABORATORY
 
-SUMMARY = "guided exploration against other orders: presses and seconds until the goals are met"
 VERSION = 4
 """Of what an exploration does: raised when kept ones say nothing of the program any more."""
 PHANTOMS = 3

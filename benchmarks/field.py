@@ -28,7 +28,6 @@ from diagnose.compare.models import HOMOGENEOUS, RIVALS, Prepared, as_touched, p
 from palpate.arguments import progress_bar
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field, map_sd, with_field
 
-SUMMARY = "held-out presses of tissue: FEM with a field against one modulus, 1D models and moduli by place"
 PER_PLACE, TRUTH = "modulus-by-place", "truth"
 
 

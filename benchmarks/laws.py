@@ -28,7 +28,6 @@ from scenes.variety.objects import thing
 from scenes.variety.recorded import explored
 from scenes.variety.writing import write
 
-SUMMARY = "laws of tissue as whole recordings: named, and how near?"
 LAWS = ("power_law_relaxation", "poroelasticity", "jkr_adhesion", "adhesion")
 OBJECTS, LEAST_PRESSES = 6, 18
 SKIPPED = ("tip_radius_m", "plane_strain_modulus_pa")

@@ -12,7 +12,6 @@ from reconstruct.steps.s6_one_d.one_d import profiles
 from reconstruct.steps.s7_modulus.modulus import fit_modulus
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions, fit_paper_modulus
 
-SUMMARY = "the modulus, K_G and its factorisation included"
 PAPER_S = 3.0
 
 

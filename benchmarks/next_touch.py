@@ -22,7 +22,7 @@ import numpy as np
 from benchmarks._diagnosis_blind import opened_case, verdict_path
 from benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from benchmarks._diagnosis_scores import answer_of
-from benchmarks._rates import wilson
+from benchmarks.evidence import wilson
 from benchmarks.timing import table
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
@@ -38,7 +38,6 @@ from scenes.variety.objects import Thing, thing
 from scenes.variety.recorded import explored, frame
 from scenes.variety.writing import write
 
-SUMMARY = "the touch that a diagnosis proposes, made: how often does it settle what was open?"
 WAYS = ("proposed", "by chance")
 
 

@@ -9,7 +9,6 @@ from benchmarks._recording import add_recording, recording_of, timed
 from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s6_one_d.one_d import fit_paper, fit_robust, profiles
 
-SUMMARY = "Kelvin-Voigt and Hunt-Crossley fits of every press"
 PAPER_S = 0.5
 
 

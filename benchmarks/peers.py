@@ -19,13 +19,21 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._mujoco_peer import DEPTHS_M, POISSON, TIP_RADIUS_M, YOUNG_PA, hertz_n
-from benchmarks._peers import PEERS, Peer, lines_of
+from benchmarks._peers import (
+    DEPTHS_M,
+    PEERS,
+    POISSON,
+    TIP_RADIUS_M,
+    YOUNG_PA,
+    Peer,
+    hertz_n,
+    lines_of,
+)
 from benchmarks.compliance import block
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.recording import read_recording
 
-SUMMARY = "MuJoCo flex, Newton, scikit-fem by hand, the paper's method, a spring-damper map: the same presses"
 SHARES = np.array([0.25, 0.6, 1.0])
 """Of a press's greatest depth, for which a peer is asked; between them force over depth is straight in the
 root of the depth, which Hertz and a spring both are."""
@@ -59,6 +67,17 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                     ["peer", "held-out error [mN]", "presses"], [list(r.values()) for r in result["held_out"]]
                 )
             )
+    result["figures"] = [
+        Figure(f"{found['peer']}, {what}", value, unit=unit)
+        for found in result["block"] if "failed" not in found
+        for what, value, unit in (
+            (f"force over Hertz at {1e3 * DEPTHS_M[-1]:g} mm", found["over_hertz"][-1], "1"),
+            ("CPU of a step", 1e6 * found["step_s"], "us"),
+        )
+    ] + [
+        Figure(f"{row['peer']}, held-out error, rms of {row['presses']} presses", row["rmse_mn"], unit="mN")
+        for row in result.get("held_out", []) if row["presses"]
+    ]  # fmt: skip
     return result
 
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks._recording import add_indentation, add_recording, recording_of
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from reconstruct.methods import METHODS
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 
-SUMMARY = "the whole reconstruction, step by step"
 PAPER_S = 45.0
 
 
@@ -29,6 +29,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Time both methods, every step apart."""
     recording = recording_of(arguments)
     result: dict[str, Any] = {}
+    figures = []
     for method in arguments.method:
         options = ReconstructOptions(method=method, paper=PaperOptions(indentation_m=arguments.indentation))
         laps, cpu = [], []
@@ -47,7 +48,10 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         print(table(["step", "median [s]", "share"], rows))
         result[method] = {"median_s": median, "least_s": min(totals), "most_s": max(totals),
                           "cpu_s": float(np.median(cpu)), "steps_s": steps}  # fmt: skip
-    return result
+        spread = (min(totals), max(totals))
+        figures.append(Figure(f"method {method}, wall", median, spread, "s").at_most(PAPER_S, "the paper's"))
+        figures.append(Figure(f"method {method}, CPU", float(np.median(cpu)), (min(cpu), max(cpu)), "s"))
+    return {**result, "figures": figures}
 
 
 def _cpu_s() -> float:

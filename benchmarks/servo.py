@@ -15,11 +15,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from palpate.servo.free_air import FreeAir
 from palpate.servo.report import ring_rows, snapshot
 
-SUMMARY = "the 1 kHz tick: compute time by contacts and nodes, late ticks against an empty loop"
 AIMS_US = {1: 100.0, 16: 300.0}
 
 
@@ -29,7 +29,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--contacts", type=int, nargs="+", default=[1, 4, 16, 32])
     parser.add_argument("--ticks", type=int, default=20_000, help="ticks a compute-time figure")
     parser.add_argument("--seconds", type=float, default=10.0, help="of each real-time loop, in 1 s slices")
-    parser.add_argument("--no-peer", action="store_true", help="leave MuJoCo's flex out")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -71,11 +70,16 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 }
             )
     _print_late(result["late"])
-    if not arguments.no_peer:
-        from benchmarks._mujoco_peer import compare
-
-        result["peer"] = compare()
+    result["figures"] = [_kept(row, name) for row in result["compute"] for name in ("median", "p99.9")]
     return result
+
+
+def _kept(row: dict[str, Any], name: str) -> Figure:
+    contacts, nodes = row["contacts"], row["touchable_nodes"]
+    figure = Figure(
+        f"CPU of a tick, {contacts} contacts, {nodes} nodes, {name}", row["cpu_us"][name], unit="us"
+    )
+    return figure.at_most(AIMS_US[contacts]) if name == "p99.9" and contacts in AIMS_US else figure
 
 
 def _figures(seen: Measured) -> dict[str, Any]:

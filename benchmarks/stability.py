@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _stability_objects
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
@@ -24,7 +25,6 @@ from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from palpate.servo.elastic_plane import ElasticPlane
 from render.passivity import PassivityOptions
 
-SUMMARY = "energy given back by the closed loop over hands, moduli, rates, quantisation and delay"
 AIM_J = 1e-3
 TIP_RADIUS_M, TYPICAL_DEPTH_M = 0.005, 0.003
 IMPEDANCES = ((0.0, 0.0), (2.0, 200.0), (12.0, 600.0), (5.0, 2000.0))
@@ -129,6 +129,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         result["dome_cases"] = _stability_objects.cases()
         by = ("delay_s", "young_modulus_pa", "mass_kg", "friction", "tips", "quantisation_m")
         result["dome_by"] = _report("dome, dragged over", result["dome_cases"], by)
+    result["figures"] = [
+        Figure(f"{words}: energy given back to the hand, worst of {len(own)}",
+               1e3 * max(case["given_back_j"] for case in own), unit="mJ").at_most(1e3 * AIM_J)
+        for words, own in (("plane", cases), ("dome", result.get("dome_cases", [])))
+        if own
+    ]  # fmt: skip
     return result
 
 

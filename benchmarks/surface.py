@@ -15,12 +15,11 @@ from typing import Any
 import numpy as np
 
 from benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.nearest import distance, sample
 from palpate.arguments import progress_bar
 from reconstruct.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
-
-SUMMARY = "distance of reconstructed surfaces from known shapes, against the hull"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -99,4 +98,12 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         "s",
     ]
     print(table(header, rows))
-    return {"shapes": found}
+    figures = []
+    for words, measured in (
+        ("surface", found),
+        ("the paper's hull", {n: r["hull"] for n, r in found.items()}),
+    ):
+        away = np.array([1e3 * row["mean_m"] for row in measured.values()])
+        what = f"{words}, mean distance to the true shape, median of {len(away)}"
+        figures.append(Figure(what, float(np.median(away)), (float(away.min()), float(away.max())), "mm"))
+    return {"shapes": found, "figures": figures}

@@ -12,12 +12,13 @@ import numpy as np
 
 @dataclass(frozen=True)
 class Timing:
-    """Seconds over the repeats; spread is (max - min) / median."""
+    """Seconds over the repeats; spread is (max - min) / median, cpu_spread_s the least and the most."""
 
     median_s: float
     least_s: float
     most_s: float
     cpu_median_s: float
+    cpu_spread_s: tuple[float, float]
     repeats: int
 
     @property
@@ -36,7 +37,8 @@ def measure(work: Callable[[], Any], *, repeats: int = 5, warm_up: int = 1) -> T
         work()
         wall.append(time.perf_counter() - w)
         cpu.append(time.process_time() - c)
-    return Timing(float(np.median(wall)), min(wall), max(wall), float(np.median(cpu)), repeats)
+    limits = (min(cpu), max(cpu))
+    return Timing(float(np.median(wall)), min(wall), max(wall), float(np.median(cpu)), limits, repeats)
 
 
 def table(header: list[str], rows: list[list[Any]]) -> str:

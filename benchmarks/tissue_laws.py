@@ -25,7 +25,6 @@ from benchmarks.timing import table
 from mechanics.errors import RecordingError
 from reconstruct.external.compression import Compression, read_compression
 
-SUMMARY = "laws of tissue: silicones that soften and holds of beef, on unseen curves"
 FROM_STRAIN = 0.02
 SILICONES, BEEF = "tissue_phantom_compression", "meat_indentation_relaxation"
 

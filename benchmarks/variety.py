@@ -23,8 +23,8 @@ import numpy as np
 
 from benchmarks._diagnosis_cases import WEIGHT
 from benchmarks._diagnosis_scores import answer_of
-from benchmarks._rates import wilson
 from benchmarks._surface_truth import Truth
+from benchmarks.evidence import Figure, rates, wilson
 from benchmarks.surface import deviation
 from benchmarks.timing import table
 from diagnose.pipeline import diagnose
@@ -38,7 +38,6 @@ from scenes.variety.draws import Draw, draw
 from scenes.variety.objects import solved, thing
 from scenes.variety.recorded import Varied, record
 
-SUMMARY = "recordings as varied as the world: how many are reconstructed, and how well, by each nuisance"
 ROOMS = ("mechanics", "reconstruct")
 _WITHIN_S = 0.15
 """A press is found where a first touch is told within a true touch, or this close to it."""
@@ -121,7 +120,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def program_key(rooms: Sequence[str]) -> str:
     """A key of the program text that an answer depends on."""
-    root, digest = Path(__file__).parents[2], hashlib.sha256()
+    root, digest = Path(__file__).parents[1], hashlib.sha256()
     for room in rooms:
         for path in sorted((root / room).rglob("*.py")):
             digest.update(path.read_bytes())
@@ -271,7 +270,26 @@ def report(answers: list[dict[str, Any]]) -> dict[str, Any]:
         named = _first(answer) not in (None, "none")
         if "error" not in answer or abs(answer["error"]) > 0.1 or not answer["covers"] or named:
             print(_miss(answer))
-    return {"figures": figures}
+    return {"groups": figures, "figures": _kept(answers)}
+
+
+def _kept(answers: list[dict[str, Any]]) -> list[Figure]:
+    """Of all explorations."""
+    all_of = _figures(answers)
+    done, of = all_of["reconstructed"], all_of["recordings"]
+    counted = {
+        "explorations reconstructed": (done, of),
+        "modulus within 5 %": (all_of["within_5"], done),
+        "modulus within 10 %": (all_of["within_10"], done),
+        "interval holds the modulus": (all_of["covered"], done),
+        "sound objects without a false alarm": (all_of["sound"], all_of["diagnosed"]),
+    }
+    error = [100 * abs(a["error"]) for a in answers if "error" in a]
+    if not error:
+        return rates(counted)
+    middle = (float(np.quantile(error, 0.25)), float(np.quantile(error, 0.75)))
+    what = "error of the modulus, median (middle half)"
+    return [*rates(counted), Figure(what, float(np.median(error)), middle, "%")]
 
 
 def _figures(members: list[dict[str, Any]]) -> dict[str, Any]:

@@ -17,7 +17,6 @@ import numpy as np
 
 from benchmarks.timing import table
 
-SUMMARY = "frame time of the touch window, the work before a picture and its drawing"
 WANTED_HZ = 30.0
 
 

@@ -132,6 +132,12 @@ def _shell_of(path: Path) -> trimesh.Trimesh:
                 return _boundary(pyvista.from_meshio(meshio.read(path, file_format=BY_MESHIO[suffix])))
     except SurfaceError:
         raise
+    except ImportError as error:
+        name = suffix.removeprefix(".")
+        raise SurfaceError(
+            f"'{path}' needs {error.name or 'a library'} to be read as {name}, which is not installed: "
+            "pip install 'palpate[import]'"
+        ) from error
     except (SystemExit, Exception) as error:  # each library has errors of its own for a damaged file
         reason = "it is damaged" if isinstance(error, SystemExit) else " ".join(str(error).split())[:200]
         raise SurfaceError(f"'{path}' cannot be read as {suffix.removeprefix('.')} ({reason})") from error

@@ -1,6 +1,6 @@
 """Whatever stands in a recording, MODEL, scene or message of a device is understood or refused in one line.
 
-`palpate bench fuzz` tries the same at length, with whole commands.
+`python -m tests.support fuzz` tries the same at length, with whole commands.
 """
 
 from __future__ import annotations
@@ -16,8 +16,6 @@ import tomli_w
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from benchmarks._device_bytes import STATE, tried
-from benchmarks._mutations import MUTATIONS, OF_SAMPLES
 from benchmarks._servo_load import block_model
 from mechanics import recording as of_recording
 from mechanics.errors import DeviceError, ModelError, PalpateError, RecordingError, SceneError
@@ -27,6 +25,9 @@ from mechanics.recording import read_recording
 from mechanics.schema import Key
 from scenes.scene import SCHEMA as OF_SCENE
 from scenes.scene import load_scene
+
+from .support.device_bytes import STATE, tried
+from .support.mutations import MUTATIONS, OF_SAMPLES
 
 VALUES = st.recursive(
     st.booleans() | st.integers() | st.floats() | st.text(max_size=6) | st.just(10**400),

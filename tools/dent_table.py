@@ -11,6 +11,7 @@ lambda/2 (ln J)^2. `--stiffening` r makes of mu/2 (I1 - 3) the family of mechani
 from __future__ import annotations
 
 import argparse
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,8 +23,7 @@ from mechanics.dent import dent_law, grid
 from mechanics.effects.strain_stiffening import hardening
 from mechanics.elasticity import lame_parameters
 from mechanics.files import atomic_file
-
-SUMMARY = "recompute the tables of the sticking dent (finite strain, linear)"
+from tools.script import script
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -408,7 +408,7 @@ def run(arguments: argparse.Namespace) -> dict:
         if arguments.output:
             header = (
                 f"half-spaces that stiffen or soften, over the neo-Hookean one; Poisson's ratio "
-                f"{arguments.poisson_ratio};\nmade by 'palpate bench dent-table --family --element "
+                f"{arguments.poisson_ratio};\nmade by 'python -m tools.dent_table --family --element "
                 f"{arguments.element}'\nc20/c10, depth/R, ln(force ratio) over c20/c10, the same sideways"
             )
             with atomic_file(Path(arguments.output)) as temporary:
@@ -433,7 +433,11 @@ def write_table(path: Path, table: np.ndarray, arguments: argparse.Namespace) ->
     header = (
         f"{arguments.law} (c20/c10 {arguments.stiffening}) half-space under a sticking sphere, "
         f"Poisson's ratio {arguments.poisson_ratio},\npressed to {arguments.until} R, smallest element "
-        f"{arguments.element} R; made by 'palpate bench dent-table'\ndepth/R, c, alpha, tau"
+        f"{arguments.element} R; made by 'python -m tools.dent_table'\ndepth/R, c, alpha, tau"
     )
     with atomic_file(path) as temporary:
         np.savetxt(temporary, table, fmt="%.6f", delimiter=",", header=header)
+
+
+if __name__ == "__main__":
+    sys.exit(script(sys.modules["__main__"]))

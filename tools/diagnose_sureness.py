@@ -9,20 +9,20 @@ is not counted. Seeds that were fitted to say nothing of calibration.
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import defaultdict
 from typing import Any
 
 import numpy as np
 from scipy.special import expit
 
-from benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from benchmarks.timing import table
 from diagnose.search.naming import WEIGHTS
 from diagnose.verdict.corrections import SURENESS_FILE, UNNAMED, how_named
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
-
-SUMMARY = "how often names and candidates are true, from judged cases of known truth"
+from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
+from tools.script import script
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -47,7 +47,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     for how, each in sorted(counts.items()):
         lines.append(f'["{how}"]')
         lines += [f"{role} = [{right:.0f}, {of:.1f}]" for role, (right, of) in sorted(each.items())]
-    write_fitted("diagnose-sureness", arguments, "\n".join(lines))
+    write_fitted("diagnose_sureness", arguments, "\n".join(lines))
     return {how: {role: list(c) for role, c in each.items()} for how, each in counts.items()}
 
 
@@ -65,3 +65,7 @@ def stood(opened: dict[str, Any]) -> list[tuple[str, str, bool, float]]:
             weight = float(np.nan_to_num(expit(WEIGHTS.log_odds(*verdict["scores"][name]))))
         found.append((how, effect(name).role.name.lower(), there, weight))
     return found
+
+
+if __name__ == "__main__":
+    sys.exit(script(sys.modules["__main__"]))

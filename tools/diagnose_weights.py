@@ -10,6 +10,7 @@ where the fit found them at all (evidence above 10, something closed); after a w
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Sequence
 from itertools import zip_longest
 from typing import Any
@@ -17,13 +18,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize
 
-from benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from benchmarks.timing import table
 from diagnose.search.naming import FILE, WEIGHTS
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
-
-SUMMARY = "weights of evidence and closure in naming an effect, fitted to judged cases"
+from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
+from tools.script import script
 
 RIDGE = (5.0, 15.0)
 """One standard deviation of the two weights' prior."""
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     ]
     print(table(["log odds", "there", "effect", "log10 gain", "closure", "case"], lines))
     values = "\n".join(f"{n} = {v:.2f}" for n, v in zip(KEYS, fitted, strict=True))
-    write_fitted("diagnose-weights", arguments, f"[weights]\n{values}")
+    write_fitted("diagnose_weights", arguments, f"[weights]\n{values}")
     return {
         "cases": len(opened),
         "rows": len(rows),
@@ -108,3 +108,7 @@ def weights(x: np.ndarray, there: np.ndarray, ridge: Sequence[float] = RIDGE) ->
         return float(np.logaddexp(0.0, -sign * odds).sum() + 0.5 * ((w[1:] / np.asarray(ridge)) ** 2).sum())
 
     return np.asarray(minimize(loss, np.array([-10.0, 3.0, 8.0])).x)
+
+
+if __name__ == "__main__":
+    sys.exit(script(sys.modules["__main__"]))

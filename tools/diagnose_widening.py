@@ -10,17 +10,17 @@ from __future__ import annotations
 
 import argparse
 import math
+import sys
 from collections import defaultdict
 from typing import Any
 
 import numpy as np
 
-from benchmarks._diagnosis_opened import add_opened_arguments, opened_cases, write_fitted
 from benchmarks.timing import table
 from diagnose.verdict.corrections import WIDENING_FILE
 from mechanics.errors import OptionError
-
-SUMMARY = "factors by which parameters' intervals are widened, from judged cases of known truth"
+from tools.judged_cases import add_opened_arguments, opened_cases, write_fitted
+from tools.script import script
 
 COVERED = 0.95
 LEAST = 39
@@ -46,7 +46,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         [n, str(len(v)), f"{np.mean(np.array(v) <= 1):.2f}", f"{chosen.get(n, chosen['all']):.2f}"]
         for n, v in sorted(found.items())]))  # fmt: skip
     factors = "\n".join(f"{n} = {v:.2f}" for n, v in chosen.items())
-    write_fitted("diagnose-widening", arguments, f"[factor]\n{factors}")
+    write_fitted("diagnose_widening", arguments, f"[factor]\n{factors}")
     return {"factors": chosen, "values": {n: len(v) for n, v in found.items()}}
 
 
@@ -79,3 +79,7 @@ def quantile(ordered: np.ndarray) -> float:
     """Of (n,) distances in order, that which 95 % of further ones do not exceed."""
     n = len(ordered)
     return float(ordered[min(math.ceil(COVERED * (n + 1)), n) - 1])
+
+
+if __name__ == "__main__":
+    sys.exit(script(sys.modules["__main__"]))

@@ -1,14 +1,14 @@
 """What judged cases of known truth correct: how sure a name is, and how wide an interval must be.
 
-A name is as sure as those that were named alike were right. Counts of judged cases, by the effect's role and
-by how it was named, are in sureness.toml with the seeds that they come from (`palpate bench
-diagnose-sureness`). What is not named is there less often than its score says, as something else explained
+A name is as sure as those that were named alike were right. sureness.toml holds the counts of judged cases, by
+the effect's role and by how it was named, with the seeds that they come from (`python -m
+tools.diagnose_sureness`). What is not named is there less often than its score says, as something else explained
 the gap better.
 
 A fit's covariance knows noise and the sites' scatter; it does not know what the law, the surface and the
 search's own choice leave. Conformal factors make up for that: of judged cases the distance of the truth from
-the value, in half intervals, and of these the quantile that 95 % do not exceed (widening.toml, `palpate bench
-diagnose-widening`).
+the value, in half intervals, and of these the quantile that 95 % do not exceed (widening.toml, written by
+`python -m tools.diagnose_widening`).
 """
 
 from __future__ import annotations

@@ -6,7 +6,7 @@ isotropic part of Fung and of Veronda & Westmann), and 1 / sqrt(1 - 4 r J) below
 c20 / c10 at small strains, and 0 is neo-Hookean.
 
 The dent's force and sideways stiffness over the neo-Hookean ones were solved for some r by the axisymmetric
-finite-strain solver and stand in mechanics/dent_stiffening.csv; 'palpate bench dent-table --family' makes it.
+finite-strain solver and stand in mechanics/dent_stiffening.csv ('python -m tools.dent_table --family').
 The far field is left as it is.
 """
 

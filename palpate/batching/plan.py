@@ -11,10 +11,13 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import OptionError, RecordingError
+from mechanics.files import read_toml, reading, sha256_of_file
 from mechanics.recording import recording_files
-from palpate.batching.steps import MODEL, STEPS, THUMBNAIL, content_of
 from palpate.keywords import taken
 from palpate.tasks.graph import Task
+
+STEPS = ("reconstruct", "compare", "diagnose")
+MODEL, THUMBNAIL = "model", "thumbnail.png"
 
 MEMORY_BYTES = {"reconstruct": 1_450_000_000, "compare": 1_300_000_000, "diagnose": 1_300_000_000}
 """What a step takes at most before anything is measured (docs/batch.md has the measured figures)."""
@@ -148,6 +151,24 @@ def _names(paths: Sequence[Path], roots: Mapping[Path, Path]) -> list[str]:
 
 def _stem(path: Path) -> str:
     return next((path.name.removesuffix(e) for e in _ENDINGS if path.name.endswith(e)), path.name)
+
+
+def content_of(recording: str | Path, shape: str = "") -> dict[str, str]:
+    """SHA-256 of each of a recording's files: samples, description, and what stands in for the geometry: the
+    shape or the model that the description names, or the shape that the options do.
+
+    Raises RecordingError where the recording is missing or its description no TOML.
+    """
+    samples, description = recording_files(recording)
+    about = read_toml(description, RecordingError).get("object", {})
+    named = [about.get(key) for key in ("shape", "model")] if isinstance(about, dict) else []
+    files = {"samples": samples, "description": description, "stated shape": Path(shape)}
+    for key, value in zip(("shape", "model"), named, strict=False):
+        if isinstance(value, str):
+            place = description.parent / value
+            files |= {key: place, **{f"{key}/{name}": place / name for name in ("model.toml", "mesh.vtu")}}
+    with reading(samples, RecordingError):
+        return {name: sha256_of_file(path) for name, path in files.items() if path.is_file()}
 
 
 def tasks_of(found: Found, choice: Choice, out: Path) -> list[Task]:

@@ -3,33 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 from mechanics.errors import PalpateError
 from mechanics.files import Kind, atomic_file, sole_writer
 from mechanics.progress import Progress
 from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
-from palpate.batching.summary import Agreement, Entry, agreements, entry_of, write_csv, write_parquet
+from palpate.batching.summary import Batch, agreements, entry_of, write_csv, write_parquet
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
 from palpate.tasks.graph import Graph, Task
 
 _TRACE = Kind("a trace", (b"Traceback",))
-
-
-@dataclass(frozen=True)
-class Batch:
-    """What came out. entries: one a recording, in the order of their paths; folder: the output; reused: tasks
-    that were finished before; agreements: how far the explorations of one object agree; undescribed: tables
-    in the folders that are no recordings, as no .toml lies beside them."""
-
-    folder: Path
-    entries: tuple[Entry, ...]
-    agreements: tuple[Agreement, ...]
-    tasks: int
-    reused: int
-    undescribed: tuple[Path, ...] = ()
 
 
 def batch(

@@ -13,32 +13,11 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import RecordingError
-from mechanics.files import PNG, atomic_file, read_toml, reading, sha256_of_file
-from mechanics.recording import recording_files
+from mechanics.files import PNG, atomic_file
 from palpate import api
 from palpate.arguments import emit_json
+from palpate.batching.plan import MODEL, STEPS, THUMBNAIL, content_of
 from palpate.results.recording import Recording
-
-STEPS = ("reconstruct", "compare", "diagnose")
-MODEL, THUMBNAIL = "model", "thumbnail.png"
-
-
-def content_of(recording: str | Path, shape: str = "") -> dict[str, str]:
-    """SHA-256 of each of a recording's files: samples, description, and what stands in for the geometry: the
-    shape or the model that the description names, or the shape that the options do.
-
-    Raises RecordingError where the recording is missing or its description no TOML.
-    """
-    samples, description = recording_files(recording)
-    about = read_toml(description, RecordingError).get("object", {})
-    named = [about.get(key) for key in ("shape", "model")] if isinstance(about, dict) else []
-    files = {"samples": samples, "description": description, "stated shape": Path(shape)}
-    for key, value in zip(("shape", "model"), named, strict=False):
-        if isinstance(value, str):
-            place = description.parent / value
-            files |= {key: place, **{f"{key}/{name}": place / name for name in ("model.toml", "mesh.vtu")}}
-    with reading(samples, RecordingError):
-        return {name: sha256_of_file(path) for name, path in files.items() if path.is_file()}
 
 
 @dataclass(frozen=True)

@@ -75,6 +75,20 @@ class Agreement:
     expected: float
 
 
+@dataclass(frozen=True)
+class Batch:
+    """What came out. entries: one a recording, in the order of their paths; folder: the output; reused: tasks
+    that were finished before; agreements: how far the explorations of one object agree; undescribed: tables
+    in the folders that are no recordings, as no .toml lies beside them."""
+
+    folder: Path
+    entries: tuple[Entry, ...]
+    agreements: tuple[Agreement, ...]
+    tasks: int
+    reused: int
+    undescribed: tuple[Path, ...] = ()
+
+
 def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps: Sequence[str]) -> Entry:
     """The entry of one recording. outcomes: step -> outcome, of those that ended; bad: why it could not even
     be planned."""

@@ -14,9 +14,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from diagnose.compare.models import RIVALS
-from palpate.batching.run import Batch
-from palpate.batching.steps import THUMBNAIL
-from palpate.batching.summary import Entry
+from palpate.batching.plan import THUMBNAIL
+from palpate.batching.summary import Batch, Entry
 from palpate.report.page import Page
 
 MOST_OBJECTS = 12

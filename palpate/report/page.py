@@ -143,9 +143,9 @@ def png_bytes(picture: Any) -> bytes:
     if hasattr(picture, "savefig"):
         picture.savefig(buffer, format="png", dpi=110, bbox_inches="tight")
     else:
-        from PIL import Image
+        from matplotlib.image import imsave
 
-        Image.fromarray(picture).save(buffer, format="PNG")
+        imsave(buffer, picture, format="png")
     return buffer.getvalue()
 
 

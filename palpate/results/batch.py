@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from palpate.batching import run as room
-from palpate.batching.steps import MODEL
+from palpate.batching import summary as room
+from palpate.batching.plan import MODEL
 from palpate.batching.summary import COLUMNS, Row
 from palpate.results.base import Result
 

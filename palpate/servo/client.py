@@ -309,9 +309,11 @@ class Servo:
 
 
 def _cpu_time_s(process_id: int) -> float:
-    """User and system time of a process so far, s; NaN where the system does not tell."""
+    """User and system time of a process so far, s; NaN where it is gone."""
+    import psutil
+
     try:
-        fields = Path(f"/proc/{process_id}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()
-    except (OSError, IndexError):
+        times = psutil.Process(process_id).cpu_times()
+    except psutil.Error:
         return float("nan")
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return float(times.user + times.system)

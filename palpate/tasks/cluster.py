@@ -1,8 +1,8 @@
 """An executor of Dask workers, which may be anywhere that sees the same folders. Needs palpate[cluster].
 
-A thread of a Dask worker keeps one of our own workers (`palpate.tasks.child`) and hands it the jobs: the same
-process on one thread that does them on this machine, which dies with the Dask worker and not the other way
-round. Dask does again what a lost worker had; what a lost scheduler had, the driver hands on anew.
+A thread of a Dask worker keeps one of our own workers (`tasks.local.Child`) and hands it the jobs: the same
+process on one thread that does them on this machine, which dies with the Dask worker and not the other
+way round. Dask does again what a lost worker had; what a lost scheduler had, the driver hands on anew.
 """
 
 from __future__ import annotations
@@ -17,8 +17,8 @@ from collections.abc import Sequence
 from typing import Any, Self
 
 from mechanics.errors import OptionError
-from palpate.tasks.child import Child
 from palpate.tasks.driver import Answer
+from palpate.tasks.local import Child, waiting
 
 _AHEAD = 2, 32
 """Jobs that the scheduler is given at once, so many a thread of its workers and so many more: none of them
@@ -128,11 +128,7 @@ class DaskExecutor:
 
     def collect(self, timeout_s: float) -> list[tuple[str, Answer]]:
         """Answers that came; waits that long for the first. Jobs of a scheduler that went away are "lost"."""
-        keys = []
-        with contextlib.suppress(queue.Empty):
-            keys.append(self._ended.get(timeout=timeout_s))
-            while True:
-                keys.append(self._ended.get_nowait())
+        keys = waiting(self._ended, timeout_s)
         if self._client.status == "closed":
             lost = [*self._unsent, *(name for name, _ in self._given.values())]
             self._given.clear()
@@ -143,10 +139,7 @@ class DaskExecutor:
         good = [future for _, future in ended.values() if future.status == "finished"]
         with contextlib.suppress(Exception):  # whatever it was, it is asked for one by one
             answers = dict(zip((f.key for f in good), self._client.gather(good), strict=True))
-            return [
-                (name, answers[key] if key in answers else self._answer(future))
-                for key, (name, future) in ended.items()
-            ]
+            return [(n, answers[key] if key in answers else self._answer(f)) for key, (n, f) in ended.items()]
         return [(name, self._answer(future)) for name, future in ended.values()]
 
     def _answer(self, future: Any) -> Answer:

@@ -12,9 +12,8 @@ from typing import Any
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
 from palpate.arguments import finite
-from palpate.tasks.driver import Outcome, run
+from palpate.tasks.driver import Outcome, Status, run
 from palpate.tasks.graph import Graph
-from palpate.tasks.words import Status
 
 
 def add_engine(parser: argparse.ArgumentParser) -> None:
@@ -71,38 +70,25 @@ def run_with_bar(
     progress: bool | Progress = True,
     outcomes: dict[str, Outcome] | None = None,
 ) -> dict[str, Outcome]:
-    """`driver.run` on the executor that is wanted; progress: a bar where standard error is a terminal, or who
-    is told words and the share that is done."""
-    with executor(workers, scheduler, memory_bytes) as chosen, Bar(progress is True) as bar:
+    """`driver.run` on the executor that is wanted; progress: a bar where standard error is a terminal, or a
+    function of words and the share that is done."""
+    from tqdm import tqdm
+
+    with (
+        executor(workers, scheduler, memory_bytes) as chosen,
+        tqdm(
+            total=100.0,
+            disable=progress is not True or not sys.stderr.isatty(),
+            bar_format="{percentage:3.0f}% {bar:20} {elapsed} {desc}",
+        ) as bar,
+    ):
 
         def tell(status: Status) -> None:
-            bar(status)
+            words, share = status.words(), status.fraction
             if callable(progress):
-                progress(status.words(), status.fraction)
+                progress(words, share)
+            bar.set_description_str(words[: max(10, shutil.get_terminal_size().columns - 36)], refresh=False)
+            bar.n = 100.0 * share
+            bar.refresh()
 
         return run(graph, chosen, root, force=force, tell=tell, outcomes=outcomes)
-
-
-class Bar:
-    """One line on standard error: share, bar, time, what runs and how long the rest may take."""
-
-    def __init__(self, wanted: bool = True) -> None:
-        from tqdm import tqdm
-
-        self._bar = tqdm(
-            total=100.0,
-            disable=not (wanted and sys.stderr.isatty()),
-            bar_format="{percentage:3.0f}% {bar:20} {elapsed} {desc}",
-        )
-
-    def __call__(self, status: Status) -> None:
-        room = shutil.get_terminal_size().columns - 36
-        self._bar.set_description_str(status.words()[: max(10, room)], refresh=False)
-        self._bar.n = 100.0 * status.fraction
-        self._bar.refresh()
-
-    def __enter__(self) -> Bar:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        self._bar.close()

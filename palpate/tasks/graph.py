@@ -1,16 +1,19 @@
-"""What is to be done: tasks, what they need, and the key by which a result is recognised."""
+"""What is to be done: tasks, what they need, and the records by which a finished one is recognised."""
 
 from __future__ import annotations
 
+import hashlib
 import json
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
+from mechanics.files import atomic_file, sha256_of_file
 from mechanics.store import content_key
-from palpate import __version__
+from palpate.version import __version__
 
 
 @dataclass(frozen=True)
@@ -56,25 +59,61 @@ class Graph:
         for task in tasks:
             if self.tasks.setdefault(task.name, task) != task:
                 raise ValueError(f"two different tasks are named '{task.name}'")
-        self.users: dict[str, list[str]] = {name: [] for name in self.tasks}
         for name, task in self.tasks.items():
             for need in task.needs:
                 if need not in self.tasks:
                     raise ValueError(f"task '{name}' needs '{need}', which is not in the graph")
-                self.users[need].append(name)
-        if sum(1 for _ in self.in_order()) < len(self.tasks):
-            raise ValueError("tasks of the graph need each other in a circle")
+        self.sorter()
 
     def __len__(self) -> int:
         return len(self.tasks)
 
-    def in_order(self) -> Iterator[Task]:
-        """Every task after those that it needs; tasks in a circle never come."""
-        missing = {name: len(task.needs) for name, task in self.tasks.items()}
-        ready = [name for name, count in missing.items() if not count]
-        for name in ready:
-            yield self.tasks[name]
-            for user in self.users[name]:
-                missing[user] -= 1
-                if not missing[user]:
-                    ready.append(user)
+    def sorter(self) -> TopologicalSorter[str]:
+        """Prepared to give the names of tasks whose needs have ended. Raises ValueError for a circle."""
+        sorter = TopologicalSorter({name: task.needs for name, task in self.tasks.items()})
+        try:
+            sorter.prepare()
+        except CycleError as error:
+            raise ValueError(f"tasks of the graph need each other in a circle: {error.args[1]}") from error
+        return sorter
+
+
+@dataclass(frozen=True)
+class Record:
+    """A finished task. value: what its function returned; digest: SHA-256 of that and of the products;
+    seconds, cpu_s: of the call; peak_bytes: of the process during it, with its children."""
+
+    key: str
+    needs: Mapping[str, str]
+    digest: str
+    value: Any
+    seconds: float
+    cpu_s: float
+    peak_bytes: int
+    host: str
+
+
+def finished(task: Task, needs: Mapping[str, str]) -> Record | None:
+    """The task's record, where it is of this content, made from these needs (name -> digest), and whole."""
+    try:
+        record = Record(**json.loads(task.record.read_text(encoding="utf-8")))
+    except (OSError, ValueError, TypeError):
+        return None
+    same = record.key == task.key and record.needs == dict(needs)
+    return record if same and all(path.exists() for path in task.products) else None
+
+
+def write_record(path: Path, record: Record) -> None:
+    """Write it whole; the products are there already."""
+    with atomic_file(path) as temporary:
+        temporary.write_text(json.dumps(vars(record)) + "\n", encoding="utf-8")
+
+
+def digest_of(value: Any, products: tuple[Path, ...]) -> str:
+    """SHA-256 of a value and of the bytes of files, and of folders' files."""
+    digest = hashlib.sha256(json.dumps(value, sort_keys=True).encode())
+    for product in products:
+        files = sorted(p for p in product.rglob("*") if p.is_file()) if product.is_dir() else [product]
+        for path in files:
+            digest.update(f"|{path.relative_to(product)}|{sha256_of_file(path)}".encode())
+    return digest.hexdigest()

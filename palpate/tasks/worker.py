@@ -20,13 +20,14 @@ import threading
 import time
 import traceback
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
+
+import psutil
 
 from mechanics.errors import PalpateError
-from palpate import __version__
 from palpate.arguments import plain
-from palpate.tasks.memory import Peak
-from palpate.tasks.record import Record, digest_of, write_record
+from palpate.tasks.graph import Record, digest_of, write_record
+from palpate.version import __version__
 
 THREADS = (
     "OMP_NUM_THREADS",
@@ -72,6 +73,49 @@ def done(job: dict[str, Any]) -> dict[str, Any]:
     except Exception as error:
         return _failed(f"{type(error).__name__}: {error}", traceback.format_exc())
     return {"state": "done", "record": vars(record)}
+
+
+_SAMPLE_S = 0.2
+
+
+class Peak:
+    """Greatest memory of this process and its children while the block runs: `with Peak() as peak`."""
+
+    bytes: int = 0
+
+    def __enter__(self) -> Self:
+        with contextlib.suppress(OSError):  # Linux: the kernel's own high-water mark begins anew
+            Path("/proc/self/clear_refs").write_text("5")
+        self._ended = threading.Event()
+        self._thread = threading.Thread(target=self._watch, daemon=True)
+        self._thread.start()
+        return self
+
+    def _watch(self) -> None:
+        own = psutil.Process()
+        while not self._ended.wait(_SAMPLE_S):
+            self.bytes = max(self.bytes, sum(map(_resident_bytes, (own, *own.children()))))
+
+    def __exit__(self, *_: object) -> None:
+        self._ended.set()
+        self._thread.join()
+        self.bytes = max(self.bytes, high_water_bytes())
+
+
+def _resident_bytes(process: psutil.Process) -> int:
+    try:
+        return int(process.memory_info().rss)
+    except psutil.Error:  # it ended meanwhile
+        return 0
+
+
+def high_water_bytes() -> int:
+    """The greatest resident memory of this process, since `Peak` began where the system counts anew (Linux;
+    psutil does not read this mark, and getrusage's carries over a parent's); else what is resident now."""
+    with contextlib.suppress(OSError, StopIteration, ValueError):
+        status = Path("/proc/self/status").read_text().splitlines()
+        return 1024 * next(int(line.split()[1]) for line in status if line.startswith("VmHWM:"))
+    return _resident_bytes(psutil.Process())
 
 
 def _failed(reason: str, trace: str = "") -> dict[str, Any]:

@@ -1,4 +1,4 @@
-"""The weights of evidence and closure: what their fit tells apart (palpate bench diagnose-weights)."""
+"""The weights of evidence and closure: what their fit tells apart (python -m tools.diagnose_weights)."""
 
 import numpy as np
 

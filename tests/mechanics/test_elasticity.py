@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 import scipy.sparse.linalg as spla
 
-from benchmarks.elements import compliance, mixed_compliance
 from mechanics.elasticity import element_stiffness, lame_parameters, stiffness, strain
 from mechanics.errors import MeshError
 from mechanics.pardiso import available
 from mechanics.patch import PatchSampler
 from mechanics.solver import Solver
 
+from ..support.elements import compliance, mixed_compliance
 from .closed_forms import uniaxial_strain_of_stress, volume_strain_of_pressure
 
 

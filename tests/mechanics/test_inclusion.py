@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import argparse
-
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from benchmarks.nodule import felt
 from mechanics.compliance import condense
 from mechanics.errors import MeshError
 from mechanics.inclusion import Region
 from mechanics.moduli import inclusion_ratio, share_inside
 from mechanics.pardiso import available
 from mechanics.solver import Solver
+
+from ..support.nodule import AxisPress, felt
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -77,8 +76,8 @@ def test_a_factor_an_element_is_asked_for(box):
 @pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
 def test_a_nodule_is_felt_as_in_a_fine_reference():
     """Nodules of 10 mm, 6 times as stiff, tops 4 and 14 mm deep: contrast within 10 % of another library."""
-    arguments = argparse.Namespace(mesh_size=0.01, centre=[0.014, 0.024], radius=0.01, ratio=6.0, depth=0.004)
-    for row, least in zip(felt(arguments), (0.4, 0.05), strict=True):
+    for centre_m, least in ((0.014, 0.4), (0.024, 0.05)):
+        row = felt(AxisPress(0.004, centre_m, nodule_radius_m=0.01, modulus_ratio=6.0))
         assert row["reference"] > least
         assert row["contrast"] == pytest.approx(row["reference"], rel=0.10)
         assert row["plain_force_over_reference"] == pytest.approx(1, abs=0.04)

@@ -232,3 +232,11 @@ def test_up_is_a_direction_of_the_file():
     leaning.apply_transform(trimesh.transformations.rotation_matrix(0.5, [1, 0, 0]))
     with pytest.raises(SurfaceError, match=r"flat ones are for --up \+x, -x"):
         standing(surface_of(leaning))
+
+
+@pytest.mark.parametrize("ending", ["msh", "inp"])
+def test_a_library_that_is_not_installed_is_named_with_its_extra(tmp_path, monkeypatch, ending):
+    (tmp_path / f"a.{ending}").write_text("$MeshFormat")
+    monkeypatch.setitem(sys.modules, "meshio", None)
+    with pytest.raises(SurfaceError, match=r"needs meshio .* pip install 'palpate\[import\]'"):
+        read_surface(tmp_path / f"a.{ending}")

@@ -1,4 +1,4 @@
-"""The commands that the benchmark of interrupts runs are commands."""
+"""The commands that are interrupted at random are commands."""
 
 from __future__ import annotations
 
@@ -6,15 +6,16 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks import _interrupts
-from benchmarks._small_disk import SmallDisk
 from palpate.cli import parser_of
 from palpate.importing.tables import SUFFIXES
 
+from ..support import interrupts
+from ..support.small_disk import SmallDisk
 
-@pytest.mark.parametrize("name", _interrupts.COMMANDS)
+
+@pytest.mark.parametrize("name", interrupts.COMMANDS)
 def test_every_command_that_is_interrupted_is_one_that_works_on_files_that_are_there(name, tmp_path):
-    argv = _interrupts._jobs(tmp_path, tmp_path)[name].argv
+    argv = interrupts._jobs(tmp_path, tmp_path)[name].argv
     parser_of(argv[0]).parse_args(argv[1:])
     inputs = [Path(word) for word in argv[1:] if "recordings" in word]
     assert all(file.is_file() for file in inputs)

@@ -7,13 +7,13 @@ import dataclasses
 import numpy as np
 import pytest
 
-from benchmarks._faults import FAULTS
 from mechanics.errors import PalpateError, RecordingError
 from reconstruct.checks.finding import Finding, decades_of_tail
 from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.registry import Checkup, check, checked_samples, widened
 from reconstruct.checks.samples import Samples
 
+from ..support.faults import FAULTS
 from .exploration_of_cylinder import explore_cylinder
 
 NEED_PRESSES = ("base half the size", "base double the size", "support 2 cm too high")

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
 from mechanics.errors import PalpateError
 
@@ -59,7 +60,7 @@ def threads() -> dict[str, Any]:
     return {
         "omp": os.environ["OMP_NUM_THREADS"],
         "numba": numba.get_num_threads(),
-        "running": len(os.listdir("/proc/self/task")),
+        "running": psutil.Process().num_threads(),
         "process": os.getpid(),
     }
 

@@ -167,18 +167,18 @@ def test_a_measured_peak_corrects_the_estimate_and_a_crash_doubles_it(tmp_path):
     here = Here(2, memory_bytes=150 * GB)
     peak = {"key": "", "needs": {}, "digest": "", "value": 0, "seconds": 1, "cpu_s": 1, "host": "here"}
     here.answers = {"1": [{"state": "done", "record": {**peak, "peak_bytes": 100 * GB}}]}
-    state = driver._Run(Graph(tasks), here, tmp_path, False, lambda s: None, {})
-    state._begin()
+    state = driver._Run(Graph(tasks), here, tmp_path, False, {})
+    state.begin()
     assert len(state.running) == 2  # nothing is known yet
     for name, answer in here.collect(0):
-        state._take(name, answer)
-    state._begin()
+        state.take(name, answer)
+    state.begin()
     assert len(state.running) == 1  # 110 of the one that runs, now that it is known
-    state._take(*here.collect(0)[0])
-    state._begin()
+    state.take(*here.collect(0)[0])
+    state.begin()
     name = next(iter(state.running))
-    state._take(name, {"state": "crashed", "reason": ""})
-    assert state._memory(name) == 220 * GB
+    state.take(name, {"state": "crashed", "reason": ""})
+    assert state.memory_bytes(name) == 220 * GB
 
 
 def test_workers_of_another_version_or_without_the_folder_say_so(tmp_path):

@@ -15,7 +15,7 @@ NAMED = re.compile(r"`([A-Z]+)\[((?:[^\]\\]|\\.)+)\]`|`(test_\w+)`")
 
 @pytest.mark.parametrize(("page", "least"), [("robustness.md", 120), ("safety.md", 15)])
 def test_every_row_of_the_docs_names_tests_that_exist(page, least):
-    from benchmarks._faults import FAULTS
+    from ...support.faults import FAULTS
 
     root, defined = Path(__file__).resolve().parents[3], set()
     tables = {key: value for module in TABLES for key, value in vars(module).items() if key.isupper()}

@@ -290,3 +290,12 @@ def test_press_of_twelve_millimetres_into_a_cylinder_finds_equilibrium_whatever_
     half = np.sort(np.concatenate([steps, steps - 0.75]))
     finer, _ = straight_press(thing, Specimen(finite=True), point, normal, half, Fineness())
     assert force == pytest.approx(finer[1::2], rel=0.005)
+
+
+@pytest.mark.slow
+def test_force_of_a_linear_press_does_not_hang_on_the_mesh() -> None:
+    thing, point, normal = phantom("cylinder"), np.array([40.0, 0.0, 40.0]), np.array([1.0, 0.0, 0.0])
+    depths = np.array([0.7, 1.8, 5.0])
+    coarse, _ = straight_press(thing, Specimen(), point, normal, depths, Fineness())
+    fine, _ = straight_press(thing, Specimen(), point, normal, depths, Fineness(1.5, 5.0, 0.35))
+    assert coarse == pytest.approx(fine, rel=0.02)

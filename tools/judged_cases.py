@@ -1,4 +1,4 @@
-"""What benches that fit to judged cases share: which cases, and the file that the program reads."""
+"""What the tools that fit to judged cases share: which cases, and the file that the program reads."""
 
 from __future__ import annotations
 
@@ -34,11 +34,11 @@ def opened_cases(given: Sequence[str], size: str) -> Iterator[tuple[Case, dict[s
                 yield case, opened_case(case, Path(folder))
 
 
-def write_fitted(bench: str, arguments: argparse.Namespace, body: str) -> None:
+def write_fitted(tool: str, arguments: argparse.Namespace, body: str) -> None:
     """The file with the command and the seeds that it comes from above it, where it is asked for."""
     if not arguments.write:
         return
     seeds = ", ".join(given.rpartition(":")[2] for given in arguments.work)
-    whence = f"# palpate bench {bench} --size {arguments.size}, seeds {seeds}"
+    whence = f"# python -m tools.{tool} --size {arguments.size}, seeds {seeds}"
     with atomic_file(Path(arguments.write)) as temporary:
         temporary.write_text(f"{whence}\n{body}\n", encoding="utf-8")

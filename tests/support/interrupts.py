@@ -30,9 +30,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 
-from benchmarks._fuzz_cases import PRESS, cube
-from benchmarks._small_disk import SmallDisk
 from benchmarks.timing import table
 from mechanics.errors import OptionError, PalpateError
 from mechanics.files import temporary_prefix
@@ -40,6 +39,9 @@ from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording, recording_files, write_recording
 from palpate.child import module_command, module_environment
 from scenes.embedded import embedded_names, embedded_recording
+
+from .fuzz_cases import PRESS, cube
+from .small_disk import SmallDisk
 
 FULL, FAILING = "full disk", "failing write"
 HOW = ("SIGINT", "SIGTERM", "SIGKILL", FULL, FAILING)
@@ -83,7 +85,7 @@ def _jobs(sound: Path, out: Path) -> dict[str, Job]:
                          file("diagnose.html")), 2.0),
         "batch": Job(("batch", recording, "-o", file("batch"), "--do", "reconstruct", "--workers", "1",
                       "--set", "reconstruct.mesh_size_m=0.012"), 2.0),
-        "bench": Job(("bench", "elements", "--json", file("elements.json"))),
+        "bench": Job(("bench", "one-d", "--json", file("one-d.json"))),
         "model": Job(("model", str(sound / "block.stl"), "-o", file("made"), "--mesh-size", "0.008")),
         "material": Job(("material", *(str(sound / f"dent-{k}.csv") for k in range(3)), "--kind",
                          "indentation", "--tip-radius", "0.005", "--fast", "--json", file("material.json"))),
@@ -305,18 +307,14 @@ def _of_words(text: str, code: int | None, codes: tuple[int, ...]) -> list[str]:
 
 def _family(pid: int) -> list[int]:
     """A process and all that it started, its group too."""
-    parents: dict[int, tuple[int, int]] = {}
-    for entry in Path("/proc").iterdir():
-        if entry.name.isdigit():
-            with contextlib.suppress(OSError):
-                fields = (entry / "stat").read_text().rpartition(")")[2].split()
-                parents[int(entry.name)] = int(fields[1]), int(fields[2])
     found = {pid}
-    while True:
-        more = {p for p, (parent, group) in parents.items() if parent in found or group == pid} - found
-        if not more:
-            return sorted(found)
-        found |= more
+    with contextlib.suppress(psutil.Error):
+        found |= {child.pid for child in psutil.Process(pid).children(recursive=True)}
+    for other in psutil.pids():
+        with contextlib.suppress(OSError):
+            if os.getpgid(other) == pid:
+                found.add(other)
+    return sorted(found)
 
 
 def _orphans(family: list[int]) -> list[str]:
@@ -334,11 +332,11 @@ def _orphans(family: list[int]) -> list[str]:
 def _command(pid: int) -> str:
     """The command line of a living process, '' where it is gone."""
     try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-        line = Path(f"/proc/{pid}/cmdline").read_bytes().replace(b"\0", b" ").decode(errors="replace")
-    except OSError:
+        process = psutil.Process(pid)
+        line = " ".join(process.cmdline())
+        return "" if process.status() == psutil.STATUS_ZOMBIE else line[-120:]
+    except psutil.Error:
         return ""
-    return "" if state == "Z" else line[-120:]
 
 
 def _digests(folder: Path) -> dict[str, str]:

@@ -32,8 +32,6 @@ from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.laboratory.verification import straight_press
 from scenes.phantoms import phantom
 
-SUMMARY = "linear and finite-strain rendering of deep presses against whole-body solutions and recordings"
-
 TIP_RADIUS_M = 0.005
 PLACES = {
     "top, middle": ((0.0, 0.0, 80.0), (0.0, 0.0, 1.0)),

@@ -25,7 +25,6 @@ from mechanics.patch import PatchSampler
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 
-SUMMARY = "locking: linear, quadratic and mean-dilatation tetrahedra near nu = 0.5"
 KINDS = {"linear": (1, False), "quadratic": (2, False), "quadratic, mean dilatation": (2, True)}
 
 

@@ -19,8 +19,6 @@ from reconstruct.steps.s5_mesh.meshing import MeshingOptions
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 from scenes.embedded import embedded_recording
 
-SUMMARY = "the modulus of a recording on meshes of 10, 7 and 5 mm"
-
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Recordings, sizes, repeats."""

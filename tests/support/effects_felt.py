@@ -31,94 +31,65 @@ class Case:
     right: Callable[[float], bool]
 
 
+Felt = Callable[[dict[str, float], dict[str, float]], float]
+SOFTER, STIFFER = (lambda x: x < 0.995), (lambda x: x > 1.005)
+
+
 def cases(model: Model) -> list[Case]:
     """One for every effect of object, boundary and contact at strength 1, and one of three together."""
     normal = model.support.normal
     height = float(model.support.height(model.mesh.points).max())
     top, _ = places(model)
-    radius = height / 5
-    stiffness, tip = model.material.young_modulus_pa / height, model.tool.tip_radius_m
-    side = _side(model)
-    lump = {"centre_m": list(top[0] - 2 * radius * normal), "radius_m": radius, "modulus_ratio": 6.0}
-    memory = {"g": [0.3], "tau_s": [0.3]}
-    held, pressed, second = "held on top, over the plain", "pressed from the side, over the plain", "again"
+    radius, tip = height / 5, model.tool.tip_radius_m
+    stiffness = model.material.young_modulus_pa / height
+    keys: dict[str, dict[str, Any]] = {
+        "finite_strain": {},
+        "strain_stiffening": {"c20_over_c10": 0.35},
+        "viscoelasticity": {"g": [0.3], "tau_s": [0.3]},
+        "mullins_softening": {"r": 3.7, "m_rel": 1.0},
+        "poisson_ratio": {"poisson_ratio": 0.35},
+        "inclusion": {
+            "centre_m": list(top[0] - 2 * radius * normal), "radius_m": radius, "modulus_ratio": 6.0
+        },
+        "modulus_gradient": {"ratio_base": 1.5, "ratio_top": 0.7},
+        "skin_layer": {"thickness_m": 0.003, "modulus_ratio": 3.0},
+        "unbonded_base": {"bonded_fraction": 0.5, "direction": list(_side(model))},
+        "compliant_base": {"k_normal_pa_per_m": stiffness, "k_tangential_pa_per_m": stiffness / 3},
+        "tip_radius": {"tip_radius_m": 1.3 * tip},
+        "friction_slip": {"mu": 0.1},
+        "adhesion": {"pull_off_n": 0.1, "range_m": 0.0006},
+    }  # fmt: skip
+    found = [Case(name, {name: keys[name]}, *_sense(name)) for name in keys]
+    three = ("viscoelasticity", "friction_slip", "inclusion")
+    together = {name: keys[name] for name in three}
+    return [*found, Case(", ".join(three), together, *_sense("viscoelasticity"))]
 
-    def over(key: str) -> Callable[[dict[str, float], dict[str, float]], float]:
+
+def _sense(name: str) -> tuple[str, Felt, Callable[[float], bool]]:
+    """(what a hand must feel, the number that is shown, whether it is as it must be) of an effect."""
+
+    def over(key: str) -> Felt:
         return lambda own, plain: own[key] / plain[key]
 
-    def softer(x: float) -> bool:
-        return x < 0.995
+    def share(key: str, of: str) -> Felt:
+        return lambda own, plain: own[key] / own[of] / (plain[key] / plain[of])
 
-    def stiffer(x: float) -> bool:
-        return x > 1.005
+    def itself(key: str) -> Felt:
+        return lambda own, plain: own[key]
 
-    slips = {"mu": 0.1}
-    return [
-        Case("finite_strain", {"finite_strain": {}}, held, over("held"), softer),
-        Case("strain_stiffening", {"strain_stiffening": {"c20_over_c10": 0.35}}, held, over("held"), stiffer),
-        Case(
-            "viscoelasticity",
-            {"viscoelasticity": memory},
-            "just pressed, over the end of the hold",
-            lambda own, plain: own["reached"] / own["held"] / (plain["reached"] / plain["held"]),
-            lambda x: x > 1.05,
+    held, pressed = "held on top, over the plain", "pressed from the side, over the plain"
+    just, again = "just pressed, over the end of the hold", "half way down, again over the first time"
+    stiffer = ("strain_stiffening", "inclusion", "skin_layer", "tip_radius")
+    others: dict[str, tuple[str, Felt, Callable[[float], bool]]] = {
+        "viscoelasticity": (just, share("reached", "held"), lambda x: x > 1.05),
+        "mullins_softening": (again, share("second", "first"), lambda x: x < 0.95),
+        "unbonded_base": (pressed, over("side"), SOFTER),
+        "friction_slip": (
+            "dragged: sideways over normal force", itself("sideways"), lambda x: 0.05 < x < 0.105
         ),
-        Case(
-            "mullins_softening",
-            {"mullins_softening": {"r": 3.7, "m_rel": 1.0}},
-            f"half way down, {second} over the first time",
-            lambda own, plain: own["second"] / own["first"] / (plain["second"] / plain["first"]),
-            lambda x: x < 0.95,
-        ),
-        Case("poisson_ratio", {"poisson_ratio": {"poisson_ratio": 0.35}}, held, over("held"), softer),
-        Case("inclusion", {"inclusion": lump}, held, over("held"), stiffer),
-        Case(
-            "modulus_gradient",
-            {"modulus_gradient": {"ratio_base": 1.5, "ratio_top": 0.7}},
-            held,
-            over("held"),
-            softer,
-        ),
-        Case("skin_layer", {"skin_layer": {"thickness_m": 0.003, "modulus_ratio": 3.0}}, held, over("held"),
-             stiffer),
-        Case(
-            "unbonded_base",
-            {"unbonded_base": {"bonded_fraction": 0.5, "direction": list(side)}},
-            pressed,
-            over("side"),
-            softer,
-        ),
-        Case(
-            "compliant_base",
-            {"compliant_base": {"k_normal_pa_per_m": stiffness, "k_tangential_pa_per_m": stiffness / 3}},
-            held,
-            over("held"),
-            softer,
-        ),
-        Case("tip_radius", {"tip_radius": {"tip_radius_m": 1.3 * tip}}, held, over("held"),
-             stiffer),
-        Case(
-            "friction_slip",
-            {"friction_slip": slips},
-            "dragged: sideways over normal force",
-            lambda own, plain: own["sideways"],
-            lambda x: 0.05 < x < 0.105,
-        ),
-        Case(
-            "adhesion",
-            {"adhesion": {"pull_off_n": 0.1, "range_m": 0.0006}},
-            "greatest pull on the way out, N",
-            lambda own, plain: own["pull"],
-            lambda x: 0.05 < x < 0.11,
-        ),
-        Case(
-            "viscoelasticity, friction_slip, inclusion",
-            {"viscoelasticity": memory, "friction_slip": slips, "inclusion": lump},
-            "just pressed, over the end of the hold",
-            lambda own, plain: own["reached"] / own["held"] / (plain["reached"] / plain["held"]),
-            lambda x: x > 1.05,
-        ),
-    ]  # fmt: skip
+        "adhesion": ("greatest pull on the way out, N", itself("pull"), lambda x: 0.05 < x < 0.11),
+    }  # fmt: skip
+    return others.get(name, (held, over("held"), STIFFER if name in stiffer else SOFTER))
 
 
 def _side(model: Model) -> np.ndarray:

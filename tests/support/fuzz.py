@@ -1,14 +1,14 @@
 """Hostile files, command lines and bytes, drawn by seed, against the commands: refused, accepted, broken.
 
 A recording, a MODEL folder, a scene, other programs' files, surfaces (each of their files, damaged by
-`_mutations`), the options of every command and the bytes of devices. The commands answer in one process that
+`mutations`), the options of every command and the bytes of devices. The commands answer in one process that
 is watched and goes on from case to case; one in `--strangers` runs in a process of its own, as a person runs
 it. Nothing may end in a traceback, in more than one line of refusal, in over a minute of processor time, in
 over 2 GB beyond what the sound command takes, in files that are left behind, or silently in another answer: a
 press of a damaged folder says something or gives the sound folder's force (unless `model.toml` was changed,
 which people may edit); a modulus that is off by a factor of two is never without a word.
 
-`--interrupts N` ends long commands at N random moments in place of that (`_interrupts`).
+`--interrupts N` ends long commands at N random moments in place of that (`interrupts`).
 """
 
 from __future__ import annotations
@@ -25,13 +25,13 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._fuzz_cases import SHARES, TARGETS, Case, Sound
-from benchmarks._fuzz_child import Child, Runner, Stranger
-from benchmarks._interrupts import interrupted
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 
-SUMMARY = "hostile files, command lines and bytes, drawn by seed: refused, accepted, broken; interrupts"
+from .fuzz_cases import SHARES, TARGETS, Case, Sound
+from .fuzz_child import Child, Runner, Stranger
+from .interrupts import interrupted
+
 _COMPILES_S = 600.0
 """A sound command's first time may have to compile."""
 _SAME, _ALIKE, _OFF = 0.01, 0.05, np.log(2.0)

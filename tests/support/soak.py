@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import psutil
 from scipy.stats import theilslopes
 
 from benchmarks._servo_load import block_model
@@ -28,7 +29,6 @@ from palpate.servo import Servo, exploring_hand
 from palpate.servo.layout import DEADLINE, LATE, MISSED, STARTED, TICKS
 from palpate.window.session import TouchSession
 
-SUMMARY = "a long session: memory, clocks and late ticks beside a window and a recording; models swapped"
 SAMPLES = 120
 LATCHED = tuple(word for bit, word in WORDS.items() if bit & LATCHING)
 
@@ -106,13 +106,12 @@ class Health:
 
 
 def process_size(pid: int) -> dict[str, float]:
-    """rss_mb, threads and files of a process (Linux)."""
-    status = Path(f"/proc/{pid}/status").read_text(encoding="ascii", errors="replace")
-    fields = dict(line.split(":", 1) for line in status.splitlines() if ":" in line)
+    """rss_mb, threads and files of a process."""
+    process = psutil.Process(pid)
     return {
-        "rss_mb": int(fields["VmRSS"].split()[0]) / 1024.0,
-        "threads": float(fields["Threads"]),
-        "files": float(len(os.listdir(f"/proc/{pid}/fd"))),
+        "rss_mb": process.memory_info().rss / 2**20,
+        "threads": float(process.num_threads()),
+        "files": float(process.num_fds()),
     }
 
 

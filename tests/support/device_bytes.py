@@ -10,9 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._mutations import MUTATIONS
 from devices.codecs import haply, pid, spacemouse
 from mechanics.errors import DeviceError
+
+from .mutations import MUTATIONS
 
 MESSAGES = 200
 """A seed."""

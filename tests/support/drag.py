@@ -16,7 +16,6 @@ import numpy as np
 
 from benchmarks.timing import table
 
-SUMMARY = "a press dragged over a scene's map of stiffness: its ripple against what a finger tells apart"
 TOLD_APART = 0.07
 SPEED_M_PER_S, SMOOTH_M, END_M = 0.02, 0.004, 0.006
 COLOURS = ("#c1121f", "#d98c00", "#1d3557")

@@ -18,8 +18,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._faults import FAULTS
-from benchmarks._quick_touches import varied
 from benchmarks.timing import table
 from mechanics.errors import ContactError, PalpateError
 from mechanics.recording import Recording, read_recording
@@ -28,7 +26,8 @@ from reconstruct.checks.registry import REFUSALS, check
 from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording
 
-SUMMARY = "the check-up: faults found and named, false warnings on sound recordings"
+from .faults import FAULTS
+from .quick_touches import varied
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:

@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from benchmarks._device_bytes import MESSAGES
-from benchmarks._mutations import EXTREMES, MUTATIONS, OF_SAMPLES, Mutation
 from mechanics.box_mesh import box_mesh
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
@@ -20,6 +18,9 @@ from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording, write_recording
 from palpate import cli
 from scenes.embedded import embedded_names, embedded_recording
+
+from .device_bytes import MESSAGES
+from .mutations import EXTREMES, MUTATIONS, OF_SAMPLES, Mutation
 
 PRESS = ("--at", "0,0,0.03", "--direction", "0,0,-1", "--depth", "0.002", "--speed", "0.02")
 _MESH_M = "0.015"

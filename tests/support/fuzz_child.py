@@ -19,7 +19,11 @@ import traceback
 from pathlib import Path
 from typing import Any, Protocol
 
+import psutil
+
 from palpate.child import module_command, module_environment
+
+CLONE = Path(__file__).resolve().parents[2]
 
 LONGEST_S, MOST_BYTES = 60.0, 2e9
 """Of processor time and memory beyond what the sound command takes."""
@@ -46,7 +50,7 @@ def answer(argv: list[str]) -> dict[str, Any]:
     try:
         with contextlib.redirect_stdout(said), contextlib.redirect_stderr(error):
             if argv[0] == "#bytes":
-                from benchmarks._device_bytes import tried
+                from .device_bytes import tried
 
                 code = tried(int(argv[1]))
             else:
@@ -89,8 +93,8 @@ class Child:
 
     def _start(self) -> None:
         self._process = subprocess.Popen(
-            module_command("benchmarks._fuzz_child"), stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=module_environment(),
+            module_command("tests.support.fuzz_child"), stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=clone_environment(),
         )  # fmt: skip
         for words in self.first:  # imports, and kernels that are not compiled yet
             self._asked(words, 10 * LONGEST_S)
@@ -157,18 +161,24 @@ class _Watch:
 
 
 def resident(pid: int) -> float:
-    """Bytes in memory; 0 where the system does not say."""
-    with contextlib.suppress(OSError, IndexError):
-        return 4096.0 * float(Path(f"/proc/{pid}/statm").read_text().split()[1])
+    """Bytes in memory; 0 where the process is gone."""
+    with contextlib.suppress(psutil.Error):
+        return float(psutil.Process(pid).memory_info().rss)
     return 0.0
 
 
 def cpu_s(pid: int) -> float:
-    """Seconds of processor time so far; 0 where the system does not say."""
-    with contextlib.suppress(OSError, IndexError):
-        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    """Seconds of processor time so far; 0 where the process is gone."""
+    with contextlib.suppress(psutil.Error):
+        times = psutil.Process(pid).cpu_times()
+        return float(times.user + times.system)
     return 0.0
+
+
+def clone_environment(**variables: str) -> dict[str, str]:
+    """`module_environment`, in which the clone's own `tests` are found too."""
+    found = module_environment(**variables)
+    return {**found, "PYTHONPATH": os.pathsep.join([found["PYTHONPATH"], str(CLONE)])}
 
 
 if __name__ == "__main__":

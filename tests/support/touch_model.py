@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from benchmarks._sample_shapes import sample_mesh
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.recording import Recording, read_recording
@@ -21,7 +20,8 @@ from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.touch import forces_at
 
-SUMMARY = "predicted against recorded forces where shape and modulus are known"
+from .sample_shapes import sample_mesh
+
 WAYS = (
     ("hertz", False),
     ("sphere", False),

@@ -13,14 +13,14 @@ from functools import partial
 
 import numpy as np
 
-from benchmarks._sample_shapes import PLACES, sample_mesh, sample_places
 from benchmarks.timing import table
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from mechanics.touch import touch_force
 
-SUMMARY = "force of a press on meshes of 10, 7 and 5 mm"
+from .sample_shapes import PLACES, sample_mesh, sample_places
+
 NU, MODULUS, RADIUS = 0.49, 20e3, 0.005
 
 

@@ -1,15 +1,20 @@
-"""Improved models through the real servo process: what a tick costs, and whether the effect is felt."""
+"""Improved models through the real servo process: what a tick costs, and whether the effect is felt.
+
+A scene's model with each effect at the contract's strength 1, written, read back and run through the servo
+along a scripted path, beside the plain model in the same run.
+"""
 
 from __future__ import annotations
 
+import argparse
 import shutil
+import tempfile
 import time
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from benchmarks._apply_effects import Case, cases, felt_on, path_of
 from benchmarks.timing import table
 from devices.registry import DeviceChoice
 from diagnose.apply import with_effects
@@ -19,8 +24,30 @@ from mechanics.model_files import read_model, write_model
 from mechanics.recording import write_recording
 from palpate.servo.client import Servo
 
+from .effects_felt import Case, cases, felt_on, path_of
+
 BUDGET_US = 1000.0
 POLL_S = 0.5
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which effects, on what."""
+    parser.add_argument("--effects", nargs="*", default=[], help="(default: all)")
+    parser.add_argument("--scene", default="silicone-1", help="whose model is improved (default: silicone-1)")
+    parser.add_argument("--work", metavar="FOLDER", help="keeps models (default: a temporary folder)")
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure, print, return."""
+    from scenes.build import model_of
+    from scenes.scene import load_scene
+
+    with tempfile.TemporaryDirectory() as temporary:
+        work = Path(arguments.work or temporary)
+        work.mkdir(parents=True, exist_ok=True)
+        rows = run_all(model_of(load_scene(arguments.scene)), work, arguments.effects)
+    show(rows)
+    return {"servo": rows}
 
 
 def run_all(model: Model, work: Path, only: list[str]) -> list[dict[str, Any]]:

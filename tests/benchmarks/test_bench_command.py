@@ -1,0 +1,67 @@
+"""`palpate bench` finds the benchmarks of the clone that it is run in, and nothing outside of one."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from benchmarks.evidence import read
+from palpate import cli
+from palpate.commands.bench import clone, names
+
+CLONE = Path(__file__).resolve().parents[2]
+PRODUCT = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
+
+
+def test_an_installed_copy_outside_of_a_clone_says_so_in_a_line(tmp_path):
+    installed = tmp_path / "site-packages"
+    for name in PRODUCT:
+        shutil.copytree(CLONE / name, installed / name, ignore=shutil.ignore_patterns("__pycache__"))
+    elsewhere = tmp_path / "elsewhere"
+    elsewhere.mkdir()
+    ended = subprocess.run(
+        [sys.executable, "-P", "-m", "palpate", "bench", "contacts"],
+        cwd=elsewhere,
+        env={**os.environ, "PYTHONPATH": str(installed)},
+        capture_output=True,
+        text=True,
+    )
+    assert ended.returncode == 2, ended.stderr
+    assert len(ended.stderr.strip().splitlines()) == 1
+    assert "clone" in ended.stderr and not ended.stdout
+
+
+def test_inside_a_folder_of_the_clone_it_is_found(monkeypatch):
+    monkeypatch.chdir(CLONE / "docs" / "decisions")
+    assert clone() == CLONE
+    promised = {"contacts", "one-d", "modulus", "compliance", "servo", "diagnose"}
+    assert promised <= set(names()) and not {"timing", "evidence"} & set(names())
+
+
+def test_an_unknown_name_lists_what_is_allowed(monkeypatch, capsys):
+    monkeypatch.chdir(CLONE)
+    assert cli.main(["bench", "nothing"]) == 2
+    assert "allowed are batch, calibrate" in capsys.readouterr().err
+
+
+def test_evidence_is_kept_where_it_is_wanted(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(CLONE)
+    path = tmp_path / "one-d.json"
+    assert cli.main(["bench", "one-d", "--repeats", "1", "--evidence", str(path)]) == 0
+    kept = read(path)
+    assert kept.command == "palpate bench one-d --repeats 1"
+    assert any("bounded, robust" in figure.what for figure in kept.figures)
+
+
+def test_every_benchmark_has_help(monkeypatch, capsys):
+    monkeypatch.chdir(CLONE)
+    for name in names():
+        with pytest.raises(SystemExit) as end:
+            cli.main(["bench", name, "--help"])
+        assert end.value.code == 0
+        assert "--evidence" in capsys.readouterr().out, name
