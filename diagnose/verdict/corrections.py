@@ -1,9 +1,9 @@
 """What judged cases of known truth correct: how sure a name is, and how wide an interval must be.
 
-A name is as sure as those that were named alike were right. sureness.toml holds the counts of judged cases, by
-the effect's role and by how it was named, with the seeds that they come from (`python -m
-tools.diagnose_sureness`). What is not named is there less often than its score says, as something else explained
-the gap better.
+A name is as sure as those that were named alike were right. sureness.toml holds the counts of judged cases,
+by the effect's role and by how it was named, with the seeds that they come from (`python -m
+tools.diagnose_sureness`). What is not named is there less often than its score says, as something else
+explained the gap better.
 
 A fit's covariance knows noise and the sites' scatter; it does not know what the law, the surface and the
 search's own choice leave. Conformal factors make up for that: of judged cases the distance of the truth from
