@@ -4,12 +4,12 @@ effects)."""
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Mapping, Sequence
+from typing import Any, Protocol
 
 import numpy as np
 
-from diagnose.verdict.result import Diagnosis
+from diagnose.search.attribution import Attribution
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effect, effects
 from mechanics.model import Model
@@ -19,7 +19,24 @@ REPLAYS = 2
 """Of the modulus's refit: a force goes with the modulus but for friction and adhesion."""
 
 
-def improved(model: Model, diagnosis: Diagnosis) -> tuple[Model, list[str]]:
+class Verdict(Protocol):
+    """What is read of a diagnosis: the effects that it asserts, every effect's name and parameters (entries),
+    the modulus (Pa) fitted with them, the search."""
+
+    @property
+    def effects(self) -> tuple[str, ...]: ...
+
+    @property
+    def entries(self) -> Sequence[Any]: ...
+
+    @property
+    def young_modulus_pa(self) -> float: ...
+
+    @property
+    def attribution(self) -> Attribution | None: ...
+
+
+def improved(model: Model, diagnosis: Verdict) -> tuple[Model, list[str]]:
     """(model with the asserted effects, their names). Instrument effects are left out: they must not be
     rendered.
 
@@ -81,7 +98,7 @@ def with_effects(model: Model, named: Mapping[str, Mapping[str, Any]]) -> Model:
     return model
 
 
-def corrected(recording: Recording, diagnosis: Diagnosis) -> Recording:
+def corrected(recording: Recording, diagnosis: Verdict) -> Recording:
     """The recording with asserted instrument effects taken off, what the instrument does last first.
 
     Those that cannot be taken off stay. Times keep their samples.

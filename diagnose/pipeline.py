@@ -71,7 +71,7 @@ def diagnose(
 
     progress("touches", 0.02)
     presses = presses_on(recording, model)
-    model = with_tip_of(model, presses)
+    given, model = model, with_tip_of(model, presses)
     # a surface of another recording's presses may be passed because the object moved
     own = model.fitted_to(presses)
     met = reached(presses) if own else np.ones(len(presses), dtype=bool)
@@ -121,8 +121,9 @@ def diagnose(
     result = conclude(evidence, lap)
     progress("done", 1.0)
     return dataclasses.replace(
-        result, seconds=seconds, left_out=tuple(sorted(left_out | untold | hidden - settled))
-    )
+        result, seconds=seconds, left_out=tuple(sorted(left_out | untold | hidden - settled)),
+        recording=recording, model=given,
+    )  # fmt: skip
 
 
 def with_tip_of(model: Model, presses: Presses) -> Model:

@@ -18,6 +18,7 @@ from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file, read_toml
 from mechanics.leads import leads, play
 from mechanics.recording import Recording, dump_toml
+from mechanics.result import Result
 from mechanics.samples import delayed
 from mechanics.schema import ANY, Key, Schema, check_table
 
@@ -39,14 +40,16 @@ SCHEMA: Schema = {
 TOOL = Kind("a tool's calibration", (b"[calibration]",))
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """None where a thing was not told; then it is left as it is.
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
+    """What an instrument does to a recording; None where a thing was not told, which is then left as it is.
 
     tip_radius_m; stiffness_n_per_m of the tool between sensor and tip; play_m, positive where the tip lags
     behind the sensor, negative where the sensor lags; matrix (3, 3), read = matrix true; bias_n (3,);
     delay_s, by which the force reads late; force_noise_std_n an axis. interval: key -> [low, high] at 95 %.
-    about: on what it was calibrated, and what that cannot tell.
+    about: on what it was calibrated, and what that cannot tell. A recording names it: [tool] calibration =
+    "TOOL.toml". `plot`: what the sensor's matrix makes of each axis. `show`: nothing, it has no
+    place in space.
     """
 
     tip_radius_m: float | None = None
@@ -59,7 +62,7 @@ class Calibration:
     interval: Mapping[str, Any] = field(default_factory=dict)
     about: Mapping[str, Any] = field(default_factory=dict)
 
-    def applied(self, recording: Recording) -> Recording:
+    def corrected(self, recording: Recording) -> Recording:
         """The recording as an ideal instrument had read it."""
         force, position = recording.force_on_tool, recording.position
         if self.delay_s:
@@ -80,7 +83,11 @@ class Calibration:
             force_noise_std_n=self.force_noise_std_n or recording.force_noise_std_n,
         )
 
-    def table(self) -> dict[str, Any]:
+    def save(self, path: Path | str) -> Path:
+        """Write TOOL.toml; returns its path."""
+        return write_calibration(path, self)
+
+    def as_json(self) -> dict[str, Any]:
         """What the TOML holds."""
         tool = {n: getattr(self, n) for n in ("tip_radius_m", "stiffness_n_per_m", "play_m")}
         sensor = {n: getattr(self, n) for n in ("matrix", "bias_n", "delay_s", "force_noise_std_n")}
@@ -108,7 +115,7 @@ def write_calibration(path: Path | str, calibration: Calibration) -> Path:
     if path.suffix != ".toml":
         raise RecordingError(f"'{path}' must end in .toml")
     with atomic_file(path, TOOL) as temporary:
-        temporary.write_text(dump_toml(calibration.table()), encoding="utf-8")
+        temporary.write_text(dump_toml(calibration.as_json()), encoding="utf-8")
     return path
 
 

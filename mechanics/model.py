@@ -42,6 +42,7 @@ from mechanics.press_files import read_csv, read_presses, write_csv, write_press
 from mechanics.press_making import no_presses
 from mechanics.presses import Presses
 from mechanics.recording import POISSON, TIP_RADIUS, dump_toml
+from mechanics.result import Result
 from mechanics.schema import ANY, Key, Named, Schema, check_table
 from mechanics.tetmesh import TetMesh, vertex_normals
 from mechanics.vtk_files import read_vtk, vtk_bytes
@@ -127,15 +128,16 @@ class Tool:
         object.__setattr__(self, "tip_radius_m", positive("tip_radius_m", self.tip_radius_m))
 
 
-@dataclass(frozen=True)
-class Model:
-    """Everything that a renderer needs; SI units, device frame.
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Result):
+    """An object that can be felt, everything that a renderer needs; m, N, Pa, device frame.
 
     shape_uncertainty_m: (n,) standard deviation of the surface along its normal at each node, or None.
     presses: the table of what was pressed. effects: parameters of every effect that a diagnosis added, by
     name; what of one is material stands in the material, and only that counts. provenance: where it came
     from. about: tables that inform, by name;
-    nothing reads physics from these two.
+    nothing reads physics from these two. `plot`: the object with the places touched. `show`: the same in 3D
+    on its support, the touches coloured by their own modulus, kPa.
     """
 
     mesh: TetMesh
@@ -154,6 +156,20 @@ class Model:
         given, needed = self.material.field, len(self.mesh.tetrahedra)
         if given is not None and len(given) != needed:
             raise ModelError(f"field has {len(given)} values; the mesh needs {needed}, one a tetrahedron")
+
+    @property
+    def name(self) -> str:
+        """Of the recording, phantom or folder that it came from."""
+        known = self.provenance.get("recording") or self.provenance.get("phantom")
+        return str(known or (self.path.name if self.path else "model"))
+
+    def save(self, path: Path | str) -> Model:
+        """Write a MODEL folder that ParaView opens, and return the model that knows it.
+
+        What is computed for the model later, its compliance, is kept there. Raises ModelError where the
+        folder exists and holds something else.
+        """
+        return self.replaced(path=write_model(path, self))
 
     @cached_property
     def normals(self) -> np.ndarray:

@@ -816,7 +816,7 @@ def full_disk(most=100):
 
 def test_a_write_that_fails_leaves_what_was_there(folder, record, tmp_path):
     from mechanics.recording import write_recording
-    from palpate.report.page import Page
+    from palpate.show.page import Page
     from render.replay import write_forces
 
     recording = read_recording(record())

@@ -30,6 +30,7 @@ from mechanics.press_sites import sites_of
 from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
+from mechanics.result import Result
 from mechanics.sites import TouchSites, touch_sites
 from mechanics.smooth_field import SmoothField
 from mechanics.touch import forces_at
@@ -110,10 +111,14 @@ class RegionResult:
     bias: dict[str, float]
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Held-out errors. press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM.
-    fields: of the modulus, in each fold that asked for one, else None."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
+    """Held-out rms force errors, N: rmse_n, relative_rmse by model.
+
+    press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM. fields: of the modulus, in each
+    fold that asked for one, else None. recording: what was compared on; None for presses that came without.
+    `plot`: the error of every held-out press. `show`: the object, each press coloured by the FEM's error.
+    """
 
     prepared: Prepared
     model: Model
@@ -126,6 +131,7 @@ class Comparison:
     noise_n: float
     predicted: dict[str, np.ndarray]
     regions: tuple[RegionResult, ...] = field(default_factory=tuple)
+    recording: Recording | None = None
 
     @property
     def presses(self) -> Presses:
@@ -153,7 +159,8 @@ def compare(
     if model is None:
         made = reconstruct_fully(recording, ReconstructOptions(seed=seed), lambda s, f: progress(s, 0.6 * f))
         model = made.model
-    return compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
+    found = compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
+    return replace(found, recording=recording)
 
 
 def compare_presses(
