@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from mechanics.errors import PalpateError
 from mechanics.files import Kind, atomic_file, sole_writer
 from mechanics.progress import Progress
+from mechanics.result import Result
 from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
-from palpate.batching.summary import Agreement, Entry, agreements, entry_of, write_csv, write_parquet
+from palpate.batching.summary import (
+    COLUMNS,
+    Agreement,
+    Entry,
+    Row,
+    agreements,
+    entry_of,
+    write_csv,
+    write_parquet,
+)
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
 from palpate.tasks.graph import Graph, Task
@@ -18,11 +29,17 @@ from palpate.tasks.graph import Graph, Task
 _TRACE = Kind("a trace", (b"Traceback",))
 
 
-@dataclass(frozen=True)
-class Batch:
-    """What came out. entries: one a recording, in the order of their paths; folder: the output; reused: tasks
-    that were finished before; agreements: how far the explorations of one object agree; undescribed: tables
-    in the folders that are no recordings, as no .toml lies beside them."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Result):
+    """A row a recording, and how far explorations of one object agree. Moduli Pa, gaps N rms, lengths m.
+
+    Iterate over its rows, or take `table`, name -> column, which `pandas.DataFrame` reads. entries: one a
+    recording with what every step returned, in the order of their paths; agreements: objects explored more
+    than once; folder: has a folder a recording, summary.csv and index.html; reused: tasks that were finished
+    before; undescribed: tables in the folders that are no recordings, as no .toml lies beside them; steps:
+    what was done. `plot`: moduli over the mean of their object, or over the recordings. `show`: the first
+    objects side by side.
+    """
 
     folder: Path
     entries: tuple[Entry, ...]
@@ -30,6 +47,28 @@ class Batch:
     tasks: int
     reused: int
     undescribed: tuple[Path, ...] = ()
+    steps: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> list[Row]:
+        """As in summary.csv, in the order of the recordings' paths."""
+        return [entry.row for entry in self.entries]
+
+    @property
+    def failed(self) -> list[Row]:
+        """Those that failed; `reason` says why."""
+        return [row for row in self.rows if row.status == "failed"]
+
+    @property
+    def table(self) -> dict[str, list[Any]]:
+        """The columns of summary.csv by name; None where nothing is known."""
+        return {name: [getattr(row, name) for row in self.rows] for name in COLUMNS}
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.entries)
 
 
 def batch(
@@ -73,11 +112,11 @@ def batch(
                 outcomes=outcomes,
             )
         except KeyboardInterrupt:
-            _write(_made(folder, found, choice, tasks, bad, outcomes), choice)
+            _write(_made(folder, found, choice, tasks, bad, outcomes))
             raise
         made = _made(folder, found, choice, tasks, bad, outcomes)
         made = replace(made, undescribed=tuple(undescribed(sources, folder)))
-        _write(made, choice)
+        _write(made)
     return made
 
 
@@ -95,12 +134,12 @@ def _made(
         ended = {task.stage: outcomes[task.name] for task in own if task.name in outcomes}
         entries.append(entry_of(recording.name, ended, bad.get(recording.name), choice.steps))
     reused = sum(outcome.reused for outcome in outcomes.values())
-    return Batch(folder, tuple(entries), tuple(agreements(entries)), sum(map(len, tasks.values())), reused)
+    planned = sum(map(len, tasks.values()))
+    agreeing = tuple(agreements(entries))
+    return Batch(folder, tuple(entries), agreeing, planned, reused, steps=tuple(choice.steps))
 
 
-def _write(made: Batch, choice: Choice) -> None:
-    from palpate.report.batch import write_report
-
+def _write(made: Batch) -> None:
     for entry in made.entries:
         log = made.folder / entry.row.recording / "error.txt"
         if entry.trace:
@@ -108,7 +147,6 @@ def _write(made: Batch, choice: Choice) -> None:
                 temporary.write_text(entry.trace, encoding="utf-8")
         else:
             log.unlink(missing_ok=True)
-    rows = [entry.row for entry in made.entries]
-    write_csv(made.folder / "summary.csv", rows)
-    write_parquet(made.folder / "summary.parquet", rows)
-    write_report(made.folder / "index.html", made, choice.steps)
+    write_csv(made.folder / "summary.csv", made.rows)
+    write_parquet(made.folder / "summary.parquet", made.rows)
+    made.report(made.folder / "index.html")

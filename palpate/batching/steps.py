@@ -14,10 +14,9 @@ from typing import Any
 
 from mechanics.errors import RecordingError
 from mechanics.files import PNG, atomic_file, read_toml, reading, sha256_of_file
-from mechanics.recording import recording_files
+from mechanics.recording import Recording, recording_files
 from palpate import api
 from palpate.arguments import emit_json
-from palpate.results.recording import Recording
 
 STEPS = ("reconstruct", "compare", "diagnose")
 MODEL, THUMBNAIL = "model", "thumbnail.png"
@@ -117,7 +116,7 @@ def _written(plan: Planned, step: str, result: Any, figures: Mapping[str, Any]) 
 def _draw_thumbnail(model: Any, path: Path) -> None:
     from matplotlib.figure import Figure
 
-    from palpate.report.object3d import draw_object
+    from palpate.show.object3d import draw_object
 
     figure = Figure(figsize=(1.6, 1.2))
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
