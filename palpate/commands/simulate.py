@@ -26,7 +26,7 @@ from palpate.arguments import (
     natural,
     say,
 )
-from palpate.report.page import PAGE
+from palpate.show.page import PAGE
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.sealing import write_sealed
 from scenes.phantoms import PHANTOMS
@@ -122,7 +122,7 @@ def run(arguments: argparse.Namespace) -> int:
     elif arguments.truth:
         emit_json({"truth": result.truth}, arguments.truth)
     if arguments.pictures:
-        from palpate.report.laboratory import simulation_figure
+        from palpate.show.simulation import simulation_figure
 
         with atomic_file(arguments.pictures, PNG) as picture:
             simulation_figure(result).savefig(picture, dpi=110, format="png")
