@@ -129,16 +129,9 @@ def run(arguments: argparse.Namespace) -> int:
         say(arguments, f"pictures: {arguments.pictures}")
     if arguments.report:
         say(arguments, f"report: {result.report(arguments.report)}")
-    duration = float(result.recording.t[-1])
-    summary = {
-        "recording": str(path),
-        "samples": len(result.recording.t),
-        "duration_s": duration,
-        "palpations": len(result.touches),
-        "sealed": bool(arguments.seal),
-    }
-    if not arguments.seal:
-        summary["truth"] = result.truth
+    summary = {**result.as_json(), "recording": str(path), "sealed": bool(arguments.seal)}
+    if arguments.seal:
+        del summary["truth"]
     words = result.lines()
     say(arguments, *(words[:1] if arguments.seal else words), f"written to {path}")
     emit_json(summary, arguments.json)

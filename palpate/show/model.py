@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from matplotlib.axes import Axes
 from pyvista import Plotter
@@ -27,6 +29,19 @@ def lines(result: Model) -> list[str]:
         f"edges of {with_unit(result.mesh_size_m, 'mm', 1e3)}",
         f"  folder: {result.path or 'not written; .save(MODEL) writes it'}",
     ]
+
+
+def as_json(result: Model) -> dict[str, Any]:
+    """The figures of `palpate model --json`, keys with units."""
+    return {
+        "model": None if result.path is None else str(result.path),
+        "young_modulus_pa": result.material.young_modulus_pa,
+        "volume_m3": float(result.mesh.volumes.sum()),
+        "nodes": len(result.mesh.points),
+        "tetrahedra": len(result.mesh.tetrahedra),
+        "support_point_m": result.support.point,
+        "support_normal": result.support.normal,
+    }
 
 
 def draw(result: Model, ax: Axes) -> None:

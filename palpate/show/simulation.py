@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -36,6 +37,18 @@ def lines(result: Simulation) -> list[str]:
         refit = size["rms_after_best_scale_n"]
         words.append(f"  {name}: {size['rms_n']:.4f} N, {refit:.4f} N after a refit of the modulus")
     return words
+
+
+def as_json(result: Simulation) -> dict[str, Any]:
+    """The figures of `palpate simulate --json`, keys with units."""
+    path = result.recording.path
+    return {
+        "recording": None if path is None else str(path),
+        "samples": len(result.recording.t),
+        "duration_s": float(result.recording.t[-1]),
+        "palpations": len(result.touches),
+        "truth": result.truth,
+    }
 
 
 def draw(result: Simulation, ax: Axes) -> None:
