@@ -19,9 +19,10 @@ import numpy as np
 
 from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
+from diagnose.specimen.result import FLOORS, Material
 from mechanics.errors import RecordingError
 from palpate import api
-from palpate.results.material import CEILING, FLOORS, Material
+from reconstruct.external.uniaxial import CEILING
 
 BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005
 

@@ -47,7 +47,7 @@ def diagnose(
 
     progress("touches", 0.02)
     presses = presses_on(recording, model)
-    model = with_tip_of(model, presses)
+    given, model = model, with_tip_of(model, presses)
     # a surface of another recording's presses may be passed because the object moved
     own = model.fitted_to(presses)
     met = reached(presses) if own else np.ones(len(presses), dtype=bool)
@@ -103,6 +103,8 @@ def diagnose(
         result,
         seconds={name: round(s, 2) for name, s in clock.laps.items()},
         left_out=tuple(sorted(left_out | unobservable | hidden - settled)),
+        recording=recording,
+        model=given,
     )
 
 

@@ -18,6 +18,7 @@ from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file, read_toml
 from mechanics.leads import leads, play
 from mechanics.quantities import TIP_RADIUS
+from mechanics.result import Result
 from mechanics.samples import delayed
 from mechanics.schema import ANY, Key, Schema, check_table
 from mechanics.toml_text import dump_toml
@@ -40,14 +41,16 @@ SCHEMA: Schema = {
 TOOL = Kind("a tool's calibration", (b"[calibration]",))
 
 
-@dataclass(frozen=True)
-class Calibration:
-    """None where a value is not known; then the reading is left as it is.
+@dataclass(frozen=True, eq=False, repr=False)
+class Calibration(Result):
+    """What an instrument does to a recording. None where a value is not known: that reading is left as it is.
 
     tip_radius_m; stiffness_n_per_m of the tool between sensor and tip; play_m, positive where the tip lags
     behind the sensor, negative where the sensor lags; matrix (3, 3), read = matrix true; bias_n (3,);
     delay_s, by which the force reads late; force_noise_std_n an axis. interval: key -> [low, high] at 95 %.
-    about: on what it was calibrated, and what that cannot tell.
+    about: on what it was calibrated, and what that cannot tell. A recording names it: [tool] calibration =
+    "TOOL.toml". `plot`: what the sensor's matrix makes of each axis. `show`: nothing, it has no
+    place in space.
     """
 
     tip_radius_m: float | None = None
@@ -77,7 +80,15 @@ class Calibration:
             position = position + force / self.stiffness_n_per_m
         return force, position
 
-    def table(self) -> dict[str, Any]:
+    def corrected(self, recording: Any) -> Any:
+        """The `mechanics.recording.Recording` as an ideal instrument had read it."""
+        return recording.corrected(self)
+
+    def save(self, path: Path | str) -> Path:
+        """Write TOOL.toml; returns its path."""
+        return write_calibration(path, self)
+
+    def as_json(self) -> dict[str, Any]:
         """What the TOML holds."""
         tool = {n: getattr(self, n) for n in ("tip_radius_m", "stiffness_n_per_m", "play_m")}
         sensor = {n: getattr(self, n) for n in ("matrix", "bias_n", "delay_s", "force_noise_std_n")}
@@ -105,7 +116,7 @@ def write_calibration(path: Path | str, calibration: Calibration) -> Path:
     if path.suffix != ".toml":
         raise RecordingError(f"'{path}' must end in .toml")
     with atomic_file(path, TOOL) as temporary:
-        temporary.write_text(dump_toml(calibration.table()), encoding="utf-8")
+        temporary.write_text(dump_toml(calibration.as_json()), encoding="utf-8")
     return path
 
 

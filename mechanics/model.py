@@ -22,6 +22,7 @@ from mechanics.moduli import gradient_ratio, skin_ratio, with_balls, within_limi
 from mechanics.press_making import no_presses
 from mechanics.presses import Presses
 from mechanics.quantities import USUAL_TIP_RADIUS_M
+from mechanics.result import Result
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 
@@ -61,15 +62,16 @@ class Tool:
         object.__setattr__(self, "tip_radius_m", positive("tip_radius_m", self.tip_radius_m))
 
 
-@dataclass(frozen=True)
-class Model:
-    """Everything that a renderer needs; SI units, device frame.
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Result):
+    """An object that can be felt, everything that a renderer needs; m, N, Pa, device frame.
 
     shape_uncertainty_m: (n,) standard deviation of the surface along its normal at each node, or None.
     presses: the table of what was pressed. effects: parameters of every effect that a diagnosis added, by
     name; what of one is material stands in the material, and only that counts. provenance: where it came
     from. about: tables that inform, by name;
-    nothing reads physics from these two.
+    nothing reads physics from these two. `plot`: the object with the places touched. `show`: the same in 3D
+    on its support, the touches coloured by their own modulus, kPa.
     """
 
     mesh: TetMesh
@@ -88,6 +90,12 @@ class Model:
         given, needed = self.material.field, len(self.mesh.tetrahedra)
         if given is not None and len(given) != needed:
             raise ModelError(f"field has {len(given)} values; the mesh needs {needed}, one a tetrahedron")
+
+    @property
+    def name(self) -> str:
+        """Of the recording, phantom or folder that it came from."""
+        known = self.provenance.get("recording") or self.provenance.get("phantom")
+        return str(known or (self.path.name if self.path else "model"))
 
     @cached_property
     def normals(self) -> np.ndarray:

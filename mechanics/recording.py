@@ -33,6 +33,7 @@ from mechanics.files import (
     sha256_of_file,
 )
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from mechanics.result import Result
 from mechanics.schema import ANY, Key, Listed, Schema, check_table
 from mechanics.segments import STATED, Segment
 from mechanics.store import content_key
@@ -102,15 +103,15 @@ class NotRead(UserWarning):
     not recorded, rows without a number."""
 
 
-@dataclass(frozen=True)
-class Recording:
-    """Samples and description of one exploration; arrays are read-only.
+@dataclass(frozen=True, eq=False, repr=False)
+class Recording(Result):
+    """What a device logged while a hand explored one object; arrays are read-only.
 
     t: (n,) s, strictly increasing. position: (n, 3) m, centre of the spherical tip, device frame.
     force_on_tool: (n, 3) N, the reaction that pushes the tool out, device frame.
     quaternion: (n, 4) unit (w, x, y, z), tool frame to device frame, or None.
     boundary_phase: (start, end) s of phase I, or None where it is to be detected. segments: what was done
-    when, as far as it is stated.
+    when, as far as it is stated. `plot`: force over time. `show`: the tip's path, coloured by force.
     """
 
     t: np.ndarray
@@ -149,6 +150,20 @@ class Recording:
     def name(self) -> str:
         """The stem of the files, or the object's name where the recording was never on disk."""
         return self.path.name.removesuffix(".gz").rsplit(".", 1)[0] if self.path else self.object_name
+
+    @property
+    def duration_s(self) -> float:
+        """From the first sample to the last, s."""
+        return float(self.t[-1] - self.t[0])
+
+    @property
+    def force_n(self) -> np.ndarray:
+        """(n,) N, length of the force."""
+        return np.linalg.norm(self.force_on_tool, axis=1)
+
+    def save(self, path: Path | str) -> Path:
+        """Write NAME.csv.gz (or .csv) and NAME.toml (docs/recording-format.md); returns the samples' path."""
+        return write_recording(path, self)
 
     @cached_property
     def content(self) -> str:

@@ -13,9 +13,14 @@ import importlib
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from diagnose.compare.before_after import Changes as Changes
+    from diagnose.compare.comparison import Comparison as Comparison
     from diagnose.explore.explorer import Explorer as Explorer
     from diagnose.explore.segments import Instrument as Instrument
     from diagnose.explore.segments import Segment as Segment
+    from diagnose.specimen.result import Material as Material
+    from diagnose.verdict.result import Diagnosis as Diagnosis
+    from mechanics.calibration import Calibration as Calibration
     from mechanics.errors import CacheError as CacheError
     from mechanics.errors import ContactError as ContactError
     from mechanics.errors import DeviceError as DeviceError
@@ -30,6 +35,8 @@ if TYPE_CHECKING:
     from mechanics.errors import RecordingError as RecordingError
     from mechanics.errors import SceneError as SceneError
     from mechanics.errors import SurfaceError as SurfaceError
+    from mechanics.model import Model as Model
+    from mechanics.recording import Recording as Recording
     from palpate.api import batch as batch
     from palpate.api import calibrate as calibrate
     from palpate.api import changes as changes
@@ -48,22 +55,15 @@ if TYPE_CHECKING:
     from palpate.api import renderer as renderer
     from palpate.api import replay as replay
     from palpate.api import simulate as simulate
+    from palpate.batching.summary import Batch as Batch
+    from palpate.importing.imported import Imported as Imported
     from palpate.keywords import options as options
-    from palpate.results.batch import Batch as Batch
-    from palpate.results.calibration import Calibration as Calibration
-    from palpate.results.changes import Changes as Changes
-    from palpate.results.check import Checkup as Checkup
-    from palpate.results.comparison import Comparison as Comparison
-    from palpate.results.curve import Curve as Curve
-    from palpate.results.diagnosis import Diagnosis as Diagnosis
-    from palpate.results.imported import Imported as Imported
-    from palpate.results.material import Material as Material
-    from palpate.results.model import Model as Model
-    from palpate.results.reconstruction import Reconstruction as Reconstruction
-    from palpate.results.recording import Recording as Recording
-    from palpate.results.replay import ReplayResult as ReplayResult
-    from palpate.results.simulation import Simulation as Simulation
+    from reconstruct.checks.checkup import Checkup as Checkup
+    from reconstruct.pipeline import Reconstruction as Reconstruction
     from render.base import Renderer as Renderer
+    from render.press import Curve as Curve
+    from render.replay import ReplayResult as ReplayResult
+    from scenes.laboratory.simulate import Simulation as Simulation
 
     __version__: str
 
@@ -75,20 +75,20 @@ _DOOR = {
     "diagnose.explore.explorer": "Explorer",
     "diagnose.explore.segments": "Instrument Segment",
     "palpate.keywords": "options",
-    "palpate.results.recording": "Recording",
-    "palpate.results.imported": "Imported",
-    "palpate.results.calibration": "Calibration",
-    "palpate.results.changes": "Changes",
-    "palpate.results.check": "Checkup",
-    "palpate.results.material": "Material",
-    "palpate.results.model": "Model",
-    "palpate.results.reconstruction": "Reconstruction",
-    "palpate.results.replay": "ReplayResult",
-    "palpate.results.curve": "Curve",
-    "palpate.results.comparison": "Comparison",
-    "palpate.results.diagnosis": "Diagnosis",
-    "palpate.results.simulation": "Simulation",
-    "palpate.results.batch": "Batch",
+    "mechanics.recording": "Recording",
+    "palpate.importing.imported": "Imported",
+    "mechanics.calibration": "Calibration",
+    "diagnose.compare.before_after": "Changes",
+    "reconstruct.checks.checkup": "Checkup",
+    "diagnose.specimen.result": "Material",
+    "mechanics.model": "Model",
+    "reconstruct.pipeline": "Reconstruction",
+    "render.replay": "ReplayResult",
+    "render.press": "Curve",
+    "diagnose.compare.comparison": "Comparison",
+    "diagnose.verdict.result": "Diagnosis",
+    "scenes.laboratory.simulate": "Simulation",
+    "palpate.batching.summary": "Batch",
     "render.base": "Renderer",
     "mechanics.errors": (
         "PalpateError FileError RecordingError ContactError LoudAirError NoBaseError SurfaceError MeshError "
@@ -104,6 +104,7 @@ def __getattr__(name: str) -> object:
     if name == "__version__":
         value: object = importlib.import_module("palpate.version").__version__
     elif name in _HOME:
+        importlib.import_module("palpate.show")  # results know how they look
         value = getattr(importlib.import_module(_HOME[name]), name)
     else:
         raise AttributeError(f"module 'palpate' has no attribute '{name}'; it has {', '.join(_HOME)}")

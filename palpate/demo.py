@@ -16,6 +16,7 @@ from mechanics.model_files import write_model
 from mechanics.options import option
 from mechanics.progress import Progress
 from mechanics.recording import Recording, read_recording
+from mechanics.result import Result
 from palpate.servo.report import ServoReport
 from palpate.warm_up import warming_up
 from reconstruct.pipeline import Reconstruction
@@ -33,8 +34,8 @@ class DemoOptions:
     diagnosis: bool = option(True, "diagnose the gap too, in its fast form", flag="--diagnosis")
 
 
-@dataclass(frozen=True)
-class DemoResult:
+@dataclass(frozen=True, eq=False, repr=False)
+class DemoResult(Result):
     """Everything that the report shows.
 
     rendered_n: (n, 3) N, force on the tool along the recorded path. replay_rmse_n, contact_force_rms_n: N,

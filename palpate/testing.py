@@ -20,8 +20,8 @@ from palpate.keywords import options as options_of
 
 if TYPE_CHECKING:
     from palpate.api.telling import ModelLike
-    from palpate.results.curve import Curve
     from render.base import Renderer
+    from render.press import Curve
 
 
 @pytest.fixture(scope="session")

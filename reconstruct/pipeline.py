@@ -5,6 +5,7 @@ from __future__ import annotations
 import dataclasses
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,7 @@ from mechanics.model_files import read_model
 from mechanics.progress import Clock, Progress, part, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
 from mechanics.recording import Recording, base_model_of
+from mechanics.result import Result
 from mechanics.sites import TouchSites
 from mechanics.toml_text import plain
 from reconstruct.checks.finding import Finding
@@ -42,13 +44,14 @@ from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
 from reconstruct.steps.s7_modulus.modulus_paper import PaperFit
 
 
-@dataclass(frozen=True)
-class Reconstruction:
-    """The model and everything on the way to it (for reports, comparison and diagnosis).
+@dataclass(frozen=True, eq=False, repr=False)
+class Reconstruction(Result):
+    """The model and every step on the way to it; goes wherever a model goes. Moduli Pa, lengths m, forces N.
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
-    findings: of the check-up, grave ones first; the interval is as wide as they make it.
+    findings: of the check-up, grave ones first; the interval is as wide as they make it. `plot`: force over
+    time with the touches that were found. `show`: the model.
     """
 
     model: Model
@@ -64,6 +67,25 @@ class Reconstruction:
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
     findings: tuple[Finding, ...] = ()
+
+    @property
+    def recording(self) -> Recording:
+        """What it was made from."""
+        return self.exploration.recording
+
+    @property
+    def young_modulus_pa(self) -> float:
+        """The global Young's modulus, Pa."""
+        return self.model.material.young_modulus_pa
+
+    @property
+    def young_modulus_ci95_pa(self) -> tuple[float, float]:
+        """Its 95 % interval (low, high), Pa."""
+        return self.model.material.young_modulus_ci95_pa
+
+    def report(self, path: Path | str, beside: dict[str, Model] | None = None) -> Path:
+        """Write the paper's figures and table, remade, as an HTML page; beside: other models by name."""
+        return self._report(path, beside=beside)
 
 
 def reconstruct(

@@ -16,6 +16,7 @@ import numpy as np
 from mechanics.errors import OptionError, RecordingError
 from mechanics.files import Kind, atomic_file, read_text
 from mechanics.quantities import TIP_RADIUS
+from mechanics.result import Result
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
 from render.scene import TouchScene, scene_of
@@ -31,13 +32,14 @@ BESIDE = 1.1
 """Of the object's diagonal: from its middle so far the support is aimed at on purpose (and drawn)."""
 
 
-@dataclass(frozen=True)
-class Curve:
+@dataclass(frozen=True, eq=False, repr=False)
+class Curve(Result):
     """A force response: t (n,) s, position (n, 3) m of the tip's centre, depth (n,) m, force (n, 3) N on the
     tool.
 
-    normal: (3,) outward at first touch, or None for a curve that was read. Depth is travel along -n since
-    first touch, 0 before it.
+    Depth is travel along -n since first touch, 0 before it. normal: (3,) outward at first touch; renderer,
+    tip_radius_m: what it was pressed with; None for a curve that was read. `plot`: force along the normal,
+    and its length, over depth. `show`: the object as it is deformed at the deepest, with tip and force.
     """
 
     t: np.ndarray
@@ -45,6 +47,18 @@ class Curve:
     depth: np.ndarray
     force: np.ndarray
     normal: np.ndarray | None = None
+    renderer: Renderer | None = None
+    tip_radius_m: float | None = None
+
+    @property
+    def deepest(self) -> int:
+        """Sample of the greatest depth."""
+        return int(np.argmax(self.depth))
+
+    def save(self, path: Path | str) -> Path:
+        """Write `t,x,y,z,depth,fx,fy,fz` (s, m, m, N), which `palpate press --expect` takes."""
+        write_curve(path, self)
+        return Path(path)
 
     @property
     def peak_force_n(self) -> float:
@@ -117,7 +131,8 @@ def press(
     position = touch + along[:, None] * direction
     state = scene.start([radius], dt_s=1.0 / rate_hz)
     force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), 1.0 / rate_hz))
-    return Curve(t, position, np.maximum(along * steepness, 0.0), force[:, 0], normal)
+    depth = np.maximum(along * steepness, 0.0)
+    return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius)
 
 
 def first_touch(

@@ -9,9 +9,12 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.files import Kind, atomic_file
+from mechanics.model import Model
 from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
+from mechanics.result import Result
+from mechanics.samples import runs
 from render.base import Renderer
 from render.scene import TouchScene, scene_of
 
@@ -90,3 +93,53 @@ def replay_error(recording: Recording, presses: Presses, forces: np.ndarray) -> 
     error = rms_n(forces[contact] - recording.force_on_tool[contact])
     size = rms_n(recording.force_on_tool[contact])
     return ReplayError(error, size, error / size if size > 0 else float("nan"), contact)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ReplayResult(Result):
+    """Forces of a renderer along a recorded path, against those measured.
+
+    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. contact: (n,) bool, the samples that
+    count: phase II, from first touch to its loss and 50 ms around. rmse_n: N, rms length of the error over
+    them; force_rms_n: of the measured force; relative: their ratio. `plot`: both forces over time. `show`:
+    the object, each touch coloured by its rms error.
+    """
+
+    recording: Recording
+    model: Model
+    renderer: str
+    t: np.ndarray
+    force_n: np.ndarray
+    contact: np.ndarray
+    rmse_n: float
+    force_rms_n: float
+    relative: float
+
+    @property
+    def error_n(self) -> np.ndarray:
+        """(n, 3) N, rendered less measured force."""
+        return self.force_n - self.recording.force_on_tool
+
+    @property
+    def noise_n(self) -> float | None:
+        """N, rms length of the sensor's noise, where the recording states it."""
+        noise = self.recording.force_noise_std_n
+        return None if noise is None else float(noise * np.sqrt(3.0))
+
+    def save(self, path: Path | str) -> Path:
+        """Write `t,fx,fy,fz` (s, and N on the tool) as `palpate replay` does."""
+        write_forces(path, self.t, self.force_n)
+        return Path(path)
+
+    def touches(self) -> tuple[np.ndarray, np.ndarray]:
+        """Places (k, 3) m where the tip met the object, and the rms error (k,) N of each touch."""
+        size = np.linalg.norm(self.force_n, axis=1)
+        places, errors = [], []
+        for first, last in runs(self.contact):
+            felt = np.flatnonzero(size[first:last] > 0)
+            if len(felt):
+                at = first + felt[0]
+                normal = self.force_n[at] / size[at]
+                places.append(self.recording.position[at] - self.recording.tip_radius_m * normal)
+                errors.append(np.sqrt((self.error_n[first:last] ** 2).sum(axis=1).mean()))
+        return np.array(places).reshape(-1, 3), np.array(errors)

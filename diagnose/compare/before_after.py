@@ -19,6 +19,7 @@ from mechanics.effects.base import Role
 from mechanics.effects.registry import effect
 from mechanics.model import Model
 from mechanics.recording import Recording
+from mechanics.result import Result
 
 _95 = 1.96
 _NEAR_M = 0.012
@@ -71,12 +72,15 @@ class Place:
     ci95: tuple[float, float]
 
 
-@dataclass(frozen=True)
-class Changes:
-    """ratio, difference_pa: second over, less first, with 95 % intervals; beside: the ratio of the moduli
+@dataclass(frozen=True, eq=False, repr=False)
+class Changes(Result):
+    """Two recordings of one object: their moduli, ratio and difference, and which effect explains it.
+
+    ratio, difference_pa: second over, less first, with 95 % intervals; beside: the ratio of the moduli
     beside the effects named, None without diagnoses. places: that both pressed, empty where they share none.
     explained_by: effects, "young_modulus" where the object itself differs, nothing where no difference
-    shows.
+    shows. `plot`: both moduli, or each shared place's ratio. `show`: the first object, coloured at shared
+    places by the ratio.
     """
 
     before: Side

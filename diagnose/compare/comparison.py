@@ -9,7 +9,7 @@ geometry is used.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -21,6 +21,7 @@ from mechanics.options import option
 from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
+from mechanics.result import Result
 from mechanics.smooth_field import SmoothField
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 from reconstruct.placing import presses_on
@@ -63,10 +64,14 @@ class RegionResult:
     bias: dict[str, float]
 
 
-@dataclass(frozen=True)
-class Comparison:
-    """Held-out errors. press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM.
-    fields: of the modulus, in each fold that asked for one, else None."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison(Result):
+    """Held-out rms force errors, N: rmse_n, relative_rmse by model.
+
+    press_rmse_n: model -> (p,); fold: (p,); moduli_pa: (folds,) of the FEM. fields: of the modulus, in each
+    fold that asked for one, else None. recording: what was compared on; None for presses that came without.
+    `plot`: the error of every held-out press. `show`: the object, each press coloured by the FEM's error.
+    """
 
     prepared: Prepared
     model: Model
@@ -79,6 +84,7 @@ class Comparison:
     noise_n: float
     predicted: dict[str, np.ndarray]
     regions: tuple[RegionResult, ...] = field(default_factory=tuple)
+    recording: Recording | None = None
 
     @property
     def presses(self) -> Presses:
@@ -106,7 +112,8 @@ def compare(
     if model is None:
         made = reconstruct_fully(recording, ReconstructOptions(seed=seed), lambda s, f: progress(s, 0.6 * f))
         model = made.model
-    return compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
+    found = compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
+    return replace(found, recording=recording)
 
 
 def compare_presses(

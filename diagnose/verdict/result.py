@@ -8,11 +8,15 @@ from typing import Any
 
 import numpy as np
 
+from diagnose import apply
 from diagnose.forward.prediction import Forward
 from diagnose.instrument.free_air import FreeAir
 from diagnose.search.attribution import Attribution
 from diagnose.verdict.where import Where
 from mechanics.effects.registry import effect
+from mechanics.model import Model
+from mechanics.recording import Recording
+from mechanics.result import Result
 
 _SENTENCES = {
     "none": "the gap is noise; no effect is missing",
@@ -104,14 +108,16 @@ class NextTouch:
         return {f.name: _plain(getattr(self, f.name)) for f in fields(self)}
 
 
-@dataclass(frozen=True)
-class Diagnosis:
-    """What `palpate diagnose` answers. Gaps: N, rms of the force 3-vector over held-out contact samples.
+@dataclass(frozen=True, eq=False, repr=False)
+class Diagnosis(Result):
+    """The sim-to-real gap: where, which effect, how far it shrinks. Gaps: N, rms of the force 3-vector over
+    held-out contact samples.
 
     errors_n: our own errors, N rms: sensor, repeatability, shape, numerical. reasons: the verdict in words.
     held_out_n: gap (before, after), N, at the places of the deepest and of the fastest presses, fitted to the
     rest. left_out: effects that were not tried, as such presses cannot show them or a quick diagnosis does
-    without.
+    without. recording, model: what was diagnosed. `plot`: what each effect would take away. `show`: the
+    object coloured by the gap, with the next touch as an arrow.
     """
 
     noise_n: float
@@ -137,6 +143,20 @@ class Diagnosis:
     residual_after: np.ndarray | None = None
     left_out: tuple[str, ...] = ()
     held_out_n: dict[str, tuple[float, float]] = field(default_factory=dict)
+    recording: Recording | None = None
+    model: Model | None = None
+
+    def improved(self) -> Model:
+        """The model with the object's, contact's and boundary's effects that were named; the instrument's are
+        not the object's and stay out. Its modulus is that at which the renderer meets the recording best."""
+        assert self.model is not None, "only what `diagnose` returned knows its model"
+        better, _ = apply.improved(self.model, self)
+        return apply.with_replayed_modulus(better, self.corrected()).replaced(path=None)
+
+    def corrected(self) -> Recording:
+        """The recording with the instrument's effects taken off."""
+        assert self.recording is not None, "only what `diagnose` returned knows its recording"
+        return apply.corrected(self.recording, self)
 
     @property
     def summary(self) -> str:
@@ -147,8 +167,8 @@ class Diagnosis:
             explain="explains" if len(self.effects) == 1 else "explain",
         )
 
-    def words(self) -> list[str]:
-        """The three answers, a line each, for a terminal."""
+    def lines(self) -> list[str]:
+        """The three answers, a line each, with units."""
         near = self.where.leading
         lines = [
             f"verdict: {self.summary}",

@@ -5,6 +5,7 @@ as what `load` or `reconstruct` returned, a MODEL folder or a scene. SI units; d
 tool. What a room needs is imported when its function is called.
 """
 
+import palpate.show as _show  # noqa: F401  (results know how they look)
 from palpate.api.judging import changes, compare, diagnose
 from palpate.api.laboratory import batch, calibrate, material, simulate
 from palpate.api.models import export, load, model_of, reconstruct

@@ -11,10 +11,10 @@ from palpate.api.telling import told
 from palpate.keywords import taken
 
 if TYPE_CHECKING:
+    from diagnose.compare.before_after import Changes
+    from diagnose.compare.comparison import Comparison
+    from diagnose.verdict.result import Diagnosis
     from palpate.api.telling import ModelLike, RecordingLike
-    from palpate.results.changes import Changes
-    from palpate.results.comparison import Comparison
-    from palpate.results.diagnosis import Diagnosis
 
 
 def compare(
@@ -32,16 +32,12 @@ def compare(
     """
     from diagnose.compare.comparison import CompareOptions
     from diagnose.compare.comparison import compare as compared
-    from palpate.results.base import dressed
-    from palpate.results.comparison import Comparison
-    from palpate.results.model import model_of
 
     chosen = CompareOptions(**taken("compare", options)[CompareOptions])
     measured = read_recording(recording)
     with told("compare", progress) as tell:
         plain = None if model is None else load(model, progress=tell)
-        result = compared(measured, plain, chosen, seed=seed, progress=tell)
-    return dressed(Comparison, result, recording=measured, model=model_of(result.model))
+        return compared(measured, plain, chosen, seed=seed, progress=tell)
 
 
 def changes(
@@ -63,8 +59,6 @@ def changes(
     """
     from diagnose.compare.before_after import Side
     from diagnose.compare.before_after import changes as weighed
-    from palpate.results.base import dressed
-    from palpate.results.changes import Changes
 
     taken("changes", options)
     sides = []
@@ -82,7 +76,7 @@ def changes(
                     measured, made, fast=fast, seed=seed, progress=lambda s, x: step(s, 0.4 + 0.6 * x)
                 )
             sides.append(Side(measured, made.model, found))
-    return dressed(Changes, weighed(*sides))
+    return weighed(*sides)
 
 
 def diagnose(
@@ -103,9 +97,6 @@ def diagnose(
     """
     from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
     from diagnose.pipeline import diagnose as diagnosed
-    from palpate.results.base import dressed
-    from palpate.results.diagnosis import Diagnosis
-    from palpate.results.model import model_of
     from reconstruct.placing import presses_on
 
     given = taken("diagnose", {"fast": fast, "seed": seed, **({"most": 1} if fast else {}), **options})
@@ -116,8 +107,8 @@ def diagnose(
             begun = 0.3
         else:
             plain = load(model, progress=tell)
-            made, begun = model_of(plain.replaced(presses=presses_on(measured, plain))), 0.0
-        result = diagnosed(
+            made, begun = plain.replaced(presses=presses_on(measured, plain)), 0.0
+        return diagnosed(
             measured,
             made,
             DiagnoseOptions(**given[DiagnoseOptions]),
@@ -125,4 +116,3 @@ def diagnose(
             nuisance=NuisanceOptions(**given[NuisanceOptions]),
             attribution=AttributionOptions(**given[AttributionOptions]),
         )
-    return dressed(Diagnosis, result, recording=measured, model=made)

@@ -15,11 +15,11 @@ from palpate.api.telling import told
 from palpate.keywords import taken
 
 if TYPE_CHECKING:
+    from diagnose.specimen.result import Material
+    from mechanics.calibration import Calibration
     from palpate.api.telling import RecordingLike
-    from palpate.results.batch import Batch
-    from palpate.results.calibration import Calibration
-    from palpate.results.material import Material
-    from palpate.results.simulation import Simulation
+    from palpate.batching.run import Batch
+    from scenes.laboratory.simulate import Simulation
     from scenes.phantoms import Phantom
 
 
@@ -45,8 +45,6 @@ def calibrate(
     """
     from diagnose.calibrate.on_object import calibrate_on_object
     from diagnose.calibrate.on_plate import calibrate_on_plate
-    from palpate.results.base import dressed
-    from palpate.results.calibration import Calibration
     from reconstruct.geometry.placed import nowhere
     from reconstruct.steps.s3_contacts.contacts import explore
 
@@ -61,7 +59,7 @@ def calibrate(
     with told("calibrate", progress) as tell:
         if modulus_pa is None:
             found = explore(measured, boundary=nowhere(measured), unbroken=True)
-            plain = calibrate_on_plate(measured, found)
+            result = calibrate_on_plate(measured, found)
         else:
             made = reconstruct(
                 measured,
@@ -70,11 +68,10 @@ def calibrate(
                 progress=lambda s, x: tell(s, 0.3 * x),
                 **options,
             )
-            plain = calibrate_on_object(
+            result = calibrate_on_object(
                 measured, made.model, modulus_pa, trust=trust, seed=seed,
                 progress=lambda s, x: tell(s, 0.3 + 0.7 * x),
             )  # fmt: skip
-    result = dressed(Calibration, plain)
     if save is not None:
         result.save(save)
     return result
@@ -102,8 +99,8 @@ def material(
     indentations on, effects are searched for as `diagnose` does, each curve held out (docs/real-data.md).
     Raises RecordingError where a file cannot be read, ContactError where nothing is touched.
     """
+    from diagnose.specimen.material import material_of
     from palpate.importing.specimens import read_tests
-    from palpate.materials import material_of
 
     tests = read_tests(
         files, kind=kind, tip_radius_m=tip_radius_m, columns=dict(columns or {}), units=dict(units or {})
@@ -145,7 +142,6 @@ def simulate(
     """
     from mechanics.files import check_target
     from mechanics.recording import SAMPLES
-    from palpate.results.simulation import simulation_of
     from scenes.laboratory.hand import HandOptions, cohort_hand
     from scenes.laboratory.simulate import SimulateOptions
     from scenes.laboratory.simulate import simulate as simulated
@@ -160,7 +156,7 @@ def simulate(
         check_target(save, SAMPLES)
     thing = phantom if isinstance(phantom, Phantom) else named(phantom)
     with told("simulate", progress) as tell:
-        plain = simulated(
+        result = simulated(
             thing,
             effects,
             SimulateOptions(**given[SimulateOptions]),
@@ -171,7 +167,6 @@ def simulate(
             workers=workers,
             progress=tell,
         )
-    result = simulation_of(plain, Path(thing.name).name, thing)
     return result if save is None else result.save(save)
 
 
@@ -200,11 +195,9 @@ def batch(
     """
     from palpate.batching.plan import Choice
     from palpate.batching.run import batch as run
-    from palpate.results.base import dressed
-    from palpate.results.batch import Batch
 
     steps = tuple(do.split(",")) if isinstance(do, str) else tuple(do)
-    plain = run(
+    return run(
         [recordings] if isinstance(recordings, str | Path) else recordings,
         out,
         Choice(steps, options, seed, reports),
@@ -214,4 +207,3 @@ def batch(
         force=force,
         progress=progress,
     )
-    return dressed(Batch, plain)

@@ -14,9 +14,9 @@ from palpate.api.telling import told
 from palpate.keywords import taken
 
 if TYPE_CHECKING:
+    from mechanics.model import Model
     from palpate.api.telling import ModelLike, RecordingLike
-    from palpate.results.model import Model
-    from palpate.results.reconstruction import Reconstruction
+    from reconstruct.pipeline import Reconstruction
 
 
 def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
@@ -27,25 +27,24 @@ def load(source: ModelLike, *, progress: bool | Progress = True) -> Model:
     then reconstructed. progress: True draws a bar where stderr is a terminal. Raises ModelError or SceneError
     where there is none.
     """
-    from mechanics.model import Model as Plain
+    from mechanics.model import Model
     from mechanics.model_files import read_model
-    from palpate.results.model import model_of
     from scenes.build import model_of as scene_model
     from scenes.scene import Scene, load_scene
 
-    if isinstance(source, Plain):
-        return model_of(source)
+    if isinstance(source, Model):
+        return source
     held = getattr(source, "model", None)
-    if isinstance(held, Plain):
-        return model_of(held)
+    if isinstance(held, Model):
+        return held
     if isinstance(source, str | Path):
         if Path(source).is_dir():
-            return model_of(read_model(source))
+            return read_model(source)
         source = load_scene(source)
     if not isinstance(source, Scene):
         raise OptionError(f"a {type(source).__name__} is no model: give one, a MODEL folder or a scene")
     with told("load", progress) as tell:
-        return model_of(scene_model(source, tell))
+        return scene_model(source, tell)
 
 
 def model_of(
@@ -73,7 +72,6 @@ def model_of(
 
     from mechanics.files import check_target
     from mechanics.model_files import MODEL
-    from palpate.results.model import model_of as dressed_model
     from scenes.build import model_of_mesh
     from scenes.scene import Scene
 
@@ -88,7 +86,7 @@ def model_of(
         if value is not None and not value > 0:
             raise OptionError(f"{name} is {value}; it must be greater than 0")
     with told("model", progress) as tell:
-        made = dressed_model(model_of_mesh(shape, scene, tell))
+        made = model_of_mesh(shape, scene, tell)
     return made if save is None else made.save(save)
 
 
@@ -108,8 +106,7 @@ def reconstruct(
     The result goes wherever a model goes. Raises OptionError, ContactError, SurfaceError or MeshError.
     """
     from mechanics.files import check_target
-    from mechanics.model_files import MODEL, write_model
-    from palpate.results.reconstruction import reconstruction_of
+    from mechanics.model_files import MODEL
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
     from render.felt import felt_surface
 
@@ -124,9 +121,9 @@ def reconstruct(
     }
     chosen = ReconstructOptions(**given[ReconstructOptions], **steps, seed=seed)
     with told("reconstruct", progress) as tell:
-        result = reconstruct_fully(read_recording(recording), chosen, tell)
-    made = reconstruction_of(result, None if save is None else write_model(save, result.model))
+        made = reconstruct_fully(read_recording(recording), chosen, tell)
     if save is not None:
+        made = dataclasses.replace(made, model=made.model.save(save))
         felt_surface(made.model, made.sites)
     return made
 

@@ -11,10 +11,10 @@ from mechanics.progress import Progress
 from palpate.api.telling import told
 
 if TYPE_CHECKING:
+    from mechanics.recording import Recording
     from palpate.api.telling import RecordingLike
-    from palpate.results.check import Checkup
-    from palpate.results.imported import Imported
-    from palpate.results.recording import Recording
+    from palpate.importing.imported import Imported
+    from reconstruct.checks.checkup import Checkup
 
 
 def read_recording(source: RecordingLike) -> Recording:
@@ -24,22 +24,21 @@ def read_recording(source: RecordingLike) -> Recording:
     N, device frame (docs/recording-format.md). Raises RecordingError for what is missing or impossible.
     """
     from mechanics.errors import RecordingError
-    from mechanics.recording import Recording as Plain
+    from mechanics.recording import Recording
     from mechanics.recording import read_recording as read
-    from palpate.results.recording import recording_of
     from scenes.embedded import embedded_names, embedded_recording
 
-    if isinstance(source, Plain):
-        return recording_of(source)
+    if isinstance(source, Recording):
+        return source
     held = getattr(source, "recording", None)
-    if isinstance(held, Plain):
-        return recording_of(held)
+    if isinstance(held, Recording):
+        return held
     if str(source) in embedded_names():
-        return recording_of(read(embedded_recording(str(source))))
+        return read(embedded_recording(str(source)))
     if not isinstance(source, str | Path):
         raise OptionError(f"a {type(source).__name__} is no recording: give one, or the path of its file")
     try:
-        return recording_of(read(source))
+        return read(source)
     except RecordingError as error:
         if Path(source).exists() or "." in Path(source).name:
             raise
@@ -53,7 +52,7 @@ def check(recording: RecordingLike, *, full: bool = False, progress: bool | Prog
     each with a stretch in s; `reconstruct` refuses what is grave. Raises RecordingError for what is no
     recording, and what `reconstruct` raises with `full`.
     """
-    from palpate.results.check import Checkup
+    from reconstruct.checks.checkup import Checkup
     from reconstruct.checks.registry import looked_at
     from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
 
@@ -78,9 +77,9 @@ def import_table(*files: str | Path, mapping: str | Path | None = None, **said: 
     import dataclasses as classes
 
     from palpate.importing.convert import understand
+    from palpate.importing.imported import Imported
     from palpate.importing.mapping import Said, read_mapping
     from palpate.importing.tables import read_tables
-    from palpate.results.imported import Imported
 
     held = {} if mapping is None else read_mapping(mapping)
     for key, value in said.items():

@@ -12,8 +12,8 @@ from mechanics.progress import Progress, silent
 if TYPE_CHECKING:
     import mechanics.model
     import mechanics.recording
-    from palpate.results.reconstruction import Reconstruction
-    from palpate.results.simulation import Simulation
+    from reconstruct.pipeline import Reconstruction
+    from scenes.laboratory.simulate import Simulation
     from scenes.scene import Scene
 
     RecordingLike = str | Path | mechanics.recording.Recording | Simulation

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     import mechanics.recording
     from mechanics.presses import Presses
     from palpate.api.telling import ModelLike, RecordingLike
-    from palpate.results.curve import Curve
-    from palpate.results.replay import ReplayResult
     from render.base import Renderer
     from render.options import RenderOptions
+    from render.press import Curve
+    from render.replay import ReplayResult
     from render.scene import TouchScene
 
 
@@ -54,10 +54,8 @@ def replay(
     mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. options: see
     `pp.options("replay")`. Raises OptionError.
     """
-    from palpate.results.model import model_of
-    from palpate.results.replay import ReplayResult
     from reconstruct.steps.s3_contacts.quasi_static import is_points
-    from render.replay import replay_error, replay_recording
+    from render.replay import ReplayResult, replay_error, replay_recording
 
     make = _renderer("replay", model, renderer, options)
     measured = read_recording(recording)
@@ -72,7 +70,7 @@ def replay(
     error = replay_error(measured, _touched(measured, scene.model), forces)
     return ReplayResult(
         recording=measured,
-        model=model_of(scene.model),
+        model=scene.model,
         renderer=scene.renderer.name,
         t=measured.t,
         force_n=forces,
@@ -109,8 +107,6 @@ def press(
     """
     import numpy as np
 
-    from palpate.results.base import dressed
-    from palpate.results.curve import Curve
     from render.press import press as pressed
 
     make = _renderer("press", model, renderer, options)
@@ -118,7 +114,7 @@ def press(
         scene = make(tell)
     along = -scene.model.support.normal if direction is None else np.asarray(direction, dtype=float)
     radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
-    curve = pressed(
+    return pressed(
         scene,
         np.asarray(at, dtype=float),
         along,
@@ -129,7 +125,6 @@ def press(
         rate_hz=rate_hz,
         tip_radius_m=radius,
     )
-    return dressed(Curve, curve, renderer=scene.renderer, tip_radius_m=radius)
 
 
 def _renderer(

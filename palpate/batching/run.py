@@ -59,11 +59,11 @@ def batch(
                 outcomes=outcomes,
             )
         except KeyboardInterrupt:
-            _write(_made(folder, found, choice, tasks, bad, outcomes), choice)
+            _write(_made(folder, found, choice, tasks, bad, outcomes))
             raise
         made = _made(folder, found, choice, tasks, bad, outcomes)
         made = replace(made, undescribed=tuple(undescribed(sources, folder)))
-        _write(made, choice)
+        _write(made)
     return made
 
 
@@ -81,12 +81,12 @@ def _made(
         ended = {task.stage: outcomes[task.name] for task in own if task.name in outcomes}
         entries.append(entry_of(recording.name, ended, bad.get(recording.name), choice.steps))
     reused = sum(outcome.reused for outcome in outcomes.values())
-    return Batch(folder, tuple(entries), tuple(agreements(entries)), sum(map(len, tasks.values())), reused)
+    planned = sum(map(len, tasks.values()))
+    agreeing = tuple(agreements(entries))
+    return Batch(folder, tuple(entries), agreeing, planned, reused, steps=tuple(choice.steps))
 
 
-def _write(made: Batch, choice: Choice) -> None:
-    from palpate.report.batch import write_report
-
+def _write(made: Batch) -> None:
     for entry in made.entries:
         log = made.folder / entry.row.recording / "error.txt"
         if entry.trace:
@@ -94,7 +94,6 @@ def _write(made: Batch, choice: Choice) -> None:
                 temporary.write_text(entry.trace, encoding="utf-8")
         else:
             log.unlink(missing_ok=True)
-    rows = [entry.row for entry in made.entries]
-    write_csv(made.folder / "summary.csv", rows)
-    write_parquet(made.folder / "summary.parquet", rows)
-    write_report(made.folder / "index.html", made, choice.steps)
+    write_csv(made.folder / "summary.csv", made.rows)
+    write_parquet(made.folder / "summary.parquet", made.rows)
+    made.report(made.folder / "index.html")

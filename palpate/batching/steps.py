@@ -14,10 +14,10 @@ from typing import Any
 
 from mechanics.errors import RecordingError
 from mechanics.files import PNG, atomic_file
+from mechanics.recording import Recording
 from palpate import api
 from palpate.arguments import emit_json
 from palpate.batching.plan import MODEL, STEPS, THUMBNAIL, content_of
-from palpate.results.recording import Recording
 
 
 @dataclass(frozen=True)
@@ -96,7 +96,7 @@ def _written(plan: Planned, step: str, result: Any, figures: Mapping[str, Any]) 
 def _draw_thumbnail(model: Any, path: Path) -> None:
     from matplotlib.figure import Figure
 
-    from palpate.report.object3d import draw_object
+    from palpate.show.object3d import draw_object
 
     figure = Figure(figsize=(1.6, 1.2))
     ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 import importlib.util
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.files import Kind, atomic_file
+from mechanics.result import Result
 from palpate.tasks.driver import Outcome
 
 _Z95 = 1.959964
@@ -75,11 +76,17 @@ class Agreement:
     expected: float
 
 
-@dataclass(frozen=True)
-class Batch:
-    """What came out. entries: one a recording, in the order of their paths; folder: the output; reused: tasks
-    that were finished before; agreements: how far the explorations of one object agree; undescribed: tables
-    in the folders that are no recordings, as no .toml lies beside them."""
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Result):
+    """A row a recording, and how far explorations of one object agree. Moduli Pa, gaps N rms, lengths m.
+
+    Iterate over its rows, or take `table`, name -> column, which `pandas.DataFrame` reads. entries: one a
+    recording with what every step returned, in the order of their paths; agreements: objects explored more
+    than once; folder: has a folder a recording, summary.csv and index.html; reused: tasks that were finished
+    before; undescribed: tables in the folders that are no recordings, as no .toml lies beside them; steps:
+    what was done. `plot`: moduli over the mean of their object, or over the recordings. `show`: the first
+    objects side by side.
+    """
 
     folder: Path
     entries: tuple[Entry, ...]
@@ -87,6 +94,28 @@ class Batch:
     tasks: int
     reused: int
     undescribed: tuple[Path, ...] = ()
+    steps: tuple[str, ...] = ()
+
+    @property
+    def rows(self) -> list[Row]:
+        """As in summary.csv, in the order of the recordings' paths."""
+        return [entry.row for entry in self.entries]
+
+    @property
+    def failed(self) -> list[Row]:
+        """Those that failed; `reason` says why."""
+        return [row for row in self.rows if row.status == "failed"]
+
+    @property
+    def table(self) -> dict[str, list[Any]]:
+        """The columns of summary.csv by name; None where nothing is known."""
+        return {name: [getattr(row, name) for row in self.rows] for name in COLUMNS}
+
+    def __iter__(self) -> Iterator[Row]:
+        return iter(self.rows)
+
+    def __len__(self) -> int:
+        return len(self.entries)
 
 
 def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps: Sequence[str]) -> Entry:

@@ -10,7 +10,7 @@ import argparse
 
 from palpate import api
 from palpate.arguments import add_input, add_json, add_output, emit_json, say
-from palpate.report.page import PAGE
+from palpate.show.page import PAGE
 
 SUMMARY = "what may be wrong with a recording, before it is believed"
 

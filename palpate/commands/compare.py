@@ -23,7 +23,7 @@ from palpate.arguments import (
     given_for,
     say,
 )
-from palpate.report.page import PAGE
+from palpate.show.page import PAGE
 from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "FEM against interpolated 1D models on held-out palpations"

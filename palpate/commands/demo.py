@@ -11,7 +11,6 @@ import argparse
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
 
 from mechanics.files import check_target, sole_writer
 from mechanics.model_files import MODEL
@@ -26,9 +25,6 @@ from palpate.arguments import (
     say,
 )
 from palpate.demo import DemoOptions, run_demo
-
-if TYPE_CHECKING:
-    from diagnose.verdict.result import Diagnosis
 
 SUMMARY = "the main job on the embedded example; prints the report's path"
 
@@ -64,48 +60,23 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _run(arguments: argparse.Namespace, folder: Path) -> None:
-    from palpate.report.demo import write_report
     from scenes.build import keep
     from scenes.embedded import embedded_recording
     from scenes.scene import FOLDER, read_scene
 
     source = arguments.recording or embedded_recording()
     result = run_demo(source, folder, options_from(arguments, DemoOptions), progress_bar, arguments.seed)
-    report = write_report(result, folder)
+    report = result.report(folder / "report.html")
     if not arguments.recording:
         # 'palpate touch' opens at once; by its file, as a folder of that name would go before it
         keep(read_scene(FOLDER / "demo.toml"), folder / "model")
-    model = result.model
     say(
         arguments,
-        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa from {len(model.presses)} presses",
-        f"rendered against measured force: {result.replay_rmse_n:.3f} N rms "
-        f"of {result.contact_force_rms_n:.3f} N rms",
-        str(result.servo),
-        *([f"diagnosis: {result.diagnosis.summary}"] if result.diagnosis else []),
+        *result.lines(),
         f"report: {report.resolve()}",
         f"to feel it: palpate touch {folder / 'model' if arguments.recording else ''}".rstrip(),
     )
-    emit_json(
-        {
-            "young_modulus_pa": model.material.young_modulus_pa,
-            "young_modulus_ci95_pa": model.material.young_modulus_ci95_pa,
-            "replay_rmse_n": result.replay_rmse_n,
-            "servo": result.servo.as_dict(),
-            "seconds": result.seconds,
-            "report": str(report.resolve()),
-            "diagnosis": diagnosis_json(result.diagnosis),
-        },
-        arguments.json,
-    )
-
-
-def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
-    """The diagnosis's answer, by the keys of `palpate diagnose --json`; None where none was made."""
-    if diagnosis is None:
-        return None
-    whole = diagnosis.as_json()
-    return {key: whole[key] for key in ("verdict", "noise_n", "gap_before_n", "gap_after_n", "gap_closed")}
+    emit_json({**result.as_json(), "report": str(report.resolve())}, arguments.json)
 
 
 def _has_screen() -> bool:

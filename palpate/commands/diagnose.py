@@ -24,7 +24,7 @@ from palpate.arguments import (
     given_for,
     say,
 )
-from palpate.report.page import PAGE
+from palpate.show.page import PAGE
 from palpate.sources import add_mesh_arguments, given_model
 
 SUMMARY = "the sim-to-real gap: where, which effect, how far it shrinks"

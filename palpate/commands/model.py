@@ -48,16 +48,5 @@ def run(arguments: argparse.Namespace) -> int:
         save=arguments.output,
     )
     say(arguments, *model.lines())
-    emit_json(
-        {
-            "model": arguments.output,
-            "young_modulus_pa": model.material.young_modulus_pa,
-            "volume_m3": float(model.mesh.volumes.sum()),
-            "nodes": len(model.mesh.points),
-            "tetrahedra": len(model.mesh.tetrahedra),
-            "support_point_m": model.support.point,
-            "support_normal": model.support.normal,
-        },
-        arguments.json,
-    )
+    emit_json(model.as_json(), arguments.json)
     return 0

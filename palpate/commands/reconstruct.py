@@ -22,7 +22,7 @@ from palpate.arguments import (
     given_for,
     say,
 )
-from palpate.report.page import PAGE
+from palpate.show.page import PAGE
 
 SUMMARY = "a recording becomes a model"
 

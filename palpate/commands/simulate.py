@@ -26,7 +26,7 @@ from palpate.arguments import (
     natural,
     say,
 )
-from palpate.report.page import PAGE
+from palpate.show.page import PAGE
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.sealing import write_sealed
 from scenes.phantoms import PHANTOMS
@@ -122,23 +122,16 @@ def run(arguments: argparse.Namespace) -> int:
     elif arguments.truth:
         emit_json({"truth": result.truth}, arguments.truth)
     if arguments.pictures:
-        from palpate.report.laboratory import simulation_figure
+        from palpate.show.simulation import simulation_figure
 
         with atomic_file(arguments.pictures, PNG) as picture:
             simulation_figure(result).savefig(picture, dpi=110, format="png")
         say(arguments, f"pictures: {arguments.pictures}")
     if arguments.report:
         say(arguments, f"report: {result.report(arguments.report)}")
-    duration = float(result.recording.t[-1])
-    summary = {
-        "recording": str(path),
-        "samples": len(result.recording.t),
-        "duration_s": duration,
-        "palpations": len(result.touches),
-        "sealed": bool(arguments.seal),
-    }
-    if not arguments.seal:
-        summary["truth"] = result.truth
+    summary = {**result.as_json(), "recording": str(path), "sealed": bool(arguments.seal)}
+    if arguments.seal:
+        del summary["truth"]
     words = result.lines()
     say(arguments, *(words[:1] if arguments.seal else words), f"written to {path}")
     emit_json(summary, arguments.json)

@@ -10,12 +10,12 @@ from __future__ import annotations
 import re
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from diagnose.specimen.bench import Curve
+from diagnose.specimen.result import Tests
 from mechanics.bounds import LARGEST_N
 from mechanics.errors import OptionError, RecordingError
 from mechanics.recording import WIDEST_PATH_M, NotRead
@@ -23,7 +23,7 @@ from palpate.importing.mapping import Said, find_columns
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import without_unit
 from reconstruct.external.indentation import read_chiaro
-from reconstruct.external.uniaxial import Uniaxial, of_compression, read_tension
+from reconstruct.external.uniaxial import of_compression, read_tension
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
@@ -31,20 +31,6 @@ _LEAST_ROWS = 8
 _BEYOND = 1e15
 _TIPS_M = (1e-9, 0.1)
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
-
-
-@dataclass(frozen=True)
-class Tests:
-    """The curves of one kind: curves of an indentation, with the tip's radius; tests of compression or
-    tension; holds (t s, value) of relaxation. stated_modulus_pa: by the maker's own software, NaN where not
-    said."""
-
-    kind: str
-    curves: tuple[Curve, ...] = ()
-    tests: tuple[Uniaxial, ...] = ()
-    holds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
-    tip_radius_m: float | None = None
-    stated_modulus_pa: float = float("nan")
 
 
 def read_tests(

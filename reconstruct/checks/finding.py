@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from scipy.stats import binom
@@ -42,6 +43,20 @@ class Finding:
     def line(self) -> str:
         """One line for a person."""
         return f"{'GRAVE' if self.grave else 'note'}: {self.name}: {self.saw} ({self.sure}); {self.todo}"
+
+    def as_json(self) -> dict[str, Any]:
+        """Its figures, keys with units."""
+        return {
+            "name": self.name,
+            "grave": self.grave,
+            "saw": self.saw,
+            "sure": self.sure,
+            "todo": self.todo,
+            "modulus_error": self.error,
+            "decades": self.decades,
+            "stretch_s": self.stretch,
+            "channels": self.channels,
+        }
 
 
 def decades_of_tail(count: int, among: int, share: float) -> float:

@@ -12,7 +12,8 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
-from mechanics.recording import Recording
+from mechanics.recording import Recording, read_recording, write_recording
+from mechanics.result import Result
 from scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
 from scenes.laboratory.hand import HandOptions
 from scenes.laboratory.motion import Motion
@@ -22,12 +23,14 @@ from scenes.laboratory.truth import truth_of
 from scenes.phantoms import Phantom
 
 
-@dataclass(frozen=True)
-class Simulation:
-    """A recording and the truth about it; `clean_n` (n, 3) is its force on the tool without noise, device
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation(Result):
+    """A recording of the virtual laboratory and the truth about it; goes wherever a recording goes.
+
+    body: the phantom as it was explored. `clean_n` (n, 3) N is the force on the tool without noise, device
     frame; `readings` are it with the true positions beside, before noise and rounding; `motion` is the
     hand's true way, object frame. `ideal_n` (n, 3): where asked for, what the ideal
-    object would have answered to the same way.
+    object would have answered to the same way. `plot`: force over time. `show`: the tip's path.
     """
 
     recording: Recording
@@ -37,6 +40,17 @@ class Simulation:
     motion: Motion
     readings: Readings
     ideal_n: np.ndarray | None = None
+    body: Phantom | None = None
+
+    @property
+    def phantom(self) -> str:
+        """The name of what was explored."""
+        return "object" if self.body is None else Path(self.body.name).name
+
+    def save(self, path: Path | str) -> Simulation:
+        """Write the recording with its truth; returns the simulation whose recording knows its file."""
+        written = write_recording(path, self.recording, truth=self.truth)
+        return replace(self, recording=read_recording(written))
 
 
 def simulate(
@@ -84,7 +98,7 @@ def simulate(
     truth = truth_of(session, present, clean, whole, sizes, strengths)
     recording, way = session.recording(whole, clean, truth), session.way
     plain_n = session.run((), regions=False)[1] if ideal else None
-    return Simulation(recording, truth, clean, touches, way, whole, plain_n)
+    return Simulation(recording, truth, clean, touches, way, whole, plain_n, phantom)
 
 
 def _parameters(

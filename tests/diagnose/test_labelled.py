@@ -29,5 +29,5 @@ def test_labelled(shared_recordings, name, stated):
     if not stated:
         recording = dataclasses.replace(recording, boundary_phase=None)
     result = diagnose(recording, reconstruct(recording, ReconstructOptions()))
-    assert list(result.effects) == [EXPECTED[name]], result.words()
+    assert list(result.effects) == [EXPECTED[name]], result.lines()
     assert result.gap_after_n < result.gap_before_n or EXPECTED[name] == "inclusion"

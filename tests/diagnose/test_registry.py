@@ -15,7 +15,7 @@ from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
 from mechanics.dent import dent_law, grid
 from mechanics.effects import registry
-from palpate.report.diagnosis_words import meaning
+from palpate.show.diagnosis.words import meaning
 from render.effects import rendered_touch
 from render.options import RenderOptions
 

@@ -17,10 +17,7 @@ from diagnose.pipeline import diagnose
 from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
 from mechanics.gap_bins import gap_by_bin
-from palpate.commands import demo
-from palpate.report.demo import diagnosis_words
-from palpate.report.diagnosis import write_report
-from palpate.report.diagnosis_figures import gains, view_of
+from palpate.show.demo import diagnosis_json, diagnosis_words
 from reconstruct.placing import presses_on
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -227,11 +224,11 @@ def test_what_makes_the_held_out_gap_grow_is_a_candidate_and_never_named(bench, 
 
 def test_the_page_says_what_to_do_and_its_view_switches_effects_on(delayed, tmp_path):
     recording, model, result = delayed
-    text = write_report(tmp_path / "page.html", recording, model, result).read_text(encoding="utf-8")
+    text = result.report(tmp_path / "page.html").read_text(encoding="utf-8")
     assert "What to do next: take time delay off the readings" in text
     assert "fitted anew with what was found" in text and "once more" in text
     assert 'class="view3d"' in text and "everything that the best model" not in text
-    view = view_of(model, result)
+    view = result.view()
     measured, simulated, found, *effects = view.traces.lines
     late = next(line for line in effects if "time delay" in line.name)
     counted = result.forward.touches.counted
@@ -244,7 +241,7 @@ def test_the_page_says_what_to_do_and_its_view_switches_effects_on(delayed, tmp_
 def test_a_bar_says_what_finite_strain_takes_away_beside_an_effect(delayed):
     result = delayed[2]
     ax = Figure().subplots()
-    gains(ax, result)
+    result.plot(ax)
     names = [label.get_text() for label in ax.get_yticklabels()]
     for name, entry in zip(names, (e for e in result.entries if e.gap_closed is not None), strict=False):
         alone = entry.name == "finite_strain" or "finite_strain" not in (
@@ -259,9 +256,9 @@ def test_the_demo_says_which_simulation_is_diagnosed_and_its_json_has_the_verdic
         SimpleNamespace(diagnosis=result, model=model, recording=SimpleNamespace(path="demo.csv.gz"))
     )
     assert "starts from the simplest one" in words and "do not have time delay" in words
-    found = demo.diagnosis_json(result)
+    found = diagnosis_json(result)
     assert found["verdict"]["effects"] == ["time_delay"] and found["gap_after_n"] < found["gap_before_n"]
-    assert demo.diagnosis_json(None) is None
+    assert diagnosis_json(None) is None
 
 
 def test_a_swing_that_was_taken_for_a_press_is_not_weighed(bench):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from mechanics.recording import read_recording
-from palpate.report.modulus_figures import height_trends
+from palpate.show.reconstruction.modulus import height_trends
 from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
 

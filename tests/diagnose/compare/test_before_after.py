@@ -13,8 +13,6 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.press_making import of_places
 from palpate import cli
-from palpate.results.base import dressed
-from palpate.results.changes import Changes
 
 UP = np.array([0.0, 0.0, 1.0])
 
@@ -77,7 +75,7 @@ def test_recordings_without_a_common_frame_share_no_place():
 
 
 def test_it_prints_draws_and_writes_a_page(tmp_path):
-    result = dressed(Changes, changes(side(16e3), side(20e3, seed=1)))
+    result = changes(side(16e3), side(20e3, seed=1))
     assert "the object itself differs" in str(result)
     held = result.as_json()
     assert held["differs"] is True and held["explained_by"] == ["young_modulus"] and len(held["places"]) == 9

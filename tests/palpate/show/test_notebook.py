@@ -19,10 +19,10 @@ CELLS = (
     "from mechanics.box_mesh import box_mesh\n"
     "from mechanics.material import Material\n"
     "from mechanics.model import Model, Support, Tool\n"
-    "from palpate.results.model import model_of\n"
     "support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))\n"
     "mesh = box_mesh((4, 4, 2), (0.06, 0.06, 0.03)).quadratic()\n"
-    "model = model_of(Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015))",
+    "pp.Model\n"
+    "model = Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015)",
     "model",
     "model.show()",
 )

@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from palpate.report.page import Page
-from palpate.report.quantities import readable
+from palpate.show.page import Page
+from palpate.show.quantities import readable
 
 
 @pytest.mark.parametrize(

@@ -11,9 +11,11 @@ import pytest
 import trimesh
 from matplotlib.figure import Figure
 
-from palpate.report.page import Page
-from palpate.report.quantities import DEPTH, ERROR, MODULUS, ORDER, UNCERTAINTY
-from palpate.report.view3d import Colouring, Line, Thing, Traces, View, facing, scripts
+from palpate.show.model_view import facing
+from palpate.show.page import Page
+from palpate.show.quantities import DEPTH, ERROR, MODULUS, ORDER, UNCERTAINTY
+from palpate.show.view3d import View, scripts
+from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
 
 from . import browser
 
@@ -242,7 +244,6 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     from mechanics.box_mesh import box_mesh
     from mechanics.material import Material
     from mechanics.model import Model, Support, Tool
-    from palpate.results.model import model_of
 
     class ZMQInteractiveShell:
         pass
@@ -256,6 +257,6 @@ def test_a_notebook_shows_a_model_to_be_turned(monkeypatch, tmp_path):
     monkeypatch.setitem(sys.modules, "IPython.display", kernel.display)
     mesh = box_mesh((4, 4, 2), (0.06, 0.06, 0.03)).quadratic()
     support = Support(np.zeros(3), np.array([0.0, 0.0, 1.0]))
-    model = model_of(Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015))
+    model = Model(mesh, Material(20e3, 0.49), support, Tool(0.005), mesh_size_m=0.015)
     assert model.show() is None
     assert len(shown) == 1 and shown[0].startswith("<div><iframe srcdoc=") and "view3d" in shown[0]

@@ -10,7 +10,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from palpate.cli import main
-from palpate.report.laboratory import PRESSES_SHOWN, simulation_figure, view_of
+from palpate.show.simulation import PRESSES_SHOWN, simulation_figure, view
 from scenes.laboratory.simulate import SimulateOptions, simulate
 from scenes.phantoms import phantom
 
@@ -73,11 +73,10 @@ def test_command_writes_a_page_whose_places_lie_on_the_phantom(springs, tmp_path
     text = page.read_text(encoding="utf-8")
     assert 'class="view3d"' in text and "with tool compliance 1" in text and "palpate reconstruct" in text
     result, _ = _figure({"tool_compliance": 1})
-    body = phantom("cylinder")
-    view = view_of(result, body)
-    near = cKDTree(view.thing.points).query(view.places)[0]
+    seen = view(result)
+    near = cKDTree(seen.thing.points).query(seen.places)[0]
     assert near.max() < 2e-3, "the places are in the frame of the surface"
-    read, ideal, _ = view.traces.lines
+    read, ideal, _ = seen.traces.lines
     assert np.abs(read.force_n - ideal.force_n).max() < 0.1, "noise alone: a soft tool moves the depth"
-    deeper = read.depth_m - view.traces.depth_m
+    deeper = read.depth_m - seen.traces.depth_m
     assert deeper[ideal.force_n[:, 0] > 0.4].min() > 0.2e-3 and deeper.max() < 5e-3

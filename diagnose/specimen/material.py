@@ -1,0 +1,213 @@
+"""The material of a specimen from tests in a machine."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+
+from diagnose.forward.touches import touches_of
+from diagnose.specimen.bench import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
+from diagnose.specimen.result import Material, Tests
+from diagnose.specimen.rivals import held_out_rivals
+from mechanics.effects.finite_strain import EFFECT as FINITE
+from mechanics.effects.registry import effects
+from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
+from mechanics.effects.viscoelasticity import EFFECT as PRONY
+from mechanics.errors import OptionError
+from mechanics.progress import Progress, silent
+from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
+from reconstruct.external.relaxation import held_out_relaxation
+from reconstruct.external.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
+
+UNIAXIAL_UNKNOWN = (
+    "friction at the faces",
+    "Poisson's ratio",
+    "memory (one speed)",
+    "what differs from place to place",
+)
+RELAXATION_UNKNOWN = (
+    "stiffness against depth",
+    "what is faster than the ramp or slower than the hold",
+    "place",
+)
+INDENTATION_UNKNOWN = ("what differs from place to place", "sideways forces and friction", "Poisson's ratio")
+
+
+def material_of(
+    tests: Tests,
+    files: Sequence[str | Path],
+    *,
+    layer_m: float | None = None,
+    poisson_ratio: float = USUAL_POISSON_RATIO,
+    specimens: bool = False,
+    fast: bool = False,
+    seed: int = 0,
+    progress: Progress = silent,
+) -> Material:
+    """What the curves say. Raises ContactError where none has a contact, OptionError for what fits no such
+    test."""
+    names = tuple(Path(f).name for f in files)
+    if layer_m is not None and not layer_m > 0:
+        raise OptionError(f"--layer is {layer_m} m; it must be greater than 0")
+    if not POISSON_RATIO.takes(poisson_ratio):
+        raise OptionError(f"--poisson-ratio is {poisson_ratio}; it must be {POISSON_RATIO.words}")
+    if tests.kind in ("compression", "tension"):
+        return _uniaxial(tests, names)
+    if tests.kind == "relaxation":
+        return _relaxation(tests, names)
+    assert tests.tip_radius_m is not None
+    bench = bench_of(
+        tests.curves, tests.tip_radius_m, layer_m=layer_m, poisson_ratio=poisson_ratio, specimens=specimens
+    )
+    return _indentation(tests, bench, names, fast, seed, progress)
+
+
+def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
+    curves = tests.tests
+    errors = held_out(curves)
+    error = {name: float(np.median(e)) for name, e in errors.items()}
+    law = next(each for each in LAWS if each.name == chosen(errors))
+    ready = [c.upto(MOST_STRAIN) for c in curves]
+    fitted = fit_law(ready, law)
+    own = np.array([fit_law([c], law).young_modulus_pa for c in ready])
+    spread = 1.96 * own.std(ddof=1) / np.sqrt(len(own)) if len(own) > 1 else np.nan
+    c = fitted.coefficients
+    parameters = {"law": law.name, "strain_zero": fitted.zero}
+    if law.name.startswith("yeoh"):
+        parameters |= {f"c{k + 1}0_over_c10": float(c[k] / c[0]) for k in range(1, len(c))}
+    elif len(law.shapes) > 1:
+        parameters["exponent"] = fitted.shape
+    stiffens = law.name not in ("linear", "neo-hookean")
+    closed = 1 - (error[law.name] / max(error["neo-hookean"], 1e-12)) ** 2
+    words = "it stiffens otherwise than a neo-Hookean" if stiffens else f"{law.name} is enough"
+    first = ready[0]
+    return Material(
+        kind=tests.kind,
+        files=names,
+        curves=len(curves),
+        held_out="curve by curve" if len(curves) > 1 else "blocks of strain of one curve",
+        young_modulus_pa=fitted.young_modulus_pa,
+        young_modulus_ci95_pa=(fitted.young_modulus_pa - spread, fitted.young_modulus_pa + spread),
+        law=law.name,
+        error=error,
+        verdict=f"{words}: {law.name} misses held-out stress by {100 * error[law.name]:.2g} % to "
+        f"{100 * MOST_STRAIN:.0f} % strain ({CEILING} {100 * error[CEILING]:.2g} %)",
+        effects=(FINITE.name, STIFFENING.name) if stiffens else (),
+        closed=closed if stiffens else None,
+        parameters=parameters,
+        unknown=UNIAXIAL_UNKNOWN,
+        seen=(
+            first.stretch,
+            first.stress,
+            fitted.stress(first.stretch),
+            "stretch",
+            "engineering stress [Pa]",
+        ),
+    )
+
+
+def _relaxation(tests: Tests, names: tuple[str, ...]) -> Material:
+    found = [held_out_relaxation(t, value) for t, value in tests.holds]
+    error = {name: float(np.median([e[name] for e, _ in found])) for name in found[0][0]}
+    fit = found[0][1]
+    physical = {k: v for k, v in error.items() if k not in (CEILING, "spring")}
+    law = min(physical, key=lambda name: physical[name])
+    closed = 1 - (error[law] / max(error["spring"], 1e-12)) ** 2
+    nan = float("nan")
+    return Material(
+        kind="relaxation",
+        files=names,
+        curves=len(found),
+        held_out="blocks of log time",
+        young_modulus_pa=nan,
+        young_modulus_ci95_pa=(nan, nan),
+        law=law,
+        error=error,
+        verdict=f"{100 * fit.loss:.0f} % of the force is lost in the hold, which "
+        + ("a Kelvin-Voigt element could do" if fit.kelvin_voigt_can else "neither 1D model can do"),
+        effects=() if fit.kelvin_voigt_can else (PRONY.name,),
+        closed=closed,
+        parameters={PRONY.name: {"g": [g / fit.end for g in fit.g] if fit.end > 0 else list(fit.g),
+                                        "tau_s": list(fit.tau_s)}},
+        unknown=RELAXATION_UNKNOWN,
+    )  # fmt: skip
+
+
+def _indentation(
+    tests: Tests, bench: Bench, names: tuple[str, ...], fast: bool, seed: int, progress: Progress
+) -> Material:
+    own = bench.modulus_pa[bench.used]
+    unused = [n for n, u in zip(names, bench.used, strict=True) if not u]
+    notes = [f"without a contact, left out: {', '.join(unused)}"] if unused else []
+    if np.isfinite(tests.stated_modulus_pa):
+        notes.append(f"the maker's software states {tests.stated_modulus_pa:.4g} Pa")
+    approach = approach_of(bench)
+    made = diagnose_bench(bench, fast=fast, seed=seed, progress=progress)
+    if made is None:
+        return _few(bench, approach, names, notes)
+    touches = touches_of(bench.model.presses.net)
+    rows = touches.counted
+    size = float(np.sqrt((touches.push[rows] ** 2).mean()))
+    error = {
+        name: float(np.sqrt(((force - touches.push)[rows] ** 2).mean())) / size
+        for name, force in held_out_rivals(touches).items()
+    }
+    error |= {"ideal": made.gap_before_n / size, "verdict": made.gap_after_n / size}
+    holds = unseen_holds(bench, made)
+    if holds is not None:
+        error |= {"ideal, holds": holds[0], "verdict, holds": holds[1]}
+        notes.append(f"of unseen holds {100 * (1 - (holds[1] / holds[0]) ** 2):.0f} % is closed")
+    low, high = np.quantile(own, [0.025, 0.975]) if bench.specimens else _mean_interval(own)
+    factor = bench.similarity.modulus
+    entries = {e.name: bench.similarity.back(e.parameters) for e in made.entries if e.name in made.effects}
+    told = {e.name for e in effects()} - set(made.left_out)
+    return Material(
+        kind="indentation",
+        files=names,
+        curves=len(own),
+        held_out="curve by curve, normal force",
+        young_modulus_pa=float(np.median(own)) if bench.specimens else made.young_modulus_pa / factor,
+        young_modulus_ci95_pa=(float(low), float(high)),
+        law=bench.model.material.dent_law,
+        error=error,
+        verdict=made.summary,
+        effects=made.effects,
+        closed=made.gap_closed,
+        closed_ci95=made.gap_closed_ci95,
+        parameters=entries,
+        notes=(*notes, *made.reasons),
+        unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - told)),
+        diagnosis=made,
+    )
+
+
+def _mean_interval(own: np.ndarray) -> tuple[float, float]:
+    error = 1.96 * own.std(ddof=1) / np.sqrt(len(own)) if len(own) > 1 else np.nan
+    return float(own.mean() - error), float(own.mean() + error)
+
+
+def _few(bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]) -> Material:
+    own = approach.modulus_pa
+    low, high = _mean_interval(own)
+    gone = f"{100 * approach.hysteresis:.0f} % of the work does not come back"
+    if not np.isfinite(approach.hysteresis):
+        gone = "it ends in its hold"
+    pull = float(approach.pull_n.max())
+    if pull > 0:
+        gone += f", and it pulls by up to {pull:.2g} N on the way out"
+    return Material(
+        kind="indentation",
+        files=names,
+        curves=len(own),
+        held_out="blocks of each way in",
+        young_modulus_pa=float(own.mean()),
+        young_modulus_ci95_pa=(low, high),
+        law=approach.law,
+        error=approach.error,
+        verdict=f"{approach.law} follows the way in best; {gone}",
+        parameters={"onset_m": bench.onset_m[bench.used].tolist()},
+        notes=(*notes, "fewer than 6 curves: none can be held out, so no effect is named"),
+        unknown=(*INDENTATION_UNKNOWN, "which effect, for want of curves"),
+    )

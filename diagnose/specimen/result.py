@@ -1,0 +1,65 @@
+"""What a bench test holds, and what it says of a material: a modulus, the law that predicts curves it has not
+seen, what it cannot tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagnose.specimen.bench import Curve
+from diagnose.verdict.result import Diagnosis
+from mechanics.result import Result
+from reconstruct.external.uniaxial import Uniaxial
+
+FLOORS = {
+    "relaxation": ("spring",),
+    "compression": ("linear",),
+    "tension": ("linear",),
+    "indentation": ("kelvin-voigt", "hunt-crossley"),
+}
+"""1D models, by kind of test."""
+
+
+@dataclass(frozen=True)
+class Tests:
+    """The curves of one kind: curves of an indentation, with the tip's radius; tests of compression or
+    tension; holds (t s, value) of relaxation. stated_modulus_pa: by the maker's own software, NaN where not
+    said."""
+
+    kind: str
+    curves: tuple[Curve, ...] = ()
+    tests: tuple[Uniaxial, ...] = ()
+    holds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
+    tip_radius_m: float | None = None
+    stated_modulus_pa: float = float("nan")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Material(Result):
+    """kind: of the test. curves: how many. young_modulus_pa with its 95 % interval (NaN where the test tells
+    none). law: what predicts best of those with physics; error: each predictor's held-out rms error over the
+    rms (of N, Pa): 1D models are the floor, 'regression' has no physics and is the ceiling. closed: share of
+    the gap beyond the noise that the verdict closes on held-out curves, with its interval. effects: what was
+    named. parameters: by law or effect, SI. unknown: what such a test cannot tell. seen: (x, measured,
+    predicted, axes' words). `plot`: measured and predicted. `show`: nothing, it has no place in space.
+    """
+
+    kind: str
+    files: tuple[str, ...]
+    curves: int
+    held_out: str
+    young_modulus_pa: float
+    young_modulus_ci95_pa: tuple[float, float]
+    law: str
+    error: dict[str, float]
+    verdict: str
+    effects: tuple[str, ...] = ()
+    closed: float | None = None
+    closed_ci95: tuple[float, float] | None = None
+    parameters: dict[str, Any] = field(default_factory=dict)
+    notes: tuple[str, ...] = ()
+    unknown: tuple[str, ...] = ()
+    seen: tuple[np.ndarray, np.ndarray, np.ndarray, str, str] | None = None
+    diagnosis: Diagnosis | None = None

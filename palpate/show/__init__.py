@@ -1,0 +1,145 @@
+"""How results look: in lines, as a plot (matplotlib), in 3D (PyVista), as an HTML page; one module a kind.
+
+A module has those of these functions that its result needs, each with the result first:
+
+    lines(result) -> list[str]             what `print` says, with units
+    as_json(result) -> dict                the figures of the command's --json
+    draw(result, ax)                       the one plot
+    place(result, plotter)                 into a 3D scene, device frame, m
+    view(result) -> View | None            the object to be turned, in pages and notebooks
+    report(result, path, **more) -> Path   the HTML page
+    save(result, path)                     what reads it back, where its own class does not write it
+
+`register(TYPE, module)` adds one. Importing this package lets every result know; a module is imported when a
+result of its type is first printed or drawn.
+"""
+
+from __future__ import annotations
+
+import importlib
+from collections.abc import Callable
+from pathlib import Path
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from mechanics.errors import OptionError
+from mechanics.result import Result, present_by
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from pyvista import Plotter
+
+    from palpate.show.view3d import View
+
+_KINDS: dict[str, str | ModuleType] = {
+    "mechanics.recording.Recording": "recording",
+    "mechanics.model.Model": "model",
+    "mechanics.calibration.Calibration": "calibration",
+    "reconstruct.pipeline.Reconstruction": "reconstruction",
+    "reconstruct.checks.checkup.Checkup": "check",
+    "render.press.Curve": "curve",
+    "render.replay.ReplayResult": "replay",
+    "diagnose.compare.comparison.Comparison": "comparison",
+    "diagnose.compare.before_after.Changes": "changes",
+    "diagnose.verdict.result.Diagnosis": "diagnosis",
+    "diagnose.specimen.result.Material": "material",
+    "scenes.laboratory.simulate.Simulation": "simulation",
+    "palpate.importing.imported.Imported": "imported",
+    "palpate.batching.summary.Batch": "batch",
+    "palpate.demo.DemoResult": "demo",
+}
+"""Type -> the module of this package that shows it."""
+
+
+def register(kind: type[Result], module: ModuleType) -> None:
+    """Let `module` show results of a type and of those derived from it."""
+    _KINDS[_name(kind)] = module
+
+
+def _name(kind: type) -> str:
+    return f"{kind.__module__}.{kind.__qualname__}"
+
+
+def _module_of(result: Result) -> ModuleType:
+    for kind in type(result).__mro__:
+        found = _KINDS.get(_name(kind))
+        if isinstance(found, str):
+            found = _KINDS[_name(kind)] = importlib.import_module(f"{__name__}.{found}")
+        if found is not None:
+            return found
+    name = type(result).__name__
+    raise OptionError(f"no module shows a {name}: palpate.show.register({name}, module) names one")
+
+
+def _function(result: Result, name: str, words: str) -> Callable[..., Any]:
+    found = getattr(_module_of(result), name, None)
+    if found is None:
+        raise OptionError(f"a {type(result).__name__} has no {words}")
+    return found
+
+
+class _Presenter:
+    """Asks the module of a result's type (`mechanics.result.Presenter`)."""
+
+    def lines(self, result: Result) -> list[str]:
+        return _function(result, "lines", "words")(result)
+
+    def as_json(self, result: Result) -> dict[str, Any]:
+        return _function(result, "as_json", "figures for JSON")(result)
+
+    def plot(self, result: Result, ax: Axes | None) -> Axes:
+        draw = _function(result, "draw", "plot")
+        if ax is None:
+            from matplotlib import pyplot
+
+            _, ax = pyplot.subplots(figsize=(8, 4), layout="constrained")
+        draw(result, ax)
+        return ax
+
+    def show(self, result: Result, plotter: Plotter | None, screenshot: str | Path | None) -> Plotter | None:
+        from mechanics.files import PNG, atomic_file
+        from palpate.show.notebook import in_notebook, show_view
+        from palpate.show.scenery import new_plotter
+
+        place = _function(result, "place", "place in space: use .plot()")
+        if plotter is not None:
+            place(result, plotter)
+            return plotter
+        view = self.view(result) if screenshot is None and in_notebook() else None
+        if view is not None:
+            show_view(view, result.lines()[0], self._picture(result))
+            return None
+        plotter = new_plotter(off_screen=screenshot is not None)
+        place(result, plotter)
+        if screenshot is None:
+            plotter.show()
+        else:
+            with atomic_file(screenshot, PNG) as temporary:
+                plotter.screenshot(str(temporary))
+        return plotter
+
+    def view(self, result: Result) -> View | None:
+        found = getattr(_module_of(result), "view", None)
+        return None if found is None else found(result)
+
+    def report(self, result: Result, path: Path | str, **more: Any) -> Path:
+        return _function(result, "report", "page")(result, path, **more)
+
+    def save(self, result: Result, path: Path | str) -> Any:
+        return _function(result, "save", "file of its own")(result, path)
+
+    def html(self, result: Result) -> str:
+        from palpate.show.notebook import words_and_picture
+
+        return words_and_picture(str(result), self._picture(result))
+
+    def _picture(self, result: Result) -> Figure:
+        from matplotlib.figure import Figure
+
+        figure = Figure(figsize=(7, 3.2), layout="constrained")
+        _function(result, "draw", "plot")(result, figure.subplots())
+        return figure
+
+
+present_by(_Presenter())

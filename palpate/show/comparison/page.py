@@ -1,0 +1,84 @@
+"""The comparison's page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from diagnose.compare.comparison import Comparison, verdict
+from diagnose.compare.models import HOMOGENEOUS, RIVALS
+from palpate.show.comparison.figures import DEPTH_M, across_region, by_press, compared, scatter, still, view
+from palpate.show.page import Page
+
+
+def report(result: Comparison, path: Path | str) -> Path:
+    """One self-contained page; returns its path."""
+    recording = result.recording
+    assert recording is not None, "only what `compare` returned knows its recording"
+    page = Page(f"Who predicts the next touch: {recording.name}")
+    words = verdict(result)
+    page.lead(words[:1].upper() + words[1:] + ".")
+    page.paragraph(meaning(result))
+    model = result.model.path or "MODEL"
+    page.next_step(
+        f"What to do next: feel it: `palpate touch {model} --beside hunt-crossley`; ask what the FEM still "
+        f"leaves out: `palpate diagnose {recording.path or 'REC'} --model {model}`."
+    )
+    page.view(
+        view(result),
+        still(result),
+        "Left: FEM's error at each press, held out of every fit. Right: the press that it predicts worst.",
+    )
+    page.paragraph(
+        "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
+        "paths. Errors are root mean squares of the force vector; the sensor's noise alone is "
+        f"{1e3 * result.noise_n:.0f} mN. The 1D models are fitted press by press and interpolated over the "
+        f"surface; FEM has one number for the whole object, its Young's modulus ({HOMOGENEOUS}), or a smooth "
+        "field of it where the presses that it is fitted to ask for one: they did in "
+        f"{sum(f is not None for f in result.fields)} of {len(result.fields)} folds."
+    )
+    page.heading("Held-out palpations and regions")
+    names = compared(result)
+    rows = [
+        [
+            "folds over sites",
+            len(result.presses),
+            *(1e3 * result.rmse_n[m] for m in names),
+            *("–" for _ in names),
+        ]
+    ]
+    for r in result.regions:
+        bias = [f"{100 * r.bias[m]:+.0f} %" for m in names]
+        rows.append([r.region.name, int(r.region.members.sum()), *(1e3 * r.rmse_n[m] for m in names), *bias])
+    page.table(["held out", "presses", *(f"{m} [mN]" for m in names), *(f"bias {m}" for m in names)], rows)
+    for r in result.regions:
+        page.paragraph(f"{r.region.name}: {r.region.words}.")
+    page.figure(by_press(result), "Held-out error of every press (folds over sites), sorted by FEM's.")
+    page.figure(scatter(result), "Normal force, predicted against measured, every held-out contact sample.")
+    for r in result.regions:
+        if r.region.name in ("top-centre", "base-band"):
+            page.figure(
+                across_region(result, r.region.members),
+                f"Force at {DEPTH_M * 1e3:g} mm by place with {r.region.name} left out of every fit; "
+                "red: the left-out presses as measured.",
+            )
+    page.heading("What each model is made for")
+    page.paragraph(
+        "The 1D models need no mesh and no base, and cost nothing to compute; inside a dense cloud of "
+        "touches they follow the object. Where nobody touched they repeat what the nearest touches felt, "
+        "and they have no tangential force. FEM carries shape and base to untouched places, and is as "
+        "good as the shape."
+    )
+    return page.write(path)
+
+
+def meaning(result: Comparison) -> str:
+    """What the errors mean for a hand, in a sentence or two."""
+    best = min(RIVALS, key=lambda name: result.rmse_n[name])
+    fem, other, noise = (1e3 * v for v in (result.rmse_n["fem"], result.rmse_n[best], result.noise_n))
+    words = (
+        f"At a place that it has not seen the FEM is {fem:.0f} mN off, {best} {other:.0f} mN, of which the "
+        f"sensor's noise is {noise:.0f} mN."
+    )
+    if result.rmse_n["fem"] < 1.3 * result.noise_n:
+        words += " The FEM's share of its error is smaller than what the sensor can tell."
+    return words

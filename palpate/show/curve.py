@@ -1,0 +1,75 @@
+"""A force response: force over depth, the object as it is deformed at the deepest."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechanics.errors import OptionError
+from render.base import Renderer
+from render.press import Curve
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
+
+
+def lines(result: Curve) -> list[str]:
+    """What `print` says, with units."""
+    depth = float(result.depth.max())
+    if result.renderer is None:
+        return [f"a curve that was read: {result.peak_force_n:.4g} N at most, {depth * 1e3:.3g} mm deep"]
+    normal = ", ".join(f"{float(v) + 0.0:.3g}" for v in np.asarray(result.normal))
+    return [
+        f"{result.renderer.name}: {result.peak_force_n:.4g} N at most; at {depth * 1e3:.3g} mm the force "
+        f"on the tool is {', '.join(f'{f:.4g}' for f in result.force_at(depth))} N",
+        f"  normal there ({normal}); {len(result.t)} samples in {result.t[-1]:.3g} s",
+    ]
+
+
+def as_json(result: Curve) -> dict[str, Any]:
+    """The figures of `palpate press --json`, keys with units."""
+    depth = float(result.depth.max())
+    return {
+        "renderer": _renderer(result).name,
+        "normal": result.normal,
+        "depth_m": depth,
+        "force_at_depth_n": result.force_at(depth),
+        "peak_force_n": result.peak_force_n,
+    }
+
+
+def draw(result: Curve, ax: Axes) -> None:
+    """Force along the normal, and its length, over depth."""
+    touching = result.depth > 0
+    depth = result.depth[touching] * 1e3
+    ax.plot(depth, result.force[touching] @ result.normal, color="#1d3557", label="along the normal")
+    size = np.linalg.norm(result.force[touching], axis=1)
+    ax.plot(depth, size, "--", lw=1, color="#e08e1b", label="magnitude")
+    ax.set(xlabel="depth [mm]", ylabel="force on the tool [N]", title=_renderer(result).name)
+    ax.set_xlim(left=0)
+    ax.set_ylim(bottom=0)
+    ax.legend(frameon=False, loc="upper left")
+
+
+def place(result: Curve, plotter: Plotter) -> None:
+    """The object as it is deformed at the deepest, with tip and force."""
+    from palpate.show.scenery import add_deformed, add_force, add_path, add_tip
+
+    renderer, radius, last = _renderer(result), result.tip_radius_m, result.deepest + 1
+    assert radius is not None
+    state = renderer.start([radius])
+    steps = np.diff(result.t[:last], prepend=result.t[0] - (result.t[1] - result.t[0]))
+    renderer.follow(state, np.ascontiguousarray(result.position[:last, None]), steps)
+    add_deformed(plotter, renderer, renderer.displacement(state))
+    add_path(plotter, result.position[:last])
+    centre, force = result.position[result.deepest], result.force[result.deepest]
+    add_tip(plotter, centre, radius)
+    add_force(plotter, centre + radius * np.asarray(result.normal), force)
+
+
+def _renderer(result: Curve) -> Renderer:
+    if result.renderer is None:
+        raise OptionError("a curve that was read knows no renderer: press the model to draw it")
+    return result.renderer

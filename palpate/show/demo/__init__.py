@@ -1,0 +1,160 @@
+"""The demo's report: what was touched, what was reconstructed, how its force compares, how the loop ran."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.axes import Axes
+from pyvista import Plotter
+
+from diagnose.verdict.result import Diagnosis
+from palpate.demo import DemoResult
+from palpate.servo.report import ServoReport
+from palpate.show import model as made
+from palpate.show.demo.figures import figures, view
+from palpate.show.diagnosis.gaps import known
+from palpate.show.page import Page, save_figures
+from palpate.show.reconstruction.exploration import force_over_time
+
+__all__ = ["as_json", "draw", "lines", "place", "report", "view"]
+
+
+def lines(result: DemoResult) -> list[str]:
+    """What `print` says, with units."""
+    model = result.model
+    return [
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa from {len(model.presses)} presses",
+        f"rendered against measured force: {result.replay_rmse_n:.3f} N rms of "
+        f"{result.contact_force_rms_n:.3f} N rms",
+        str(result.servo),
+        *([f"diagnosis: {result.diagnosis.summary}"] if result.diagnosis else []),
+    ]
+
+
+def as_json(result: DemoResult) -> dict[str, Any]:
+    """The figures of `palpate demo --json`."""
+    material = result.model.material
+    return {
+        "young_modulus_pa": material.young_modulus_pa,
+        "young_modulus_ci95_pa": material.young_modulus_ci95_pa,
+        "replay_rmse_n": result.replay_rmse_n,
+        "servo": result.servo.as_dict(),
+        "seconds": result.seconds,
+        "diagnosis": diagnosis_json(result.diagnosis),
+    }
+
+
+def diagnosis_json(diagnosis: Diagnosis | None) -> dict[str, Any] | None:
+    """The diagnosis's answer, by the keys of `palpate diagnose --json`; None where none was made."""
+    if diagnosis is None:
+        return None
+    whole = diagnosis.as_json()
+    return {key: whole[key] for key in ("verdict", "noise_n", "gap_before_n", "gap_after_n", "gap_closed")}
+
+
+def draw(result: DemoResult, ax: Axes) -> None:
+    """Force over time with the touches that were found."""
+    force_over_time(ax, result.reconstruction.exploration)
+
+
+def place(result: DemoResult, plotter: Plotter) -> None:
+    """The model."""
+    made.place(result.model, plotter)
+
+
+def report(result: DemoResult, path: Path | str) -> Path:
+    """Write the page, and its pictures as PNGs beside it; returns the page's path."""
+    path = Path(path)
+    folder = path.parent
+    model, servo = result.model, result.servo
+    low, high = (v / 1e3 for v in model.material.young_modulus_ci95_pa)
+    page = Page(f"Palpate: {result.recording.object_name}, touched and felt")
+    page.lead(
+        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
+        f"(95 % interval {low:.1f} to {high:.1f} kPa{_truth(result)}) that feels like the object to "
+        f"{1e3 * result.replay_rmse_n:.0f} mN, of {1e3 * result.contact_force_rms_n:.0f} mN in a touch."
+    )
+    page.paragraph(
+        f"{_meaning(result)} The loop that a hand would feel held {servo.rate_hz:.0f} Hz with "
+        f"{servo.missed_ticks} ticks missed."
+    )
+    page.next_step(f"What to do next: feel it: `palpate touch {model.path or folder / 'model'}`.")
+    drawn = figures(result)
+    saved = save_figures(folder, drawn)
+    for figure in drawn.values():
+        plt.close(figure)
+    page.view(
+        view(result),
+        saved["object"],
+        "Left: contact points and fixed base. Right: how uncertain the shape is.",
+    )
+    page.paragraph(
+        f"Surface: {result.reconstruction.surface.method}; {result.reconstruction.surface.reason}."
+    )
+    page.heading("What the hand did")
+    page.figure(saved["force"], "Force over time: the base is traced in phase I; circles are first touches.")
+    page.heading("Measured against rendered")
+    page.figure(
+        saved["presses"], "Four presses, from the softest to the hardest, replayed through the renderer."
+    )
+    if result.diagnosis is not None:
+        page.heading("What a simpler simulation would leave out")
+        page.paragraph(diagnosis_words(result))
+    page.heading("The 1 kHz loop")
+    page.paragraph(f"{str(servo).replace(chr(10), '; ')}. {sent_words(servo)}".strip())
+    page.figure(saved["servo"], "Every tick of the servo process against the simulated hand.")
+    page.heading("Time")
+    page.table(["stage", "time [s]"], [[name, round(s, 1)] for name, s in result.seconds.items()])
+    return page.write(path)
+
+
+def _meaning(result: DemoResult) -> str:
+    noise = result.reconstruction.exploration.noise_n * np.sqrt(3.0)
+    ratio = result.replay_rmse_n / noise
+    compared = "as small as" if ratio < 1.1 else f"{ratio:.1f} times"
+    return f"That difference is {compared} the sensor's own noise ({1e3 * noise:.0f} mN)."
+
+
+def diagnosis_words(result: DemoResult) -> str:
+    """What the diagnosis found, and which of the two simulations it is about."""
+    found, law = result.diagnosis, result.model.material.dent_law
+    assert found is not None
+    deep = law != "linear"
+    words = (
+        "Two simulations are compared with the hand here. The renderer, whose curves stand above, uses the "
+        f"dent law that the presses fit best ({law}). The diagnosis starts from the simplest one, linear and "
+        f"for small strain, and asks what that leaves out: {found.summary}. At places that it was not fitted "
+        f"to, the simplest simulation is {1e3 * found.gap_before_n:.0f} mN off"
+    )
+    if found.effects:
+        words += f", with what was found {1e3 * found.gap_after_n:.0f} mN"
+    words += f"; the sensor's noise is {1e3 * found.noise_n:.0f} mN."
+    if deep and known() in found.effects:
+        words += " Finite strain is in the rendered curves already: that is what the law stands for."
+    rest = [name.replace("_", " ") for name in found.effects if not (deep and name == known())]
+    if rest:
+        words += f" The rendered curves do not have {' and '.join(rest)}: what to do about that stands in "
+        words += f"the page of `palpate diagnose {result.recording.path or 'REC'} --report PAGE.html`."
+    return words
+
+
+def sent_words(servo: ServoReport) -> str:
+    """Why the device was sent another greatest force than was rendered, '' where it was not."""
+    more = servo.peak_force_n - servo.peak_rendered_n
+    if abs(more) < 0.01:
+        return ""
+    if more > 0:
+        return (
+            f"The {more:.2f} N more that were sent than rendered are damping: where a held sample would give "
+            "the hand energy back, the passivity controller resists the motion. It took "
+            f"{1e3 * servo.energy_damped_j:.1f} mJ in all."
+        )
+    return f"The {-more:.2f} N less that were sent than rendered were held back by the safety filter."
+
+
+def _truth(result: DemoResult) -> str:
+    truth = (result.recording.truth or {}).get("young_modulus_pa")
+    return f"; the truth is {truth / 1e3:.1f} kPa" if truth else ""

@@ -1,0 +1,126 @@
+"""The demo's pictures and view: what was touched, measured against rendered force, the servo's ticks."""
+
+from __future__ import annotations
+
+import matplotlib.pyplot as plt
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
+
+from palpate.demo import DemoResult
+from palpate.servo.histogram import lower_edge_ns
+from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
+from palpate.show.object3d import Colours, draw_object
+from palpate.show.quantities import ERROR, UNCERTAINTY
+from palpate.show.reconstruction.exploration import force_over_time
+from palpate.show.view3d import View
+from palpate.show.view3d_parts import Colouring, Line
+from reconstruct.steps.s6_one_d.uniaxial import low_passed
+from render.felt import felt_surface
+
+SHOWN_PRESSES = 4
+_STEP_S = 0.05
+"""Between samples of one press of a diagnosis; what is longer lies between presses."""
+
+
+def measured_against_rendered(axes: np.ndarray, result: DemoResult) -> np.ndarray:
+    """Force along the normal over depth, measured and rendered, of presses spread over the peak force."""
+    presses = result.model.presses
+    shown = low_passed(presses)
+    push = [shown.push[shown.rows([i])].max() for i in range(len(presses))]
+    chosen = np.argsort(push)[np.linspace(0, len(push) - 1, len(axes)).round().astype(int)]
+    curves, smooth = presses.window(0.03, 0.03), shown.window(0.03, 0.03)
+    for ax, i in zip(axes, chosen, strict=True):
+        own = curves.rows([i])
+        depth, at = smooth.depth[own] * 1e3, np.searchsorted(result.recording.t, curves.t[own])
+        rendered = result.rendered_n[at] @ presses.normal[i]
+        ax.plot(depth, curves.push[own], ".", ms=1, color="#a8bccb", label="measured")
+        ax.plot(depth, rendered, lw=1.5, color="#c1121f", label="rendered")
+        ax.set(title=f"press {i + 1}", xlabel="depth [mm]")
+    axes[0].set_ylabel("force along the normal [N]")
+    axes[0].legend(loc="upper left", frameon=False, markerscale=8)
+    return axes
+
+
+def view(result: DemoResult) -> View:
+    """The object; each press as measured, as rendered, and as the diagnosis's ideal simulation."""
+    model, recording = result.model, result.recording
+    shown = low_passed(model.presses).window(0.03, 0.03)
+    at = np.searchsorted(recording.t, shown.t).clip(0, len(recording.t) - 1)
+    off = result.rendered_n[at] - shown.force
+    each = rms_by_press(shown, off)
+    lines = [
+        Line("measured", local(shown, shown.force), "measured"),
+        Line("rendered", local(shown, result.rendered_n[at]), "rendered"),
+        *_simulated(result, shown.t),
+    ]
+    error = Colouring(
+        ERROR,
+        None,
+        each,
+        "Rendered less measured, root mean square over each press; between presses what is near.",
+    )
+    first, *others = usual_colourings(model)
+    return view_of_presses(model, shown, [first, error, *others], lines, int(np.argmax(each)))
+
+
+def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
+    """The diagnosis's own simulations at times t (n,) s: the ideal one, and with what was found."""
+    found = result.diagnosis
+    if (
+        found is None
+        or found.forward is None
+        or found.residual_before is None
+        or found.residual_after is None
+    ):
+        return []
+    touches = found.forward.touches
+    following = np.searchsorted(touches.t, t).clip(1, len(touches.t) - 1)
+    between = touches.t[following] - touches.t[following - 1] > _STEP_S
+    lines = []
+    for name, residual, kind in (
+        ("ideal simulation (linear, small strain)", found.residual_before, "effect"),
+        ("simulation with what was found", found.residual_after, "found"),
+    ):
+        force = touches.local_force - residual
+        seen = np.stack([np.interp(t, touches.t, axis, np.nan, np.nan) for axis in force.T], axis=1)
+        lines.append(Line(name, np.where(between[:, None], np.nan, seen), kind, False))
+    return lines if found.effects else lines[:1]
+
+
+def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
+    """Compute time and lateness of every tick, logarithmic counts."""
+    for ax, histogram, name in (
+        (axes[0], result.servo.compute, "compute time of a tick [µs]"),
+        (axes[1], result.servo.lateness, "start after the deadline [µs]"),
+    ):
+        lower_us = np.array([lower_edge_ns(i) for i in range(len(histogram.counts) + 1)]) / 1e3
+        used = np.flatnonzero(histogram.counts)
+        least = max(lower_us[used[0]], 0.1) if len(used) else 0.1
+        edges = np.geomspace(least, max(histogram.greatest_ns / 1e3, 2 * least) * 1.05, 41)
+        counts, _ = np.histogram(lower_us[:-1].clip(least), edges, weights=histogram.counts)
+        ax.stairs(counts, edges, fill=True, color="#457b9d")
+        ax.set(xlabel=name, ylabel="ticks", yscale="log", xscale="log", xlim=(edges[0], edges[-1]))
+        wide = edges[-1] > 300 * edges[0]
+        ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
+        ax.xaxis.set_major_formatter("{x:g}")
+        ax.xaxis.set_minor_formatter(NullFormatter())
+    return axes
+
+
+def figures(result: DemoResult) -> dict[str, Figure]:
+    """The report's pictures by name."""
+    force, ax = plt.subplots(figsize=(9, 3), layout="constrained")
+    force_over_time(ax, result.reconstruction.exploration)
+    thing, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    model = result.model
+    touches = model.presses.point
+    draw_object(axes[0], model, touches=touches, show_base=True)
+    axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
+    doubt = felt_surface(model).uncertainty_m
+    draw_object(axes[1], model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
+    presses, axes = plt.subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True, layout="constrained")
+    measured_against_rendered(axes, result)
+    loop, axes = plt.subplots(1, 2, figsize=(9, 2.6), layout="constrained")
+    servo_histogram(axes, result)
+    return {"force": force, "object": thing, "presses": presses, "servo": loop}

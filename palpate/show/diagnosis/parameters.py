@@ -1,0 +1,97 @@
+"""Parameters of effects in words, with units that a hand knows."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from diagnose.verdict.result import Diagnosis
+from mechanics.quantities import read_unit, split_key
+
+WORDS = {
+    "mu": "friction coefficient",
+    "g": "extra force right after a fast press, shares of the lasting force",
+    "tau_s": "that extra force fades within",
+    "share": "extra force right after a fast press, share of the lasting force",
+    "exponent": "it fades by this power of time",
+    "diffusivity_m2_per_s": "fluid drains at",
+    "work_j_per_m2": "work to separate the surfaces",
+    "healed": "share of it that pulls on first touch",
+    "c20_over_c10": "stiffening (c20 over c10; below 0 it softens)",
+    "r": "softening on repeats (r; smaller is more)",
+    "m_rel": "width of the softening (m, of the greatest load)",
+    "matrix": "reading per true force, 3 x 3",
+    "tip_radius_m": "radius of the tip",
+    "poisson_ratio": "Poisson's ratio",
+    "centre_m": "middle at",
+    "radius_m": "radius",
+    "modulus_ratio": "stiffness relative to the rest, times",
+    "thickness_m": "thickness",
+    "ratio_base": "stiffness at the base, times the mean",
+    "ratio_top": "stiffness at the top, times the mean",
+    "k_normal_pa_per_m": "support's stiffness, pressed",
+    "k_tangential_pa_per_m": "support's stiffness, sideways",
+    "bonded_fraction": "share of the base that holds",
+    "direction": "the loose part lies towards",
+    "pull_off_n": "greatest pull",
+    "range_m": "felt up to this distance",
+    "inside": "share of it that holds within the contact too",
+    "stiffness_n_per_m": "the tool's stiffness",
+    "bias_n": "reading in free air, x y z",
+    "rate_n_per_s": "zero drifts by, x y z",
+    "mass_kg": "mass beyond the sensor",
+    "delay_s": "force reads late by",
+    "width_m": "width of the play",
+    "shift_m": "shift, x y z",
+    "rotation_rad": "turn, x y z",
+}
+MOST_NUMBERS = 12
+"""Of a list that are written out; of longer ones the least and the greatest."""
+
+
+def plain_key(key: str) -> tuple[str, float, str]:
+    """(words, factor from SI, unit) of a parameter's key, in units that a hand knows."""
+    name, si = split_key(key)
+    unit, factor = read_unit(si)
+    return WORDS.get(key, name.replace("_", " ")), factor, unit
+
+
+def number(value: Any, factor: float = 1.0) -> str:
+    """A parameter's value, or a list of values, to three digits."""
+    if isinstance(value, list) and len(value) == 1:
+        return number(value[0], factor)
+    if isinstance(value, list) and len(value) > MOST_NUMBERS:
+        least, most = (number(float(f(value)), factor) for f in (np.min, np.max))
+        return f"{least} to {most} ({len(value)} values)"
+    if isinstance(value, list):
+        return "(" + ", ".join(number(v, factor) for v in value) + ")"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, (int, float)):
+        return str(value)
+    scaled = value * factor
+    return f"{scaled:.0f}" if 100 <= abs(scaled) < 1e5 else f"{scaled:.2g}" if abs(scaled) < 1 else (
+        f"{scaled:.3g}"
+    )  # fmt: skip
+
+
+def short(parameters: dict[str, Any]) -> str:
+    """Parameters in one line."""
+    said = []
+    for key, value in parameters.items():
+        words, factor, unit = plain_key(key)
+        said.append(f"{words} {number(value, factor)} {unit}".strip())
+    return ", ".join(said)
+
+
+def parameter_rows(result: Diagnosis) -> list[list[str]]:
+    """Effect, quantity, value, 95 % interval and unit of what was named."""
+    rows = []
+    for entry in result.entries:
+        for key, value in entry.parameters.items() if entry.name in result.effects else ():
+            words, factor, unit = plain_key(key)
+            low, high = entry.intervals.get(key, (None, None))
+            span = "-" if low is None else f"{number(low, factor)} to {number(high, factor)}"
+            rows.append([entry.name.replace("_", " "), words, number(value, factor), span, unit])
+    return rows

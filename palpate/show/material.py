@@ -1,0 +1,69 @@
+"""The material that a bench test told: modulus, law, held-out errors."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnose.specimen.result import Material
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+
+def lines(result: Material) -> list[str]:
+    """What `print` says, with units."""
+    text = [f"{result.kind}: {result.curves} curve{'s' * (result.curves != 1)}; {result.verdict}"]
+    if np.isfinite(result.young_modulus_pa):
+        low, high = result.young_modulus_ci95_pa
+        between = f" (95 % interval {low:.4g} to {high:.4g} Pa)" if np.isfinite(low) else ""
+        text.append(f"Young's modulus {result.young_modulus_pa:.4g} Pa{between}")
+    ranked = sorted(result.error.items(), key=lambda item: item[1])
+    text.append(f"held out ({result.held_out}): " + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked))
+    if result.closed is not None and result.closed_ci95 is not None:
+        low, high = result.closed_ci95
+        text.append(f"closed {result.closed:.0%} of the gap (95 % interval {low:.0%} to {high:.0%})")
+    text += [f"  {name}: {value}" for name, value in result.parameters.items()]
+    text += [f"  {note}" for note in result.notes]
+    if result.unknown:
+        text.append(f"not told by such a test: {', '.join(result.unknown)}")
+    return text
+
+
+def as_json(result: Material) -> dict[str, Any]:
+    """The figures of `palpate material --json`."""
+    finite = np.isfinite(result.young_modulus_pa)
+    return {
+        "kind": result.kind,
+        "files": list(result.files),
+        "curves": result.curves,
+        "held_out": result.held_out,
+        "young_modulus_pa": result.young_modulus_pa if finite else None,
+        "young_modulus_ci95_pa": (
+            list(result.young_modulus_ci95_pa) if np.isfinite(result.young_modulus_ci95_pa).all() else None
+        ),
+        "law": result.law,
+        "relative_error": result.error,
+        "verdict": result.verdict,
+        "effects": list(result.effects),
+        "gap_closed": result.closed,
+        "gap_closed_ci95": None if result.closed_ci95 is None else list(result.closed_ci95),
+        "parameters": result.parameters,
+        "notes": list(result.notes),
+        "unknown": list(result.unknown),
+    }
+
+
+def draw(result: Material, ax: Axes) -> None:
+    """Measured and predicted, else the held-out errors."""
+    if result.seen is None:
+        names, values = zip(*sorted(result.error.items(), key=lambda item: item[1]), strict=True)
+        ax.barh(names, [100 * v for v in values])
+        ax.set(xlabel="held-out error [%]")
+        return
+    x, measured, predicted, across, up = result.seen
+    ax.plot(x, measured, ".", ms=2, color="#c1121f", label="measured")
+    ax.plot(x, predicted, "-", lw=1, color="#1d3557", label=result.law)
+    ax.set(xlabel=across, ylabel=up)
+    ax.legend(frameon=False)

@@ -1,0 +1,113 @@
+"""A reconstruction: how the model came about, and the paper's figures and tables, remade."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from pyvista import Plotter
+
+from palpate.show import model as made
+from palpate.show.reconstruction.exploration import force_over_time
+from palpate.show.reconstruction.page import report, view
+from reconstruct.pipeline import Reconstruction
+
+__all__ = ["as_json", "draw", "lines", "place", "report", "view"]
+
+_NAMED = 12
+
+
+def lines(result: Reconstruction) -> list[str]:
+    """What `print` says, with units."""
+    model, exploration, surface = result.model, result.exploration, result.surface
+    quality = result.meshing.report
+    low, high = model.material.young_modulus_ci95_pa
+    not_used = [*exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
+    more = len(not_used) - _NAMED
+    lines = [
+        f"{exploration.recording.name}: {len(exploration.presses)} palpations"
+        + (f", {len(not_used)} contacts not used:" if not_used else ""),
+        *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
+        *([f"  and {more} more (as_json, or --json, names all)"] if more > 0 else []),
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
+        f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
+    ]
+    lines += [f.line() for f in result.findings]
+    if result.modulus:
+        misfit = float((result.modulus.press.rms_n**2).mean() ** 0.5)
+        lines.append(f"  {result.modulus.reason}; misfit of a press {misfit:.3f} N")
+    if exploration.delay_s:
+        lines.append(
+            f"the force reads {exploration.delay_s * 1e3:.0f} +- {exploration.delay_error_s * 1e3:.1f} "
+            "ms late (first against last touch); corrected before everything else"
+        )
+    lines += [
+        f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
+        *(f"  {note}" for note in (result.placed.notes if result.placed else ())),
+        f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
+        f"l = {model.mesh_size_m * 1e3:g} mm; radius-edge ratio {_spread(quality.radius_edge_ratio)}, "
+        f"distance to the surface {_spread(1e3 * quality.surface_distance_m)} mm (50, 95, 100 %)",
+    ]
+    return lines
+
+
+def as_json(result: Reconstruction) -> dict[str, Any]:
+    """The figures of `palpate reconstruct --json`, keys with units."""
+    model, exploration, fit = result.model, result.exploration, result.modulus
+    figures = {
+        "method": model.provenance["method"],
+        "young_modulus_pa": model.material.young_modulus_pa,
+        "young_modulus_ci95_pa": model.material.young_modulus_ci95_pa,
+        "poisson_ratio": model.material.poisson_ratio,
+        "palpations": len(exploration.presses),
+        "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
+        "findings": [f.as_json() for f in result.findings],
+        "noise_n": exploration.noise_n,
+        "force_delay_s": exploration.delay_s,
+        "force_delay_sd_s": exploration.delay_error_s,
+        "surface": {
+            "method": result.surface.method,
+            "reason": result.surface.reason,
+            "volume_m3": result.surface.volume_m3,
+        },
+        "geometry": {**result.placed.about, "notes": list(result.placed.notes)} if result.placed else None,
+        "mesh": {
+            "radius_edge_ratio": _percentiles(result.meshing.report.radius_edge_ratio),
+            "surface_distance_m": _percentiles(result.meshing.report.surface_distance_m),
+            "volume_m3": result.meshing.report.volume_m3,
+        },
+        "press_modulus_pa": result.press_modulus_pa,
+        "seconds": result.seconds,
+    }
+    if fit:
+        figures |= {
+            "dent_law": fit.press.law,
+            "by_law": {
+                k: {"young_modulus_pa": e, "misfit_n": m, "share": s} for k, (e, m, s) in fit.by_law.items()
+            },
+            "by_depth": [{"depth_m": d, "young_modulus_pa": e, "consistent": c} for d, e, c in fit.by_depth],
+            "between_sites": fit.between,
+            "shape_error": fit.shape_error,
+        }
+    if result.paper_fit:
+        figures["not_used"] = [{"t_s": t, "reason": reason} for t, reason in result.paper_fit.not_used]
+    return figures
+
+
+def draw(result: Reconstruction, ax: Axes) -> None:
+    """Force over time with the touches that were found."""
+    force_over_time(ax, result.exploration)
+
+
+def place(result: Reconstruction, plotter: Plotter) -> None:
+    """The model."""
+    made.place(result.model, plotter)
+
+
+def _percentiles(values: np.ndarray) -> dict[str, float]:
+    return {name: float(np.percentile(values, at)) for name, at in (("p50", 50), ("p95", 95), ("max", 100))}
+
+
+def _spread(values: np.ndarray) -> str:
+    return " / ".join(f"{v:.2f}" for v in _percentiles(values).values())

@@ -1,0 +1,249 @@
+"""The report of a reconstruction: the paper's figures and table, remade from a recording, beside its
+numbers."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from matplotlib import pyplot as plt
+from matplotlib.figure import Figure
+
+from mechanics.model import Model
+from mechanics.touch import forces_at
+from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
+from palpate.show.object3d import Colours, draw_object
+from palpate.show.page import Page, save_figures
+from palpate.show.quantities import ERROR, MODULUS
+from palpate.show.reconstruction.differences import differences
+from palpate.show.reconstruction.exploration import exploration_figures
+from palpate.show.reconstruction.modulus import (
+    depth_figure,
+    height_trends,
+    moduli_figure,
+    over_surface,
+    quality_histogram,
+    spatial_figure,
+    undamped_figure,
+)
+from palpate.show.reconstruction.tables import (
+    one_d_table,
+    point_load_table,
+    speed_table,
+    table_one,
+    trends_table,
+)
+from palpate.show.view3d import View
+from palpate.show.view3d_parts import Colouring, Line
+from reconstruct.pipeline import Reconstruction
+from reconstruct.steps.s6_one_d.one_d import low_passed
+
+
+def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | None = None) -> Path:
+    """Write the page, and its figures as PNGs into the folder PATH without suffix; returns the page's path.
+
+    A path without suffix gets '.html': its own name is the folder's.
+    beside: other models by name, drawn beside in Figures 4 and 6 and in Table 1.
+    """
+    path = Path(path)
+    path = path if path.suffix else path.with_suffix(".html")
+    figures = _figures(result, beside or {})
+    save_figures(path.with_suffix(""), figures)
+    page = Page(f"Reconstruction of {result.exploration.recording.name}")
+    _summary(page, result)
+    page.view(
+        view(result), figures["object"],
+        "Left: first touches and fixed base. Right: the modulus of single presses, and where.",
+    )  # fmt: skip
+    _how(page, result)
+    page.heading("Exploration and geometry")
+    page.figure(
+        figures["figure-2"], "Force magnitude, first touches (o) and peaks (+) (the paper's Figure 2)."
+    )
+    page.figure(
+        figures["figure-3abc"],
+        "(a) First touches (+) and base outline with its farthest-point sample (o); (b) mesh, fixed base "
+        "nodes and the nodes nearest to the contacts, in order; (c) force over depth of every palpation (the "
+        "paper's Figure 3).",
+    )
+    _not_used(page, result)
+    page.figure(figures["figure-mesh"], _mesh_words(result))
+    page.heading("1D models")
+    page.figure(figures["figure-3d"], "Kelvin-Voigt and Hunt-Crossley parameters (the paper's Figure 3(d)).")
+    page.figure(figures["figure-4"], "Without damping; k_H at the mean exponent (the paper's Figure 4).")
+    one_d_table(page, result)
+    page.heading("Where the parameters hold")
+    page.figure(
+        figures["figure-5"],
+        "Above, k_V over the surface (radial basis functions through the presses, dots); below, k_V, k_H and "
+        "e over height on the side, relative to their means and on one scale (the paper's Figure 5).",
+    )
+    trends_table(page, height_trends(result.model))
+    page.heading("Modulus")
+    page.figure(
+        figures["figure-6"],
+        "(a) Moduli of single palpations, * the global one with its 95 % interval; (b) where (the paper's "
+        "Figure 6).",
+    )
+    page.table(*table_one(result, beside or {}))
+    if "figure-depth" in figures:
+        page.figure(figures["figure-depth"], "Global modulus from samples up to a greatest depth.")
+    point_load_table(page, result)
+    page.heading("Where this differs from the paper, and why")
+    for words in differences(result):
+        page.paragraph(words)
+    speed_table(page, result)
+    return page.write(path)
+
+
+def view(result: Reconstruction) -> View:
+    """The object; each press as measured and as the model with its one modulus answers the same path."""
+    model = result.model
+    shown = low_passed(model.presses).window(0.03, 0.03)
+    colourings, lines = usual_colourings(model), [Line("measured", local(shown, shown.force), "measured")]
+    selected = 0
+    if result.sites is not None and result.modulus is not None:
+        force = forces_at(
+            result.sites,
+            shown.displacement,
+            shown.starts,
+            young_modulus_pa=result.modulus.modulus_pa,
+            tip_radius_m=shown.tip_radius_m,
+            law=result.modulus.press.law,
+        )
+        lines.append(Line("model with one modulus", local(shown, force)))
+        each = rms_by_press(shown, force - shown.force)
+        words = (
+            "Model less measured, root mean square over each press, which the modulus was fitted to; between "
+            "presses what is near."
+        )
+        colourings.insert(1, Colouring(ERROR, None, each, words))
+        selected = int(np.argmax(each))
+    return view_of_presses(model, shown, colourings, lines, selected)
+
+
+def object_figure(model: Model) -> Figure:
+    """First touches and fixed base; the modulus of single presses over the surface."""
+    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    touches = model.presses.point
+    draw_object(axes[0], model, touches=touches, show_base=True)
+    axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
+    own = model.presses.fits["e_pa"]
+    if np.isfinite(own).any():
+        values = own[np.isfinite(own)] * MODULUS.scale
+        limits = MODULUS.limits(values.min(), values.max())
+        colours = Colours(over_surface(model, own * MODULUS.scale), MODULUS, limits)
+        draw_object(axes[1], model, colours, touches=touches[np.isfinite(own)])
+    else:
+        axes[1].set_axis_off()
+    return figure
+
+
+def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figure]:
+    models = {result.exploration.recording.name: result.model, **beside}
+    figures = exploration_figures(result)
+    figures["object"] = object_figure(result.model)
+    figures["figure-4"] = undamped_figure(models)
+    figures["figure-5"] = spatial_figure(
+        result.model, result.exploration.recording.name, next(iter(beside.items()), None)
+    )
+    figures["figure-6"] = moduli_figure(models)
+    report = result.meshing.report
+    quality, axes = plt.subplots(1, 3, figsize=(12, 2.8), layout="constrained")
+    quality_histogram(axes[0], report.radius_edge_ratio, "radius-edge ratio", 2.0)
+    quality_histogram(
+        axes[1], report.edge_m * 1e3, "edge length [mm]", result.model.mesh_size_m * 1e3, "wanted"
+    )
+    quality_histogram(axes[2], report.surface_distance_m * 1e3, "distance to the surface [mm]", 2.0)
+    figures["figure-mesh"] = quality
+    if result.modulus and result.modulus.by_depth:
+        figures["figure-depth"] = depth_figure(result.modulus)
+    return figures
+
+
+def _summary(page: Page, result: Reconstruction) -> None:
+    model = result.model
+    low, high = model.material.young_modulus_ci95_pa
+    page.lead(
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
+        f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations."
+    )
+    page.paragraph(_meaning(result))
+    where, recording = model.path or "MODEL", result.exploration.recording.path or "REC"
+    page.next_step(
+        f"What to do next: feel it: `palpate touch {where}`; see what it leaves out: "
+        f"`palpate diagnose {recording} --model {where} --report PAGE.html`."
+    )
+    for finding in result.findings:
+        page.paragraph(finding.line())
+
+
+def _meaning(result: Reconstruction) -> str:
+    """What the modulus and its interval mean, in a sentence or two."""
+    model = result.model
+    e, (low, high) = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
+    words = f"About as soft as {_soft_as(e)}."
+    if np.isfinite([low, high]).all():
+        words += (
+            f" Another exploration of the same object would be expected to find a modulus within "
+            f"{100 * max(high / e - 1, 1 - low / e):.0f} % of this one."
+        )
+    if result.modulus:
+        misfit = float(np.sqrt((result.modulus.press.rms_n**2).mean()))
+        words += f" One number for the whole object leaves {1e3 * misfit:.0f} mN of a press unexplained."
+    return words
+
+
+_SOFTNESS = (
+    (2e3, "fat tissue or a soft jelly"),
+    (8e3, "liver"),
+    (20e3, "relaxed muscle"),
+    (60e3, "a very soft silicone, or tensed muscle"),
+    (300e3, "a soft rubber"),
+    (np.inf, "a firm rubber, or stiffer"),
+)
+"""Up to a modulus, Pa: what is about as soft. Orders of magnitude of elastography and of data sheets."""
+
+
+def _soft_as(modulus_pa: float) -> str:
+    return next(words for limit, words in _SOFTNESS if modulus_pa <= limit)
+
+
+def _how(page: Page, result: Reconstruction) -> None:
+    surface = result.surface
+    page.paragraph(
+        f"Surface: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. Force "
+        "noise "
+        f"{result.exploration.noise_n * 1e3:.1f} mN an axis. Method: {result.model.provenance['method']}."
+    )
+    if result.modulus:
+        fit = result.modulus
+        page.paragraph(
+            f"{fit.reason[0].upper()}{fit.reason[1:]}. Spread between sites {100 * fit.between:.1f} %; the "
+            f"shape's uncertainty makes {100 * fit.shape_error:.2f} % of the modulus's standard error."
+        )
+        page.table(
+            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen by resamples"],
+            [
+                [name, e / 1e3, 1e3 * misfit, f"{100 * share:.0f} %"]
+                for name, (e, misfit, share) in fit.by_law.items()
+            ],
+        )
+
+
+def _not_used(page: Page, result: Reconstruction) -> None:
+    rows = [*result.exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
+    if rows:
+        page.paragraph(f"Contacts not used ({len(rows)}):")
+        page.table(["at [s]", "why"], [[float(t), reason] for t, reason in rows])
+
+
+def _mesh_words(result: Reconstruction) -> str:
+    report = result.meshing.report
+    within = 100 * np.mean(report.radius_edge_ratio <= 2)
+    return (
+        f"Quality of the {len(result.meshing.mesh.tetrahedra)} tetrahedra: {within:.1f} % within a "
+        f"radius-edge ratio of 2 (greatest {report.radius_edge_ratio.max():.2f}); greatest distance between "
+        f"mesh and surface {report.surface_distance_m.max() * 1e3:.2f} mm; volume "
+        f"{report.volume_m3 * 1e6:.1f} of {report.surface_volume_m3 * 1e6:.1f} cm³."
+    )

@@ -1,0 +1,64 @@
+"""A replay: rendered against measured force along a recorded path."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from palpate.show.quantities import ERROR
+from render.replay import ReplayResult
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
+
+MEASURED, RENDERED = "#a8bccb", "#c1121f"
+
+
+def lines(result: ReplayResult) -> list[str]:
+    """What `print` says, with units."""
+    return [
+        f"{result.renderer}: error {result.rmse_n:.4g} N rms over {int(result.contact.sum())} contact "
+        f"samples, {100 * result.relative:.3g} % of the measured {result.force_rms_n:.4g} N rms"
+        + (f" (sensor noise {result.noise_n:.3g} N)" if result.noise_n is not None else "")
+    ]
+
+
+def as_json(result: ReplayResult) -> dict[str, Any]:
+    """The figures of `palpate replay --json`, keys with units."""
+    figures = {
+        "renderer": result.renderer,
+        "samples": len(result.force_n),
+        "contact_samples": int(result.contact.sum()),
+        "rmse_n": result.rmse_n,
+        "force_rms_n": result.force_rms_n,
+        "relative_rmse": result.relative,
+        "peak_force_n": float(np.linalg.norm(result.force_n, axis=1).max()),
+    }
+    return figures if result.noise_n is None else {**figures, "noise_n": result.noise_n}
+
+
+def draw(result: ReplayResult, ax: Axes) -> None:
+    """Both forces over time."""
+    ax.plot(result.t, result.recording.force_n, lw=1.6, color=MEASURED, label="measured")
+    ax.plot(result.t, np.linalg.norm(result.force_n, axis=1), lw=0.7, color=RENDERED, label=result.renderer)
+    counted = result.contact if result.contact.any() else np.ones_like(result.contact)
+    most = max(result.recording.force_n[counted].max(), np.linalg.norm(result.force_n, axis=1).max())
+    ax.set(
+        xlabel="time [s]",
+        ylabel="force magnitude [N]",
+        xlim=(result.t[counted][0], result.t[counted][-1]),
+        ylim=(0, 1.05 * most),
+        title=f"error {result.rmse_n:.3f} N rms, {100 * result.relative:.1f} %",
+    )
+    ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)
+
+
+def place(result: ReplayResult, plotter: Plotter) -> None:
+    """The object, each touch coloured by its rms error."""
+    from palpate.show.scenery import add_dots, add_object
+
+    add_object(plotter, result.model)
+    places, errors = result.touches()
+    add_dots(plotter, places, errors * 1e3, label=ERROR.label, colour_map=ERROR.colour_map)
