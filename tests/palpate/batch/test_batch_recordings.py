@@ -15,7 +15,7 @@ import pytest
 
 import palpate as pp
 from palpate import cli
-from palpate.batching import steps
+from palpate.batching import run, steps
 from palpate.batching.plan import Choice, find, tasks_of
 from palpate.batching.summary import COLUMNS, Row, agreement
 
@@ -38,7 +38,7 @@ def quick(monkeypatch):
     did: list[tuple[str, str]] = []
 
     def step(name):
-        def run(*, sha256, options, seed, reports, recording, shape, folder):
+        def step_run(*, sha256, options, seed, reports, recording, shape, folder):
             import tomllib
 
             assert steps.content_of(recording, shape) == dict(sha256)
@@ -66,7 +66,7 @@ def quick(monkeypatch):
                 },
             }[name]  # fmt: skip
 
-        return run
+        return step_run
 
     for name in steps.STEPS:
         monkeypatch.setattr(steps, name, step(name))
@@ -255,7 +255,13 @@ def test_bad_arguments_are_told_in_a_line(tmp_path, words, said, capsys):
 def test_values_of_options_are_read_as_toml_and_else_as_words(tmp_path, quick, monkeypatch):
     seen = {}
     monkeypatch.setattr("palpate.batching.run.find", lambda *given: seen.update(given=given) or [])
-    monkeypatch.setattr("palpate.batching.run._write", lambda made, choice: seen.update(choice=choice))
+    made_of = run._made
+
+    def made(folder, found, choice, *more):
+        seen.update(choice=choice)
+        return made_of(folder, found, choice, *more)
+
+    monkeypatch.setattr(run, "_made", made)
     given = ["diagnose.fast=true", "diagnose.without=adhesion", "reconstruct.mesh_size_m=0.008"]
     cli.main(["batch", ".", "-o", str(tmp_path / "o"), *(w for v in given for w in ("--set", v))])
     assert seen["choice"].options == {
