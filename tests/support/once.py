@@ -20,7 +20,7 @@ def folder_made_once(factory: pytest.TempPathFactory, name: str, make: Callable[
     try:
         folder.mkdir()
     except FileExistsError:
-        assert eventually(done.exists, 900.0), f"the worker that makes '{name}' did not end"
+        assert eventually(done.exists), f"the worker that makes '{name}' did not end"
         return folder
     try:
         make(folder)

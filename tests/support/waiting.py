@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 
-PATIENCE_S = 120.0
+PATIENCE_S = 600.0
 
 
 def eventually(condition: Callable[[], object], patience_s: float = PATIENCE_S) -> bool:

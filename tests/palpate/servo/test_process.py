@@ -40,9 +40,9 @@ def pressing(fake: FakeInverse) -> bool:
 
 def pressing_after_enabling(servo: Servo, fake: FakeInverse) -> bool:
     """As a person does: enable, and once more where the device was not back yet."""
-    for _ in range(48):
+    for _ in range(240):
         servo.enable()
-        if eventually(lambda: pressing(fake), PATIENCE_S / 48):
+        if eventually(lambda: pressing(fake), PATIENCE_S / 240):
             return True
     return False
 

@@ -120,7 +120,7 @@ def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -
             ["xdotool", *words], env=environment, capture_output=True, text=True, check=False
         ).stdout.strip()
 
-    assert eventually(lambda: pointer("search", "--name", "^Palpate"), 600.0), "no window opened"
+    assert eventually(lambda: pointer("search", "--name", "^Palpate")), "no window opened"
     window = pointer("search", "--name", "^Palpate").splitlines()[-1]
     time.sleep(5.0)
     pointer("mousemove", "--window", window, "320", "280")
