@@ -50,7 +50,7 @@ def test_no_bit_of_a_stored_file_changes_unnoticed(tmp_path):
 
 def test_a_write_that_fails_leaves_what_was_there(folder, record, tmp_path):
     from mechanics.recording import write_recording
-    from palpate.report.page import Page
+    from palpate.show.page import Page
     from render.replay import write_forces
 
     recording = read_recording(record())
