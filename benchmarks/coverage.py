@@ -16,7 +16,7 @@ from benchmarks._rates import wilson
 from benchmarks._surface_truth import phantom_truth
 from benchmarks.surface import deviation
 from benchmarks.timing import table
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct_fully
 from scenes.laboratory.hand import cohort_hand
 from scenes.laboratory.presses import PROTOCOLS

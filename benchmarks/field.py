@@ -33,7 +33,7 @@ from diagnose.compare.comparison import (
     compare_presses,
     prepare,
 )
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field, map_sd, with_field
 
 SUMMARY = "held-out presses of tissue: FEM with a field against one modulus, 1D models and moduli by place"

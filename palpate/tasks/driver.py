@@ -8,10 +8,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Protocol
 
-from palpate import __version__
 from palpate.tasks.graph import Graph, Task
 from palpate.tasks.record import Record, finished
 from palpate.tasks.words import Status
+from palpate.version import __version__
 
 RETRIES = 1
 """How often a task is tried again whose process ended in the middle; it then counts for twice its memory."""

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.store import content_key
-from palpate import __version__
+from palpate.version import __version__
 
 
 @dataclass(frozen=True)

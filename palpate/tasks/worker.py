@@ -23,10 +23,10 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import PalpateError
-from palpate import __version__
-from palpate.arguments import plain
+from palpate.output import plain
 from palpate.tasks.memory import Peak
 from palpate.tasks.record import Record, digest_of, write_record
+from palpate.version import __version__
 
 THREADS = (
     "OMP_NUM_THREADS",
