@@ -110,12 +110,13 @@ def _add(parser: Any, field: dataclasses.Field[Any]) -> None:
     name = next((word for word in ("bool", "int", "float") if word in types), "str")
     required = field.default is dataclasses.MISSING or how.needed
     unit = f" [{meta['unit']}]" if meta["unit"] else ""
-    default = "" if required or field.default == () else f" (default: {field.default})"
+    switch = name == "bool" and "written" in meta and field.default is False
+    said = not (required or switch or field.default == ())
+    default = f" (default: {field.default})" if said else ""
     keywords: dict[str, Any] = {"help": f"{meta['help']}{unit}{default}".replace("%", "%%")}
     if not (required and how.positional):
         keywords["default"] = argparse.SUPPRESS
     if name == "bool":
-        switch = "written" in meta and field.default is False
         keywords["action"] = "store_true" if switch else argparse.BooleanOptionalAction
     else:
         keywords["type"] = _parser(field, how, name)

@@ -39,7 +39,7 @@ class ExportOperands:
         parse=vector,
     )
     depth_m: float | None = operand(None, "how deep; None: half the tip's radius", unit="m")
-    unit: str = operand("m", "of an STL's lengths")
+    unit: str = operand("m", "of an STL's lengths", metavar="UNIT")
 
 
 def _answer(notes: tuple[str, ...], asked: ExportOperands, out: Output) -> int:
