@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mechanics.errors import OptionError
 from mechanics.surface_files import UNITS, is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand
+from render.registry import names
 
 if TYPE_CHECKING:
     import mechanics.model
@@ -78,8 +79,6 @@ def poisson_operand(words: str, default: float | None = None, **more: Any) -> An
 
 def renderer_operand(words: str = "what answers", default: str | None = "fem") -> Any:
     """--renderer NAME."""
-    from render.registry import names
-
     return operand(default, words, choices=names())
 
 

@@ -32,7 +32,9 @@ class DemoOperands:
         None, "a recording; None: the embedded silicone cylinder", count="?"
     )
     _: KW_ONLY
-    folder: str = operand("palpate-demo", "folder for model and report", flag="--output", short="-o", metavar="FOLDER")
+    folder: str = operand(
+        "palpate-demo", "folder for model and report", flag="--output", short="-o", metavar="FOLDER"
+    )
     window: bool | None = operand(
         None, "open the touch window at the end; None: where there is a screen and a terminal"
     )

@@ -33,7 +33,7 @@ class ExportOperands:
     _: KW_ONLY
     at: Sequence[float] | None = operand(
         None,
-        "(3,) where the scene's tip presses; None: middle of the top",
+        "where the scene's tip presses, (3,); None: middle of the top",
         unit="m",
         metavar="X,Y,Z",
         parse=vector,

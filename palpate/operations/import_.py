@@ -75,7 +75,7 @@ class ImportOperands:
     frame: str | None = operand(None, "of the force; None: device", choices=("device", "tool"))
     rotation: Any = operand(None, "(3, 3) from the file's axes to the device frame", only="python")
     flange_to_tip_m: Sequence[float] | None = operand(
-        None, "(3,) in the tool's frame", unit="m", metavar="X,Y,Z", parse=_list
+        None, "in the tool's frame, (3,)", unit="m", metavar="X,Y,Z", parse=_list
     )
     mass_kg: float | None = operand(
         None, "beyond the sensor; its weight is taken off", unit="kg", flag="--tool-mass"

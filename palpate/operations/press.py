@@ -39,11 +39,11 @@ class PressOperands:
 
     model: ModelLike | Renderer = model_operand()
     at: Sequence[float] = operand(
-        REQUIRED, "(3,) point that the tip's centre is aimed at", unit="m", metavar="X,Y,Z", parse=vector
+        REQUIRED, "point that the tip's centre is aimed at, (3,)", unit="m", metavar="X,Y,Z", parse=vector
     )
     direction: Sequence[float] | None = operand(
         None,
-        "(3,) of the motion, any length; None: straight onto the support",
+        "of the motion, (3,), any length; None: straight onto the support",
         metavar="X,Y,Z",
         parse=vector,
     )

@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, Any
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._shared import renderer_operand, with_friction
+from palpate.operations._shared import with_friction
 from palpate.operations.load import load
 from render.options import RenderOptions
+from render.registry import create, names
 from render.support import SupportOptions
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ class RendererOperands:
     """Whose, and which."""
 
     model: ModelLike | Renderer = operand(REQUIRED, "of which object")
-    name: str = renderer_operand("which renderer")
+    name: str = operand("fem", f"one of {', '.join(names())}")
     _: KW_ONLY
 
 
@@ -46,7 +47,6 @@ def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], Tou
     """What will make the renderer, on its model's support; options are looked at at once."""
     from render.base import Renderer
     from render.felt import with_own_stiffness
-    from render.registry import create
     from render.scene import scene_of
 
     support = call.of(SupportOptions)
@@ -56,6 +56,8 @@ def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], Tou
             words = "a renderer that is there keeps its options; give them to pp.renderer"
             raise OptionError(f"{', '.join(given)}: {words}")
         return lambda tell: scene_of(model, support)
+    if name not in names():
+        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(names())}")
     chosen = _with_scene(model, call.of(RenderOptions))
 
     def make(tell: Progress) -> TouchScene:

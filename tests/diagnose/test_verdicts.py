@@ -17,7 +17,7 @@ from diagnose.search.whiten import NuisanceOptions
 from diagnose.verdict.next_touch import next_touch
 from diagnose.verdict.validation import held_out_by_refit
 from mechanics.gap_bins import gap_by_bin
-from palpate.commands import demo
+from palpate.operations import demo
 from palpate.report.demo import diagnosis_words
 from palpate.report.diagnosis import write_report
 from palpate.report.diagnosis_figures import gains, view_of

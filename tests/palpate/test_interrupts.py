@@ -8,8 +8,8 @@ import pytest
 
 from benchmarks import _interrupts
 from benchmarks._small_disk import SmallDisk
-from palpate.cli import parser_of
 from palpate.importing.tables import SUFFIXES
+from palpate.operations._run import parser_of
 
 
 @pytest.mark.parametrize("name", _interrupts.COMMANDS)
