@@ -30,7 +30,7 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
 from palpate.output import Output, progress_bar
 from palpate.servo import SafetyOptions, ServoOptions, ServoReport
-from palpate.window.session import TouchSession
+from palpate.window.session import SessionOptions, TouchSession
 from render.options import RenderOptions
 from render.registry import names
 from render.support import SupportOptions
@@ -136,13 +136,15 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
                     model,
                     title=scene.title,
                     device=device,
-                    renderer=asked.renderer or scene.renderer,
-                    beside=_beside(asked, scene),
-                    render_options=with_friction(call.of(RenderOptions), scene),
                     mapping=_mapping(call, name, scene, model),
-                    options=servo_options,
-                    recording=None if asked.record is None else Path(asked.record),
-                    pictures=not asked.headless,
+                    options=SessionOptions(
+                        renderer=asked.renderer or scene.renderer,
+                        beside=_beside(asked, scene),
+                        render=with_friction(call.of(RenderOptions), scene),
+                        servo=servo_options,
+                        recording=None if asked.record is None else Path(asked.record),
+                        pictures=not asked.headless,
+                    ),
                 )
             )
             session.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
