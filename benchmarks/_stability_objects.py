@@ -78,8 +78,13 @@ def one(
         SPEC,
         HandImpedance(*hand),
         press_and_drag(loop.rate_hz),
-        loop=Loop(loop.rate_hz, loop.quantisation_m, loop.delay_s, coupling=active),
-        passivity=PassivityOptions(passivity=active),
+        loop=Loop(
+            loop.rate_hz,
+            loop.quantisation_m,
+            loop.delay_s,
+            coupling=active,
+            passivity=PassivityOptions(passivity=active),
+        ),
         tip_offsets_m=offsets,
     )
 

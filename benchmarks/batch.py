@@ -30,10 +30,10 @@ from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
 from mechanics.recording import recording_files
-from palpate.arguments import progress_bar
 from palpate.batching.plan import Choice
 from palpate.batching.run import Batch, batch
 from palpate.child import module_environment
+from palpate.output import progress_bar
 from palpate.tasks.driver import Status
 from palpate.tasks.driver import run as run_graph
 from palpate.tasks.engine import executor

@@ -13,11 +13,11 @@ from typing import Any
 
 import numpy as np
 
+import palpate as pp
 from benchmarks.evidence import rates
 from benchmarks.timing import table
 from mechanics.recording import Recording
 from mechanics.samples import delayed
-from palpate import api
 
 TIP_M, RATE_HZ, NOISE_N = 0.004, 500.0, 0.005
 STIFF = "stiffness_n_per_m"
@@ -80,7 +80,7 @@ def _plate(seed: int) -> list[dict[str, Any]]:
     stiffness, play = float(np.exp(rng.uniform(np.log(500), np.log(8000)))), float(rng.uniform(0, 3e-4))
     late = float(rng.uniform(-0.01, 0.025))
     recording = plate(stiffness, play, late, rng)
-    made = api.calibrate(recording, rigid=True, progress=False)
+    made = pp.calibrate(recording, rigid=True, progress=False)
     between = made.interval
     return [
         _judged("plate: stiffness, share", stiffness, made.stiffness_n_per_m, between.get(STIFF), stiffness),
@@ -118,7 +118,7 @@ def plate(stiffness: float, play: float, late: float, rng: np.random.Generator) 
 def _phantom(seed: int, name: str) -> list[dict[str, Any]]:
     """One exploration of the laboratory, its instrument spoilt afterwards, as an instrument does."""
     rng = np.random.default_rng([22, seed])
-    made = api.simulate(name, seed=seed, sizes=False, progress=False)
+    made = pp.simulate(name, seed=seed, sizes=False, progress=False)
     clean = made.recording
     stiffness = float(np.exp(rng.uniform(np.log(600), np.log(4000))))
     gain, talk = float(rng.uniform(0.85, 1.15)), 0.03 * rng.standard_normal((3, 3))
@@ -133,7 +133,7 @@ def _phantom(seed: int, name: str) -> list[dict[str, Any]]:
         path=None,
         sha256="",
     )
-    found = api.calibrate(
+    found = pp.calibrate(
         spoilt, modulus_pa=float((clean.truth or {})["young_modulus_pa"]), seed=seed, progress=False
     )
     between, told = found.interval, found.stiffness_n_per_m

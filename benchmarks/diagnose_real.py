@@ -17,11 +17,11 @@ from typing import Any
 
 import numpy as np
 
+import palpate as pp
 from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
 from diagnose.specimen.result import FLOORS, Material
 from mechanics.errors import RecordingError
-from palpate import api
 from reconstruct.external.uniaxial import CEILING
 
 BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005
@@ -113,22 +113,22 @@ def _silicones(folder: Path, arguments: argparse.Namespace) -> Rows:
     for each in sorted(p for p in folder.iterdir() if p.is_dir())[:: arguments.every]:
         files = sorted(each.glob("*.csv"))
         if files:
-            yield each.name, api.material(*files, progress=False)
+            yield each.name, pp.material(*files, progress=False)
 
 
 def _elastomers(folder: Path, arguments: argparse.Namespace) -> Rows:
     for path in sorted(folder.glob("*.csv")):
-        yield path.stem, api.material(path, progress=False)
+        yield path.stem, pp.material(path, progress=False)
 
 
 def _chiaro(folder: Path, arguments: argparse.Namespace) -> Rows:
     for path in sorted(folder.glob("fmt-*.txt")):
-        yield path.stem[-16:], api.material(path, progress=False)
+        yield path.stem[-16:], pp.material(path, progress=False)
 
 
 def _fish(folder: Path, arguments: argparse.Namespace) -> Rows:
     for path in sorted(folder.glob("*.csv")):
-        yield path.stem[-20:], api.material(path, progress=False)
+        yield path.stem[-20:], pp.material(path, progress=False)
 
 
 def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
@@ -139,7 +139,7 @@ def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
         )
     yield (
         f"{len(files)} pieces of {arguments.session}",
-        api.material(
+        pp.material(
             *files,
             kind="indentation",
             tip_radius_m=BEEF_TIP_M,

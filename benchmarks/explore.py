@@ -30,7 +30,7 @@ from mechanics.errors import PalpateError
 from mechanics.files import atomic_file, cache_folder
 from mechanics.nearest import distance, sample
 from mechanics.store import content_key
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from scenes.laboratory.specimen import VERSION as LABORATORY
 
 VERSION = 4

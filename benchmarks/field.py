@@ -25,7 +25,7 @@ from benchmarks._tissue import Tissue, tissue
 from benchmarks.timing import table
 from diagnose.compare.comparison import CompareOptions, Comparison, compare_presses
 from diagnose.compare.models import HOMOGENEOUS, RIVALS, Prepared, as_touched, prepare
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field, map_sd, with_field
 
 PER_PLACE, TRUTH = "modulus-by-place", "truth"

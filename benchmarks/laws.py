@@ -18,10 +18,9 @@ from typing import Any
 
 import numpy as np
 
+import palpate as pp
 from benchmarks.timing import table
 from mechanics.errors import OptionError, PalpateError
-from palpate import api
-from palpate.arguments import natural
 from scenes.laboratory.effects import REGISTRY
 from scenes.variety.draws import draw
 from scenes.variety.objects import thing
@@ -37,13 +36,13 @@ SKIPPED = ("tip_radius_m", "plane_strain_modulus_pa")
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which laws, how many recordings of each."""
     parser.add_argument("--laws", nargs="+", default=LAWS, metavar="LAW", help=f"default: {', '.join(LAWS)}")
-    parser.add_argument("--recordings", type=natural, default=2, help="of each law (default: 2)")
+    parser.add_argument("--recordings", type=int, default=2, help="of each law (default: 2)")
     parser.add_argument(
         "--strength", type=float, nargs=2, default=(0.5, 2.5), metavar=("LEAST", "MOST"),
         help="between which strengths are drawn, evenly in their logarithm; both may be negative",
     )  # fmt: skip
-    parser.add_argument("--presses", type=natural, default=36, help="of a recording, at most (default: 36)")
-    parser.add_argument("--seed", type=natural, default=913, help="of the draws (default: 913)")
+    parser.add_argument("--presses", type=int, default=36, help="of a recording, at most (default: 36)")
+    parser.add_argument("--seed", type=int, default=913, help="of the draws (default: 913)")
     parser.add_argument("--touches", type=Path, metavar="FOLDER", help="solved touches (default: the user's)")
 
 
@@ -87,8 +86,8 @@ def one(law: str, strength: float, seed: int, number: int, most: int, touches: P
     with TemporaryDirectory() as folder:
         path = write(Path(folder) / "recording.csv.gz", made.recording, drawn)
         try:
-            model = api.reconstruct(path, progress=False)
-            answer = api.diagnose(path, model, progress=False)
+            model = pp.reconstruct(path, progress=False)
+            answer = pp.diagnose(path, model, progress=False)
         except PalpateError as error:
             return {**row, "refused": str(error)}
     entry = next((e for e in answer.entries if e.name == law), None)

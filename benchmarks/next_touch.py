@@ -30,7 +30,7 @@ from diagnose.verdict.result import Diagnosis, NextTouch
 from mechanics.errors import PalpateError
 from mechanics.model_files import read_model
 from mechanics.recording import read_recording
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct
 from scenes.laboratory.curves import workers_of_ours
 from scenes.laboratory.presses import Touch

@@ -86,8 +86,7 @@ def one(
         SPEC,
         HandImpedance(mass, damping, stiffness),
         thrown(loop.rate_hz) if free else press_hold_release(loop.rate_hz),
-        loop=dataclasses.replace(loop, coupling=active),
-        passivity=PassivityOptions(passivity=active),
+        loop=dataclasses.replace(loop, coupling=active, passivity=PassivityOptions(passivity=active)),
         thrown_m_per_s=np.array([0.0, 0.0, -0.1]) if free else None,
     )
 

@@ -18,7 +18,7 @@ from benchmarks._surface_truth import OWN, Truth, phantom_truth, touch
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.nearest import distance, sample
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from reconstruct.steps.s4_surface.surface import SURFACES, SurfaceOptions, reconstruct_surface
 
 

@@ -31,7 +31,7 @@ from diagnose.pipeline import diagnose
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file, cache_folder
 from mechanics.model import Model
-from palpate.arguments import progress_bar
+from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct_fully
 from scenes.laboratory.curves import workers_of_ours
 from scenes.variety.draws import Draw, draw

@@ -34,7 +34,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Print the table; returns its figures, s."""
     from devices.channel import PoseChannel
     from devices.registry import DeviceChoice, options_of
-    from palpate.window.session import TouchSession
+    from palpate.window.session import SessionOptions, TouchSession
     from palpate.window.window import TouchWindow
     from scenes.build import model_of
     from scenes.scene import load_scene
@@ -46,7 +46,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     channel.write(time.perf_counter(), tuple(above))
     mouse = DeviceChoice("mouse", {"channel": str(channel.path), "options": options_of("mouse")()})
     beside = (scene.beside or "hunt-crossley") if arguments.beside else ""
-    session = TouchSession(model, title=scene.title, device=mouse, renderer=scene.renderer, beside=beside)
+    options = SessionOptions(scene.renderer, beside)
+    session = TouchSession(model, title=scene.title, device=mouse, options=options)
     found: dict[str, Any] = {}
     with session:
         session.start()

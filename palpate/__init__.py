@@ -4,13 +4,16 @@
     made = pp.reconstruct(recording)                       # its model, and how it came about
     replayed = pp.replay(made, recording)                  # rendered against measured force
 
-`dir(pp)` lists the door: functions, what they return, errors. Results print themselves, `.plot()` by
-matplotlib, `.show()` in 3D by PyVista. SI units; device frame; forces on the tool. See docs/python.md.
+`dir(pp)` lists functions, what they return, errors; `help(pp.press)` tells every option with its unit and
+default. Results print themselves, `.plot()` by matplotlib, `.show()` in 3D by PyVista. SI units; device
+frame; forces on the tool. See docs/python.md.
 Nothing is loaded until it is used (PEP 562).
 """
 
 import importlib
 from typing import TYPE_CHECKING
+
+from palpate.operations._list import calls as _calls
 
 if TYPE_CHECKING:
     from diagnose.compare.before_after import Changes as Changes
@@ -37,27 +40,27 @@ if TYPE_CHECKING:
     from mechanics.errors import SurfaceError as SurfaceError
     from mechanics.model import Model as Model
     from mechanics.recording import Recording as Recording
-    from palpate.api import batch as batch
-    from palpate.api import calibrate as calibrate
-    from palpate.api import changes as changes
-    from palpate.api import check as check
-    from palpate.api import compare as compare
-    from palpate.api import diagnose as diagnose
-    from palpate.api import export as export
-    from palpate.api import import_table as import_table
-    from palpate.api import load as load
-    from palpate.api import material as material
-    from palpate.api import model_of as model_of
-    from palpate.api import press as press
-    from palpate.api import read_recording as read_recording
-    from palpate.api import read_table as read_table
-    from palpate.api import reconstruct as reconstruct
-    from palpate.api import renderer as renderer
-    from palpate.api import replay as replay
-    from palpate.api import simulate as simulate
     from palpate.batching.summary import Batch as Batch
     from palpate.importing.imported import Imported as Imported
-    from palpate.keywords import options as options
+    from palpate.operations._declare import options as options
+    from palpate.operations.batch import batch as batch
+    from palpate.operations.calibrate import calibrate as calibrate
+    from palpate.operations.check import check as check
+    from palpate.operations.compare import changes as changes
+    from palpate.operations.compare import compare as compare
+    from palpate.operations.diagnose import diagnose as diagnose
+    from palpate.operations.export import export as export
+    from palpate.operations.import_ import import_table as import_table
+    from palpate.operations.import_ import read_table as read_table
+    from palpate.operations.load import load as load
+    from palpate.operations.material import material as material
+    from palpate.operations.model import model_of as model_of
+    from palpate.operations.press import press as press
+    from palpate.operations.read_recording import read_recording as read_recording
+    from palpate.operations.reconstruct import reconstruct as reconstruct
+    from palpate.operations.renderer import renderer as renderer
+    from palpate.operations.replay import replay as replay
+    from palpate.operations.simulate import simulate as simulate
     from reconstruct.checks.checkup import Checkup as Checkup
     from reconstruct.pipeline import Reconstruction as Reconstruction
     from render.base import Renderer as Renderer
@@ -67,14 +70,10 @@ if TYPE_CHECKING:
 
     __version__: str
 
-_DOOR = {
-    "palpate.api": (
-        "read_recording read_table import_table material check load model_of reconstruct renderer replay "
-        "press compare changes diagnose calibrate simulate export batch"
-    ),
+_OTHERS = {
     "diagnose.explore.explorer": "Explorer",
     "diagnose.explore.segments": "Instrument Segment",
-    "palpate.keywords": "options",
+    "palpate.operations._declare": "options",
     "mechanics.recording": "Recording",
     "palpate.importing.imported": "Imported",
     "mechanics.calibration": "Calibration",
@@ -95,7 +94,7 @@ _DOOR = {
         "ModelError CacheError OptionError DeviceError SceneError DiagnosisError"
     ),
 }
-_HOME = {name: module for module, names in _DOOR.items() for name in names.split()}
+_HOME = _calls() | {name: module for module, names in _OTHERS.items() for name in names.split()}
 
 __all__ = [*_HOME, "__version__"]
 
@@ -103,9 +102,9 @@ __all__ = [*_HOME, "__version__"]
 def __getattr__(name: str) -> object:
     if name == "__version__":
         value: object = importlib.import_module("palpate.version").__version__
-    elif name in _HOME:
+    elif (home := (_HOME | _calls()).get(name)) is not None:
         importlib.import_module("palpate.show")  # results know how they look
-        value = getattr(importlib.import_module(_HOME[name]), name)
+        value = getattr(importlib.import_module(home), name)
     else:
         raise AttributeError(f"module 'palpate' has no attribute '{name}'; it has {', '.join(_HOME)}")
     globals()[name] = value

@@ -1,4 +1,4 @@
-"""The `palpate` command: finds the sub-command's module, parses, runs, and turns errors into one line.
+"""The `palpate` command: finds the operation, parses, runs, and turns errors into one line.
 
 Exit codes: 0 success, 1 a check that the user asked for failed, 2 bad arguments or input, 130 interrupted,
 143 ended by SIGTERM.
@@ -12,33 +12,10 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from palpate.operations._list import commands
+
 if TYPE_CHECKING:
     import argparse
-
-COMMANDS = {
-    "demo": "the main job on the embedded example; prints the report's path",
-    "check": "what may be wrong with a recording, before it is believed",
-    "reconstruct": "a recording becomes a model",
-    "model": "a MODEL from a surface's file and a modulus",
-    "import": "other programs' files become a recording",
-    "export": "a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL",
-    "material": "the material of a specimen from a machine's curves",
-    "replay": "a recorded tip path through a renderer, headless",
-    "press": "one scripted press on a model, headless",
-    "compare": "FEM against interpolated 1D models on held-out palpations",
-    "diagnose": "the sim-to-real gap: where, which effect, how far it shrinks",
-    "calibrate": "the instrument told from presses on something known",
-    "touch": "feel a model or scene at 1 kHz",
-    "devices": "which devices are there, and for the others why not",
-    "explore": "where to touch next and why, and when to stop",
-    "simulate": "the virtual laboratory: a person's exploration of a phantom",
-    "bench": "benchmarks: medians, spreads and ratios",
-    "batch": "many recordings at once",
-    "completion": "what lets a shell complete all this: bash, zsh or fish",
-}
-"""Every sub-command, one line each; its module is `palpate.commands.NAME`."""
-MODULES = {"import": "palpate.commands.import_"}
-"""Where a command's name is a word of Python's own."""
 
 
 class Ended(KeyboardInterrupt):
@@ -52,12 +29,16 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         # nothing is open yet, and libraries that are half loaded do not bear an exception: leave at once
         words = list(sys.argv[1:] if argv is None else argv)
-        command, module, code = _loaded(words)
-        if module is None:
+        if "_ARGCOMPLETE" in os.environ:
+            from palpate.operations.completion import complete
+
+            complete(os.environ.get("COMP_LINE", ""))
+        command, name, code = _loaded(words)
+        if name is None:
             return code
         prog = command.prog
         _listen(_interrupt)
-        return _run(command, module, words[1:])
+        return _run(command, name, words[1:])
     except ModuleNotFoundError as error:
         if _is_ours(error.name):
             raise
@@ -78,20 +59,19 @@ def main(argv: Sequence[str] | None = None) -> int:
             signal.signal(number, handler)
 
 
-def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, Any, int]:
-    """(parser, the command's module or None, then the exit code)."""
-    import importlib
-
+def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, str | None, int]:
+    """(parser, the command's name or None, then the exit code)."""
     parser = _top_parser()
     if not argv or argv[0].startswith("-"):
         parser.parse_args(argv)
         parser.print_help()
         return parser, None, 2 if not argv else 0
     name = argv[0]
-    if name not in COMMANDS:
-        parser.error(f"'{name}' is no command; allowed are {', '.join(COMMANDS)}")
-    module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
-    return *_with_arguments(name, module), 0
+    if name not in commands():
+        parser.error(f"'{name}' is no command; allowed are {', '.join(commands())}")
+    from palpate.operations._run import parser_of
+
+    return parser_of(name), name, 0
 
 
 def _is_ours(name: str | None) -> bool:
@@ -100,33 +80,14 @@ def _is_ours(name: str | None) -> bool:
     return name is None or name.partition(".")[0] in ours
 
 
-def _with_arguments(name: str, module: Any) -> tuple[argparse.ArgumentParser, Any]:
-    from palpate.arguments import OneLineParser
-
-    command = OneLineParser(
-        prog=f"palpate {name}",
-        description=module.__doc__,
-    )
-    module.add_arguments(command)
-    return command, module
-
-
-def parser_of(name: str) -> argparse.ArgumentParser:
-    """The parser of one command, with all its options."""
-    import importlib
-
-    module = importlib.import_module(MODULES.get(name, f"palpate.commands.{name}"))
-    return _with_arguments(name, module)[0]
-
-
-def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int:
+def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
     import warnings
 
     from mechanics.errors import PalpateError
-    from mechanics.files import refusal, sweep_scratch
+    from mechanics.files import refusal
     from mechanics.recording import NotRead
-    from palpate.arguments import check_paths
+    from palpate.operations._run import run_command
 
     def refused(words: str) -> int:
         print(f"{command.prog}: {' '.join(words.split())}", file=sys.stderr)
@@ -143,10 +104,7 @@ def _run(command: argparse.ArgumentParser, module: Any, words: list[str]) -> int
     with warnings.catch_warnings():
         warnings.showwarning = warned
         try:
-            arguments = command.parse_args(words)
-            check_paths(command, arguments)
-            sweep_scratch()
-            return int(module.run(arguments) or 0)
+            return run_command(name, words, command)
         except PalpateError as error:
             return refused(str(error))
         except BrokenPipeError:
@@ -194,8 +152,8 @@ def _end(code: int) -> None:
 def _top_parser() -> argparse.ArgumentParser:
     import argparse
 
-    width = max(map(len, COMMANDS))
-    listing = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in COMMANDS.items())
+    width = max(map(len, commands()))
+    listing = "\n".join(f"  {name:<{width}}  {summary}" for name, summary in commands().items())
     parser = argparse.ArgumentParser(
         prog="palpate",
         usage="palpate COMMAND ... | palpate COMMAND --help",
@@ -203,7 +161,7 @@ def _top_parser() -> argparse.ArgumentParser:
         epilog=f"commands:\n{listing}",
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
-    from palpate import __version__
+    from palpate.version import __version__
 
     parser.add_argument("--version", action="version", version=f"palpate {__version__}")
     return parser

@@ -1,22 +1,28 @@
-"""The main job in one go: reconstruct, precompute, replay, feel for ten seconds, diagnose; then a report."""
+"""The main job in one go: reconstruct, precompute, replay, feel for ten seconds, diagnose."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from mechanics.model import Model
-from mechanics.model_files import write_model
 from mechanics.options import option
 from mechanics.progress import Progress
-from mechanics.recording import Recording, read_recording
+from mechanics.recording import Recording
 from mechanics.result import Result
+from palpate.operations.diagnose import AttributionOptions, diagnose
+from palpate.operations.read_recording import read_recording
+from palpate.operations.reconstruct import reconstruct
+from palpate.operations.renderer import renderer
+from palpate.operations.replay import replay
+from palpate.output import progress_bar
+from palpate.servo.headless import run_headless
 from palpate.servo.report import ServoReport
 from palpate.warm_up import warming_up
 from reconstruct.pipeline import Reconstruction
@@ -57,55 +63,42 @@ class DemoResult(Result):
         return self.reconstruction.model
 
 
-def run_demo(
-    source: Path | str,
-    folder: Path,
-    options: DemoOptions,
-    bar: Callable[[str], AbstractContextManager[Progress]],
-    seed: int = 0,
-) -> DemoResult:
-    """Do all of it; the model goes to `folder/model`. `bar(label)` makes a progress bar for a stage."""
-    import render
-    from mechanics.compliance import load_or_condense
-    from palpate.servo.headless import run_headless
-    from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
-    from render.felt import with_own_stiffness
-    from render.replay import replay_recording, rms_n
-
+def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int = 0) -> DemoResult:
+    """Do all of it; the model goes to `folder/model`."""
     seconds: dict[str, float] = {}
 
     @contextmanager
     def stage(label: str) -> Iterator[Progress]:
         start = time.perf_counter()
-        with bar(label) as progress:
+        with progress_bar(label) as progress:
             yield progress
             progress("done", 1.0)
         seconds[label] = time.perf_counter() - start
 
     recording = read_recording(source)
     with warming_up() as compiling, stage("reconstruct") as progress:
-        done = reconstruct_fully(recording, ReconstructOptions(seed=seed), progress)
-        path = write_model(folder / "model", done.model)
-        done = replace(done, model=done.model.replaced(path=path))
+        done = reconstruct(recording, save=folder / "model", seed=seed, progress=progress)
         model = done.model
         progress("compiling", 0.99)
         compiling()
     with stage("precompute") as progress:
-        load_or_condense(model, progress=progress)
-        renderer = render.create(options.renderer, model, progress=progress)
-        with_own_stiffness(renderer)
+        rendering = renderer(model, options.renderer, progress=progress)
     with stage("replay") as progress:
-        rendered = replay_recording(renderer, recording, progress)
-        touching = model.presses.touching(recording.t)
-        error = rms_n((rendered - recording.force_on_tool)[touching])
-        whole = rms_n(recording.force_on_tool[touching])
+        replayed = replay(rendering, recording, progress=progress)
     with stage("feel at 1 kHz") as progress:
         servo = run_headless(model, options.renderer, seconds=options.seconds, seed=seed, progress=progress)
     diagnosis = None
     if options.diagnosis:
-        from diagnose.options import DiagnoseOptions
-        from diagnose.pipeline import diagnose
-
         with stage("diagnose") as progress:
-            diagnosis = diagnose(recording, model, DiagnoseOptions(fast=True, seed=seed), progress)
-    return DemoResult(recording, done, rendered, error, whole, servo, diagnosis, seconds)
+            most = AttributionOptions().most
+            diagnosis = diagnose(recording, model, fast=True, most=most, seed=seed, progress=progress)
+    return DemoResult(
+        recording,
+        done,
+        replayed.force_n,
+        replayed.rmse_n,
+        replayed.force_rms_n,
+        servo,
+        diagnosis,
+        seconds,
+    )

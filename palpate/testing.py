@@ -15,11 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from palpate import api
-from palpate.keywords import options as options_of
+from palpate.operations.press import press
+from palpate.operations.renderer import renderer as make_renderer
+from render.options import RenderOptions
 
 if TYPE_CHECKING:
-    from palpate.api.telling import ModelLike
+    from palpate.operations._shared import ModelLike
     from render.base import Renderer
     from render.press import Curve
 
@@ -31,11 +32,11 @@ def press_model() -> Callable[..., Curve]:
     A function `press_model(model_or_scene, at, direction=None, depth_m=0.004, speed_m_per_s=0.01,
     renderer="fem", ...)`; lengths m, speed m/s, forces N on the tool, device frame.
     """
-    ours = {option.name for option in options_of("renderer")}
+    ours = set(RenderOptions.__dataclass_fields__)
 
     @cache
     def renderer_of(model: ModelLike, name: str, given: tuple[tuple[str, Any], ...]) -> Renderer:
-        return api.renderer(model, name, progress=False, **dict(given))
+        return make_renderer(model, name, progress=False, **dict(given))
 
     def pressed(
         model_or_scene: ModelLike,
@@ -50,6 +51,6 @@ def press_model() -> Callable[..., Curve]:
         given = tuple(sorted((name, value) for name, value in more.items() if name in ours))
         made = renderer_of(model_or_scene, renderer, given)
         rest = {name: value for name, value in more.items() if name not in ours}
-        return api.press(made, at, direction, depth_m, speed_m_per_s, **rest)
+        return press(made, at, direction, depth_m, speed_m_per_s, **rest)
 
     return pressed

@@ -1,7 +1,28 @@
-"""Rendering: a model and a tip become a force, behind one small interface."""
+"""Rendering: a model and a tip become a force, behind one small interface.
+
+What is named here is loaded when it is used (PEP 562), so that options cost no renderer.
+"""
+
+import importlib
+from typing import TYPE_CHECKING
 
 import mechanics as mechanics  # it says where compiled kernels are kept, before the first is decorated
-from render.base import Renderer as Renderer
-from render.options import RenderOptions as RenderOptions
-from render.registry import create as create
-from render.registry import names as names
+
+if TYPE_CHECKING:
+    from render.base import Renderer as Renderer
+    from render.options import RenderOptions as RenderOptions
+    from render.registry import create as create
+    from render.registry import names as names
+
+_HOME = {
+    "Renderer": "render.base",
+    "RenderOptions": "render.options",
+    "create": "render.registry",
+    "names": "render.registry",
+}
+
+
+def __getattr__(name: str) -> object:
+    if name not in _HOME:
+        raise AttributeError(f"module 'render' has no attribute '{name}'; it has {', '.join(_HOME)}")
+    return getattr(importlib.import_module(_HOME[name]), name)

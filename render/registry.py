@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import importlib
+from typing import TYPE_CHECKING
 
 from mechanics.errors import OptionError
-from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from render.base import Renderer
 from render.options import RenderOptions
+
+if TYPE_CHECKING:
+    from mechanics.model import Model
+    from render.base import Renderer
 
 _RENDERERS = {
     "fem": "render.fem",

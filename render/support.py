@@ -7,13 +7,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numba import njit
 
-from mechanics.model import Model
 from mechanics.options import check_ranges, option
+
+if TYPE_CHECKING:
+    from mechanics.model import Model
 
 CREEP_M_PER_S = 0.005
 """Below this speed friction falls off linearly, so that it does not chatter at rest."""

@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from mechanics.errors import PalpateError
-from palpate.arguments import OneLineParser, emit_json
+from palpate.operations._flags import OneLineParser
+from palpate.output import emit_json
 
 
 def script(module: ModuleType, words: Sequence[str] | None = None) -> int:

@@ -13,7 +13,7 @@ from typing import Any
 from mechanics.errors import OptionError, RecordingError
 from mechanics.files import read_toml, reading, sha256_of_file
 from mechanics.recording import recording_files
-from palpate.keywords import taken
+from palpate.operations._declare import check_options
 from palpate.tasks.graph import Task
 
 STEPS = ("reconstruct", "compare", "diagnose")
@@ -54,7 +54,7 @@ class Choice:
                 raise OptionError(f"options of '{step}': allowed are those of {', '.join(STEPS)}")
             if "seed" in values:
                 raise OptionError(f"{step}.seed: one seed is for all steps; give --seed, or seed=")
-            taken(step, values)
+            check_options(step, values)
 
     def of(self, step: str) -> dict[str, Any]:
         """The options of one step."""

@@ -15,9 +15,9 @@ from typing import Any
 from mechanics.errors import RecordingError
 from mechanics.files import PNG, atomic_file
 from mechanics.recording import Recording
-from palpate import api
-from palpate.arguments import emit_json
 from palpate.batching.plan import MODEL, STEPS, THUMBNAIL, content_of
+from palpate.operations.read_recording import read_recording
+from palpate.output import emit_json
 
 
 @dataclass(frozen=True)
@@ -41,11 +41,13 @@ class Planned:
         """The recording, which must still be the one that was planned for."""
         if content_of(self.recording, self.shape) != dict(self.sha256):
             raise RecordingError(f"'{self.recording}' changed after the batch began: run it again")
-        return api.read_recording(self.recording)
+        return read_recording(self.recording)
 
 
 def reconstruct(**planned: Any) -> dict[str, Any]:
     """The model. What an older model gave is removed first."""
+    from palpate.operations.reconstruct import reconstruct
+
     plan = Planned(**planned)
     place = plan.place
     for step in STEPS[1:]:
@@ -53,7 +55,7 @@ def reconstruct(**planned: Any) -> dict[str, Any]:
             (place / name).unlink(missing_ok=True)
     measured = plan.read()
     given = {**plan.options, **({"shape": plan.shape} if plan.shape else {})}
-    result = api.reconstruct(measured, save=place / MODEL, seed=plan.seed, progress=False, **given)
+    result = reconstruct(measured, save=place / MODEL, seed=plan.seed, progress=False, **given)
     emit_json({"model": place / MODEL, **result.as_json()}, str(place / "reconstruct.json"))
     with _closing_figures():
         _draw_thumbnail(result.model, place / THUMBNAIL)
@@ -70,16 +72,20 @@ def reconstruct(**planned: Any) -> dict[str, Any]:
 
 def compare(**planned: Any) -> dict[str, Any]:
     """FEM against the 1D models, on the model's geometry."""
+    from palpate.operations.compare import compare
+
     plan = Planned(**planned)
-    result = api.compare(plan.read(), plan.place / MODEL, seed=plan.seed, progress=False, **plan.options)
+    result = compare(plan.read(), plan.place / MODEL, seed=plan.seed, progress=False, **plan.options)
     _written(plan, "compare", result, result.as_json())
     return {"rmse_n": result.rmse_n, "relative_rmse": result.relative_rmse}
 
 
 def diagnose(**planned: Any) -> dict[str, Any]:
     """The gap, its cause, and how far it shrinks."""
+    from palpate.operations.diagnose import diagnose
+
     plan = Planned(**planned)
-    result = api.diagnose(plan.read(), plan.place / MODEL, seed=plan.seed, progress=False, **plan.options)
+    result = diagnose(plan.read(), plan.place / MODEL, seed=plan.seed, progress=False, **plan.options)
     found = result.as_json()
     _written(plan, "diagnose", result, found)
     keys = ("noise_n", "gap_before_n", "gap_after_n", "gap_closed")

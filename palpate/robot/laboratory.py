@@ -43,6 +43,15 @@ class RobotOptions:
     speed_error: float = option(0.15, "of the speed, as a share of it")
 
 
+@dataclass(frozen=True)
+class Solving:
+    """How touches are solved: by how many processes (None: one a core), kept where, who is told of it."""
+
+    workers: int | None = 1
+    cache: Path | None = None
+    progress: Progress = silent
+
+
 JOIN_S = 0.25
 """In free air, over which a touch's way is joined to where the last one ended."""
 
@@ -63,16 +72,14 @@ class LaboratoryRobot:
         seed: int = 0,
         options: SimulateOptions | None = None,
         robot: RobotOptions | None = None,
-        workers: int | None = 1,
-        cache: Path | None = None,
-        progress: Progress = silent,
+        solving: Solving | None = None,
         places: Sequence[Touch] | None = None,
     ) -> None:
         self.phantom, self.effects, self.seed = phantom, dict(effects or {}), seed
         self.options = options or SimulateOptions()
         self.robot = robot or RobotOptions()
         self.hand = HandOptions(hold_share=0.3, longest_hold_s=0.5, pause_s=0.1, tilt_deg=4.0)
-        self._workers, self._cache, self._progress = workers, cache, progress
+        self._solving = solving or Solving()
         self._surface = trimesh.Trimesh(phantom.vertices, phantom.faces, process=False)
         self._rng = np.random.default_rng([seed, 16])
         self._touches: list[Touch] = []
@@ -130,9 +137,9 @@ class LaboratoryRobot:
             seed=seed,
             sizes=False,
             staging=Staging(touches=tuple(touches)),
-            workers=self._workers,
-            cache=self._cache,
-            progress=self._progress,
+            workers=self._solving.workers,
+            cache=self._solving.cache,
+            progress=self._solving.progress,
         )
         return self.last
 

@@ -10,7 +10,7 @@ energy that passes between hand and force is that of the continuous motion, not 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -59,6 +59,7 @@ class Loop:
     """rate_hz of the ticks; quantisation_m of the positions (0: none); delay_s from a pose to its force.
 
     known_delay: whether the passivity controller is told the delay. coupling: whether there is one.
+    passivity, safety: of the controller and the filter. tremor_m: rms of noise on each reading, by seed.
     """
 
     rate_hz: float = 1000.0
@@ -66,6 +67,10 @@ class Loop:
     delay_s: float = 0.0
     known_delay: bool = True
     coupling: bool = True
+    passivity: PassivityOptions = field(default_factory=PassivityOptions)
+    safety: SafetyOptions = field(default_factory=SafetyOptions)
+    tremor_m: float = 0.0
+    seed: int = 0
 
 
 @dataclass(frozen=True)
@@ -196,18 +201,14 @@ def closed_loop(
     intended_m: np.ndarray,
     *,
     loop: Loop | None = None,
-    passivity: PassivityOptions | None = None,
-    safety: SafetyOptions | None = None,
     thrown_m_per_s: np.ndarray | None = None,
     tip_offsets_m: np.ndarray | None = None,
-    tremor_m: float = 0.0,
-    seed: int = 0,
     timing: Timing | None = None,
 ) -> ClosedLoopResult:
     """Run a hand that means to follow `intended_m` (n + 1, 3), one place a period, for n periods.
 
     thrown_m_per_s: (3,) the hand's first velocity, for a free mass. tip_offsets_m: (m, 3) where on the tool
-    its tips are (one, in the middle). tremor_m: rms of noise on each reading. timing: regular by default.
+    its tips are (one, in the middle). timing: regular by default.
     Force is enabled from the first tick; it ramps in, so begin out of contact.
     """
     loop = loop or Loop()
@@ -226,9 +227,9 @@ def closed_loop(
     parameters = TickParameters(
         period_ns,
         period_ns,
-        safety_parameters(safety or SafetyOptions(), spec),
+        safety_parameters(loop.safety, spec),
         passivity_parameters(
-            passivity or PassivityOptions(),
+            loop.passivity,
             max_damping_n_s_per_m=spec.max_damping_n_s_per_m,
             delay_ticks=known,
             rate_hz=loop.rate_hz,
@@ -242,7 +243,7 @@ def closed_loop(
     step = HandImpedance(
         hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m, period_ns * 1e-9 / SUBSTEPS
     )
-    noise = tremor_m * np.random.default_rng(seed).standard_normal((n, 3))
+    noise = loop.tremor_m * np.random.default_rng(loop.seed).standard_normal((n, 3))
     kept(_run, renderer)(
         program.kernel,
         renderer.parameters,

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping as MappingType
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -40,41 +40,47 @@ def exploring_hand(model: Model, *, seed: int = 0, target_force_n: float = 1.0) 
     return DeviceChoice("simulated", {"intention": intention, "seed": seed})
 
 
+@dataclass(frozen=True)
+class HeadlessOptions:
+    """servo: of the loop; mapping: from the device's frame to the model's, None the identity; render: of the
+    renderer; record: a recording (NAME.csv or NAME.csv.gz) of what was touched."""
+
+    servo: ServoOptions | None = None
+    mapping: Mapping | None = None
+    render: Any = None
+    record: Path | str | None = None
+
+
 def run_headless(
     model: Model | Path | str,
     renderer: str = "fem",
     device: str | DeviceChoice = "simulated",
     seconds: float = 10.0,
     *,
-    options: ServoOptions | None = None,
-    mapping: Mapping | None = None,
-    render_options: Any = None,
-    device_options: MappingType[str, Any] | None = None,
-    record: Path | str | None = None,
+    options: HeadlessOptions | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> ServoReport:
     """Feel `model` for `seconds` and report; prints nothing.
 
-    device: a name or DeviceChoice; 'simulated' without options explores the model by itself. record: a
-    recording (NAME.csv or NAME.csv.gz) of what was touched. Raises the PalpateError that stopped it.
+    device: a name, or a DeviceChoice with options; 'simulated' explores the model by itself. Raises the
+    PalpateError that stopped it.
     """
-    if isinstance(device, str):
-        if device == "simulated" and not device_options:
-            known = model if isinstance(model, Model) else read_model(model)
-            device = exploring_hand(known, seed=seed)
-        else:
-            device = DeviceChoice(device, dict(device_options or {}))
+    options = options or HeadlessOptions()
+    if device == "simulated":
+        device = exploring_hand(model if isinstance(model, Model) else read_model(model), seed=seed)
+    elif isinstance(device, str):
+        device = DeviceChoice(device, {})
     with Servo(
         model,
         renderer=renderer,
         device=device,
-        options=options,
-        mapping=mapping,
-        render_options=render_options,
+        options=options.servo,
+        mapping=options.mapping,
+        render_options=options.render,
     ) as servo:
         servo.start(lambda stage, fraction: progress(stage, 0.3 * fraction))
-        recorder = Recorder(servo) if record is not None else None
+        recorder = Recorder(servo) if options.record is not None else None
         servo.enable()
         start = time.perf_counter()
         while (elapsed := time.perf_counter() - start) < seconds:
@@ -85,8 +91,8 @@ def run_headless(
                 recorder.collect()
         result = servo.report()
         servo.stop()
-        if recorder is not None and record is not None:
-            recorder.write(record)
+        if recorder is not None and options.record is not None:
+            recorder.write(options.record)
         if servo.failure:
             raise DeviceError(servo.failure)
         progress("touching", 1.0)

@@ -11,7 +11,7 @@ from typing import Any
 
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
-from palpate.arguments import finite
+from palpate.operations._flags import finite
 from palpate.tasks.driver import Outcome, Status, run
 from palpate.tasks.graph import Graph
 

@@ -25,7 +25,7 @@ from typing import Any, Self
 import psutil
 
 from mechanics.errors import PalpateError
-from palpate.arguments import plain
+from palpate.output import plain
 from palpate.tasks.graph import Record, digest_of, write_record
 from palpate.version import __version__
 

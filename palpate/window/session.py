@@ -11,7 +11,7 @@ import math
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
@@ -43,12 +43,22 @@ FRICTIONS = (math.inf, 1.0, 0.5, 0.2, 0.05)
 MODULUS_STEP = 1.25
 
 
-class TouchSession:
-    """Use in a `with` statement, after which every force is zero and the servo is gone.
+@dataclass(frozen=True)
+class SessionOptions:
+    """renderer: that is felt; beside: a second one, '' for none; render: of every renderer here, felt or
+    drawn; servo: of the loop; recording: its file, written on close, None until asked for; pictures: whether
+    there is something to draw on."""
 
-    beside: a second renderer, '' for none. render_options: of every renderer here, felt or drawn.
-    recording: its file, written on close; None until asked for.
-    """
+    renderer: str = "fem"
+    beside: str = ""
+    render: RenderOptions = field(default_factory=RenderOptions)
+    servo: ServoOptions | None = None
+    recording: Path | None = None
+    pictures: bool = True
+
+
+class TouchSession:
+    """Use in a `with` statement, after which every force is zero and the servo is gone."""
 
     def __init__(
         self,
@@ -56,34 +66,30 @@ class TouchSession:
         *,
         title: str = "object",
         device: DeviceChoice | str = "simulated",
-        renderer: str = "fem",
-        beside: str = "",
-        render_options: RenderOptions | None = None,
         mapping: Mapping | None = None,
-        options: ServoOptions | None = None,
-        recording: Path | None = None,
-        pictures: bool = True,
+        options: SessionOptions | None = None,
     ) -> None:
+        asked = options or SessionOptions()
         self.model = model
         self.title = title
         self.trace = Trace()
         self.young_modulus_pa = model.material.young_modulus_pa
-        self._options = render_options or RenderOptions()
+        self._options = asked.render
         self.friction = rendered_touch(model, self._options).friction
         self.worker = Worker()
         self.recording: SessionRecording | None = None
-        self._recording_path = recording
-        self._pictures = pictures
-        self._beside_name = beside
+        self._recording_path = asked.recording
+        self._pictures = asked.pictures
+        self._beside_name = asked.beside
         self._beside: Beside | None = None
         self._device = DeviceChoice(device) if isinstance(device, str) else device
         self._has_force = spec_of(self._device.name).has_force
         self._servo = Servo(
             model,
-            renderer=renderer,
+            renderer=asked.renderer,
             device=self._device,
             mapping=mapping,
-            options=options,
+            options=asked.servo,
             render_options=self._options,
         )
         self._renderers: dict[str, Renderer] = {}

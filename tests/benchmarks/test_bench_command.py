@@ -12,7 +12,7 @@ import pytest
 
 from benchmarks.evidence import read
 from palpate import cli
-from palpate.commands.bench import clone, names
+from palpate.operations.bench import clone, names
 
 CLONE = Path(__file__).resolve().parents[2]
 PRODUCT = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")

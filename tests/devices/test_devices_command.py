@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import argparse
 import dataclasses
 import json
 
@@ -11,7 +10,9 @@ import pytest
 from devices.haply import HaplyOptions
 from devices.registry import DEVICES, options_of
 from palpate.cli import main
-from palpate.commands import touch
+from palpate.operations._declare import Call
+from palpate.operations._run import parser_of
+from palpate.operations.touch import TouchOperands, device_choice
 
 from .fake_inverse import FakeInverse
 
@@ -50,14 +51,13 @@ def test_an_unknown_device_is_refused(capsys: pytest.CaptureFixture) -> None:
 
 
 def test_every_option_of_every_driver_is_a_flag_of_its_own() -> None:
-    parser = argparse.ArgumentParser()
-    touch.add_arguments(parser)
-    # old spellings of a flag are kept, unseen
-    names = [action.dest for action in parser._actions if action.help is not argparse.SUPPRESS]
+    parser = parser_of("touch")
+    names = [action.dest for action in parser._actions]
     assert len(names) == len(set(names)), "two options would overwrite each other"
     for device in DEVICES:
         assert {field.name for field in dataclasses.fields(options_of(device))} <= set(names)
     given = parser.parse_args(["block", "--haply-uri", "ws://elsewhere:1", "--ffb-full-scale", "4"])
-    choice, _ = touch.device_choice(given, "haply", None, None)
+    asked, call = TouchOperands(), Call(vars(given))
+    choice, _ = device_choice(asked, call, "haply", None, None)
     assert choice.options["options"] == HaplyOptions(uri="ws://elsewhere:1")
-    assert touch.device_choice(given, "pid-ffb", None, None)[0].options["options"].full_scale_n == 4.0
+    assert device_choice(asked, call, "pid-ffb", None, None)[0].options["options"].full_scale_n == 4.0

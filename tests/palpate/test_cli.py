@@ -14,7 +14,9 @@ import pytest
 
 from mechanics.options import option
 from palpate import cli
-from palpate.arguments import add_options, emit_json, options_from
+from palpate.operations._flags import add_options, options_from
+from palpate.operations._list import commands
+from palpate.output import emit_json
 
 
 @dataclass(frozen=True)
@@ -35,7 +37,7 @@ def parse(*words: str) -> SampleOptions:
 def test_options_become_flags_and_come_back():
     assert parse() == SampleOptions()
     given = parse(
-        "--mesh-size", "0.005", "--surface", "hull", "--threshold-n", "1", "--no-holds", "--repeats", "4"
+        "--mesh-size", "0.005", "--surface", "hull", "--threshold", "1", "--no-holds", "--repeats", "4"
     )
     assert given == SampleOptions(0.005, "hull", 1.0, False, 4)
 
@@ -47,7 +49,7 @@ def test_bad_option_values_exit_with_2(words, capsys):
     assert stop.value.code == 2
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", commands())
 def test_every_command_is_there_or_says_so(name, capsys):
     try:
         code = cli.main([name, "--help"])

@@ -6,19 +6,23 @@ import argparse
 import re
 import shutil
 import subprocess
+import sys
 
 import pytest
 
 from palpate import cli
-from palpate.arguments import told_help
-from palpate.commands.completion import SHELLS, script
+from palpate.child import module_environment
+from palpate.operations._flags import in_order
+from palpate.operations._list import commands
+from palpate.operations._run import parser_of
+from palpate.operations.completion import SHELLS, completion
 
 UNITS = {"m", "n", "s", "hz", "pa", "kg", "n/m", "m/s", "mm", "deg", "rad", "n/s", "n_s/m", "m_per_s", "1"}
 
 
-@pytest.mark.parametrize("name", cli.COMMANDS)
+@pytest.mark.parametrize("name", commands())
 def test_help_says_units_before_defaults_and_nothing_that_only_python_has(name):
-    parser = cli.parser_of(name)
+    parser = parser_of(name)
     text = " ".join(parser.format_help().split())
     assert "(default: )" not in text and "(default: None)" not in text and "SUPPRESS" not in text
     assert not re.search(r"\bNone\b", text)
@@ -26,7 +30,7 @@ def test_help_says_units_before_defaults_and_nothing_that_only_python_has(name):
     for action in parser._actions:
         if action.help is argparse.SUPPRESS or not action.option_strings:
             continue
-        words = told_help(action.help or "")
+        words = in_order(action.help or "")
         assert words and not words.startswith("("), f"{action.option_strings} has no words"
         shown = parser._get_formatter()._format_args(action, "VALUE")
         assert shown.lower() not in UNITS, f"{action.option_strings}: the unit belongs in brackets"
@@ -48,34 +52,56 @@ def test_help_says_units_before_defaults_and_nothing_that_only_python_has(name):
     ],
 )  # fmt: skip
 def test_words_are_put_in_order(said, told):
-    assert told_help(said) == told
+    assert in_order(said) == told
 
 
-def test_a_flag_is_shown_without_its_unit_and_taken_with_it_too():
-    parser = cli.parser_of("reconstruct")
-    assert "--least-duration-s" not in parser.format_help()
-    for flag in ("--least-duration", "--least-duration-s"):
-        assert parser.parse_args(["REC", "-o", "MODEL", flag, "0.1"]).least_duration_s == 0.1
+def test_a_flag_has_one_spelling_without_its_unit():
+    parser = parser_of("reconstruct")
+    given = parser.parse_args(["REC", "-o", "MODEL", "--least-duration", "0.1"])
+    assert given.least_duration_s == 0.1
+    assert not any("--least-duration-s" in action.option_strings for action in parser._actions)
+
+
+def test_the_list_is_shown_as_it_stands():
+    shown = cli._top_parser().format_help()
+    assert all(
+        re.search(rf"^  {name} +{re.escape(words)}$", shown, re.M) for name, words in commands().items()
+    )
 
 
 @pytest.mark.parametrize("shell", SHELLS)
-def test_completion_knows_every_command_and_its_options(shell):
-    text = script(shell)
-    assert all(name in text for name in cli.COMMANDS)
-    assert "neo-hookean" in text and "mesh-size" in text and "least-duration-s" not in text
+def test_a_shell_is_told_to_ask_the_program(shell):
+    text = completion(shell)
+    assert "palpate" in text and "_ARGCOMPLETE" in text
+
+
+@pytest.mark.parametrize(
+    ("line", "expected"),
+    [
+        ("palpate reco", {"reconstruct"}),
+        ("palpate reconstruct --mesh-si", {"--mesh-size"}),
+        ("palpate reconstruct --dent-law neo", {"neo-hookean"}),
+        ("palpate export --to s", {"sofa", "stl"}),
+        ("palpate press --renderer kel", {"kelvin-voigt"}),
+    ],
+)
+def test_what_is_typed_is_completed(line, expected, tmp_path):
+    answer = tmp_path / "answer"
+    environment = module_environment(
+        _ARGCOMPLETE="1",
+        _ARGCOMPLETE_IFS="\n",
+        _ARGCOMPLETE_STDOUT_FILENAME=str(answer),
+        COMP_LINE=line,
+        COMP_POINT=str(len(line)),
+    )
+    done = subprocess.run(
+        [sys.executable, "-m", "palpate"], env=environment, capture_output=True, text=True, cwd=tmp_path
+    )
+    assert {word.strip() for word in answer.read_text().split()} == expected, done.stderr
 
 
 @pytest.mark.skipif(not shutil.which("bash"), reason="needs bash")
-@pytest.mark.parametrize(
-    ("words", "expected"),
-    [
-        (["palpate", "reco"], {"reconstruct"}),
-        (["palpate", "reconstruct", "--mesh-si"], {"--mesh-size"}),
-        (["palpate", "reconstruct", "--dent-law", "neo"], {"neo-hookean"}),
-        (["palpate", "export", "--to", "s"], {"sofa", "stl"}),
-    ],
-)
-def test_bash_completes(words, expected):
-    ask = f'COMP_WORDS=({" ".join(words)}); COMP_CWORD={len(words) - 1}; _palpate; echo "${{COMPREPLY[@]}}"'
-    done = subprocess.run(["bash", "-c", script("bash") + ask], capture_output=True, text=True, check=True)
-    assert set(done.stdout.split()) == expected, done.stderr
+def test_bash_takes_the_script():
+    words = completion("bash") + "\ncomplete -p palpate"
+    done = subprocess.run(["bash", "-c", words], capture_output=True, text=True, check=True)
+    assert "_python_argcomplete" in done.stdout

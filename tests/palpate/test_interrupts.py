@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from palpate.cli import parser_of
 from palpate.importing.tables import SUFFIXES
+from palpate.operations._run import parser_of
 
 from ..support import interrupts
 from ..support.small_disk import SmallDisk

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from argparse import Namespace
-
 import numpy as np
 import pytest
 import trimesh
@@ -12,7 +10,8 @@ import palpate as pp
 from mechanics.errors import ContactError, OptionError, SurfaceError
 from mechanics.press_sites import sites_of
 from palpate import cli
-from palpate.sources import given_model
+from palpate.operations._declare import Call
+from palpate.operations._shared import given_model
 from reconstruct.geometry.known_shape import place
 from reconstruct.geometry.placed import nowhere
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
@@ -146,9 +145,9 @@ def test_the_modulus_of_a_half_space_needs_no_tracing():
 def test_a_surfaces_file_is_the_model_of_a_recording(tmp_path):
     """Of compare --model and of diagnose: owners of a CAD model were refused."""
     trimesh.creation.box(extents=(80, 80, 40)).export(tmp_path / "part.stl")
-    given = Namespace(modulus=9e3, nu=None, unit="mm", up=None, sink=None)
-    scene = given_model(given, str(tmp_path / "part.stl"))
+    given = Call({"young_modulus_pa": 9e3, "unit": "mm"})
+    scene = given_model(str(tmp_path / "part.stl"), given)
     assert isinstance(scene, Scene) and scene.kind == "mesh"
     assert (scene.young_modulus_pa, scene.unit) == (9e3, "mm")
     with pytest.raises(OptionError, match="needs --model FILE"):
-        given_model(given, None)
+        given_model(None, given)

@@ -105,7 +105,7 @@ def test_press_and_replay_have_the_support_on_the_command_line(tmp_path, capsys)
     assert json.loads(result.read_text())["normal"] == [0, 0, 1]
     force = read_curve(curve).force
     assert force[len(force) // 2, 2] == pytest.approx(1.5, abs=1e-9)
-    assert main([*there, "--hold", "0.1", "--support-stiffness-n-per-m", "500", "-o", curve]) == 0
+    assert main([*there, "--hold", "0.1", "--support-stiffness", "500", "-o", curve]) == 0
     force = read_curve(curve).force
     assert force[len(force) // 2, 2] == pytest.approx(0.5, abs=1e-9)
     assert main([*there, "--no-support"]) == 2

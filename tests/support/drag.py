@@ -32,7 +32,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Drag, print the ripples; returns {line: {least_n, most_n, ripple_rms, ripple_most}}."""
-    from palpate.sources import with_friction
+    from palpate.operations._shared import with_friction
     from render.options import RenderOptions
     from render.registry import create
     from scenes.build import model_of

@@ -79,7 +79,7 @@ def _jobs(sound: Path, out: Path) -> dict[str, Job]:
         "reconstruct": Job(("reconstruct", recording, "-o", file("model"), "--mesh-size", "0.012",
                             "--report", file("figures.html")), 2.0),
         "compare": Job(("compare", recording, "--model", folder, "-o", file("compare.html"))),
-        "simulate": Job(("simulate", "block", "-o", file("simulated.csv.gz"), "--presses", "2", "--finest-mm",
+        "simulate": Job(("simulate", "block", "-o", file("simulated.csv.gz"), "--presses", "2", "--finest",
                          "6", "--workers", "1", "--no-sizes"), 2.0),
         "diagnose": Job(("diagnose", recording, "--fast", "--apply", file("improved"), "--report",
                          file("diagnose.html")), 2.0),

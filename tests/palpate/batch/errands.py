@@ -83,6 +83,6 @@ def replayed(model: str, recording: str) -> str:
     """SHA-256 of the forces that a replay gives."""
     import hashlib
 
-    from palpate import api
+    from palpate.operations.replay import replay
 
-    return hashlib.sha256(api.replay(model, recording, progress=False).force_n.tobytes()).hexdigest()
+    return hashlib.sha256(replay(model, recording, progress=False).force_n.tobytes()).hexdigest()

@@ -306,8 +306,8 @@ def test_steps_hand_every_option_to_the_doors_own_functions(tmp_path, monkeypatc
         return call
 
     for name in ("compare", "diagnose"):
-        monkeypatch.setattr(f"palpate.api.{name}", listening(name))
-    monkeypatch.setattr("palpate.api.read_recording", lambda path: path)
+        monkeypatch.setattr(f"palpate.operations.{name}.{name}", listening(name))
+    monkeypatch.setattr("palpate.batching.steps.read_recording", lambda path: path)
     given = {
         "sha256": steps.content_of(path),
         "seed": 3,

@@ -114,16 +114,16 @@ ABSURD = {
     "a seed of 40 digits": ("0 or greater", "simulate", "block", "-o", "new.csv", "--seed", "9" * 40),
     "negative presses": ("from 0", "simulate", "block", "-o", "new.csv", "--presses", "-1"),
     "no workers": ("workers is 0", "simulate", "block", "-o", "new.csv", "--workers", "0"),
-    "a finest mesh of 0": ("from 0.5 to 1000 mm", "simulate", "block", "-o", "new.csv", "--finest-mm", "0"),
+    "a finest mesh of 0": ("from 0.5 to 1000 mm", "simulate", "block", "-o", "new.csv", "--finest", "0"),
     "a tip of 1 m": ("from 0.0001 to 0.04 m", "simulate", "block", "-o", "new.csv", "--tip-radius", "1"),
-    "a speed of 0": ("from 0.0001 to 10 m/s", "simulate", "block", "-o", "new.csv", "--slowest-m-per-s", "0"),
+    "a speed of 0": ("from 0.0001 to 10 m/s", "simulate", "block", "-o", "new.csv", "--slowest", "0"),
     "a negative noise": (
         "from 0 to 1000 N",
         "simulate",
         "block",
         "-o",
         "new.csv",
-        "--force-noise-std-n",
+        "--force-noise-std",
         "-1",
     ),
     "friction of nan": (
@@ -177,10 +177,12 @@ def test_absurd_options_are_refused_before_any_work(folder, record, tmp_path, mo
 
 def test_every_default_is_within_its_range():
     from devices.registry import DEVICES, options_of
-    from palpate.keywords import FUNCTIONS, kinds
+    from palpate.operations._declare import operation_of
+    from palpate.operations._list import calls
     from palpate.servo import SafetyOptions, ServoOptions
 
-    everything = {kind for name in FUNCTIONS for kind in kinds(name)} | {options_of(name) for name in DEVICES}
+    everything = {kind for name in calls() for kind in operation_of(name).kinds}
+    everything |= {options_of(name) for name in DEVICES}
     for kind in everything | {SafetyOptions, ServoOptions}:
         for field in dataclasses.fields(kind):
             if "help" in field.metadata:
@@ -202,7 +204,7 @@ class _Named:
 
 
 def test_errors_of_the_system_anywhere_in_a_command_become_one_line(monkeypatch, tmp_path):
-    from palpate.commands import devices
+    from palpate.operations.devices import devices
 
     for error, words in (
         (OSError(28, "No space left on device", "/x/y"), "'/x/y' cannot be used (No space left on device)"),
@@ -210,10 +212,10 @@ def test_errors_of_the_system_anywhere_in_a_command_become_one_line(monkeypatch,
         (KeyboardInterrupt(), "interrupted"),
     ):
 
-        def fail(_, error=error):
+        def fail(*_, error=error, **__):
             raise error
 
-        monkeypatch.setattr(devices, "run", fail)
+        monkeypatch.setattr(devices.operation, "run", fail)
         code, said = command("devices")
         assert code == (130 if isinstance(error, KeyboardInterrupt) else 2)
         assert words in said and len(said.strip().splitlines()) == 1

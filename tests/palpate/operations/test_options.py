@@ -13,9 +13,24 @@ import pytest
 import palpate as pp
 import render.press
 import render.replay  # noqa: F401
-from palpate.keywords import FUNCTIONS, kinds
+from palpate.operations._declare import declared, operation_of, written
+from palpate.operations._list import OPERATIONS, calls
+from palpate.operations._run import command_operation, parser_of
+from palpate.operations._shared import MeshFileOptions
 
 from ...render import shapes
+
+FUNCTIONS = (
+    "reconstruct",
+    "renderer",
+    "replay",
+    "press",
+    "compare",
+    "diagnose",
+    "changes",
+    "calibrate",
+    "simulate",
+)
 
 
 class Reached(Exception):
@@ -42,7 +57,7 @@ def rooms(monkeypatch):
         rendered.append(options)
         return SimpleNamespace(model=SimpleNamespace(path=None))
 
-    monkeypatch.setattr("render.registry.create", created)
+    monkeypatch.setattr("palpate.operations.renderer.create", created)
     monkeypatch.setattr("render.scene.scene_of", lambda made, support: listening(*rendered, support))
     monkeypatch.setattr("reconstruct.placing.presses_on", lambda recording, model: model.presses)
 
@@ -97,22 +112,57 @@ def room_is_reached():
 
 @pytest.mark.parametrize("name", FUNCTIONS)
 def test_every_option_reaches_its_room(rooms, recording, name):
-    every = pp.options(name)
-    assert every
-    homes = {f.name: kind for kind in kinds(name) for f in dataclasses.fields(kind) if f.metadata}
+    homes = {
+        f.name: kind
+        for kind in operation_of(name).kinds
+        for f in declared(kind)
+        if kind is not MeshFileOptions and f.name != "seed"
+    }
+    every = [option for option in pp.options(name) if option.name in homes]
+    assert {option.name for option in every} == set(homes)
     for option in every:
         with room_is_reached() as found:
             call(name, recording, **{option.name: other(option)})
         assert getattr(found[homes[option.name]], option.name) == other(option), option.name
 
 
-@pytest.mark.parametrize("name", FUNCTIONS)
-def test_options_have_one_name_each_that_no_argument_shadows_unless_it_is_the_same(name):
-    names = [option.name for option in pp.options(name)]
-    assert len(names) == len(set(names))
-    shared = set(names) & set(inspect.signature(getattr(pp, name)).parameters)
-    assert shared <= {"method", "fast", "seed"}
-    assert all(option.help in str(pp.options(name)) for option in pp.options(name))
+@pytest.mark.parametrize("name", calls())
+def test_signature_help_and_list_show_every_option_with_its_default(name):
+    function, listed = getattr(pp, name), pp.options(name)
+    parameters = inspect.signature(function).parameters
+    with_default = {
+        n: p.default for n, p in parameters.items() if p.default is not p.empty and n != "progress"
+    }
+    assert {o.name: o.default for o in listed if o.name in with_default} == with_default
+    assert {o.name for o in listed} - set(with_default) <= {"files"}, "what comes as *files has no default"
+    assert all(option.help in str(listed) for option in listed)
+    assert all(p.kind is not p.VAR_KEYWORD for p in parameters.values())
+    words = inspect.getdoc(function)
+    for option in listed:
+        assert option.help in words
+        assert not option.unit or f"{option.name} [{option.unit}]" in words
+
+
+@pytest.mark.parametrize("name", calls())
+def test_no_two_options_of_one_operation_share_a_name(name):
+    """But for a seed that a room has too, which is the operation's."""
+    operation = operation_of(name)
+    names = [f.name for kind in (operation.operands, *operation.kinds) for f in declared(kind)]
+    twice = {n for n in names if names.count(n) > 1}
+    assert twice <= {"seed", "young_modulus_pa"}
+
+
+@pytest.mark.parametrize("name", [n for n, entry in OPERATIONS.items() if entry.command and entry.calls])
+def test_a_command_and_its_call_take_the_same_names_and_defaults(name):
+    operation, _ = command_operation(name)
+    flags = {a.dest: a for a in parser_of(name)._actions if a.dest not in ("help", "json")}
+    parameters = dict(inspect.signature(getattr(pp, operation.name)).parameters)
+    parameters.pop("progress", None)
+    only = {n: written(f).only for n, f in operation.fields.items()}
+    assert {n for n in flags if only[n] != "command"} == {n for n in parameters if only[n] != "python"}
+    for each, parameter in parameters.items():
+        if each in flags and parameter.kind is parameter.KEYWORD_ONLY:
+            assert parameter.default == operation.fields[each].default
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -131,8 +181,8 @@ def test_near_misses_and_wrong_kinds_are_told(recording, rooms):
     ):
         with pytest.raises(pp.OptionError, match=words):
             call("reconstruct", recording, **options)
-    with pytest.raises(pp.OptionError, match="has no options; allowed are reconstruct"):
-        pp.options("load")
+    with pytest.raises(pp.OptionError, match="'lod' is no operation; allowed are check"):
+        pp.options("lod")
 
 
 def test_a_renderer_keeps_its_own_options(felt, recording):

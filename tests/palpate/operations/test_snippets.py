@@ -13,7 +13,6 @@ import pytest
 
 import palpate as pp
 from palpate.child import module_environment
-from palpate.keywords import FUNCTIONS
 
 REPOSITORY = Path(__file__).resolve().parents[3]
 
@@ -46,8 +45,6 @@ def test_what_the_pages_call_is_there(page):
     assert len(ours) >= 5
     for name, call in ours:
         allowed = set(inspect.signature(getattr(pp, name)).parameters)
-        if name in FUNCTIONS:
-            allowed |= {option.name for option in pp.options(name)}
         wrong = {k.arg for k in call.keywords} - allowed
         assert wrong <= {"mesh_size"}  # the page's example of an error
 

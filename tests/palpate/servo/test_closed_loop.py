@@ -59,7 +59,7 @@ def test_energy_owed_is_half_a_tick_of_stiffness_without_a_controller():
     hand = HandImpedance(0.2, 2000.0, 1e6)
     path = press_hold_release(rate, times=1)
     result = closed_loop(
-        ElasticPlane(k), SPEC, hand, path, passivity=PassivityOptions(passivity=False), loop=Loop(rate)
+        ElasticPlane(k), SPEC, hand, path, loop=Loop(rate, passivity=PassivityOptions(passivity=False))
     )
     depth = np.maximum(0.005 - result.position[:, 2], 0.0)
     expected = 0.5 * k * (np.diff(depth) ** 2).sum()

@@ -12,7 +12,7 @@ from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
 from mechanics.model import Model
 from mechanics.recording import read_recording
-from palpate.window.session import TouchSession
+from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import TouchWindow
 from reconstruct.pipeline import reconstruct
 from scenes.scene import Scene
@@ -36,7 +36,7 @@ def test_what_a_mouse_touched_is_reconstructed(block: Model, tmp_path: Path) -> 
     channel = PoseChannel.create()
     channel.write(time.perf_counter(), (0.0, 0.0, 0.1))
     device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    with TouchSession(block, title="Block", device=device, recording=path) as session:
+    with TouchSession(block, title="Block", device=device, options=SessionOptions(recording=path)) as session:
         session.start()
         session.enable()
         window = TouchWindow(session, Scene("block", "model", "", title="Block"), channel, off_screen=True)

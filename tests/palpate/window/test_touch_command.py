@@ -27,10 +27,10 @@ def test_headless_session_with_a_recording(
 ) -> None:
     path = tmp_path / "session.csv.gz"
     words = ["touch", str(block.path), "--headless", "--seconds", "4", "--record", str(path), "--json", "-"]
-    assert main([*words, "--jump-m", "0.01"]) == 0
+    assert main([*words, "--jump", "0.01"]) == 0
     out, err = capsys.readouterr()
     result = json.loads(out)
-    loosened = "protection loosened: --jump-m is 0.01 (default 0.005)"
+    loosened = "protection loosened: --jump is 0.01 (default 0.005)"
     assert loosened in err and loosened in result["servo"]["words"]
     assert result["device"] == "simulated" and result["servo"]["ticks"] > 1000
     recording = read_recording(path)
@@ -159,11 +159,11 @@ def test_what_was_rendered_is_reconstructed(block: Model, tmp_path: Path) -> Non
     [
         (["--hand-mass", "0"], "--hand-mass"),
         (["--stale", "1e9"], "--stale"),
-        (["--jump-m", "1e9"], "--jump-m"),
+        (["--jump", "1e9"], "--jump"),
         (["--slew", "1e300"], "--slew"),
         (["--ramp", "1e-300"], "--ramp"),
-        (["--silence-s", "1e9"], "--silence-s"),
-        (["--support-damping-n-s-per-m=-1e6"], "--support-damping-n-s-per-m"),
+        (["--silence", "1e9"], "--silence"),
+        (["--support-damping=-1e6"], "--support-damping"),
         (["--support-friction=-5"], "--support-friction"),
     ],
 )

@@ -17,7 +17,7 @@ from mechanics.model import Model
 from mechanics.recording import read_recording
 from palpate.window.game import Game
 from palpate.window.picture import STIFFNESS
-from palpate.window.session import TouchSession
+from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import CHARTS_SHARE, TouchWindow
 from scenes.scene import Scene
 
@@ -34,7 +34,9 @@ def driven(block: Model, tmp_path_factory: pytest.TempPathFactory) -> Iterator[D
     channel.write(0.0, (0.0, 0.0, 0.08))
     scene = Scene("block", "model", str(block.path), title="Block", beside="hunt-crossley")
     device = DeviceChoice("mouse", {"channel": str(channel.path)})
-    with TouchSession(block, title="Block", device=device, beside=scene.beside) as session:
+    with TouchSession(
+        block, title="Block", device=device, options=SessionOptions(beside=scene.beside)
+    ) as session:
         session.start()
         session.enable()
         window = TouchWindow(session, scene, channel, off_screen=True, size=SIZE)

@@ -13,7 +13,7 @@ import pytest
 from mechanics.errors import OptionError, RecordingError
 from mechanics.recording import read_recording
 from palpate.cli import main
-from palpate.commands.simulate import effects_from
+from palpate.operations.simulate import effects_from
 from scenes.laboratory.effects import REGISTRY, UNNAMED
 from scenes.laboratory.effects.contact import relaxed
 from scenes.laboratory.sealing import opened

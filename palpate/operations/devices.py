@@ -2,59 +2,58 @@
 
 from __future__ import annotations
 
-import argparse
 import time
+from dataclasses import KW_ONLY, dataclass
 from typing import Any
 
 from devices.base import Availability, DeviceSpec
 from devices.io_thread import Rate, ThreadedDevice
 from devices.registry import DEVICES, find_devices, make_device, options_of
 from mechanics.errors import OptionError
-from palpate.arguments import add_json, add_options, emit_json, finite, options_from, say
+from palpate.operations._declare import Call, operand, operation
+from palpate.output import Output
 
-SUMMARY = "which devices are there, and for the others why not"
 HARDWARE = ("spacemouse", "pid-ffb", "haply", "forcedimension", "openhaptics")
 LEAST_MEASURE_S = 1.0
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """`NAME...`, `--measure`, every driver's options, `--json`."""
-    parser.add_argument(
-        "names",
-        nargs="*",
-        metavar="NAME",
-        help=f"only these (all by default): {', '.join(DEVICES)}",
+@dataclass(frozen=True)
+class DevicesOperands:
+    """Which, and whether they are measured."""
+
+    names: list[str] = operand(
+        (), f"only these (all by default): {', '.join(DEVICES)}", metavar="NAME", positional=True, count="*"
     )
-    parser.add_argument(
-        "--measure",
-        metavar="NUMBER",
-        type=finite,
-        help="open the hardware that is there, force off, and measure its rate for this long [s]",
+    _: KW_ONLY
+    measure: float | None = operand(
+        None, "open the hardware that is there, force off, and measure its rate for this long", unit="s"
     )
-    for name in HARDWARE:
-        add_options(parser, options_of(name))
-    add_json(parser)
 
 
-def run(arguments: argparse.Namespace) -> int:
-    """Look, and tell."""
-    if arguments.measure is not None and not arguments.measure >= LEAST_MEASURE_S:
-        raise OptionError(f"--measure is {arguments.measure}; it must be at least {LEAST_MEASURE_S:g} s")
-    options: dict[str, Any] = {name: options_from(arguments, options_of(name)) for name in HARDWARE}
-    found = find_devices(arguments.names or None, options)
-    there = [device for device in found if device.present]
-    rates = {}
-    if arguments.measure is not None:
-        chosen = dict.fromkeys(device.name for device in there if device.name in HARDWARE)
-        rates = {name: _measured(name, options[name], arguments.measure) for name in chosen}
+def _answer(found: list[tuple[Availability, Rate | None]], asked: DevicesOperands, out: Output) -> int:
+    there = [(device, rate) for device, rate in found if device.present]
     if there:
-        say(arguments, "there:", *(line for d in there for line in _present(d, rates.get(d.name))))
+        out.say("there:", *(line for device, rate in there for line in _present(device, rate)))
     if len(there) < len(found):
-        say(arguments, "not there:", *(line for d in found if not d.present for line in _absent(d)))
+        out.say("not there:", *(line for d, _ in found if not d.present for line in _absent(d)))
     if there:
-        say(arguments, "", f"to touch something with one: palpate touch --device {there[0].name}")
-    emit_json({"devices": [_plain(device, rates.get(device.name)) for device in found]}, arguments.json)
+        out.say("", f"to touch something with one: palpate touch --device {there[0][0].name}")
+    out.json({"devices": [figures(device, rate) for device, rate in found]})
     return 0
+
+
+@operation(DevicesOperands, *map(options_of, HARDWARE), answer=_answer, progress=False)
+def devices(asked: DevicesOperands, call: Call) -> list[tuple[Availability, Rate | None]]:
+    """Every device that was asked for, with its rate, Hz, where that was measured."""
+    if asked.measure is not None and not asked.measure >= LEAST_MEASURE_S:
+        raise OptionError(f"--measure is {asked.measure}; it must be at least {LEAST_MEASURE_S:g} s")
+    options: dict[str, Any] = {name: call.of(options_of(name)) for name in HARDWARE}
+    found = find_devices(asked.names or None, options)
+    rates = {}
+    if asked.measure is not None:
+        chosen = dict.fromkeys(d.name for d in found if d.present and d.name in HARDWARE)
+        rates = {name: _measured(name, options[name], asked.measure) for name in chosen}
+    return [(device, rates.get(device.name) if device.present else None) for device in found]
 
 
 def _measured(name: str, options: Any, seconds: float) -> Rate:
@@ -90,7 +89,8 @@ def _absent(device: Availability) -> list[str]:
     return _headed(device, f"why:   {device.why_not}", f"to do: {device.remedy}")
 
 
-def _plain(device: Availability, rate: Rate | None) -> dict[str, object]:
+def figures(device: Availability, rate: Rate | None) -> dict[str, object]:
+    """A device for JSON, keys with units."""
     spec = device.spec
     return {
         "name": device.name,

@@ -8,41 +8,29 @@ object, the left button presses, the wheel sets the depth, the right button turn
 
 from __future__ import annotations
 
-import argparse
 import os
 import sys
 import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
+from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from devices.channel import PoseChannel
-from devices.intention import Intention
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
 from mechanics.errors import DeviceError, OptionError
 from mechanics.files import PNG
 from mechanics.model import Model
 from mechanics.progress import Progress
-from mechanics.recording import SAMPLES
-from palpate.arguments import (
-    add_input,
-    add_json,
-    add_options,
-    add_output,
-    add_seed,
-    emit_json,
-    finite,
-    options_from,
-    progress_bar,
-    say,
-)
-from palpate.servo import SafetyOptions, ServoOptions
-from palpate.sources import add_mesh_arguments, given_scene, with_friction
-from palpate.window.session import TouchSession
+from palpate.operations._declare import Call, operand, operation
+from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
+from palpate.output import Output, progress_bar
+from palpate.servo import SafetyOptions, ServoOptions, ServoReport
+from palpate.window.session import SessionOptions, TouchSession
 from render.options import RenderOptions
 from render.registry import names
 from render.support import SupportOptions
@@ -53,73 +41,85 @@ from scenes.scene import Scene
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
 
-SUMMARY = "feel a model or scene at 1 kHz"
-DEFAULT_SCENE = "demo"
 POLL_S = 0.1
 
 
-def add_arguments(parser: argparse.ArgumentParser) -> None:
-    """The scene, the device, the window, and every option of the parts."""
-    add_input(
-        parser,
-        "scene",
-        nargs="?",
-        default=DEFAULT_SCENE,
-        metavar="MODEL_OR_SCENE",
-        help=f"what to touch (default: {DEFAULT_SCENE})",
+@dataclass(frozen=True)
+class TouchOperands:
+    """The scene, the device, the window."""
+
+    scene: str = operand(
+        "demo", "what to touch", metavar="MODEL_OR_SCENE", positional=True, count="?", reads=True
     )
-    add_mesh_arguments(parser)
-    parser.add_argument(
-        "--device",
-        metavar="NAME",
-        help=f"one of {', '.join(DEVICES)} (default: mouse; headless: simulated)",
+    _: KW_ONLY
+    device: str | None = operand(
+        None, f"one of {', '.join(DEVICES)}; None: mouse; headless: simulated", metavar="NAME"
     )
-    parser.add_argument("--headless", action="store_true", help="no window: all else is the same")
-    parser.add_argument(
-        "--seconds",
-        type=finite,
-        metavar="NUMBER",
-        help="stop after this time [s] (default: when the window closes)",
+    headless: bool = operand(False, "no window: all else is the same")
+    seconds: float | None = operand(None, "stop after this time; None: when the window closes", unit="s")
+    record: str | Path | None = operand(
+        None, "write the session as a recording (NAME.csv.gz)", metavar="REC", writes=SAMPLES
     )
-    add_output(
-        parser, "--record", kind=SAMPLES, metavar="REC", type=Path,
-        help="write the session as a recording (NAME.csv.gz)",
-    )  # fmt: skip
-    add_input(parser, "--replay", metavar="REC", help="the recording that the device 'replay' plays")
-    parser.add_argument(
-        "--renderer", metavar="NAME", help=f"one of {', '.join(names())} (default: the scene's)"
+    replay: str | None = operand(
+        None, "the recording that the device 'replay' plays", metavar="REC", reads=True
     )
-    parser.add_argument("--beside", metavar="NAME", help="a second renderer, driven by the same tip; 'none'")
-    add_output(
-        parser,
-        "--screenshot",
-        kind=PNG,
-        metavar="PNG",
-        type=Path,
-        help="save the window at its end",
+    renderer: str | None = operand(None, f"one of {', '.join(names())}; None: the scene's", metavar="NAME")
+    beside: str | None = operand(
+        None, "a second renderer, driven by the same tip, or 'none'; None: the scene's", metavar="NAME"
     )
-    add_options(parser, MapperOptions)
-    add_options(parser, RenderOptions)
-    add_options(parser, ServoOptions, skip=("safety", "passivity", "support_plane", "tip_offsets_m"))
-    add_options(parser, SupportOptions)
-    add_options(parser, SafetyOptions)
-    for name in DEVICES:
-        add_options(parser, options_of(name))
-    add_options(parser, ExplorationOptions)
-    add_seed(parser)
-    add_json(parser)
+    screenshot: str | Path | None = operand(None, "save the window at its end", metavar="PNG", writes=PNG)
+    seed: int = seed_operand()
+    guide: Callable[[TouchSession], Guide] | None = operand(
+        None, "makes the guide of an exploration, for the window", only="python"
+    )
 
 
-def run(arguments: argparse.Namespace, guided: Callable[[TouchSession], Guide] | None = None) -> int:
-    """Open, touch, close; prints what the servo did. guided: makes an exploration's guide, for the window."""
-    scene = given_scene(arguments, arguments.scene)
-    name = arguments.device or ("simulated" if arguments.headless else "mouse")
-    _check(arguments, name)
-    servo_options = options_from(
-        arguments,
-        ServoOptions,
-        safety=options_from(arguments, SafetyOptions),
-        support_plane=options_from(arguments, SupportOptions),
+@dataclass(frozen=True)
+class Touched:
+    """What the servo did. failure: what stopped it, '' where nothing did."""
+
+    scene: Scene
+    device: str
+    renderer: str
+    report: ServoReport
+    record: str | Path | None
+    failure: str
+
+    def lines(self) -> list[str]:
+        """For a person."""
+        recorded = [] if self.record is None else [f"recorded {self.record}"]
+        return [f"{self.scene.title}: {self.renderer}, {self.device}", str(self.report), *recorded]
+
+
+def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
+    if touched is not None:
+        out.say(*touched.lines())
+        out.json({"scene": touched.scene.name, "device": touched.device, "servo": touched.report.as_dict()})
+        if touched.failure:
+            raise DeviceError(touched.failure)
+    return 0
+
+
+@operation(
+    TouchOperands,
+    MeshFileOptions,
+    MapperOptions,
+    RenderOptions,
+    ServoOptions,
+    SupportOptions,
+    SafetyOptions,
+    *map(options_of, DEVICES),
+    ExplorationOptions,
+    answer=_answer,
+    progress=False,
+)
+def touch(asked: TouchOperands, call: Call) -> Touched | None:
+    """Open, touch, close; None where the window was closed before the touch began."""
+    scene = given_scene(asked.scene, call)
+    name = asked.device or ("simulated" if asked.headless else "mouse")
+    _check(asked, name)
+    servo_options = call.of(
+        ServoOptions, safety=call.of(SafetyOptions), support_plane=call.of(SupportOptions)
     )
     for word in servo_options.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
@@ -130,50 +130,45 @@ def run(arguments: argparse.Namespace, guided: Callable[[TouchSession], Guide] |
             model = model_of(scene, lambda stage, share: tell(stage, 0.5 * share))
             if channel is not None:
                 channel.write(time.perf_counter(), tuple(_above(model)))
-            device, until = device_choice(arguments, name, model, channel)
+            device, until = device_choice(asked, call, name, model, channel)
             session = stack.enter_context(
                 TouchSession(
                     model,
                     title=scene.title,
                     device=device,
-                    renderer=arguments.renderer or scene.renderer,
-                    beside=_beside(arguments, scene),
-                    render_options=with_friction(options_from(arguments, RenderOptions), scene),
-                    mapping=_mapping(arguments, name, scene, model),
-                    options=servo_options,
-                    recording=arguments.record,
-                    pictures=not arguments.headless,
+                    mapping=_mapping(call, name, scene, model),
+                    options=SessionOptions(
+                        renderer=asked.renderer or scene.renderer,
+                        beside=_beside(asked, scene),
+                        render=with_friction(call.of(RenderOptions), scene),
+                        servo=servo_options,
+                        recording=None if asked.record is None else Path(asked.record),
+                        pictures=not asked.headless,
+                    ),
                 )
             )
             session.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
             return session, until
 
-        if arguments.headless:
+        if asked.headless:
             with progress_bar("touch") as bar:
                 session, until = prepare(bar)
             session.enable()
-            _wait(session, until if arguments.seconds is None else arguments.seconds)
+            _wait(session, until if asked.seconds is None else asked.seconds)
         else:
-            shown = _in_window(prepare, scene, channel, arguments, guided)
+            shown = _in_window(prepare, scene, channel, asked)
             if shown is None:
-                return 0
+                return None
             session = shown
         report = session.report()
-    say(arguments, f"{scene.title}: {session.renderer_name}, {name}", str(report))
-    if arguments.record is not None:
-        say(arguments, f"recorded {arguments.record}")
-    emit_json({"scene": scene.name, "device": name, "servo": report.as_dict()}, arguments.json)
-    if session.servo.failure:
-        raise DeviceError(session.servo.failure)
-    return 0
+    return Touched(scene, name, session.renderer_name, report, asked.record, session.servo.failure)
 
 
 def _in_window(
     prepare: Callable[[Progress], tuple[TouchSession, float | None]],
     scene: Scene,
     channel: PoseChannel | None,
-    arguments: argparse.Namespace,
-    guided: Callable[[TouchSession], Guide] | None,
+    asked: TouchOperands,
 ) -> TouchSession | None:
     """A window from the first moment on, which shows how the preparation comes along; then the touch. None
     where a person closes it before."""
@@ -184,10 +179,11 @@ def _in_window(
     try:
         session, until = waiting.run(prepare)
         session.enable()
-        guide = None if guided is None else guided(session)
+        guide = None if asked.guide is None else asked.guide(session)
         window = TouchWindow(session, scene, channel, guide=guide)
-        seconds = until if arguments.seconds is None else arguments.seconds
-        window.run(seconds, screenshot=arguments.screenshot, shown=waiting.close)
+        seconds = until if asked.seconds is None else asked.seconds
+        picture = None if asked.screenshot is None else Path(asked.screenshot)
+        window.run(seconds, screenshot=picture, shown=waiting.close)
     except ClosedError as error:
         print(f"palpate touch: {error}", file=sys.stderr)
         return None
@@ -196,19 +192,19 @@ def _in_window(
     return session
 
 
-def _check(arguments: argparse.Namespace, name: str) -> None:
+def _check(asked: TouchOperands, name: str) -> None:
     for value, allowed, what in (
         (name, tuple(DEVICES), "device"),
-        (arguments.renderer, names(), "renderer"),
-        (arguments.beside, (*names(), "none"), "renderer"),
+        (asked.renderer, names(), "renderer"),
+        (asked.beside, (*names(), "none"), "renderer"),
     ):
         if value is not None and value not in allowed:
             raise OptionError(f"'{value}' is no {what}; allowed are {', '.join(allowed)}")
-    if arguments.seconds is not None and not arguments.seconds > 0:
-        raise OptionError(f"--seconds is {arguments.seconds}; it must be greater than 0")
-    if name == "replay" and not arguments.replay:
+    if asked.seconds is not None and not asked.seconds > 0:
+        raise OptionError(f"--seconds is {asked.seconds}; it must be greater than 0")
+    if name == "replay" and not asked.replay:
         raise OptionError("the device 'replay' plays a recording: name it with --replay REC")
-    if arguments.headless:
+    if asked.headless:
         if name == "mouse":
             raise DeviceError("the mouse needs the window: drop --headless, or use --device simulated")
     elif sys.platform.startswith("linux") and not (
@@ -221,40 +217,39 @@ def _check(arguments: argparse.Namespace, name: str) -> None:
 
 
 def device_choice(
-    arguments: argparse.Namespace, name: str, model: Model, channel: PoseChannel | None
+    asked: TouchOperands, call: Call, name: str, model: Model | None, channel: PoseChannel | None
 ) -> tuple[DeviceChoice, float | None]:
     """The device for the servo process to make, and when it will have done (s), None for never."""
-    options: Any = options_from(arguments, options_of(name))
+    options: Any = call.of(options_of(name))
     if channel is not None:
         return DeviceChoice(name, {"channel": str(channel.path), "options": options}), None
     if name == "replay":
-        recording = str(Path(arguments.replay).resolve())
+        recording = str(Path(str(asked.replay)).resolve())
         return DeviceChoice(name, {"recording": recording, "options": options}), None
     if name == "simulated":
+        assert model is not None
         path, _ = explore(
             model,
-            options_from(arguments, ExplorationOptions),
+            call.of(ExplorationOptions),
             hand_stiffness_n_per_m=options.stiffness_n_per_m,
-            seed=arguments.seed,
+            seed=asked.seed,
         )
-        intention: Intention = path
-        keywords = {"options": options, "intention": intention, "seed": arguments.seed}
+        keywords = {"options": options, "intention": path, "seed": asked.seed}
         return DeviceChoice(name, keywords), path.duration_s + 2.0
     return DeviceChoice(name, {"options": options}), None
 
 
-def _beside(arguments: argparse.Namespace, scene: Scene) -> str:
-    if arguments.beside is not None:
-        return "" if arguments.beside == "none" else arguments.beside
-    return "" if arguments.headless else scene.beside
+def _beside(asked: TouchOperands, scene: Scene) -> str:
+    if asked.beside is not None:
+        return "" if asked.beside == "none" else asked.beside
+    return "" if asked.headless else scene.beside
 
 
-def _mapping(arguments: argparse.Namespace, name: str, scene: Scene, model: Model) -> Mapping | None:
+def _mapping(call: Call, name: str, scene: Scene, model: Model) -> Mapping | None:
     """None, the identity, for devices that live in the scene's frame already."""
     if name in ("mouse", "simulated", "replay"):
         return None
-    given = {f: getattr(arguments, f) for f in MapperOptions.__dataclass_fields__ if hasattr(arguments, f)}
-    options = MapperOptions(**{**vars(scene.mapper), **given})
+    options = MapperOptions(**{**vars(scene.mapper), **call.values(MapperOptions)})
     return Mapping.from_options(options, centre_m=_above(model), rate=spec_of(name).control == "rate")
 
 

@@ -1,1 +1,0 @@
-"""One module a sub-command: `SUMMARY`, `add_arguments(parser)` and `run(arguments) -> int`."""

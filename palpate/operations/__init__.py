@@ -1,0 +1,1 @@
+"""What the program does, one file an operation: as a command, and as a Python call of the same words."""

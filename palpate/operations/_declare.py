@@ -1,0 +1,347 @@
+"""An operation, declared once: a function, the frozen dataclass of its operands, the options that it takes.
+
+    @dataclass(frozen=True)
+    class StretchOperands:
+        model: ModelLike = operand(REQUIRED, "what is stretched", metavar="MODEL", positional=True)
+        _: KW_ONLY
+        by_m: float = operand(0.001, "how far", unit="m")
+
+    @operation(StretchOperands, RenderOptions)
+    def stretch(asked: StretchOperands, call: Call) -> Curve: ...
+
+From the fields come the Python call's signature and docstring, `pp.options("stretch")`, and the flags and
+help of `palpate stretch` (`palpate.operations._flags`).
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import difflib
+import functools
+import importlib
+import inspect
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from numbers import Integral, Real
+from typing import Any, TypeVar
+
+from mechanics.errors import OptionError
+from mechanics.files import FolderKind, Kind, check_target
+from mechanics.options import check_range, option, span_of
+from mechanics.progress import Progress, silent
+from palpate.operations._list import calls
+from palpate.output import Output, progress_bar
+
+T = TypeVar("T")
+R = TypeVar("R")
+REQUIRED: Any = ...
+"""In the place of a default, where an operand has none."""
+STREAMS = ("-", "none")
+"""In the place of a path: standard output, and no file at all."""
+GREATEST = 1e15
+"""No quantity here is greater, in SI units; its square is finite too."""
+
+
+@dataclass(frozen=True)
+class OnCommandLine:
+    """How an operand is written on the command line.
+
+    metavar: its value in help; short: another spelling, as -o; positional: without a flag; count: argparse's
+    nargs ("?", "+", "*", "..."), or "repeat" for a flag that may be given several times; parse: from text to
+    the value; reads: names a file or folder that is read; writes: one that is written, its
+    `mechanics.files.Kind`, or where that is as "module:NAME"; needed: on the command line, though it has a
+    default; only: "command" or "python" where it is one's alone.
+    """
+
+    metavar: str = ""
+    short: str = ""
+    positional: bool = False
+    count: str = ""
+    parse: Callable[[str], Any] | None = None
+    reads: bool = False
+    writes: Kind | FolderKind | str | None = None
+    needed: bool = False
+    only: str = ""
+
+    def kind(self) -> Kind | FolderKind | None:
+        """What is written; None for nothing."""
+        if not isinstance(self.writes, str):
+            return self.writes
+        module, name = self.writes.split(":")
+        return getattr(importlib.import_module(module), name)
+
+
+def operand(
+    default: Any,
+    help: str,
+    *,
+    unit: str = "",
+    flag: str | None = None,
+    choices: Sequence[str] | None = None,
+    low: float = -GREATEST,
+    high: float = GREATEST,
+    **written: Any,
+) -> Any:
+    """A field of an operands dataclass: `mechanics.options.option`, and its `OnCommandLine` by keyword."""
+    made = option(default, help, unit=unit, flag=flag, choices=choices, low=low, high=high)
+    metadata = {**made.metadata, "written": OnCommandLine(**written)}
+    if default is REQUIRED:
+        return dataclasses.field(metadata=metadata)
+    return dataclasses.field(default=default, metadata=metadata)
+
+
+def written(field: dataclasses.Field[Any]) -> OnCommandLine:
+    """How a field is written; that of an options dataclass is a flag with one value."""
+    return field.metadata.get("written") or OnCommandLine()
+
+
+def declared(kind: Any) -> list[dataclasses.Field[Any]]:
+    """The fields of a dataclass that are options or operands."""
+    return [f for f in dataclasses.fields(kind) if "help" in f.metadata]
+
+
+@dataclass(frozen=True)
+class Call:
+    """One call of an operation. given: what was given, by name; wanted: whether or where progress is told;
+    out: what a command says on the way, silent in a Python call."""
+
+    given: Mapping[str, Any]
+    wanted: bool | Progress = True
+    out: Output = dataclasses.field(default_factory=lambda: Output("-"))
+
+    def of(self, kind: type[T], **instead: Any) -> T:
+        """An options dataclass with what was given of it. instead: fields that are set here."""
+        return kind(**{**self.values(kind), **instead})
+
+    def values(self, kind: type) -> dict[str, Any]:
+        """What was given of an options dataclass, by field."""
+        return {f.name: self.given[f.name] for f in declared(kind) if f.name in self.given}
+
+    @contextmanager
+    def progress(self, label: str) -> Iterator[Progress]:
+        """Where progress goes: to a callable, to a bar on a terminal, or nowhere."""
+        if callable(self.wanted):
+            yield self.wanted
+        elif self.wanted:
+            with progress_bar(label) as bar:
+                yield bar
+        else:
+            yield silent
+
+
+class Operation:
+    """What was declared; every function made by `operation` has it as its attribute `operation`.
+
+    before: what the command alone looks at before the work; answer: what it does with the result
+    (`palpate.operations._run`); None prints its lines, and writes JSON and files.
+    """
+
+    def __init__(
+        self,
+        function: Callable[[Any, Call], Any],
+        operands: Any,
+        kinds: Sequence[type],
+        *,
+        before: Callable[[Any], None] | None,
+        answer: Callable[..., int] | None,
+        has_progress: bool,
+        has_json: bool,
+    ) -> None:
+        self.name, self.function, self.operands = function.__name__, function, operands
+        self.own = {each.name for each in dataclasses.fields(operands)}
+        self.kinds, self.before, self.answer = tuple(kinds), before, answer
+        self.has_progress, self.has_json = has_progress, has_json
+        self.fields: dict[str, dataclasses.Field[Any]] = {}
+        for kind in (operands, *kinds):
+            for each in declared(kind):
+                self.fields.setdefault(each.name, each)
+
+    def signature(self, result: Any) -> inspect.Signature:
+        """That of the Python call: operands in their order, then every option by name."""
+        parameters = []
+        for field in self.fields.values():
+            if written(field).only == "command":
+                continue
+            own = field.name in self.own
+            kind: Any = inspect.Parameter.KEYWORD_ONLY
+            if own and not field.kw_only:
+                many = str(field.type).startswith("tuple")
+                kind = inspect.Parameter.VAR_POSITIONAL if many else inspect.Parameter.POSITIONAL_OR_KEYWORD
+            default = inspect.Parameter.empty if field.default is dataclasses.MISSING else field.default
+            if kind is inspect.Parameter.VAR_POSITIONAL:
+                default = inspect.Parameter.empty
+            parameters.append(inspect.Parameter(field.name, kind, default=default, annotation=field.type))
+        if self.has_progress:
+            parameters.append(
+                inspect.Parameter(
+                    "progress", inspect.Parameter.KEYWORD_ONLY, default=True, annotation="bool | Progress"
+                )
+            )
+        return inspect.Signature(parameters, return_annotation=result)
+
+    def documentation(self) -> str:
+        """The function's own words, then a line an operand or option: unit, meaning, what is allowed."""
+        lines = [inspect.getdoc(self.function) or "", ""]
+        for field in self.fields.values():
+            if written(field).only != "command":
+                lines.append(f"{field.name}{_unit(field)}: {field.metadata['help']}{_allowed(field)}")
+        if self.has_progress:
+            lines.append("progress: False for none; or a function of (stage, share done) that is told of it")
+        return "\n".join(lines)
+
+    def run(
+        self, given: Mapping[str, Any], wanted: bool | Progress = True, out: Output | None = None
+    ) -> tuple[Any, Any]:
+        """(operands, result) of what was given by name. out: of a command, None for a Python call.
+
+        Raises OptionError for a value of the wrong kind or not allowed, FileError for what cannot be written.
+        """
+        for name, value in given.items():
+            check(name, value, self.fields[name])
+            kind = written(self.fields[name]).kind()
+            if kind is not None and value is not None and str(value) not in STREAMS:
+                check_target(value, kind)
+        asked = self.operands(**{name: value for name, value in given.items() if name in self.own})
+        if out is None:
+            return asked, self.function(asked, Call(given, wanted))
+        if self.before is not None:
+            self.before(asked)
+        return asked, self.function(asked, Call(given, wanted, out))
+
+
+def operation(
+    operands: type,
+    *kinds: type,
+    before: Callable[[Any], None] | None = None,
+    answer: Callable[..., int] | None = None,
+    progress: bool = True,
+    json: bool = True,
+) -> Callable[[Callable[[Any, Call], R]], Callable[..., R]]:
+    """Make a function of (operands, Call) an operation. kinds: the options dataclasses that it takes too."""
+
+    def made(function: Callable[[Any, Call], R]) -> Callable[..., R]:
+        this = Operation(
+            function, operands, kinds, before=before, answer=answer, has_progress=progress, has_json=json
+        )
+        signature = this.signature(function.__annotations__.get("return"))
+
+        @functools.wraps(function)
+        def called(*positional: Any, **named: Any) -> R:
+            known(this.name, named, signature.parameters)
+            given = signature.bind(*positional, **named).arguments
+            return this.run(given, given.pop("progress", True))[1]
+
+        public: Any = called
+        public.__signature__, public.__doc__, public.operation = signature, this.documentation(), this
+        public.__annotations__ = {p.name: p.annotation for p in signature.parameters.values()}
+        return public
+
+    return made
+
+
+def operation_of(name: str) -> Operation:
+    """The operation behind a Python name; raises OptionError for another."""
+    homes = calls()
+    if name not in homes:
+        raise OptionError(f"'{name}' is no operation; allowed are {', '.join(homes)}")
+    return getattr(importlib.import_module(homes[name]), name).operation
+
+
+def known(name: str, given: Mapping[str, Any], allowed: Mapping[str, Any]) -> None:
+    """Raise OptionError for a name that no operand or option has."""
+    for each in given:
+        if each not in allowed:
+            near = difflib.get_close_matches(each, allowed, 3)
+            meant = f"did you mean {', '.join(near)}? " if near else ""
+            raise OptionError(
+                f"pp.{name} has no option '{each}': {meant}allowed are {', '.join(sorted(allowed))}"
+            )
+
+
+def check_options(name: str, given: Mapping[str, Any]) -> None:
+    """Raise OptionError for what an operation would refuse, before any work."""
+    this = operation_of(name)
+    known(name, given, this.fields)
+    for each, value in given.items():
+        check(each, value, this.fields[each])
+
+
+_KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {
+    "bool": (lambda v: isinstance(v, bool), "True or False"),
+    "int": (lambda v: isinstance(v, Integral) and not isinstance(v, bool), "a whole number"),
+    "float": (lambda v: isinstance(v, Real) and not isinstance(v, bool), "a number"),
+    "str": (lambda v: isinstance(v, str), "a word"),
+}
+
+
+def type_words(field: dataclasses.Field[Any]) -> set[str]:
+    """The names of a field's types: {"float", "None"}."""
+    text = field.type if isinstance(field.type, str) else getattr(field.type, "__name__", str(field.type))
+    return {part.strip() for part in text.split("|")}
+
+
+def check(name: str, value: Any, field: dataclasses.Field[Any]) -> None:
+    """Raise OptionError for a value of the wrong kind, not among the choices, or out of range."""
+    types = type_words(field)
+    if value is None and "None" in types:
+        return
+    choices = field.metadata["choices"]
+    if choices and value not in choices:
+        raise OptionError(f"{name} is {value!r}; allowed are {', '.join(choices)}")
+    plain = types - {"None"}
+    if len(plain) == 1 and (word := plain.pop()) in _KINDS and not _KINDS[word][0](value):
+        unit = f" in {field.metadata['unit']}" if field.metadata["unit"] else ""
+        raise OptionError(f"{name} is {value!r}; it must be {_KINDS[word][1]}{unit}")
+    check_range(field, value)
+
+
+@dataclass(frozen=True)
+class Option:
+    """One option: its name as a keyword, default, unit ('' for a pure number or a word), words, the only
+    values allowed where they are few, and the least and greatest number."""
+
+    name: str
+    default: Any
+    unit: str
+    help: str
+    choices: tuple[str, ...] | None
+    low: float
+    high: float
+
+    def __str__(self) -> str:
+        unit = f" [{self.unit}]" if self.unit else ""
+        allowed = f"; one of {', '.join(self.choices)}" if self.choices else ""
+        return f"{self.name} = {self.default!r}{unit}: {self.help}{allowed}"
+
+
+class Options(tuple[Option, ...]):
+    """The options of one operation; `print` lists them, a line each."""
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self))
+
+    __repr__ = __str__
+
+
+def options(function: str) -> Options:
+    """The keywords that have a default, of an operation: `print(pp.options("press"))`.
+
+    function: the name of any function of `palpate` that is an operation. Each option has a name, default,
+    unit and words. Raises OptionError for another name.
+    """
+    this = operation_of(function)
+    return Options(
+        Option(f.name, f.default, f.metadata["unit"], f.metadata["help"], f.metadata["choices"], *span_of(f))
+        for f in this.fields.values()
+        if f.default is not dataclasses.MISSING and written(f).only != "command"
+    )
+
+
+def _unit(field: dataclasses.Field[Any]) -> str:
+    return f" [{field.metadata['unit']}]" if field.metadata["unit"] else ""
+
+
+def _allowed(field: dataclasses.Field[Any]) -> str:
+    choices = field.metadata["choices"]
+    return f"; one of {', '.join(choices)}" if choices else ""

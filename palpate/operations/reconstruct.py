@@ -1,0 +1,103 @@
+"""A recording becomes a model: contacts, base, surface, tetrahedra, modulus, 1D models of every press.
+
+REC is a recording's .csv, .csv.gz or .toml. MODEL is a folder: model.toml, mesh.vtu (ParaView opens it),
+palpations.csv. Lengths in m, forces in N, moduli in Pa.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from palpate.operations._declare import Call, operand, operation
+from palpate.operations._run import answer
+from palpate.operations._shared import MODEL, recording_operand, report_operand, save_operand, seed_operand
+from palpate.operations.read_recording import read_recording
+from palpate.output import Output
+from reconstruct.geometry.stated import GeometryOptions
+from reconstruct.pipeline import ReconstructOptions
+from reconstruct.steps.s1_filter.low_pass import FilterOptions
+from reconstruct.steps.s2_base.outline import BoundaryOptions
+from reconstruct.steps.s3_contacts.contacts import ContactOptions
+from reconstruct.steps.s4_surface.surface import SurfaceOptions
+from reconstruct.steps.s5_mesh.meshing import MeshingOptions
+from reconstruct.steps.s7_modulus.modulus import ModulusOptions
+from reconstruct.steps.s7_modulus.modulus_field import FieldOptions
+from reconstruct.steps.s7_modulus.modulus_paper import PaperOptions
+
+if TYPE_CHECKING:
+    from palpate.operations._shared import RecordingLike
+    from reconstruct.pipeline import Reconstruction
+
+_STEPS: tuple[type, ...] = (
+    GeometryOptions,
+    FilterOptions,
+    BoundaryOptions,
+    ContactOptions,
+    SurfaceOptions,
+    MeshingOptions,
+    ModulusOptions,
+    FieldOptions,
+    PaperOptions,
+)
+
+
+@dataclass(frozen=True)
+class ReconstructOperands:
+    """What is reconstructed, and where the model goes."""
+
+    recording: RecordingLike = recording_operand()
+    _: KW_ONLY
+    save: str | Path | None = save_operand("folder of the model to write", "MODEL", MODEL, needed=True)
+    seed: int = seed_operand()
+    report: str | None = report_operand(
+        "write the paper's figures and table, remade; PNGs into HTML's folder"
+    )
+    beside: list[str] = operand(
+        (),
+        "with --report: another model to draw beside (repeatable)",
+        metavar="MODEL",
+        reads=True,
+        count="repeat",
+        only="command",
+    )
+
+
+def _answer(result: Reconstruction, asked: ReconstructOperands, out: Output) -> int:
+    from mechanics.model_files import read_model
+
+    if asked.report:
+        beside = {Path(name).name: read_model(name) for name in asked.beside}
+        out.say(f"report: {result.report(asked.report, beside)}")
+    unreported = dataclasses.replace(asked, report=None)
+    return answer(result, unreported, out, lines=[f"written to {asked.save}"], figures={"model": asked.save})
+
+
+@operation(ReconstructOperands, ReconstructOptions, *_STEPS, answer=_answer)
+def reconstruct(asked: ReconstructOperands, call: Call) -> Reconstruction:
+    """A recording becomes a model: contacts, base, surface, tetrahedra, Young's modulus, 1D models.
+
+    What is computed for the model later is kept in the folder `save` too. The result goes wherever a model
+    goes. Lengths m, forces N. Raises OptionError, ContactError, SurfaceError or MeshError.
+    """
+    from mechanics.model_files import read_model
+    from reconstruct.pipeline import reconstruct_fully
+    from render.felt import felt_surface
+
+    for name in asked.beside:
+        read_model(name)  # before the work
+    steps: dict[str, Any] = {
+        field.name: call.of(kind)
+        for field in dataclasses.fields(ReconstructOptions)
+        for kind in _STEPS
+        if field.default_factory is kind and call.values(kind)
+    }
+    chosen = call.of(ReconstructOptions, **steps, seed=asked.seed)
+    with call.progress("reconstruct") as tell:
+        made = reconstruct_fully(read_recording(asked.recording), chosen, tell)
+    if asked.save is not None:
+        made = dataclasses.replace(made, model=made.model.save(asked.save))
+        felt_surface(made.model, made.sites)
+    return made

@@ -1,0 +1,77 @@
+"""Renderers: what answers a tip at 1 kHz; `replay` and `press` make theirs here too."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from mechanics.errors import OptionError
+from mechanics.progress import Progress
+from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._shared import with_friction
+from palpate.operations.load import load
+from render.options import RenderOptions
+from render.registry import create, names
+from render.support import SupportOptions
+
+if TYPE_CHECKING:
+    from palpate.operations._shared import ModelLike
+    from render.base import Renderer
+    from render.scene import TouchScene
+
+
+@dataclass(frozen=True)
+class RendererOperands:
+    """Whose, and which."""
+
+    model: ModelLike | Renderer = operand(REQUIRED, "of which object")
+    name: str = operand("fem", f"one of {', '.join(names())}")
+    _: KW_ONLY
+
+
+@operation(RendererOperands, RenderOptions)
+def renderer(asked: RendererOperands, call: Call) -> Renderer:
+    """The renderer of a model: `state = r.start()`, then `state, forces = r.step(state, tips)` at 1 kHz.
+
+    tips (m, 3) m are the tips' centres, forces (m, 3) N act on the tool; device frame. The model's compliance
+    is computed, some seconds, or read from its folder. Raises OptionError.
+    """
+    make = touched_scene(asked.model, asked.name, call)
+    with call.progress("renderer") as tell:
+        return make(tell).renderer
+
+
+def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], TouchScene]:
+    """What will make the renderer, on its model's support; options are looked at at once."""
+    from render.base import Renderer
+    from render.felt import with_own_stiffness
+    from render.scene import scene_of
+
+    support = call.of(SupportOptions)
+    if isinstance(model, Renderer):
+        given = call.values(RenderOptions)
+        if given:
+            words = "a renderer that is there keeps its options; give them to pp.renderer"
+            raise OptionError(f"{', '.join(given)}: {words}")
+        return lambda tell: scene_of(model, support)
+    if name not in names():
+        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(names())}")
+    chosen = _with_scene(model, call.of(RenderOptions))
+
+    def make(tell: Progress) -> TouchScene:
+        made = create(name, load(model, progress=tell), chosen, tell)
+        if made.model.path is not None:
+            with_own_stiffness(made)
+        return scene_of(made, support)
+
+    return make
+
+
+def _with_scene(model: Any, options: RenderOptions) -> RenderOptions:
+    """The options with what the scene's file says, where a scene was given."""
+    from scenes.scene import Scene, load_scene
+
+    scene = load_scene(model) if isinstance(model, str | Path) else model
+    return with_friction(options, scene) if isinstance(scene, Scene) else options

@@ -1,0 +1,85 @@
+"""A recorded tip path through a renderer, headless: t,fx,fy,fz in s and N, the force on the tool.
+
+The tip starts in the air; contact is found on the model's surface and its support alone, without looking at
+the measured force. The same MODEL and REC give bit-identical output. What is printed compares with the
+measured force over the contact samples: phase II, from first touch to its loss and 50 ms around.
+"""
+
+from __future__ import annotations
+
+from dataclasses import KW_ONLY, dataclass
+from typing import TYPE_CHECKING
+
+from mechanics.errors import ContactError, OptionError
+from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._shared import output_operand, recording_operand, renderer_operand
+from palpate.operations.read_recording import read_recording
+from palpate.operations.renderer import touched_scene
+from render.options import RenderOptions
+from render.support import SupportOptions
+
+if TYPE_CHECKING:
+    import mechanics.model
+    import mechanics.recording
+    from mechanics.presses import Presses
+    from palpate.operations._shared import ModelLike, RecordingLike
+    from render.base import Renderer
+    from render.replay import ReplayResult
+
+
+@dataclass(frozen=True)
+class ReplayOperands:
+    """What is touched, along which path."""
+
+    model: ModelLike | Renderer = operand(
+        REQUIRED, "folder of a model, or a scene", metavar="MODEL", positional=True, reads=True
+    )
+    recording: RecordingLike = recording_operand()
+    renderer: str = renderer_operand()
+    _: KW_ONLY
+    output: str | None = output_operand("write the forces", "FORCES.csv", "render.replay:FORCES")
+
+
+@operation(ReplayOperands, RenderOptions, SupportOptions)
+def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
+    """Feed a recorded tip path to a renderer and compare its force with the measured one.
+
+    model: or a renderer that is there already. The result has t (n,) s, force_n (n, 3) N on the tool, the
+    mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. Raises OptionError.
+    """
+    from reconstruct.steps.s3_contacts.quasi_static import is_points
+    from render.replay import ReplayResult, replay_error, replay_recording
+
+    make = touched_scene(asked.model, asked.renderer, call)
+    measured = read_recording(asked.recording)
+    if is_points(measured):
+        raise OptionError(
+            f"'{measured.name}' holds points without a time, and a replay needs a path: reconstruct, compare "
+            "and diagnose read points"
+        )
+    with call.progress("replay") as tell:
+        scene = make(tell)
+        forces = replay_recording(scene, measured, tell)
+    error = replay_error(measured, _touched(measured, scene.model), forces)
+    return ReplayResult(
+        recording=measured,
+        model=scene.model,
+        renderer=scene.renderer.name,
+        t=measured.t,
+        force_n=forces,
+        contact=error.contact,
+        rmse_n=error.rmse_n,
+        force_rms_n=error.force_rms_n,
+        relative=error.relative,
+    )
+
+
+def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Model) -> Presses:
+    """The recording's presses on the model; none where it holds none."""
+    from mechanics.press_making import no_presses
+    from reconstruct.placing import presses_on
+
+    try:
+        return presses_on(recording, model)
+    except ContactError:
+        return no_presses(recording.tip_radius_m)
