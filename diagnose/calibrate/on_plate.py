@@ -11,7 +11,7 @@ from mechanics.calibration import Calibration
 from mechanics.errors import ContactError
 from mechanics.recording import Recording
 from mechanics.samples import delayed
-from reconstruct.steps.s1_filter.filtering import low_pass
+from reconstruct.steps.s1_filter.low_pass import low_pass
 from reconstruct.steps.s3_contacts.contacts import Exploration
 
 _DELAYS_S = np.arange(-0.04, 0.0401, 0.001)

@@ -25,8 +25,7 @@ from mechanics.progress import Progress, silent
 from mechanics.sites import TouchSites, touch_sites
 from mechanics.smooth_field import SmoothField
 from mechanics.touch import forces_at
-from reconstruct.steps.s6_one_d.one_d import columns, fit_robust
-from reconstruct.steps.s6_one_d.uniaxial import low_passed
+from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
 from reconstruct.steps.s7_modulus.modulus_field import (
     LAW_ERROR,
     FieldSites,

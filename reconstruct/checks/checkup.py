@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from mechanics.recording import Recording
 from mechanics.result import Result
-from reconstruct.checks.base import Finding
+from reconstruct.checks.finding import Finding
 
 
 @dataclass(frozen=True, eq=False, repr=False)

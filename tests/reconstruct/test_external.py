@@ -4,7 +4,6 @@ import csv
 
 import numpy as np
 import pytest
-from machine_moduli import fit_approach, small_strain_modulus
 
 from benchmarks._machine_curves import Elastomer, Held, fit_elastomer, fit_holds, hold_error
 from mechanics.dent import dent_law
@@ -12,6 +11,8 @@ from mechanics.errors import ContactError, RecordingError
 from reconstruct.external.compression import Compression, read_compression
 from reconstruct.external.indentation import read_chiaro
 from reconstruct.external.relaxation import fit_relaxation
+
+from .machine_moduli import fit_approach, small_strain_modulus
 
 
 @pytest.fixture

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from mechanics.model import Model, read_model
+from mechanics.model import Model
+from mechanics.model_files import read_model
 from render.felt import with_own_stiffness
 from render.registry import create
 
