@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from mechanics.errors import OptionError
 from mechanics.files import JSON
-from mechanics.options import check_range
+from mechanics.options import check_range, flag_of
 from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, type_words, written
 
 _DEFAULT = re.compile(r" *\(default: ([^()]*(?:\([^()]*\)[^()]*)*)\)")
@@ -95,14 +95,6 @@ def options_from(arguments: argparse.Namespace, kind: type) -> Any:
 
 def _title(kind: type) -> str:
     return getattr(kind, "title", kind.__name__.removesuffix("Options").lower() + " options")
-
-
-def flag_of(field: dataclasses.Field[Any]) -> str:
-    """The flag that sets a field: its name without the unit, which stands beside it."""
-    if field.metadata["flag"]:
-        return field.metadata["flag"]
-    unit = field.metadata["unit"].lower().replace("/", " per ").replace(" ", "-").replace("--", "-")
-    return ("--" + field.name.replace("_", "-")).removesuffix(f"-{unit}")
 
 
 def _add(parser: Any, field: dataclasses.Field[Any]) -> None:
