@@ -141,7 +141,7 @@ def _parser(field: dataclasses.Field[Any], how: OnCommandLine, name: str) -> Cal
     def number(text: str) -> Any:
         value = base(text)
         try:
-            if not (math.isfinite(value) or math.isinf(field.metadata["high"] or 0.0)):
+            if "written" in field.metadata and not math.isfinite(value):
                 raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
             check_range(field, value, f"'{text}'")
         except OptionError as error:
@@ -159,6 +159,14 @@ def finite(text: str) -> float:
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
     if abs(value) > GREATEST:
         raise argparse.ArgumentTypeError(f"'{text}' is beyond any quantity here (in SI units, {GREATEST:g})")
+    return value
+
+
+def natural(text: str) -> int:
+    """argparse type: a whole number, 0 or greater."""
+    value = int(text)
+    if not 0 <= value < 1 << 63:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a whole number, 0 or greater")
     return value
 
 
