@@ -77,7 +77,7 @@ def option(
 ) -> Any:
     """A dataclass field with the words that the command line prints for it.
 
-    `flag` defaults to `--field-name`; `choices` restricts a string. A boolean becomes `--flag/--no-flag`.
+    `flag` defaults to `flag_of`; `choices` restricts a string. A boolean becomes `--flag/--no-flag`.
     A field whose default is None takes a float unless `choices` is given. `low` and `high`, both allowed,
     default to the sane range of its name or unit (`span_of`); a `high` of inf allows inf. `looser`: 'higher'
     or 'lower' where that way from the default protects a hand less (`loosened`).
@@ -87,6 +87,14 @@ def option(
         "low": low, "high": high, "looser": looser,
     }  # fmt: skip
     return dataclasses.field(default=default, metadata=metadata)
+
+
+def flag_of(field: dataclasses.Field[Any]) -> str:
+    """The flag that sets an option: its name without the unit, which help shows beside it."""
+    if field.metadata["flag"]:
+        return field.metadata["flag"]
+    unit = field.metadata["unit"].lower().replace("/", " per ").replace(" ", "-").replace("--", "-")
+    return ("--" + field.name.replace("_", "-")).removesuffix(f"-{unit}")
 
 
 def span_of(field: dataclasses.Field[Any]) -> tuple[float, float]:
@@ -120,6 +128,5 @@ def loosened(options: Any) -> tuple[str, ...]:
     for field in dataclasses.fields(options):
         looser, value = field.metadata.get("looser"), getattr(options, field.name)
         if looser and (value > field.default if looser == "higher" else value < field.default):
-            flag = field.metadata["flag"] or "--" + field.name.replace("_", "-")
-            words.append(f"protection loosened: {flag} is {value:g} (default {field.default:g})")
+            words.append(f"protection loosened: {flag_of(field)} is {value:g} (default {field.default:g})")
     return tuple(words)

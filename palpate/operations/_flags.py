@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 
 from mechanics.errors import OptionError
 from mechanics.files import JSON
-from mechanics.options import check_range
+from mechanics.options import check_range, flag_of
 from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, type_words, written
 
 _DEFAULT = re.compile(r" *\(default: ([^()]*(?:\([^()]*\)[^()]*)*)\)")
@@ -97,14 +97,6 @@ def _title(kind: type) -> str:
     return getattr(kind, "title", kind.__name__.removesuffix("Options").lower() + " options")
 
 
-def flag_of(field: dataclasses.Field[Any]) -> str:
-    """The flag that sets a field: its name without the unit, which stands beside it."""
-    if field.metadata["flag"]:
-        return field.metadata["flag"]
-    unit = field.metadata["unit"].lower().replace("/", " per ").replace(" ", "-").replace("--", "-")
-    return ("--" + field.name.replace("_", "-")).removesuffix(f"-{unit}")
-
-
 def _add(parser: Any, field: dataclasses.Field[Any]) -> None:
     meta, how, types = field.metadata, written(field), type_words(field) - {"None"}
     name = next((word for word in ("bool", "int", "float") if word in types), "str")
@@ -149,7 +141,7 @@ def _parser(field: dataclasses.Field[Any], how: OnCommandLine, name: str) -> Cal
     def number(text: str) -> Any:
         value = base(text)
         try:
-            if not (math.isfinite(value) or math.isinf(field.metadata["high"] or 0.0)):
+            if "written" in field.metadata and not math.isfinite(value):
                 raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
             check_range(field, value, f"'{text}'")
         except OptionError as error:
@@ -167,6 +159,14 @@ def finite(text: str) -> float:
         raise argparse.ArgumentTypeError(f"'{text}' is not a finite number")
     if abs(value) > GREATEST:
         raise argparse.ArgumentTypeError(f"'{text}' is beyond any quantity here (in SI units, {GREATEST:g})")
+    return value
+
+
+def natural(text: str) -> int:
+    """argparse type: a whole number, 0 or greater."""
+    value = int(text)
+    if not 0 <= value < 1 << 63:
+        raise argparse.ArgumentTypeError(f"'{text}' must be a whole number, 0 or greater")
     return value
 
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 from mechanics.errors import OptionError
 from mechanics.surface_files import UNITS, is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand
+from palpate.operations._flags import natural
 from render.registry import names
 
 if TYPE_CHECKING:
@@ -47,7 +48,7 @@ def model_flag(words: str) -> Any:
 
 def seed_operand() -> Any:
     """--seed N."""
-    return operand(0, "seed of every random choice", low=0, high=2**63 - 1)
+    return operand(0, "seed of every random choice", low=0, high=2**63 - 1, parse=natural)
 
 
 def report_operand(words: str, **more: Any) -> Any:

@@ -71,7 +71,13 @@ class ExploreOperands:
     tip_radius_m: float = tip_radius_operand("of the spherical tip", 0.005)
     rate_hz: float = operand(1000.0, "with --robot: samples a second", unit="Hz")
     poisson_ratio: float = poisson_operand("of the object", 0.49)
-    modulus_pa: float | None = operand(None, "with --phantom: its Young's modulus; None: its own", unit="Pa")
+    young_modulus_pa: float | None = operand(
+        None,
+        "with --phantom: its Young's modulus; None: its own",
+        unit="Pa",
+        flag="--modulus",
+        parse=float,
+    )
     seed: int = seed_operand()
 
 
@@ -162,7 +168,7 @@ def _on_phantom(
     from scenes.phantoms import phantom
 
     thing = phantom(str(asked.phantom))
-    options = SimulateOptions(young_modulus_pa=asked.modulus_pa, tip_radius_m=asked.tip_radius_m)
+    options = SimulateOptions(young_modulus_pa=asked.young_modulus_pa, tip_radius_m=asked.tip_radius_m)
     check_ranges(options)
     robot = LaboratoryRobot(
         thing,

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from mechanics.errors import OptionError
 from mechanics.files import JSON, PNG, atomic_file
 from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._flags import natural
 from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand
 from palpate.output import Output, emit_json
 from scenes.laboratory.effects import REGISTRY
@@ -55,7 +56,7 @@ class SimulateOperands:
         writes=JSON,
         only="command",
     )
-    person: int = operand(0, "whose hand: 0 the average, 1... others", low=0, high=2**63 - 1)
+    person: int = operand(0, "whose hand: 0 the average, 1... others", low=0, high=2**63 - 1, parse=natural)
     sizes: bool = operand(True, "state each effect's size in newtons, which solves without it too")
     ideal: bool = operand(False, "also what the ideal object would answer", only="python")
     pictures: str | None = operand(
@@ -69,7 +70,7 @@ class SimulateOperands:
         "write the object to be turned, and every touch beside the ideal object's, as one HTML page"
     )
     workers: int | None = operand(
-        None, "processes that solve touches; None: one a core", low=1, high=2**63 - 1
+        None, "processes that solve touches; None: one a core", low=1, high=2**63 - 1, parse=natural
     )
     seed: int = seed_operand()
 
