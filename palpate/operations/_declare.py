@@ -203,6 +203,7 @@ class Operation:
             if kind is not None and value is not None and str(value) not in STREAMS:
                 check_target(value, kind)
         asked = self.operands(**{name: value for name, value in given.items() if name in self.own})
+        importlib.import_module("palpate.show")  # lets every result say and draw itself
         if out is None:
             return asked, self.function(asked, Call(given, wanted))
         if self.before is not None:
