@@ -81,8 +81,8 @@ def solve(number: int, finite: bool, work: str, laboratory: int) -> dict[str, An
     """Solve every touch of an object without effects, linear or neo-Hookean, and keep them in the work
     folder.
     """
+    from benchmarks.varied.objects import specimen, thing
     from scenes.laboratory.paths import touch_forces
-    from scenes.variety.objects import specimen, thing
 
     it = thing(number)
     touches = [touch for place in it.places for touch in place]
@@ -133,9 +133,9 @@ def _failure(case: Case, work: Path) -> Path:
 
 
 def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
+    from benchmarks.varied.recorded import explored
+    from benchmarks.varied.writing import write
     from scenes.laboratory.sealing import write_sealed
-    from scenes.variety.recorded import explored
-    from scenes.variety.writing import write
 
     def refuse(label: str, share: float) -> None:
         if not solve:

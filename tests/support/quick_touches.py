@@ -13,12 +13,12 @@ from unittest.mock import patch
 
 import numpy as np
 
+from benchmarks.varied.draws import draw
+from benchmarks.varied.recorded import record
 from mechanics.recording import Recording
 from scenes.laboratory.curves import Curve, PathJob
 from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom
-from scenes.variety.draws import draw
-from scenes.variety.recorded import record
 
 
 def varied(seed: int, folder: Path) -> Recording:

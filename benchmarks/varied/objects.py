@@ -11,6 +11,7 @@ from functools import lru_cache
 
 import numpy as np
 
+from benchmarks.varied.shapes import shape
 from mechanics.nearest import first_hits
 from mechanics.progress import Progress, silent
 from scenes.laboratory.paths import touch_forces
@@ -18,7 +19,6 @@ from scenes.laboratory.presses import Touch, sites
 from scenes.laboratory.solver import LabError
 from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom
-from scenes.variety.shapes import shape
 
 POOL = 20
 """Objects in the pool: one of every family, its size by chance."""

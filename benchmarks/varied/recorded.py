@@ -8,6 +8,10 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks.varied.draws import Draw
+from benchmarks.varied.instrument import logged, weighed
+from benchmarks.varied.objects import Thing, thing
+from benchmarks.varied.writing import object_name, write
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording, read_recording
 from mechanics.segments import Segment
@@ -16,10 +20,6 @@ from scenes.laboratory.motion import Motion
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import Simulation, simulate
-from scenes.variety.draws import Draw
-from scenes.variety.instrument import logged, weighed
-from scenes.variety.objects import Thing, thing
-from scenes.variety.writing import object_name, write
 
 LEAST_DEPTH_MM = 1.0
 
