@@ -17,6 +17,7 @@ from diagnose.explore.weighing import Weighing, weigh
 from diagnose.search.detectable import SEEN
 from mechanics.errors import SceneError
 from palpate.robot.laboratory import LaboratoryRobot
+from scenes.laboratory.curves import ALONE
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import simulate
@@ -139,7 +140,7 @@ def size_at(it: Sealed, strength: float) -> float:
         _options(it, body),
         seed=it.seed,
         staging=Staging(touches=touches),
-        workers=1,
+        solving=ALONE,
     )
     sizes: dict[str, Any] = made.truth["sizes"]
     return float(sizes[it.cause]["rms_after_best_scale_n"])

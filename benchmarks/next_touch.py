@@ -35,7 +35,7 @@ from mechanics.model_files import read_model
 from mechanics.recording import read_recording
 from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct
-from scenes.laboratory.curves import workers_of_ours
+from scenes.laboratory.curves import Solving, workers_of_ours
 from scenes.laboratory.presses import Touch
 
 WAYS = ("proposed", "by chance")
@@ -130,7 +130,7 @@ def _done(
     drawn = replace(case.nuisances, ends_in_contact=False)
     made = explored(
         drawn, case.effects, complete=beside or case.protocol == "complete", more=extra,
-        cache=work / "touches",
+        solving=Solving(workers=1, cache=work / "touches"),
     )  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         recording = read_recording(write(Path(folder) / "more.csv.gz", made.recording, drawn))

@@ -27,7 +27,7 @@ def varied(seed: int, folder: Path) -> Recording:
         return record(draw(seed), folder).recording
 
 
-def _curves(_: Phantom, specimen: Specimen, jobs: Sequence[PathJob], **__: Any) -> list[Curve]:
+def _curves(phantom: Phantom, specimen: Specimen, jobs: Sequence[PathJob], *_: Any) -> list[Curve]:
     return [_curve(specimen, job) for job in jobs]
 
 
