@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,8 +19,9 @@ from mechanics.model import Model
 from render.surface import ContactSurface
 
 
-class State(Protocol):
-    """What every renderer's state holds; m tips, device frame, SI units. Renderers add arrays of their own.
+class State(NamedTuple):
+    """What every renderer's state holds; m tips, device frame, SI units. Renderers that remember have a tuple
+    with arrays of their own after these.
 
     forces: (m, 3) N on the tools. touching: (m,) int64, 1 where the tip is held by the surface.
     points: (m, 3) the material point of the undeformed surface that holds the tip; normals: (m, 3) outward
@@ -36,6 +37,21 @@ class State(Protocol):
     stiffness: np.ndarray
     radii_m: np.ndarray
     dt_s: np.ndarray
+
+
+def new_state(radii_m: np.ndarray, dt_s: float) -> State:
+    """Tips in air."""
+    m = len(radii_m)
+    return State(
+        forces=np.zeros((m, 3)),
+        touching=np.zeros(m, dtype=np.int64),
+        points=np.zeros((m, 3)),
+        normals=np.zeros((m, 3)),
+        depths=np.zeros(m),
+        stiffness=np.zeros(m),
+        radii_m=radii_m.copy(),
+        dt_s=np.array([dt_s]),
+    )
 
 
 class Renderer(ABC):

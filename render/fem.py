@@ -120,6 +120,6 @@ class FemRenderer(Renderer):
         return moved
 
 
-def create(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
+def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
     """The registry's entry."""
     return FemRenderer(model, options, progress=progress)
