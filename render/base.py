@@ -16,6 +16,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.model import Model
+from render.drawing import draw_dent
 from render.surface import ContactSurface
 
 
@@ -96,7 +97,6 @@ class Renderer(ABC):
         """Points (n, 3) m and outward triangles (k, 3) of the surface that is touched and drawn."""
         return self.contact.arrays.vertices, self.contact.arrays.triangles
 
-    @abstractmethod
     def displacement_of(
         self,
         points: np.ndarray,
@@ -106,6 +106,14 @@ class Renderer(ABC):
         depths: np.ndarray,
     ) -> np.ndarray:
         """(n, 3) m, displacement of the surface's points under contacts at (c, 3) points; for drawing."""
+        moved = self._smooth_displacement(points, forces_on_tool)
+        for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
+            draw_dent(self.contact.arrays.vertices, moved, point, normal, radius, depth)
+        return moved
+
+    def _smooth_displacement(self, points: np.ndarray, forces_on_tool: np.ndarray) -> np.ndarray:
+        """(n, 3) m, what contacts move far from where they are: nothing, where a renderer knows no more."""
+        return np.zeros_like(self.contact.arrays.vertices)
 
     def step(self, state: Any, tips: np.ndarray) -> tuple[Any, np.ndarray]:
         """Advance by one tick: tips (m, 3) m are centres; returns the state and its forces (m, 3) N on the

@@ -298,6 +298,6 @@ def test_registry() -> None:
     with again.make() as device:
         assert device.read().position_m[2] == pytest.approx(0.1, abs=1e-3)
     found = find_devices()
-    assert {a.name for a in found} == set(DEVICES)
+    assert {a.spec.name for a in found} == set(DEVICES)
     for line in found:
         assert line.present or (line.why_not and line.remedy)
