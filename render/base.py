@@ -16,7 +16,6 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.model import Model
-from render.drawing import draw_dent
 from render.surface import ContactSurface
 
 
@@ -108,7 +107,7 @@ class Renderer(ABC):
         """(n, 3) m, displacement of the surface's points under contacts at (c, 3) points; for drawing."""
         moved = self._smooth_displacement(points, forces_on_tool)
         for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
-            draw_dent(self.contact.arrays.vertices, moved, point, normal, radius, depth)
+            _draw_dent(self.contact.arrays.vertices, moved, point, normal, radius, depth)
         return moved
 
     def _smooth_displacement(self, points: np.ndarray, forces_on_tool: np.ndarray) -> np.ndarray:
@@ -144,6 +143,31 @@ class Renderer(ABC):
             state.radii_m[held],
             state.depths[held],
         )
+
+
+def _draw_dent(
+    vertices: np.ndarray,
+    moved: np.ndarray,
+    point: np.ndarray,
+    normal: np.ndarray,
+    radius: float,
+    depth: float,
+) -> None:
+    """Add to `moved` (v, 3) m the dent as it is drawn, not felt: what it lacks of `depth` under a tip held at
+    `point`, and what clears the tip's sphere."""
+    offset = vertices - point
+    near = np.flatnonzero(np.einsum("ij,ij->i", offset, offset) < (4 * radius) ** 2)
+    squared = np.einsum("ij,ij->i", offset[near], offset[near])
+    lacks = depth + float(moved[near[squared.argmin()]] @ normal) if len(near) else 0.0
+    moved[near] -= lacks * np.exp(-squared / (2 * radius**2))[:, None] * normal
+    centre = point + (radius - depth) * normal
+    away = vertices[near] + moved[near] - centre
+    height = away @ normal
+    flat = np.einsum("ij,ij->i", away, away) - height**2
+    inside = flat < radius**2
+    floor = -np.sqrt(np.maximum(radius**2 - flat, 0.0))
+    push = np.where(inside & (height > floor) & (height < radius), floor - height, 0.0)
+    moved[near] += push[:, None] * normal
 
 
 class Grip(NamedTuple):
