@@ -11,8 +11,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from benchmarks._free_air import FreeAir
 from mechanics.progress import Progress
-from palpate.servo.free_air import FreeAir
 from render.base import State
 
 
