@@ -81,13 +81,14 @@ def solve(number: int, finite: bool, work: str, laboratory: int) -> dict[str, An
     """Solve every touch of an object without effects, linear or neo-Hookean, and keep them in the work
     folder.
     """
+    from benchmarks.varied.objects import specimen, thing
+    from scenes.laboratory.curves import Solving
     from scenes.laboratory.paths import touch_forces
-    from scenes.variety.objects import specimen, thing
 
     it = thing(number)
     touches = [touch for place in it.places for touch in place]
     solid = replace(specimen(it), finite=finite)
-    touch_forces(it.phantom, solid, touches, workers=1, cache=_touches(Path(work)))
+    touch_forces(it.phantom, solid, touches, Solving(workers=1, cache=_touches(Path(work))))
     return {"touches": len(touches)}
 
 
@@ -133,9 +134,10 @@ def _failure(case: Case, work: Path) -> Path:
 
 
 def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
+    from benchmarks.varied.recorded import explored
+    from benchmarks.varied.writing import write
+    from scenes.laboratory.curves import Solving
     from scenes.laboratory.sealing import write_sealed
-    from scenes.variety.recorded import explored
-    from scenes.variety.writing import write
 
     def refuse(label: str, share: float) -> None:
         if not solve:
@@ -143,8 +145,8 @@ def _explore(case: Case, work: Path, samples: Path, solve: bool) -> None:
 
     drawn = case.nuisances
     made = explored(
-        drawn, case.effects, sizes=True, complete=case.protocol == "complete", cache=_touches(work),
-        progress=refuse,
+        drawn, case.effects, sizes=True, complete=case.protocol == "complete",
+        solving=Solving(workers=1, cache=_touches(work), progress=refuse),
     )  # fmt: skip
     truth = {**made.simulation.truth, "nuisances": drawn.table()}
     name = made.recording.object_name

@@ -1,6 +1,6 @@
 """The cases of the blind benchmark: what is sealed, at which strengths, on which objects, in whose hand.
 
-Everything that is no question is drawn by the case's seed from `scenes.variety`: frame, hand, presses,
+Everything that is no question is drawn by the case's seed from `benchmarks.varied`: frame, hand, presses,
 sampling, noise, what the file states and how it is written.
 """
 
@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.varied.draws import Draw, draw
+from benchmarks.varied.shapes import FAMILIES
 from mechanics.errors import OptionError
-from scenes.variety.draws import Draw, draw
-from scenes.variety.shapes import FAMILIES
 
 INSTRUMENT = (
     "time_delay",
@@ -66,7 +66,7 @@ POOLS = {
     "medium": (0, 1, 2, 3, 4, 5),
     "full": tuple(range(len(FAMILIES))),
 }
-"""Objects of `scenes.variety` that the cases of a size choose from, each solved once as it is, ..."""
+"""Objects of `benchmarks.varied` that the cases of a size choose from, each solved once as it is, ..."""
 NEO_HOOKEAN = {"quick": (), "protocol": (), "medium": (0, 2), "full": (0, 1, 2, 3)}
 """... and those that are solved once more as neo-Hookean solids."""
 PROTOCOLS = ("ordinary", "complete")

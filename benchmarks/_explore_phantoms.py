@@ -7,6 +7,8 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.varied.draws import draw
+from benchmarks.varied.objects import Thing, thing
 from diagnose.explore.causes import least_that_matters, projected
 from diagnose.explore.estimate import Estimate, updated
 from diagnose.explore.explorer import Suggestion
@@ -15,11 +17,10 @@ from diagnose.explore.weighing import Weighing, weigh
 from diagnose.search.detectable import SEEN
 from mechanics.errors import SceneError
 from palpate.robot.laboratory import LaboratoryRobot
+from scenes.laboratory.curves import ALONE
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import simulate
-from scenes.variety.draws import draw
-from scenes.variety.objects import Thing, thing
 
 OBJECTS = (0, 1, 2, 3, 4, 5, 7, 9, 10, 11, 12, 13, 14, 17, 18)
 """Of the pool; a place of them is solved once and kept."""
@@ -86,7 +87,7 @@ def _options(sealed: Sealed, it: Thing) -> SimulateOptions:
 
 
 def sealed(seed: int) -> Sealed:
-    """The `seed`-th phantom without its strength: modulus and noise as scenes.variety draws them."""
+    """The `seed`-th phantom without its strength: modulus and noise as benchmarks.varied draws them."""
     drawn, rng = draw(seed), np.random.default_rng([29, seed])
     number = int(rng.choice(OBJECTS))
     plain = Sealed(seed, number, drawn.young_modulus_pa, drawn.noise_n)
@@ -139,7 +140,7 @@ def size_at(it: Sealed, strength: float) -> float:
         _options(it, body),
         seed=it.seed,
         staging=Staging(touches=touches),
-        workers=1,
+        solving=ALONE,
     )
     sizes: dict[str, Any] = made.truth["sizes"]
     return float(sizes[it.cause]["rms_after_best_scale_n"])

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
 from mechanics.box_mesh import box_mesh
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.tetmesh import TetMesh
-from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from render.base import Renderer
 from render.fem import FemRenderer
 from render.options import RenderOptions

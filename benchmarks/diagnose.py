@@ -1,8 +1,8 @@
 """The blind benchmark: sealed recordings of the virtual laboratory, verdicts first, truths opened after.
 
 Sizes: quick (for CI), protocol (what presses alone hide, explored in two ways), medium, full. Everything that
-is no question is drawn by each case's seed (scenes.variety). A graph of tasks, done by processes here or by a
-Dask cluster: touches are solved once an object, every case is simulated with its truth sealed and
+is no question is drawn by each case's seed (benchmarks.varied). A graph of tasks, done by processes here or
+by a Dask cluster: touches are solved once an object, every case is simulated with its truth sealed and
 reconstructed, then diagnosed, and its verdict written to the work folder, before the truth is opened; a run
 that was interrupted goes on where it stopped. Rates carry Wilson's 95 % intervals. Baselines on the same
 recordings: the best in-sample fit by BIC, and for the gap a regression of the residual on place, depth, rate

@@ -1,10 +1,10 @@
 """Laws of tissue as whole recordings: simulated, reconstructed, diagnosed; is the law named, and how near?
 
-Everything else is drawn by seed from scenes.variety (object, modulus, frame, hand, presses, instrument, what
-the file states), the law's strength within --strength. Told: the law's size (rms of the force's change beside
-the best common factor, over the noise of a reading's vector), the verdict, the law's keys against the truth,
-and whether their 95 % intervals hold it. Touches that were never solved are solved first (minutes an object,
-more where the law needs a solid of its own).
+Everything else is drawn by seed from benchmarks.varied (object, modulus, frame, hand, presses, instrument,
+what the file states), the law's strength within --strength. Told: the law's size (rms of the force's change
+beside the best common factor, over the noise of a reading's vector), the verdict, the law's keys against the
+truth, and whether their 95 % intervals hold it. Touches that were never solved are solved first (minutes an
+object, more where the law needs a solid of its own).
 """
 
 from __future__ import annotations
@@ -20,12 +20,13 @@ import numpy as np
 
 import palpate as pp
 from benchmarks.timing import table
+from benchmarks.varied.draws import draw
+from benchmarks.varied.objects import thing
+from benchmarks.varied.recorded import explored
+from benchmarks.varied.writing import write
 from mechanics.errors import OptionError, PalpateError
+from scenes.laboratory.curves import Solving
 from scenes.laboratory.effects import REGISTRY
-from scenes.variety.draws import draw
-from scenes.variety.objects import thing
-from scenes.variety.recorded import explored
-from scenes.variety.writing import write
 
 LAWS = ("power_law_relaxation", "poroelasticity", "jkr_adhesion", "adhesion")
 OBJECTS, LEAST_PRESSES = 6, 18
@@ -76,7 +77,8 @@ def one(law: str, strength: float, seed: int, number: int, most: int, touches: P
     """One recording of a law, and what came of it."""
     drawn = replace(draw(seed), number=number)
     drawn = replace(drawn, presses=int(np.clip(drawn.presses, LEAST_PRESSES, max(most, LEAST_PRESSES))))
-    made = explored(drawn, {law: strength}, it=thing(number), sizes=True, cache=touches)
+    kept = Solving(workers=1, cache=touches)
+    made = explored(drawn, {law: strength}, it=thing(number), sizes=True, solving=kept)
     truth = dict(made.recording.truth or {})
     row: dict[str, Any] = {
         "law": law, "strength": strength, "seed": seed, "object": made.thing.phantom.name,

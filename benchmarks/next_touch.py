@@ -24,6 +24,9 @@ from benchmarks._diagnosis_cases import POOLS, SEEDS, Case, cases
 from benchmarks._diagnosis_scores import answer_of
 from benchmarks.evidence import wilson
 from benchmarks.timing import table
+from benchmarks.varied.objects import Thing, thing
+from benchmarks.varied.recorded import explored, frame
+from benchmarks.varied.writing import write
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
 from diagnose.verdict.result import Diagnosis, NextTouch
@@ -32,11 +35,8 @@ from mechanics.model_files import read_model
 from mechanics.recording import read_recording
 from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct
-from scenes.laboratory.curves import workers_of_ours
+from scenes.laboratory.curves import Solving, workers_of_ours
 from scenes.laboratory.presses import Touch
-from scenes.variety.objects import Thing, thing
-from scenes.variety.recorded import explored, frame
-from scenes.variety.writing import write
 
 WAYS = ("proposed", "by chance")
 
@@ -130,7 +130,7 @@ def _done(
     drawn = replace(case.nuisances, ends_in_contact=False)
     made = explored(
         drawn, case.effects, complete=beside or case.protocol == "complete", more=extra,
-        cache=work / "touches",
+        solving=Solving(workers=1, cache=work / "touches"),
     )  # fmt: skip
     with tempfile.TemporaryDirectory() as folder:
         recording = read_recording(write(Path(folder) / "more.csv.gz", made.recording, drawn))

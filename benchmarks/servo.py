@@ -14,10 +14,10 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._free_air import FreeAir
 from benchmarks._servo_load import LATE_NS, Load, Measured, renderer_of
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
-from palpate.servo.free_air import FreeAir
 from palpate.servo.report import ring_rows, snapshot
 
 AIMS_US = {1: 100.0, 16: 300.0}

@@ -17,12 +17,12 @@ from typing import Any
 import numpy as np
 
 from benchmarks import _stability_objects
+from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
+from benchmarks._elastic_plane import ElasticPlane
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
-from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
-from palpate.servo.elastic_plane import ElasticPlane
 from render.passivity import PassivityOptions
 
 AIM_J = 1e-3

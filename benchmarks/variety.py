@@ -27,6 +27,9 @@ from benchmarks._surface_truth import Truth
 from benchmarks.evidence import Figure, rates, wilson
 from benchmarks.surface import deviation
 from benchmarks.timing import table
+from benchmarks.varied.draws import Draw, draw
+from benchmarks.varied.objects import solved, thing
+from benchmarks.varied.recorded import Varied, record
 from diagnose.pipeline import diagnose
 from mechanics.errors import PalpateError
 from mechanics.files import atomic_file, cache_folder
@@ -34,9 +37,6 @@ from mechanics.model import Model
 from palpate.output import progress_bar
 from reconstruct.pipeline import reconstruct_fully
 from scenes.laboratory.curves import workers_of_ours
-from scenes.variety.draws import Draw, draw
-from scenes.variety.objects import solved, thing
-from scenes.variety.recorded import Varied, record
 
 ROOMS = ("mechanics", "reconstruct")
 _WITHIN_S = 0.15

@@ -124,13 +124,15 @@ class Availability:
     where: a path, address or serial number. why_not, remedy: plain words, '' where it is there.
     """
 
-    name: str
-    title: str
-    present: bool
     spec: DeviceSpec
     where: str = ""
     why_not: str = ""
     remedy: str = ""
+
+    @property
+    def present(self) -> bool:
+        """Whether it is there."""
+        return not self.why_not
 
 
 def age_s(state: TipState, now_s: float) -> float:

@@ -11,9 +11,11 @@ import importlib
 import os
 import sys
 from collections.abc import Callable
+from dataclasses import replace
 from types import ModuleType
 from typing import Any
 
+from devices.base import Availability, DeviceSpec
 from mechanics.errors import DeviceError
 
 DRAIN_LIMIT = 256
@@ -100,6 +102,14 @@ class HidPort:
     def close(self) -> None:
         """Release it; never raises."""
         self._device.close()
+
+
+def permitted(entry: dict[str, Any], spec: DeviceSpec) -> Availability:
+    """hidapi's entry as `palpate devices` lists it: there, where this user may read and write it."""
+    path, spec = entry["path"].decode(), replace(spec, title=entry.get("product_string") or spec.title)
+    if may_open(path):
+        return Availability(spec, path)
+    return Availability(spec, path, f"no permission for {path}", udev_rule(entry["vendor_id"]))
 
 
 def opened(port: HidPort | None) -> HidPort:

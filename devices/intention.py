@@ -63,14 +63,17 @@ class Path:
 
 TURN_S, TURN_M_PER_S = 0.6, 0.8
 """A turn to the next direction takes so long, longer where it would go faster than this."""
+LEAST_RADIUS_M = 0.005
+SPREAD = 0.2
+"""Cosine of the widest angle between a direction and `up`."""
 
 
 class FreeExploration:
     """Presses from random directions towards a centre until it feels `target_force_n`, holds, draws back.
 
     Needs no geometry: it starts `radius_m` from the centre, moves inwards at `speed_m_per_s` until the
-    force on the tool reaches the target or it stands `least_radius_m` from the centre, waits `hold_s`, and
-    returns. Directions lie within `spread` (cosine) of `up`; every choice comes from `seed`.
+    force on the tool reaches the target or it stands LEAST_RADIUS_M from the centre, waits `hold_s`, and
+    returns. Directions lie within SPREAD of `up`; every choice comes from `seed`.
     """
 
     def __init__(
@@ -79,19 +82,15 @@ class FreeExploration:
         radius_m: float,
         *,
         up: ArrayLike = (0.0, 0.0, 1.0),
-        spread: float = 0.2,
         target_force_n: float = 1.0,
         speed_m_per_s: float = 0.02,
         hold_s: float = 0.3,
-        least_radius_m: float = 0.005,
         seed: int = 0,
     ) -> None:
         self.centre_m = np.asarray(centre_m, dtype=float)
         self.radius_m = radius_m
-        self.least_radius_m = least_radius_m
         axis = np.asarray(up, dtype=float)
         self.up = axis / np.linalg.norm(axis)
-        self.spread = spread
         self.target_force_n = target_force_n
         self.speed_m_per_s = speed_m_per_s
         self.hold_s = hold_s
@@ -108,7 +107,7 @@ class FreeExploration:
         while True:
             direction = self._random.normal(size=3)
             direction /= np.linalg.norm(direction)
-            if direction @ self.up > self.spread:
+            if direction @ self.up > SPREAD:
                 return direction
 
     def place(self, time_s: float, position_m: np.ndarray, force_on_tool_n: np.ndarray) -> np.ndarray:
@@ -118,7 +117,7 @@ class FreeExploration:
         if self._phase == "in":
             self._reach_m -= step
             felt = float(np.linalg.norm(force_on_tool_n)) >= self.target_force_n
-            if felt or self._reach_m <= self.least_radius_m:
+            if felt or self._reach_m <= LEAST_RADIUS_M:
                 self._phase, self._hold_until_s = "hold", time_s + self.hold_s
         elif self._phase == "hold" and time_s >= self._hold_until_s:
             self._phase = "out"

@@ -17,7 +17,7 @@ import atexit
 import threading
 import weakref
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 import numpy as np
@@ -76,13 +76,13 @@ def found(wire: Wire, where: Callable[[], str], sought: str = "") -> list[Availa
 
     where: asked while it is connected; sought: the place that is told where nothing is there.
     """
-    name, title = wire.spec.name, wire.spec.title
+    title = wire.spec.title
     try:
         wire.connect()
     except (DeviceError, OSError) as error:
-        why, _, remedy = str(error).partition(": ")
-        return [Availability(name, title, False, wire.spec, sought, why, remedy)]
-    entry = Availability(name, wire.spec.title, True, wire.spec, where=where())
+        why, _, remedy = _plain(error).partition(": ")
+        return [Availability(replace(wire.spec, title=title), sought, why, remedy)]
+    entry = Availability(wire.spec, where())
     wire.disconnect()
     return [entry]
 
@@ -141,10 +141,6 @@ class ThreadedDevice(OpenInWith):
     def read(self) -> TipState:
         """The newest state, at once."""
         return self._state
-
-    def pressed(self, button: int) -> bool:
-        """Whether button 0, 1, ... is down."""
-        return bool(self._state.buttons >> button & 1)
 
     def close(self) -> None:
         """Zero the force, stop the thread, release the device; harmless when repeated."""

@@ -129,11 +129,6 @@ class MouseDevice(OpenInWith):
             return self._to
         return self._to + self._left / self._number * (self._from - self._to)
 
-    def pressed(self, button: int) -> bool:
-        """Whether left (0), middle (1) or right (2) is down."""
-        pose = self._channel.read() if self._channel else None
-        return bool(pose and pose.buttons >> button & 1)
-
     def close(self) -> None:
         """Let go of the channel."""
         if self._channel is not None:
@@ -148,12 +143,9 @@ def find(options: MouseOptions | None = None) -> list[Availability]:
 
     variables = ("DISPLAY", "WAYLAND_DISPLAY")
     if sys.platform in ("darwin", "win32") or any(os.environ.get(name) for name in variables):
-        return [Availability(SPEC.name, SPEC.title, True, SPEC, where="on this screen")]
+        return [Availability(SPEC, where="on this screen")]
     return [
         Availability(
-            SPEC.name,
-            SPEC.title,
-            False,
             SPEC,
             why_not="there is no screen (neither DISPLAY nor WAYLAND_DISPLAY is set)",
             remedy="use a desktop, 'ssh -X' or 'xvfb-run', or --device simulated --headless",

@@ -16,7 +16,7 @@ import numpy as np
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.codecs import pid
 from devices.codecs.pid import PidLayout
-from devices.hid_port import HidPort, enumerate_devices, load, may_open, opened, udev_rule
+from devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
 from devices.io_thread import ForcefulDevice, Reading
 from devices.velocity import VelocityEstimate
 from mechanics.errors import DeviceError
@@ -202,29 +202,23 @@ def find(options: PidOptions | None = None, *, hid: Any = None) -> list[Availabi
     try:
         entries = _candidates(hid or load())
     except DeviceError as error:
-        return [
-            Availability(SPEC.name, SPEC.title, False, SPEC, why_not=str(error), remedy="pip install hidapi")
-        ]
+        return [Availability(SPEC, why_not=str(error), remedy="pip install hidapi")]
     if not entries:
-        words = "no stick or wheel is plugged in"
-        return [Availability(SPEC.name, SPEC.title, False, SPEC, why_not=words, remedy="plug one in")]
+        return [Availability(SPEC, why_not="no stick or wheel is plugged in", remedy="plug one in")]
     return [_look(entry, options or PidOptions(), hid) for entry in entries]
 
 
 def _look(entry: dict[str, Any], options: PidOptions, hid: Any) -> Availability:
-    path, title = entry["path"].decode(), entry.get("product_string") or SPEC.title
-    if not may_open(path):
-        rule = udev_rule(entry["vendor_id"])
-        return Availability(SPEC.name, title, False, SPEC, path, f"no permission for {path}", rule)
+    there = permitted(entry, SPEC)
+    if not there.present:
+        return there
     try:
-        port = HidPort(path, entry["vendor_id"], module=hid)
+        port = HidPort(there.where, entry["vendor_id"], module=hid)
         try:
             axes = PidLayout.from_bytes(port.descriptor()).force_axes
         finally:
             port.close()
     except (DeviceError, OSError) as error:
-        return Availability(
-            SPEC.name, title, False, SPEC, path, str(error), "choose a device with force feedback"
-        )
-    spec = replace(PidWire(options, host_clock, hid).spec, actuated_axes=axes, sensed_axes=axes)
-    return Availability(SPEC.name, title, True, spec, where=path)
+        return replace(there, why_not=str(error), remedy="choose a device with force feedback")
+    spec = PidWire(options, host_clock, hid).spec
+    return replace(there, spec=replace(spec, title=there.spec.title, actuated_axes=axes, sensed_axes=axes))

@@ -91,4 +91,4 @@ def _smoothed(position: np.ndarray, samples: int = 21) -> np.ndarray:
 
 def find(options: ReplayOptions | None = None) -> list[Availability]:
     """Always there; it needs a recording."""
-    return [Availability(SPEC.name, SPEC.title, True, SPEC, where="--replay REC")]
+    return [Availability(SPEC, where="--replay REC")]

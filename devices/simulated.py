@@ -193,4 +193,4 @@ class SimulatedHand(OpenInWith):
 
 def find(options: SimulatedOptions | None = None) -> list[Availability]:
     """Always there."""
-    return [Availability(SPEC.name, SPEC.title, True, SPEC, where="in this program")]
+    return [Availability(SPEC, where="in this program")]

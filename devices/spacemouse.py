@@ -12,7 +12,7 @@ import numpy as np
 
 from devices.base import Availability, Clock, DeviceSpec, host_clock
 from devices.codecs import spacemouse as codec
-from devices.hid_port import HidPort, enumerate_devices, load, may_open, opened, udev_rule
+from devices.hid_port import HidPort, enumerate_devices, load, opened, permitted
 from devices.io_thread import Reading, ThreadedDevice
 from mechanics.errors import DeviceError
 from mechanics.options import option
@@ -114,29 +114,7 @@ def find(options: SpacemouseOptions | None = None, *, hid: Any = None) -> list[A
     try:
         entries = enumerate_devices(_is_spacemouse, module=hid or load())
     except DeviceError as error:
-        return [
-            Availability(SPEC.name, SPEC.title, False, SPEC, why_not=str(error), remedy="pip install hidapi")
-        ]
+        return [Availability(SPEC, why_not=str(error), remedy="pip install hidapi")]
     if not entries:
-        return [
-            Availability(
-                SPEC.name, SPEC.title, False, SPEC, why_not="none is plugged in", remedy="plug one in"
-            )
-        ]
-    found = []
-    for entry in entries:
-        path = entry["path"].decode()
-        title = entry.get("product_string") or SPEC.title
-        allowed = may_open(path)
-        found.append(
-            Availability(
-                SPEC.name,
-                title,
-                allowed,
-                SPEC,
-                where=path,
-                why_not="" if allowed else f"no permission for {path}",
-                remedy="" if allowed else udev_rule(entry["vendor_id"]),
-            )
-        )
-    return found
+        return [Availability(SPEC, why_not="none is plugged in", remedy="plug one in")]
+    return [permitted(entry, SPEC) for entry in entries]

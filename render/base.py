@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from typing import Any, NamedTuple, Protocol, Self
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
@@ -19,8 +19,9 @@ from mechanics.model import Model
 from render.surface import ContactSurface
 
 
-class State(Protocol):
-    """What every renderer's state holds; m tips, device frame, SI units. Renderers add arrays of their own.
+class State(NamedTuple):
+    """What every renderer's state holds; m tips, device frame, SI units. Renderers that remember have a tuple
+    with arrays of their own after these.
 
     forces: (m, 3) N on the tools. touching: (m,) int64, 1 where the tip is held by the surface.
     points: (m, 3) the material point of the undeformed surface that holds the tip; normals: (m, 3) outward
@@ -36,6 +37,21 @@ class State(Protocol):
     stiffness: np.ndarray
     radii_m: np.ndarray
     dt_s: np.ndarray
+
+
+def new_state(radii_m: np.ndarray, dt_s: float) -> State:
+    """Tips in air."""
+    m = len(radii_m)
+    return State(
+        forces=np.zeros((m, 3)),
+        touching=np.zeros(m, dtype=np.int64),
+        points=np.zeros((m, 3)),
+        normals=np.zeros((m, 3)),
+        depths=np.zeros(m),
+        stiffness=np.zeros(m),
+        radii_m=radii_m.copy(),
+        dt_s=np.array([dt_s]),
+    )
 
 
 class Renderer(ABC):
@@ -80,7 +96,6 @@ class Renderer(ABC):
         """Points (n, 3) m and outward triangles (k, 3) of the surface that is touched and drawn."""
         return self.contact.arrays.vertices, self.contact.arrays.triangles
 
-    @abstractmethod
     def displacement_of(
         self,
         points: np.ndarray,
@@ -90,6 +105,14 @@ class Renderer(ABC):
         depths: np.ndarray,
     ) -> np.ndarray:
         """(n, 3) m, displacement of the surface's points under contacts at (c, 3) points; for drawing."""
+        moved = self._smooth_displacement(points, forces_on_tool)
+        for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
+            _draw_dent(self.contact.arrays.vertices, moved, point, normal, radius, depth)
+        return moved
+
+    def _smooth_displacement(self, points: np.ndarray, forces_on_tool: np.ndarray) -> np.ndarray:
+        """(n, 3) m, what contacts move far from where they are: nothing, where a renderer knows no more."""
+        return np.zeros_like(self.contact.arrays.vertices)
 
     def step(self, state: Any, tips: np.ndarray) -> tuple[Any, np.ndarray]:
         """Advance by one tick: tips (m, 3) m are centres; returns the state and its forces (m, 3) N on the
@@ -120,6 +143,31 @@ class Renderer(ABC):
             state.radii_m[held],
             state.depths[held],
         )
+
+
+def _draw_dent(
+    vertices: np.ndarray,
+    moved: np.ndarray,
+    point: np.ndarray,
+    normal: np.ndarray,
+    radius: float,
+    depth: float,
+) -> None:
+    """Add to `moved` (v, 3) m the dent as it is drawn, not felt: what it lacks of `depth` under a tip held at
+    `point`, and what clears the tip's sphere."""
+    offset = vertices - point
+    near = np.flatnonzero(np.einsum("ij,ij->i", offset, offset) < (4 * radius) ** 2)
+    squared = np.einsum("ij,ij->i", offset[near], offset[near])
+    lacks = depth + float(moved[near[squared.argmin()]] @ normal) if len(near) else 0.0
+    moved[near] -= lacks * np.exp(-squared / (2 * radius**2))[:, None] * normal
+    centre = point + (radius - depth) * normal
+    away = vertices[near] + moved[near] - centre
+    height = away @ normal
+    flat = np.einsum("ij,ij->i", away, away) - height**2
+    inside = flat < radius**2
+    floor = -np.sqrt(np.maximum(radius**2 - flat, 0.0))
+    push = np.where(inside & (height > floor) & (height < radius), floor - height, 0.0)
+    moved[near] += push[:, None] * normal
 
 
 class Grip(NamedTuple):

@@ -53,8 +53,3 @@ def stiffest_n_per_m(
                 break
             greatest = max(greatest, float(state.stiffness[0]))
     return greatest
-
-
-def stiffness_distortion(stiffness_n_per_m: float, compliance_m_per_n: float) -> float:
-    """The share of its stiffness that a place loses to the coupling, 0 to 1."""
-    return 1.0 - 1.0 / (1.0 + stiffness_n_per_m * compliance_m_per_n)

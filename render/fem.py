@@ -14,7 +14,6 @@ from mechanics.progress import Progress, silent
 from mechanics.surface_compliance import SurfaceCompliance
 from render.base import Renderer, check_radii
 from render.bvh import STACK, closest_triangle
-from render.drawing import draw_dent
 from render.effects import effect_arrays, rendered_touch
 from render.fem_kernel import fem_path, fem_step
 from render.fem_state import FemParameters, FemState, new_fem_state
@@ -95,14 +94,7 @@ class FemRenderer(Renderer):
             changed.compliance = replace(self.compliance, blocks=table.copy())
         return changed
 
-    def displacement_of(
-        self,
-        points: np.ndarray,
-        normals: np.ndarray,
-        forces_on_tool: np.ndarray,
-        radii_m: np.ndarray,
-        depths: np.ndarray,
-    ) -> np.ndarray:
+    def _smooth_displacement(self, points: np.ndarray, forces_on_tool: np.ndarray) -> np.ndarray:
         p, arrays = self.parameters, self.contact.arrays
         weights, stack = np.zeros(3), np.zeros(STACK, dtype=np.int64)
         corners = np.zeros((len(self.compliance.nodes) + 1, 3))  # the last one stands for the base
@@ -114,12 +106,9 @@ class FemRenderer(Renderer):
                 if corner >= 0:
                     compliance = weight / p.young_modulus_pa[0]
                     corners[:-1] -= compliance * self.compliance.displacement(corner, force)
-        moved = np.einsum("vc,vcx->vx", self.contact.node_weights, corners[self._drawn])
-        for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
-            draw_dent(arrays.vertices, moved, point, normal, radius, depth)
-        return moved
+        return np.einsum("vc,vcx->vx", self.contact.node_weights, corners[self._drawn])
 
 
-def create(model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
+def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> FemRenderer:
     """The registry's entry."""
     return FemRenderer(model, options, progress=progress)

@@ -8,7 +8,7 @@ import numpy as np
 
 from mechanics.effects.path import new_memory
 from mechanics.touch import STATE_SIZE
-from render.base import Grip, new_grip
+from render.base import Grip, new_grip, new_state
 from render.bvh import STACK
 from render.effects import EffectArrays
 from render.surface import SurfaceArrays
@@ -95,14 +95,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
     """A state of len(radii) tips in air."""
     m = len(radii)
     return FemState(
-        forces=np.zeros((m, 3)),
-        touching=np.zeros(m, dtype=np.int64),
-        points=np.zeros((m, 3)),
-        normals=np.zeros((m, 3)),
-        depths=np.zeros(m),
-        stiffness=np.zeros(m),
-        radii_m=radii.copy(),
-        dt_s=np.array([dt_s]),
+        *new_state(radii, dt_s),
         grip=new_grip(m),
         frames=np.zeros((m, 3, 3)),
         elastic=np.zeros((m, 3)),

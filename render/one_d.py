@@ -18,7 +18,6 @@ from scipy.spatial import cKDTree
 from mechanics.errors import ModelError, OptionError
 from mechanics.model import Model
 from render.base import Renderer, check_radii
-from render.drawing import draw_dent
 from render.one_d_kernel import OneDParameters, OneDState, new_one_d_state, one_d_path, one_d_step
 from render.options import RenderOptions
 from render.snapping import touched_surface
@@ -102,17 +101,3 @@ class OneDRenderer(Renderer):
         if not young_modulus_pa > 0:
             raise OptionError(f"young_modulus_pa is {young_modulus_pa}; it must be greater than 0")
         return self._with(scale=np.array([young_modulus_pa / self.model.material.young_modulus_pa]))
-
-    def displacement_of(
-        self,
-        points: np.ndarray,
-        normals: np.ndarray,
-        forces_on_tool: np.ndarray,
-        radii_m: np.ndarray,
-        depths: np.ndarray,
-    ) -> np.ndarray:
-        vertices = self.contact.arrays.vertices
-        moved = np.zeros_like(vertices)
-        for point, normal, radius, depth in zip(points, normals, radii_m, depths, strict=True):
-            draw_dent(vertices, moved, point, normal, radius, depth)
-        return moved

@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from render.base import Grip, new_grip
+from render.base import Grip, new_grip, new_state
 from render.bvh import STACK
 from render.contact import approach, lose, release
 from render.kernels import kernel
@@ -54,14 +54,7 @@ def new_one_d_state(radii: np.ndarray, dt_s: float) -> OneDState:
     """A state of len(radii) tips in air."""
     m = len(radii)
     return OneDState(
-        forces=np.zeros((m, 3)),
-        touching=np.zeros(m, dtype=np.int64),
-        points=np.zeros((m, 3)),
-        normals=np.zeros((m, 3)),
-        depths=np.zeros(m),
-        stiffness=np.zeros(m),
-        radii_m=radii.copy(),
-        dt_s=np.array([dt_s]),
+        *new_state(radii, dt_s),
         grip=new_grip(m),
         rate=np.zeros(m),
         before=np.zeros(m),

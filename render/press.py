@@ -75,42 +75,71 @@ class Curve(Result):
         return np.array([np.interp(depth_m, self.depth[:last], f) for f in self.force[:last].T])
 
 
+@dataclass(frozen=True)
+class Stroke:
+    """How a press moves, sampled at rate_hz.
+
+    depth_m: of the tip's centre along -n after first touch, of the object or of the support beside it.
+    hold_s: at depth. approach_m: of free air before. Raises OptionError for what cannot be gone.
+    """
+
+    depth_m: float
+    speed_m_per_s: float
+    hold_s: float = 0.0
+    approach_m: float = 2e-3
+    rate_hz: float = 1000.0
+
+    def __post_init__(self) -> None:
+        for value, name in ((self.depth_m, "depth"), (self.speed_m_per_s, "speed"), (self.rate_hz, "rate")):
+            if not (np.isfinite(value) and value > 0):
+                raise OptionError(f"{name} is {value}; it must be greater than 0")
+        if self.hold_s < 0 or self.approach_m <= 0:
+            raise OptionError(
+                f"hold is {self.hold_s} s and approach {self.approach_m} m: at least 0 s and more than 0 m"
+            )
+
+    def samples(self, steepness: float) -> tuple[np.ndarray, np.ndarray]:
+        """(t (n,) s, way (n,) m past first touch) of a line that goes in by `steepness` for each metre."""
+        before, deepest = self.approach_m, self.depth_m / steepness
+        out = before + deepest
+        times = np.array([0.0, out, out, 2 * out]) / self.speed_m_per_s
+        times += np.array([0.0, 0.0, self.hold_s, self.hold_s])
+        if not times[-1] * self.rate_hz <= MOST_SAMPLES:
+            raise OptionError(
+                f"the press would last {times[-1]:.4g} s, {times[-1] * self.rate_hz:.3g} samples, "
+                f"at most {MOST_SAMPLES}: press faster or hold it for less long"
+            )
+        t = np.arange(0.0, times[-1] + 0.5 / self.rate_hz, 1.0 / self.rate_hz)
+        return t, np.interp(t, times, [-before, out - before, out - before, -before])
+
+
 def press(
     touched: Renderer | TouchScene,
     at: np.ndarray,
     direction: np.ndarray,
-    depth_m: float,
-    speed_m_per_s: float,
-    *,
-    hold_s: float = 0.0,
-    approach_m: float = 2e-3,
-    rate_hz: float = 1000.0,
+    stroke: Stroke,
     tip_radius_m: float | None = None,
 ) -> Curve:
     """Press along `direction` (3,) with the tip's centre aimed at the point `at` (3,) m, device frame.
 
-    touched: a scene, or a renderer, which stands on its model's support. depth_m: of the tip's centre along
-    -n after first touch, of the object or of the support beside it. Raises OptionError where the line misses
-    both, enters the object through its base, or grazes what it meets (more than 80 degrees off the normal).
+    touched: a scene, or a renderer, which stands on its model's support. Raises OptionError where the line
+    misses both, enters the object through its base, or grazes what it meets (more than 80 degrees off the
+    normal).
     """
     scene = scene_of(touched)
     at, direction = np.asarray(at, dtype=float), np.asarray(direction, dtype=float)
     length = float(np.linalg.norm(direction))
     if not length > 0 or not np.isfinite(at).all() or not np.isfinite(length):
         raise OptionError(f"direction is {direction.tolist()}; it must be a finite vector that is not 0")
-    for value, name in ((depth_m, "depth"), (speed_m_per_s, "speed"), (rate_hz, "rate")):
-        if not (np.isfinite(value) and value > 0):
-            raise OptionError(f"{name} is {value}; it must be greater than 0")
-    if hold_s < 0 or approach_m <= 0:
-        raise OptionError(f"hold is {hold_s} s and approach {approach_m} m: at least 0 s and more than 0 m")
     direction = direction / length
     radius = scene.model.tool.tip_radius_m if tip_radius_m is None else float(tip_radius_m)
     if not TIP_RADIUS.takes(radius):
         raise OptionError(f"the tip's radius is {radius:g}; it must be {TIP_RADIUS.words}")
     height = float(scene.model.support.height(scene.model.mesh.points).max())
-    if depth_m > height:
+    if stroke.depth_m > height:
         raise OptionError(
-            f"depth is {depth_m:g} m, and the object is {height:.4g} m high: press less deep (in metres)"
+            f"depth is {stroke.depth_m:g} m, and the object is {height:.4g} m high: "
+            "press less deep (in metres)"
         )
     touch, normal = first_touch(scene, at, direction, radius)
     steepness = -float(normal @ direction)
@@ -119,18 +148,11 @@ def press(
             f"the press runs along the surface, normal {np.round(normal, 3).tolist()}: turn it into the "
             "surface"
         )
-    travel = approach_m + depth_m / steepness
-    times = np.array([0.0, travel, travel, 2 * travel]) / speed_m_per_s + np.array([0.0, 0.0, hold_s, hold_s])
-    if not times[-1] * rate_hz <= MOST_SAMPLES:
-        raise OptionError(
-            f"the press would last {times[-1]:.4g} s, {times[-1] * rate_hz:.3g} samples, "
-            f"at most {MOST_SAMPLES}: press faster or hold it for less long"
-        )
-    t = np.arange(0.0, times[-1] + 0.5 / rate_hz, 1.0 / rate_hz)
-    along = np.interp(t, times, [-approach_m, travel - approach_m, travel - approach_m, -approach_m])
+    t, along = stroke.samples(steepness)
     position = touch + along[:, None] * direction
-    state = scene.start([radius], dt_s=1.0 / rate_hz)
-    force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), 1.0 / rate_hz))
+    step_s = 1.0 / stroke.rate_hz
+    state = scene.start([radius], dt_s=step_s)
+    force = scene.follow(state, np.ascontiguousarray(position[:, None]), np.full(len(t), step_s))
     depth = np.maximum(along * steepness, 0.0)
     return Curve(t, position, depth, force[:, 0], normal, scene.renderer, radius)
 

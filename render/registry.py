@@ -1,4 +1,4 @@
-"""The renderers by name; one file each, one line here."""
+"""The renderers by name, and the module whose `create(name, model, options, progress)` makes each."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 _RENDERERS = {
     "fem": "render.fem",
-    "kelvin-voigt": "render.kelvin_voigt",
-    "hunt-crossley": "render.hunt_crossley",
-    "hunt-crossley-undamped": "render.hunt_crossley_undamped",
-    "hunt-crossley-kh": "render.hunt_crossley_kh",
+    "kelvin-voigt": "render.one_d_laws",
+    "hunt-crossley": "render.one_d_laws",
+    "hunt-crossley-undamped": "render.one_d_laws",
+    "hunt-crossley-kh": "render.one_d_laws",
 }
 
 
@@ -33,4 +33,5 @@ def create(
     """The renderer of that name for a model; raises OptionError for a name that is not there."""
     if name not in _RENDERERS:
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(_RENDERERS)}")
-    return importlib.import_module(_RENDERERS[name]).create(model, options or RenderOptions(), progress)
+    module = importlib.import_module(_RENDERERS[name])
+    return module.create(name, model, options or RenderOptions(), progress)

@@ -73,12 +73,12 @@ def rms_n(forces: np.ndarray) -> float:
     return float(np.sqrt((forces**2).sum(axis=1).mean())) if len(forces) else float("nan")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ReplayError:
     """How far replayed forces are from measured ones over the contact samples; N, vectors.
 
-    contact: (n,) bool, the samples that count. rmse_n; force_rms_n: of the measured force; relative: their
-    ratio.
+    contact: (n,) bool, the samples that count: phase II, from first touch to its loss and 50 ms around.
+    rmse_n: N, rms length of the error over them; force_rms_n: of the measured force; relative: their ratio.
     """
 
     rmse_n: float
@@ -96,12 +96,10 @@ def replay_error(recording: Recording, presses: Presses, forces: np.ndarray) -> 
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ReplayResult(Result):
+class ReplayResult(Result, ReplayError):
     """Forces of a renderer along a recorded path, against those measured.
 
-    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. contact: (n,) bool, the samples that
-    count: phase II, from first touch to its loss and 50 ms around. rmse_n: N, rms length of the error over
-    them; force_rms_n: of the measured force; relative: their ratio. `plot`: both forces over time. `show`:
+    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. `plot`: both forces over time. `show`:
     the object, each touch coloured by its rms error.
     """
 
@@ -110,10 +108,6 @@ class ReplayResult(Result):
     renderer: str
     t: np.ndarray
     force_n: np.ndarray
-    contact: np.ndarray
-    rmse_n: float
-    force_rms_n: float
-    relative: float
 
     @property
     def error_n(self) -> np.ndarray:

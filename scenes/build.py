@@ -31,9 +31,8 @@ from reconstruct.shapes.coarse_drawing import decimated
 from reconstruct.steps.s4_surface.surface import Surface
 from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 from scenes.embedded import embedded_names, embedded_recording
-from scenes.inclusions import ball_of
 from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
-from scenes.scene import Scene
+from scenes.scene import Scene, ball_of
 from scenes.virtual_presses import palpate_model
 
 VERSION = 6

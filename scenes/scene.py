@@ -27,7 +27,7 @@ from typing import Any
 from devices.mapper import MapperOptions, axis_matrix
 from mechanics.errors import OptionError, SceneError
 from mechanics.files import named_in, read_toml
-from mechanics.material import BALL
+from mechanics.material import BALL, Ball
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from mechanics.schema import Key, Listed, Schema, check_table
 from mechanics.surface_files import SUFFIXES, is_surface_file
@@ -205,3 +205,8 @@ def _inclusions(tables: Any) -> tuple[Region, ...] | None:
         name = table.get("name", f"inclusion {number + 1}")
         regions.append(Region(name, (x, y, z), float(table["radius_m"]), float(table["modulus_ratio"])))
     return tuple(regions)
+
+
+def ball_of(region: Region) -> Ball:
+    """The region as a part of a material; its centre in the mesh's frame."""
+    return Ball(region.centre_m, region.radius_m, region.modulus_ratio)

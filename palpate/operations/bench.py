@@ -48,7 +48,7 @@ def clone() -> Path:
 
 def names() -> list[str]:
     """The benchmarks of the clone that one stands in, as the command line spells them."""
-    found = (m.name for m in pkgutil.iter_modules([str(clone() / "benchmarks")]))
+    found = (m.name for m in pkgutil.iter_modules([str(clone() / "benchmarks")]) if not m.ispkg)
     return sorted(n.replace("_", "-") for n in found if n not in _HELPERS and not n.startswith("_"))
 
 

@@ -37,7 +37,7 @@ def _answer(found: list[tuple[Availability, Rate | None]], asked: DevicesOperand
     if len(there) < len(found):
         out.say("not there:", *(line for d, _ in found if not d.present for line in _absent(d)))
     if there:
-        out.say("", f"to touch something with one: palpate touch --device {there[0][0].name}")
+        out.say("", f"to touch something with one: palpate touch --device {there[0][0].spec.name}")
     out.json({"devices": [figures(device, rate) for device, rate in found]})
     return 0
 
@@ -51,9 +51,9 @@ def devices(asked: DevicesOperands, call: Call) -> list[tuple[Availability, Rate
     found = find_devices(asked.names or None, options)
     rates = {}
     if asked.measure is not None:
-        chosen = dict.fromkeys(d.name for d in found if d.present and d.name in HARDWARE)
+        chosen = dict.fromkeys(d.spec.name for d in found if d.present and d.spec.name in HARDWARE)
         rates = {name: _measured(name, options[name], asked.measure) for name in chosen}
-    return [(device, rates.get(device.name) if device.present else None) for device in found]
+    return [(device, rates.get(device.spec.name) if device.present else None) for device in found]
 
 
 def _measured(name: str, options: Any, seconds: float) -> Rate:
@@ -77,7 +77,10 @@ def abilities(spec: DeviceSpec) -> str:
 
 def _headed(device: Availability, *lines: str) -> list[str]:
     where = f" ({device.where})" if device.where else ""
-    return [f"  {device.name:<15} {device.title}{where}", *(" " * 18 + line for line in lines if line)]
+    return [
+        f"  {device.spec.name:<15} {device.spec.title}{where}",
+        *(" " * 18 + line for line in lines if line),
+    ]
 
 
 def _present(device: Availability, rate: Rate | None) -> list[str]:
@@ -93,8 +96,8 @@ def figures(device: Availability, rate: Rate | None) -> dict[str, object]:
     """A device for JSON, keys with units."""
     spec = device.spec
     return {
-        "name": device.name,
-        "title": device.title,
+        "name": spec.name,
+        "title": spec.title,
         "present": device.present,
         "where": device.where,
         "why_not": device.why_not,

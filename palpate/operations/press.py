@@ -97,8 +97,8 @@ def press(asked: PressOperands, call: Call) -> Curve:
     """
     import numpy as np
 
+    from render.press import Stroke, read_curve
     from render.press import press as pressed
-    from render.press import read_curve
 
     if asked.expect:
         read_curve(asked.expect)  # before the work
@@ -111,10 +111,6 @@ def press(asked: PressOperands, call: Call) -> Curve:
         scene,
         np.asarray(asked.at, dtype=float),
         -scene.model.support.normal if straight else np.asarray(asked.direction, dtype=float),
-        asked.depth_m,
-        asked.speed_m_per_s,
-        hold_s=asked.hold_s,
-        approach_m=asked.approach_m,
-        rate_hz=asked.rate_hz,
-        tip_radius_m=radius,
+        Stroke(asked.depth_m, asked.speed_m_per_s, asked.hold_s, asked.approach_m, asked.rate_hz),
+        radius,
     )

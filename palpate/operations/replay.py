@@ -62,15 +62,12 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         forces = replay_recording(scene, measured, tell)
     error = replay_error(measured, _touched(measured, scene.model), forces)
     return ReplayResult(
+        **vars(error),
         recording=measured,
         model=scene.model,
         renderer=scene.renderer.name,
         t=measured.t,
         force_n=forces,
-        contact=error.contact,
-        rmse_n=error.rmse_n,
-        force_rms_n=error.force_rms_n,
-        relative=error.relative,
     )
 
 

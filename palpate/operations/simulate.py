@@ -126,7 +126,9 @@ def simulate(asked: SimulateOperands, call: Call) -> Simulation:
     ideal model. save: NAME.csv.gz, with the truth in NAME.toml. Solved touches are kept in the user's cache.
     Raises OptionError or SceneError.
     """
+    from scenes.laboratory.curves import Solving
     from scenes.laboratory.hand import cohort_hand
+    from scenes.laboratory.session import Staging
     from scenes.laboratory.simulate import simulate as simulated
     from scenes.phantoms import Phantom
     from scenes.phantoms import phantom as named
@@ -142,11 +144,10 @@ def simulate(asked: SimulateOperands, call: Call) -> Simulation:
             thing,
             effects,
             call.of(SimulateOptions),
-            hand=dataclasses.replace(cohort_hand(asked.person), **call.values(HandOptions)),
             seed=asked.seed,
             sizes=asked.sizes,
             ideal=asked.ideal or asked.pictures is not None or asked.report is not None,
-            workers=asked.workers,
-            progress=tell,
+            staging=Staging(dataclasses.replace(cohort_hand(asked.person), **call.values(HandOptions))),
+            solving=Solving(asked.workers, progress=tell),
         )
     return result if asked.save is None or asked.seal else result.save(asked.save)

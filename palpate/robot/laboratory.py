@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import trimesh
@@ -21,8 +20,8 @@ from diagnose.explore.segments import Instrument, Segment
 from mechanics.errors import SceneError
 from mechanics.nearest import closest, first_hits
 from mechanics.options import option
-from mechanics.progress import Progress, silent
 from scenes.laboratory.beside import on_the_support, waving
+from scenes.laboratory.curves import ALONE, Solving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.frame import quaternions
 from scenes.laboratory.hand import HandOptions, minimum_jerk
@@ -41,15 +40,6 @@ class RobotOptions:
     way_error_deg: float = option(4.0, "of the direction in which it comes", unit="deg")
     depth_error: float = option(0.08, "of the depth, as a share of it")
     speed_error: float = option(0.15, "of the speed, as a share of it")
-
-
-@dataclass(frozen=True)
-class Solving:
-    """How touches are solved: by how many processes (None: one a core), kept where, who is told of it."""
-
-    workers: int | None = 1
-    cache: Path | None = None
-    progress: Progress = silent
 
 
 JOIN_S = 0.25
@@ -79,7 +69,7 @@ class LaboratoryRobot:
         self.options = options or SimulateOptions()
         self.robot = robot or RobotOptions()
         self.hand = HandOptions(hold_share=0.3, longest_hold_s=0.5, pause_s=0.1, tilt_deg=4.0)
-        self._solving = solving or Solving()
+        self._solving = solving or ALONE
         self._surface = trimesh.Trimesh(phantom.vertices, phantom.faces, process=False)
         self._rng = np.random.default_rng([seed, 16])
         self._touches: list[Touch] = []
@@ -133,13 +123,10 @@ class LaboratoryRobot:
             self.phantom,
             self.effects,
             self.options,
-            hand=self.hand,
             seed=seed,
             sizes=False,
-            staging=Staging(touches=tuple(touches)),
-            workers=self._solving.workers,
-            cache=self._solving.cache,
-            progress=self._solving.progress,
+            staging=Staging(self.hand, tuple(touches)),
+            solving=self._solving,
         )
         return self.last
 

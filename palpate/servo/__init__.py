@@ -6,11 +6,10 @@ from palpate.servo.headless import exploring_hand, run_headless
 from palpate.servo.options import ServoOptions
 from palpate.servo.recorder import Recorder
 from palpate.servo.report import ServoReport, ServoSnapshot
-from palpate.servo.source import FreeAirSource, ModelSource, RendererSource
+from palpate.servo.source import ModelSource, RendererSource
 from render.passivity import PassivityOptions
 
 __all__ = [
-    "FreeAirSource",
     "ModelSource",
     "PassivityOptions",
     "Recorder",

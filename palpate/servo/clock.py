@@ -23,7 +23,6 @@ def c_function(name: str, signature: Any) -> Callable[..., int]:
 
 
 _MONOTONIC = 1
-_THREAD_CPU = 3
 _ABSOLUTE = 1
 _gettime = c_function("clock_gettime", types.int32(types.int32, types.voidptr))
 _nanosleep = c_function(
@@ -35,13 +34,6 @@ _nanosleep = c_function(
 def compiled_now_ns(timespec):
     """CLOCK_MONOTONIC in ns; timespec: (2,) int64 scratch. The clock of time.perf_counter_ns on Linux."""
     _gettime(_MONOTONIC, timespec.ctypes)
-    return timespec[0] * 1_000_000_000 + timespec[1]
-
-
-@njit(cache=True, nogil=True)
-def compiled_thread_cpu_ns(timespec):
-    """CPU time of the calling thread in ns; timespec: (2,) int64 scratch."""
-    _gettime(_THREAD_CPU, timespec.ctypes)
     return timespec[0] * 1_000_000_000 + timespec[1]
 
 

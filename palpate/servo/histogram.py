@@ -62,10 +62,6 @@ class Histogram:
         index = int(np.searchsorted(np.cumsum(self.counts), share * total))
         return min(lower_edge_ns(index + 1), self.greatest_ns) / 1000.0
 
-    def over(self, threshold_ns: int) -> int:
-        """How many durations lie in bins wholly above `threshold_ns`."""
-        return int(self.counts[bin_of(threshold_ns) + 1 :].sum())
-
     def summary(self) -> dict[str, float]:
         """median, p99, p99.9, max and mean in microseconds."""
         return {

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from typing import Any
 
 import numpy as np
@@ -50,39 +50,19 @@ class ServoReport:
     cpu_s: float = float("nan")
     wall_s: float = float("nan")
 
-    @property
-    def compute_us(self) -> dict[str, float]:
-        """Compute time of a tick: median, p99, p99.9, max, mean."""
-        return self.compute.summary()
-
-    @property
-    def lateness_us(self) -> dict[str, float]:
-        """Start of a tick after its deadline: median, p99, p99.9, max, mean."""
-        return self.lateness.summary()
-
     def as_dict(self) -> dict[str, Any]:
         """For JSON."""
-        return {
-            "ticks": self.ticks,
-            "seconds": self.seconds,
-            "rate_hz": self.rate_hz,
-            "missed_ticks": self.missed_ticks,
-            "late_ticks": self.late_ticks,
-            "compute_us": self.compute_us,
-            "lateness_us": self.lateness_us,
-            "peak_rendered_n": self.peak_rendered_n,
-            "peak_force_n": self.peak_force_n,
-            "contact_share": self.contact_share,
-            "energy_given_back_j": self.energy_given_back_j,
-            "energy_damped_j": self.energy_damped_j,
-            "reasons": dict(self.reasons),
-            "words": list(self.words),
-            "cpu_s": self.cpu_s,
-            "wall_s": self.wall_s,
-        }
+        table: dict[str, Any] = {}
+        for name in (f.name for f in fields(self)):
+            value = getattr(self, name)
+            if isinstance(value, Histogram):
+                table[f"{name}_us"] = value.summary()
+            else:
+                table[name] = list(value) if isinstance(value, tuple) else value
+        return table
 
     def __str__(self) -> str:
-        c, late = self.compute_us, self.lateness_us
+        c, late = self.compute.summary(), self.lateness.summary()
         lines = [
             f"{self.ticks} ticks in {self.seconds:.1f} s ({self.rate_hz:.1f} Hz), "
             f"{self.missed_ticks} missed, {self.late_ticks} late",

@@ -52,19 +52,6 @@ class RendererChange(Protocol):
         """The other renderer."""
 
 
-@dataclass(frozen=True)
-class FreeAirSource:
-    """No object."""
-
-    name: str = "free-air"
-
-    def make(self, progress: Progress) -> tuple[Any, Model | None]:
-        """A renderer of nothing."""
-        from palpate.servo.free_air import FreeAir
-
-        return FreeAir(), None
-
-
 class ModelFolder:
     """A MODEL folder for a model that may be in memory only; `close` removes what was written for it."""
 

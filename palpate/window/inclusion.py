@@ -27,8 +27,8 @@ from mechanics.solver import Solver
 from palpate.servo import Servo
 from render.base import Renderer
 from render.fem import FemRenderer
-from scenes.inclusions import ball_of
 from scenes.phantoms import Region
+from scenes.scene import ball_of
 
 
 @dataclass(frozen=True)

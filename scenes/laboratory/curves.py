@@ -16,7 +16,6 @@ from dataclasses import dataclass
 from multiprocessing import get_context, parent_process
 from pathlib import Path
 from types import ModuleType
-from typing import TypedDict
 
 import numpy as np
 
@@ -80,14 +79,23 @@ class PathJob:
         return digest.hexdigest()[:32]
 
 
-class Solving(TypedDict, total=False):
-    """Keywords of `curves`."""
+@dataclass(frozen=True)
+class Solving:
+    """How touches are solved.
 
-    fineness: Fineness | None
-    workers: int | None
-    cache: Path | None
-    progress: Progress
-    label: str
+    workers: processes, None: one a core. cache: where solved touches are kept, None: the user's. label: what
+    `progress` is told of.
+    """
+
+    workers: int | None = None
+    cache: Path | None = None
+    progress: Progress = silent
+    fineness: Fineness = Fineness()
+    label: str = "solving touches"
+
+
+EVERY_CORE, ALONE = Solving(), Solving(workers=1)
+"""By a process a core; in the process that asks."""
 
 
 def solve(
@@ -171,19 +179,14 @@ def curves(
     phantom: Phantom,
     specimen: Specimen,
     jobs: Sequence[PathJob],
-    *,
-    fineness: Fineness | None = None,
-    workers: int | None = None,
-    cache: Path | None = None,
-    progress: Progress = silent,
-    label: str = "solving touches",
+    solving: Solving = EVERY_CORE,
 ) -> list[Curve]:
     """Solve the jobs that are not in the cache, in parallel; an interrupted run goes on where it stopped.
 
-    workers: processes, by default one a core. Raises LabError naming the touches that found no equilibrium.
+    Raises LabError naming the touches that found no equilibrium.
     """
-    fineness = fineness or Fineness()
-    cache = cache or laboratory_cache()
+    fineness, progress, label = solving.fineness, solving.progress, solving.label
+    cache = solving.cache or laboratory_cache()
     shape = phantom_key(phantom)
     paths = [cache / "curves" / shape / f"{job.key(shape, specimen, fineness)}.npz" for job in jobs]
     missing = [k for k, path in enumerate(paths) if _load(path) is None]
@@ -195,7 +198,7 @@ def curves(
         for k in missing:
             places.setdefault(jobs[k].point.tobytes(), []).append(k)
         groups = list(places.values())
-        workers = min(len(groups), workers or os.cpu_count() or 1)
+        workers = min(len(groups), solving.workers or os.cpu_count() or 1)
         progress(label, 0.0)
         tasks = [
             (phantom, specimen, [jobs[k] for k in group], fineness, cache, [paths[k] for k in group])

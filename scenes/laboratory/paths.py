@@ -6,15 +6,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from mechanics.progress import Progress, silent
-from scenes.laboratory.curves import LOADING, Curve, PathJob, Solving, curves
+from scenes.laboratory.curves import EVERY_CORE, LOADING, Curve, PathJob, Solving, curves
 from scenes.laboratory.presses import Touch
-from scenes.laboratory.specimen import Fineness, Specimen
+from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom
 
 UNLOADING = np.array([0.93, 0.82, 0.68, 0.52, 0.36, 0.22, 0.12, 0.05, 0.0])
@@ -119,23 +117,15 @@ def touch_forces(
     phantom: Phantom,
     specimen: Specimen,
     touches: Sequence[Touch],
-    *,
-    fineness: Fineness | None = None,
-    workers: int | None = None,
-    cache: Path | None = None,
-    progress: Progress = silent,
-    label: str = "solving touches",
+    solving: Solving = EVERY_CORE,
 ) -> list[TouchForce]:
     """The force of every touch, for a modulus of 1; solved where the cache does not hold it.
 
     A reversible specimen's straight presses of one site share one curve; a specimen that remembers is
     driven through all touches of a site in their order.
     """
-    keywords: Solving = {
-        "fineness": fineness, "workers": workers, "cache": cache, "progress": progress, "label": label
-    }  # fmt: skip
     if specimen.remembers:
-        return _by_site(phantom, specimen, touches, keywords)
+        return _by_site(phantom, specimen, touches, solving)
     jobs: list[PathJob] = []
     places: dict[tuple, int] = {}
     plan: list[tuple[int, bool]] = []
@@ -156,7 +146,7 @@ def touch_forces(
             places[name] = len(jobs)
             jobs.append(job)
         plan.append((places[name], shared))
-    solved = curves(phantom, specimen, jobs, **keywords)
+    solved = curves(phantom, specimen, jobs, solving)
     forces = []
     for touch, (number, shared) in zip(touches, plan, strict=True):
         curve = solved[number]
@@ -170,7 +160,7 @@ def touch_forces(
 
 
 def _by_site(
-    phantom: Phantom, specimen: Specimen, touches: Sequence[Touch], keywords: Solving
+    phantom: Phantom, specimen: Specimen, touches: Sequence[Touch], solving: Solving
 ) -> list[TouchForce]:
     jobs, members = [], []
     for site in sorted({t.site for t in touches}):
@@ -180,7 +170,7 @@ def _by_site(
             PathJob(touches[mine[0]].point, touches[mine[0]].normal, np.vstack([p[0] for p in paths]))
         )
         members.append((mine, paths))
-    solved = curves(phantom, specimen, jobs, **keywords)
+    solved = curves(phantom, specimen, jobs, solving)
     forces: dict[int, TouchForce] = {}
     for curve, (mine, paths) in zip(solved, members, strict=True):
         start = 0

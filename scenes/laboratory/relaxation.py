@@ -65,11 +65,11 @@ def beyond_quasilinear(
     motion: Motion,
     quasilinear: np.ndarray,
     modulus_pa: float,
-    keywords: Solving,
+    solving: Solving,
 ) -> np.ndarray:
     """(n, 3) N: the solid's force on the tip minus `quasilinear` (n, 3), both without straying.
 
-    specimen: with its Maxwell branches. keywords: of `curves`. Raises LabError.
+    specimen: with its Maxwell branches. Raises LabError.
     """
     spacing = COARSE if specimen.finite else FINE
     jobs, samples = [], []
@@ -79,7 +79,7 @@ def beyond_quasilinear(
         times = (at - at[0]) / RATE_HZ
         jobs.append(PathJob(touch.point, touch.normal, travel.round(4), times))
     change = np.zeros_like(quasilinear)
-    for at, curve in zip(samples, curves(phantom, specimen, jobs, **keywords), strict=True):
+    for at, curve in zip(samples, curves(phantom, specimen, jobs, solving), strict=True):
         rows = np.arange(at[0], at[-1] + 1)
         beyond = 1e-6 * modulus_pa * curve.force - quasilinear[at]
         change[rows] = np.column_stack([np.interp(rows, at, beyond[:, i]) for i in range(3)])

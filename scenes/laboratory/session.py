@@ -5,13 +5,11 @@ from __future__ import annotations
 import zlib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from mechanics.options import option
-from mechanics.progress import Progress
 from mechanics.recording import Recording
 from mechanics.segments import Segment
 from scenes.laboratory.curves import Solving
@@ -55,11 +53,12 @@ class SimulateOptions:
 class Staging:
     """What may be laid down about an exploration instead of being left to numbers and seeds.
 
-    touches: instead of a press set. complete: what `--protocol complete` does after the touches. frame:
-    (rotation (3, 3), shift (3,) m) from the object's frame to the device's. instrument: what the readings go
-    through before any effect; no effect of its own.
+    hand: whose habits. touches: instead of a press set. complete: what `--protocol complete` does after the
+    touches. frame: (rotation (3, 3), shift (3,) m) from the object's frame to the device's. instrument: what
+    the readings go through before any effect; no effect of its own.
     """
 
+    hand: HandOptions = HandOptions()
     touches: tuple[Touch, ...] | None = None
     complete: bool = False
     frame: tuple[np.ndarray, np.ndarray] | None = None
@@ -74,27 +73,20 @@ class Session:
         phantom: Phantom,
         modulus: float,
         options: SimulateOptions,
-        hand: HandOptions,
         touches: tuple[Touch, ...],
         parameters: Mapping[str, Mapping[str, Any]],
         seed: int,
-        workers: int | None,
-        cache: Path | None,
-        progress: Progress,
-        staging: Staging | None = None,
+        staging: Staging,
+        solving: Solving,
     ) -> None:
-        self.phantom, self.modulus, self.options, self.hand = phantom, modulus, options, hand
+        self.phantom, self.modulus, self.options, self.staging = phantom, modulus, options, staging
         self.touches, self.parameters, self.seed = touches, parameters, seed
-        fineness = Fineness(finest=options.finest_mm)
-        self._solving: Solving = {
-            "fineness": fineness, "workers": workers, "cache": cache, "progress": progress
-        }  # fmt: skip
+        self._solving = replace(solving, fineness=Fineness(finest=options.finest_mm))
         self.rotation, self.shift = np.eye(3), np.zeros(3)
         if options.frame:
             self.rotation, self.shift = random_frame(seed, 1e3 * phantom.height_m)
-        self.staging = staging or Staging()
-        if self.staging.frame is not None:
-            self.rotation, self.shift = self.staging.frame
+        if staging.frame is not None:
+            self.rotation, self.shift = staging.frame
 
     def _rng(self, what: str) -> np.random.Generator:
         return np.random.default_rng([self.seed, zlib.crc32(what.encode())])
@@ -117,17 +109,17 @@ class Session:
         """Solved touches with the effects `present`."""
         inside = [name for name in present if effect(name).in_solid or effect(name).on_shape]
         label = "solving " + (" + ".join(inside) if inside else "the ideal object")
-        keywords: Solving = {**self._solving, "label": label}
-        return touch_forces(self._shape(present), self.specimen(present, regions), self.touches, **keywords)
+        solving = replace(self._solving, label=label)
+        return touch_forces(self._shape(present), self.specimen(present, regions), self.touches, solving)
 
     def motion(self, radius: float) -> Motion:
         """The same hand's way every time."""
-        rng = self._rng("trace")
-        traced = trace(self.phantom, self.hand, radius, self.modulus, rng)
+        hand = self.staging.hand
+        traced = trace(self.phantom, hand, radius, self.modulus, self._rng("trace"))
         again = None
         if self.staging.complete or PROTOCOLS[self.options.protocol].complete:
-            again = trace(self.phantom, self.hand, radius, self.modulus, self._rng("retrace"))
-        return motion(self.phantom, self.touches, traced, self.hand, radius, self._rng("motion"), again)
+            again = trace(self.phantom, hand, radius, self.modulus, self._rng("retrace"))
+        return motion(self.phantom, self.touches, traced, hand, radius, self._rng("motion"), again)
 
     def run(
         self, present: Sequence[str], regions: bool = True, moved: np.ndarray | None = None
@@ -180,9 +172,9 @@ class Session:
         law = quasilinear(elastic, way, normals, p)
         prony = tuple(zip(p["g"], p["tau_s"], strict=True))
         relaxing = replace(self.specimen(present, regions), prony=prony)
-        keywords: Solving = {**self._solving, "label": "solving the relaxing solid"}
+        solving = replace(self._solving, label="solving the relaxing solid")
         return beyond_quasilinear(
-            self._shape(present), relaxing, self.touches, way, law, self.modulus, keywords
+            self._shape(present), relaxing, self.touches, way, law, self.modulus, solving
         )
 
     def _shape(self, present: Sequence[str]) -> Phantom:

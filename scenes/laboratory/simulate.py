@@ -11,11 +11,10 @@ from typing import Any
 import numpy as np
 
 from mechanics.errors import OptionError
-from mechanics.progress import Progress, silent
 from mechanics.recording import Recording, read_recording, write_recording
 from mechanics.result import Result
+from scenes.laboratory.curves import EVERY_CORE, Solving
 from scenes.laboratory.effects import REGISTRY, Bench, Readings, effect
-from scenes.laboratory.hand import HandOptions
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.presses import Touch, press_set
 from scenes.laboratory.session import Session, SimulateOptions, Staging
@@ -58,14 +57,11 @@ def simulate(
     effects: Mapping[str, float] | None = None,
     options: SimulateOptions | None = None,
     *,
-    hand: HandOptions | None = None,
     seed: int = 0,
     sizes: bool = True,
     ideal: bool = False,
-    workers: int | None = None,
-    cache: Path | None = None,
-    progress: Progress = silent,
     staging: Staging | None = None,
+    solving: Solving = EVERY_CORE,
 ) -> Simulation:
     """Explore `phantom` with `effects` (name: strength, see INTERFACE of the docs) and write down what is
     read.
@@ -73,10 +69,9 @@ def simulate(
     The ideal model has no effect: linear elastic, bonded, sticking, exact but for noise. Regions of the
     phantom count as the effect `inclusion`. seed: timing, straying, tracing and noise; the press set has
     its own number, so that solved curves are shared. sizes: also solve without each effect, to state its
-    size. staging: lay down touches, frame or instrument. Raises OptionError, LabError.
+    size. staging: lay down hand, touches, frame or instrument. Raises OptionError, LabError.
     """
     options = options or SimulateOptions()
-    hand = hand or HandOptions()
     strengths = {name: float(value) for name, value in (effects or {}).items() if float(value) != 0}
     for name, value in strengths.items():
         least = effect(name).least_strength
@@ -85,14 +80,12 @@ def simulate(
             raise OptionError(f"effect '{name}' has strength {value}; it must be {above} and at most 16")
     if any(effect(name).needs_finite for name in strengths):
         strengths.setdefault("finite_strain", 1.0)
+    staging = staging or Staging()
     modulus = options.young_modulus_pa or phantom.young_modulus_pa
     plain = replace(phantom, regions=())
-    staging = staging or Staging()
     touches = staging.touches or tuple(press_set(plain, options.protocol, options.presses))
     parameters = _parameters(plain, strengths, modulus, options, touches)
-    session = Session(
-        phantom, modulus, options, hand, touches, parameters, seed, workers, cache, progress, staging
-    )
+    session = Session(phantom, modulus, options, touches, parameters, seed, staging, solving)
     present = tuple(parameters)
     whole, clean = session.run(present)
     truth = truth_of(session, present, clean, whole, sizes, strengths)

@@ -15,7 +15,7 @@ from mechanics.sites import TouchSites
 from palpate.cli import main
 from render.felt import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
 from render.options import RenderOptions
-from render.press import press
+from render.press import Stroke, press
 from render.snapping import ONSET_NOISE_M, touched_surface
 
 from . import shapes
@@ -95,7 +95,7 @@ def test_a_place_is_as_stiff_as_a_press_there(folder):
     surface = with_own_stiffness(renderer)
     assert surface.stiffness_from == PRESSES
     for x, y in ((0.0, 0.0), (0.02, -0.01)):
-        curve = press(renderer, [x, y, 0.05], [0, 0, -1], 2 * OWN_DEPTH_M, 0.01)
+        curve = press(renderer, [x, y, 0.05], [0, 0, -1], Stroke(2 * OWN_DEPTH_M, 0.01))
         expected = float(curve.force_at(OWN_DEPTH_M)[2]) / OWN_DEPTH_M
         near = np.linalg.norm(surface.points - [x, y, 0.05], axis=1).argmin()
         assert surface.own_stiffness_n_per_m[near] == pytest.approx(expected, rel=0.02)

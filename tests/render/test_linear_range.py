@@ -10,7 +10,7 @@ from mechanics.sites import touch_sites
 from mechanics.solver import Solver
 from render.fem import FemRenderer
 from render.options import RenderOptions
-from render.press import press
+from render.press import Stroke, press
 
 from . import shapes
 
@@ -29,7 +29,7 @@ def test_the_linear_range_scales_with_the_tip_on_a_half_space_and_marks_the_rend
     force = {}
     for law in ("linear", "neo-hookean"):
         renderer = FemRenderer(made, RenderOptions(dent_law=law), compliance=compliance)
-        curve = press(renderer, at[0], [0, 0, -1], float(found.depth_m[0]), 0.05)
+        curve = press(renderer, at[0], [0, 0, -1], Stroke(float(found.depth_m[0]), 0.05))
         force[law] = curve.force_at(curve.depth.max())[2]
     assert abs(force["linear"] / force["neo-hookean"] - 1) == pytest.approx(share, abs=0.006)
     assert found.table()["depth_median_m"] == pytest.approx(found.depth_m[0])

@@ -12,14 +12,14 @@ from mechanics.errors import OptionError, RecordingError
 from mechanics.press_cutting import FoundPresses, cut
 from mechanics.recording import Recording
 from palpate.cli import main
-from render.press import greatest_difference, press, read_curve, write_curve
+from render.press import Stroke, greatest_difference, press, read_curve, write_curve
 from render.replay import replay, replay_error
 
 TIP = 0.005
 
 
 def test_a_press_starts_at_touch_and_reaches_its_depth(cylinder_renderer):
-    curve = press(cylinder_renderer, [0, 0, 0.08], [0, 0, -3.0], 4e-3, 0.02, hold_s=0.05)
+    curve = press(cylinder_renderer, [0, 0, 0.08], [0, 0, -3.0], Stroke(4e-3, 0.02, hold_s=0.05))
     assert curve.depth.max() == pytest.approx(4e-3, abs=1e-9)
     assert curve.normal == pytest.approx([0, 0, 1], abs=1e-6)
     touching = np.linalg.norm(curve.force, axis=1) > 0
@@ -29,7 +29,7 @@ def test_a_press_starts_at_touch_and_reaches_its_depth(cylinder_renderer):
 
 
 def test_an_oblique_press_counts_depth_along_the_normal(cylinder_renderer):
-    curve = press(cylinder_renderer, [0.04, 0, 0.04], [-1, 0, -0.5], 3e-3, 0.01)
+    curve = press(cylinder_renderer, [0.04, 0, 0.04], [-1, 0, -0.5], Stroke(3e-3, 0.01))
     assert curve.normal[0] > 0.99
     assert curve.depth.max() == pytest.approx(3e-3, rel=2e-3)  # the deepest sample is near the turn
     deepest = curve.force[curve.depth.argmax()]
@@ -46,15 +46,15 @@ def test_an_oblique_press_counts_depth_along_the_normal(cylinder_renderer):
 )
 def test_a_press_that_misses_says_so(cylinder_renderer, at, direction, words):
     with pytest.raises(OptionError, match=words):
-        press(cylinder_renderer, at, direction, 3e-3, 0.01)
+        press(cylinder_renderer, at, direction, Stroke(3e-3, 0.01))
 
 
 def test_curves_survive_their_file_and_are_compared(cylinder_renderer, tmp_path):
-    curve = press(cylinder_renderer, [0, 0, 0.08], [0, 0, -1], 3e-3, 0.02)
+    curve = press(cylinder_renderer, [0, 0, 0.08], [0, 0, -1], Stroke(3e-3, 0.02))
     write_curve(tmp_path / "curve.csv", curve)
     same = read_curve(tmp_path / "curve.csv")
     assert greatest_difference(curve, same)[0] < 1e-8
-    stiffer = press(cylinder_renderer.with_modulus(30e3), [0, 0, 0.08], [0, 0, -1], 3e-3, 0.02)
+    stiffer = press(cylinder_renderer.with_modulus(30e3), [0, 0, 0.08], [0, 0, -1], Stroke(3e-3, 0.02))
     worst, when = greatest_difference(stiffer, curve)
     assert worst == pytest.approx(curve.peak_force_n / 29, rel=1e-3)
     assert curve.depth[np.searchsorted(curve.t, when)] == pytest.approx(3e-3, rel=0.01)
@@ -64,7 +64,7 @@ def test_curves_survive_their_file_and_are_compared(cylinder_renderer, tmp_path)
 
 
 def test_replay_error_counts_contact_samples_of_phase_two_only(cylinder_renderer):
-    curve = press(cylinder_renderer, [0, 0, 0.08], [0, 0, -1], 4e-3, 0.02, approach_m=0.02)
+    curve = press(cylinder_renderer, [0, 0, 0.08], [0, 0, -1], Stroke(4e-3, 0.02, approach_m=0.02))
     rng = np.random.default_rng(0)
     lead = 2000
     t = np.arange(lead + len(curve.t)) * 1e-3

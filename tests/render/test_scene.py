@@ -11,7 +11,7 @@ import pytest
 from mechanics.errors import OptionError
 from mechanics.model_files import write_model
 from palpate.cli import main
-from render.press import press, read_curve
+from render.press import Stroke, press, read_curve
 from render.replay import replay
 from render.scene import TouchScene, in_the_air, scene_of
 from render.support import SupportOptions, support_plane
@@ -23,7 +23,7 @@ BESIDE = [0.09, 0.0, 0.0]  # the block ends at 0.06
 
 
 def test_a_press_beside_the_object_meets_the_plane_with_its_stiffness(block_renderer):
-    curve = press(block_renderer, BESIDE, [0, 0, -1], 1e-3, 0.01, hold_s=0.1)
+    curve = press(block_renderer, BESIDE, [0, 0, -1], Stroke(1e-3, 0.01, hold_s=0.1))
     assert curve.normal == pytest.approx([0, 0, 1])
     assert curve.position[curve.depth.argmax()] == pytest.approx([0.09, 0, TIP - 1e-3], abs=1e-12)
     still = curve.force[1:][np.diff(curve.position[:, 2]) == 0]
@@ -37,7 +37,7 @@ def test_a_press_beside_the_object_meets_the_plane_with_its_stiffness(block_rend
 
 def test_a_replay_of_a_press_feels_the_same_force(block_renderer):
     for at, direction in ((BESIDE, [0, 0, -1]), (BESIDE, [0.3, 0.2, -1]), ([0.06, 0, 0.004], [-1, 0, 0])):
-        curve = press(block_renderer, at, direction, 1e-3, 0.02)
+        curve = press(block_renderer, at, direction, Stroke(1e-3, 0.02))
         again = replay(block_renderer, curve.t, curve.position)
         assert np.abs(again - curve.force).max() < 1e-9 and curve.peak_force_n > 0.2
 
@@ -45,8 +45,8 @@ def test_a_replay_of_a_press_feels_the_same_force(block_renderer):
 def test_at_the_foot_object_and_support_add_up(block_renderer):
     options = SupportOptions(support_damping_n_s_per_m=0.0, support_friction=0.3)
     scene = scene_of(block_renderer, options)
-    both = press(scene, [0.06, 0, 0.004], [-1, 0, 0], 2e-3, 0.05)
-    alone = press(in_the_air(block_renderer), [0.06, 0, 0.004], [-1, 0, 0], 2e-3, 0.05)
+    both = press(scene, [0.06, 0, 0.004], [-1, 0, 0], Stroke(2e-3, 0.05))
+    alone = press(in_the_air(block_renderer), [0.06, 0, 0.004], [-1, 0, 0], Stroke(2e-3, 0.05))
     support = both.force - alone.force
     moving = np.abs(np.diff(both.position[:, 0], prepend=np.nan)) > 4.99e-5
     going = -np.sign(np.diff(both.position[:, 0], prepend=np.nan))[moving]
@@ -57,21 +57,23 @@ def test_at_the_foot_object_and_support_add_up(block_renderer):
 
 
 def test_a_line_that_meets_both_touches_what_comes_first(block_renderer):
-    on_top = press(block_renderer, [0, 0, 0.08], [0, 0, -1], 1e-3, 0.02)
+    on_top = press(block_renderer, [0, 0, 0.08], [0, 0, -1], Stroke(1e-3, 0.02))
     assert on_top.position[on_top.depth.argmax(), 2] == pytest.approx(0.08 + TIP - 1e-3, abs=1e-6)
-    aslant = press(block_renderer, [0.08, 0, 0], [-0.5, 0, -1], 1e-3, 0.02)  # the wall lies behind the plane
+    aslant = press(
+        block_renderer, [0.08, 0, 0], [-0.5, 0, -1], Stroke(1e-3, 0.02)
+    )  # the wall lies behind the plane
     assert aslant.normal == pytest.approx([0, 0, 1])
 
 
 def test_without_a_support_there_is_nothing_beside_the_object(block_renderer):
     bare = scene_of(block_renderer, SupportOptions(support=False))
     with pytest.raises(OptionError, match="does not meet"):
-        press(bare, BESIDE, [0, 0, -1], 1e-3, 0.02)
+        press(bare, BESIDE, [0, 0, -1], Stroke(1e-3, 0.02))
     path = np.tile([0.09, 0, 0.004], (5, 1))
     assert not replay(bare, np.arange(5) * 1e-3, path).any()
     assert replay(block_renderer, np.arange(5) * 1e-3, path)[:, 2] == pytest.approx(np.full(5, 1.5))
     with pytest.raises(OptionError, match="does not meet"):  # a metre away is a slip of the pen
-        press(block_renderer, [1, 0, 0], [0, 0, -1], 1e-3, 0.02)
+        press(block_renderer, [1, 0, 0], [0, 0, -1], Stroke(1e-3, 0.02))
 
 
 def test_each_tip_meets_the_plane_by_itself_and_one_that_is_lost_meets_nothing(block_renderer):
@@ -89,7 +91,7 @@ def test_each_tip_meets_the_plane_by_itself_and_one_that_is_lost_meets_nothing(b
 
 def test_a_device_makes_the_plane_softer(block_renderer):
     soft = scene_of(block_renderer).no_stiffer_than(300.0)
-    curve = press(soft, BESIDE, [0, 0, -1], 1e-3, 0.01, hold_s=0.1)
+    curve = press(soft, BESIDE, [0, 0, -1], Stroke(1e-3, 0.01, hold_s=0.1))
     assert curve.force[len(curve.force) // 2, 2] == pytest.approx(0.3, abs=1e-9)
     assert scene_of(block_renderer).no_stiffer_than(1e5).support.stiffness_n_per_m == 1500.0
     with pytest.raises(OptionError, match="support_friction"):

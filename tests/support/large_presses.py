@@ -29,8 +29,9 @@ from render.options import RenderOptions
 from render.replay import replay_recording, rms_n
 from scenes.laboratory.mesh import coarse_mesh
 from scenes.laboratory.specimen import Fineness, Specimen
-from scenes.laboratory.verification import straight_press
 from scenes.phantoms import phantom
+
+from .laboratory_checks import straight_press
 
 TIP_RADIUS_M = 0.005
 PLACES = {

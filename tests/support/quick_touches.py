@@ -13,12 +13,12 @@ from unittest.mock import patch
 
 import numpy as np
 
+from benchmarks.varied.draws import draw
+from benchmarks.varied.recorded import record
 from mechanics.recording import Recording
 from scenes.laboratory.curves import Curve, PathJob
 from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom
-from scenes.variety.draws import draw
-from scenes.variety.recorded import record
 
 
 def varied(seed: int, folder: Path) -> Recording:
@@ -27,7 +27,7 @@ def varied(seed: int, folder: Path) -> Recording:
         return record(draw(seed), folder).recording
 
 
-def _curves(_: Phantom, specimen: Specimen, jobs: Sequence[PathJob], **__: Any) -> list[Curve]:
+def _curves(phantom: Phantom, specimen: Specimen, jobs: Sequence[PathJob], *_: Any) -> list[Curve]:
     return [_curve(specimen, job) for job in jobs]
 
 

@@ -149,7 +149,7 @@ def test_an_inclusion_beside_the_object_is_refused():
 
 
 def test_a_press_deeper_than_the_object_or_without_end_is_refused(monkeypatch):
-    from render.press import press
+    from render.press import Stroke, press
 
     class Scene:
         model = block()
@@ -157,15 +157,14 @@ def test_a_press_deeper_than_the_object_or_without_end_is_refused(monkeypatch):
     monkeypatch.setattr("render.press.scene_of", lambda touched: touched)
     up = np.array([0.0, 0.0, 1.0])
     monkeypatch.setattr("render.press.first_touch", lambda *_: (0.035 * up, up))
-    for words, keywords in (
-        ("the object is 0.03 m high", {"depth_m": 4.0}),
-        ("tip's radius is 1e.30", {"tip_radius_m": 1e30}),
-        ("would last", {"speed_m_per_s": 1e-12}),
-        ("would last", {"hold_s": 1e9}),
+    for words, stroke, radius in (
+        ("the object is 0.03 m high", Stroke(4.0, 0.01), None),
+        ("tip's radius is 1e.30", Stroke(1e-3, 0.01), 1e30),
+        ("would last", Stroke(1e-3, 1e-12), None),
+        ("would last", Stroke(1e-3, 0.01, hold_s=1e9), None),
     ):
-        given = {"depth_m": 1e-3, "speed_m_per_s": 0.01, **keywords}
         with pytest.raises(PalpateError, match=words):
-            press(Scene(), np.zeros(3), -up, **given)
+            press(Scene(), np.zeros(3), -up, stroke, radius)
 
 
 def test_an_object_that_would_take_millions_of_tetrahedra_is_refused():

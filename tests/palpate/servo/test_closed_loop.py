@@ -7,14 +7,14 @@ import itertools
 import numpy as np
 import pytest
 
+from benchmarks._closed_loop import SUBSTEPS, Loop, Timing, closed_loop
+from benchmarks._elastic_plane import ElasticPlane
 from benchmarks._stability_objects import dome
 from benchmarks._stability_objects import one as one_on_dome
 from benchmarks.stability import IMPEDANCES, one, plane_stiffness_n_per_m, press_hold_release
 from devices.impedance import HandImpedance
 from devices.safety import CLOCK, JUMP, OVER_SPEED, WORDS
 from devices.simulated import SPEC
-from palpate.servo.closed_loop import SUBSTEPS, Loop, Timing, closed_loop
-from palpate.servo.elastic_plane import ElasticPlane
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
 from render.fem import FemRenderer
 from render.options import RenderOptions

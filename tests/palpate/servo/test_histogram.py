@@ -33,8 +33,6 @@ def test_quantiles_agree_with_sorting():
     summary = histogram.summary()
     assert summary["max"] == values.max() / 1000.0
     np.testing.assert_allclose(summary["mean"], values.mean() / 1000.0)
-    above = histogram.over(20_000)
-    assert (values > 21_000).sum() <= above <= (values >= 19_999).sum()
 
 
 def distinct(copies) -> set[float]:

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from benchmarks._closed_loop import ClosedLoopResult, Loop, closed_loop
 from devices.impedance import HandImpedance
 from devices.simulated import SPEC
 from mechanics.dent import dent_force, dent_law, grid
 from mechanics.effects.strain_stiffening import stiffening
-from palpate.servo.closed_loop import ClosedLoopResult, Loop, closed_loop
 from render.fem import FemRenderer
 from render.options import RenderOptions
 from scenes.laboratory.effects import effect

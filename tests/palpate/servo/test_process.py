@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from benchmarks._elastic_plane import PlaneSource
 from devices.haply import HaplyOptions
 from devices.registry import DeviceChoice
 from mechanics.errors import DeviceError, PalpateError
 from palpate.servo import Recorder, SafetyOptions, Servo, ServoOptions
-from palpate.servo.elastic_plane import PlaneSource
 
 from ...devices.fake_inverse import FakeInverse
 from ...support.waiting import PATIENCE_S, eventually
@@ -149,7 +149,7 @@ import sys, time
 from devices.haply import HaplyOptions
 from devices.registry import DeviceChoice
 from palpate.servo import SafetyOptions, Servo, ServoOptions
-from palpate.servo.elastic_plane import PlaneSource
+from benchmarks._elastic_plane import PlaneSource
 
 options = HaplyOptions(uri=sys.argv[1], events_uri=sys.argv[2], answer_s=2.0)
 servo = Servo(PlaneSource(500.0), device=DeviceChoice("haply", {"options": options}),
@@ -207,7 +207,7 @@ def test_a_killed_window(fake, on_orphan):
 FORKING = """
 import os, sys, time
 from palpate.servo import Servo
-from palpate.servo.elastic_plane import PlaneSource
+from benchmarks._elastic_plane import PlaneSource
 
 servo = Servo(PlaneSource(500.0))
 if sys.argv[1] == "loading":
@@ -266,7 +266,7 @@ import sys, time
 from devices.haply import HaplyOptions
 from devices.registry import DeviceChoice
 from palpate.servo import SafetyOptions, Servo, ServoOptions
-from palpate.servo.elastic_plane import PlaneSource
+from benchmarks._elastic_plane import PlaneSource
 
 options = HaplyOptions(uri=sys.argv[1], events_uri=sys.argv[2], answer_s=2.0)
 with Servo(PlaneSource(500.0), device=DeviceChoice("haply", {"options": options}),

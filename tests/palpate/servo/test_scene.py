@@ -26,7 +26,7 @@ from palpate.servo.tick import (
     tick_arrays,
 )
 from render.passivity import PassivityOptions, passivity_parameters
-from render.press import press
+from render.press import Stroke, press
 from render.scene import scene_of
 
 from ...render import shapes
@@ -77,6 +77,6 @@ def felt(scene, path: np.ndarray) -> np.ndarray:
     ],
 )
 def test_the_servo_feels_what_a_press_says(scene, at, direction):
-    curve = press(scene, at, direction, 1.5e-3, 0.02, hold_s=0.02)
+    curve = press(scene, at, direction, Stroke(1.5e-3, 0.02, hold_s=0.02))
     assert curve.peak_force_n > 0.1
     assert np.abs(felt(scene, curve.position) - curve.force).max() < 1e-9

@@ -8,10 +8,10 @@ import numpy as np
 import pytest
 from numba import njit
 
+from benchmarks._elastic_plane import ElasticPlane
 from devices.safety import SafetyOptions, reason_words, safety_parameters
 from devices.simulated import SPEC
 from palpate.servo import loop as loops
-from palpate.servo.elastic_plane import ElasticPlane
 from palpate.servo.layout import BEAT, DEADLINE, ENABLE, LATE, MISSED, STATUS, STOP, TICKS, total_bytes, views
 from palpate.servo.loop import ServoLoop, make_program, one_tick, run_tick
 from palpate.servo.report import report, ring_rows, snapshot

@@ -12,8 +12,8 @@ from mechanics.moduli import balls_ratio
 from palpate.window.inclusion import MovingInclusion
 from render.base import Renderer
 from render.registry import create
-from scenes.inclusions import ball_of
 from scenes.phantoms import Region
+from scenes.scene import ball_of
 
 
 def force(renderer: Renderer, x: float, y: float, depth: float = 0.004) -> float:

@@ -12,9 +12,8 @@ from mechanics.model import Model
 from mechanics.moduli import balls_ratio
 from scenes.build import keep, model_of
 from scenes.exploration import ExplorationOptions, base_tracing, explore
-from scenes.inclusions import ball_of
 from scenes.phantoms import Region
-from scenes.scene import load_scene, read_scene, scene_names
+from scenes.scene import ball_of, load_scene, read_scene, scene_names
 from scenes.virtual_presses import spread_places
 
 from .small import block_mesh

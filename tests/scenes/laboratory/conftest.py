@@ -13,7 +13,7 @@ from scenes.laboratory.paths import Leg, TouchForce
 def springs(monkeypatch: pytest.MonkeyPatch) -> None:
     """Touches answered by a half space instead of the solver: what is tested here comes after the solid."""
 
-    def quick(thing, specimen, touches, **_):
+    def quick(thing, specimen, touches, solving):
         forces = []
         for touch in touches:
             s = np.linspace(0, touch.depth, 12)

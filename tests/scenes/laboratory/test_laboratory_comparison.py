@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scenes.laboratory.comparison import SHARES, Press, by_depth, cylinder_shape, recorded_presses
+from benchmarks._laboratory_comparison import SHARES, Press, by_depth, cylinder_shape, recorded_presses
 from scenes.laboratory.simulate import SimulateOptions, simulate
 from scenes.phantoms import phantom
 

@@ -18,7 +18,9 @@ from scenes.laboratory.refine import boundary_faces
 from scenes.laboratory.solid import Material, Solid
 from scenes.laboratory.solver import Mixing, Problem
 from scenes.laboratory.specimen import Fineness, Specimen
-from scenes.laboratory.verification import (
+from scenes.phantoms import phantom
+
+from ...support.laboratory_checks import (
     box,
     dent_force,
     hertz_ratio,
@@ -26,7 +28,6 @@ from scenes.laboratory.verification import (
     straight_press,
     tangent_error,
 )
-from scenes.phantoms import phantom
 
 LAWS = {
     "neo-hookean": {},

@@ -11,8 +11,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit
 
+from benchmarks._free_air import FreeAir
 from mechanics.progress import Progress
-from palpate.servo.free_air import FreeAir, FreeAirState
+from render.base import State
 
 
 class PlaneParameters(NamedTuple):
@@ -60,7 +61,7 @@ class ElasticPlane(FreeAir):
         square = np.array([[-0.1, -0.1, 0.0], [0.1, -0.1, 0.0], [0.1, 0.1, 0.0], [-0.1, 0.1, 0.0]])
         return square, np.array([[0, 1, 2], [0, 2, 3]])
 
-    def step(self, state: FreeAirState, tips: np.ndarray) -> tuple[FreeAirState, np.ndarray]:
+    def step(self, state: State, tips: np.ndarray) -> tuple[State, np.ndarray]:
         """(m, 3) N on the tool."""
         _kernel(self.parameters, state, tips)
         return state, state.forces

@@ -8,18 +8,18 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.progress import Progress, silent
+from benchmarks.varied.draws import Draw
+from benchmarks.varied.instrument import logged, weighed
+from benchmarks.varied.objects import Thing, thing
+from benchmarks.varied.writing import object_name, write
 from mechanics.recording import Recording, read_recording
 from mechanics.segments import Segment
+from scenes.laboratory.curves import ALONE, Solving
 from scenes.laboratory.hand import HandOptions, cohort_hand
 from scenes.laboratory.motion import Motion
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import Simulation, simulate
-from scenes.variety.draws import Draw
-from scenes.variety.instrument import logged, weighed
-from scenes.variety.objects import Thing, thing
-from scenes.variety.writing import object_name, write
 
 LEAST_DEPTH_MM = 1.0
 
@@ -43,15 +43,13 @@ def record(
     *,
     it: Thing | None = None,
     sizes: bool = False,
-    workers: int | None = 1,
-    progress: Progress = silent,
 ) -> Varied:
     """Explore the drawn object, or `it`, with `effects`; write NAME.csv.gz and NAME.toml into `folder`.
 
     The truth is the laboratory's, with the nuisances beside ([truth.nuisances]). What was solved before is
     not solved again. Raises OptionError, LabError.
     """
-    varied = explored(draw, effects, it=it, sizes=sizes, workers=workers, progress=progress)
+    varied = explored(draw, effects, it=it, sizes=sizes)
     name = "+".join([f"variety-{draw.seed:05d}", *(f"{k}={v:g}" for k, v in (effects or {}).items())])
     path = write(folder / f"{name}.csv.gz", varied.recording, draw)
     return replace(varied, recording=read_recording(path))
@@ -65,12 +63,10 @@ def explored(
     sizes: bool = False,
     complete: bool = False,
     more: Sequence[Touch] = (),
-    workers: int | None = 1,
-    cache: Path | None = None,
-    progress: Progress = silent,
+    solving: Solving = ALONE,
 ) -> Varied:
     """The same, with nothing written. complete: by that protocol, whose parts are stated where phase I is.
-    more: touches after those that are drawn. cache: where solved touches are kept, by default the user's.
+    more: touches after those that are drawn.
     """
     it = it or thing(draw.number)
     options = SimulateOptions(
@@ -80,15 +76,15 @@ def explored(
         position_resolution_m=draw.resolution_m,
     )
     staging = Staging(
+        hand(draw),
         touches=(*touches(it, draw), *more),
         complete=complete,
         frame=frame(draw),
         instrument=lambda readings: weighed(readings, draw),
     )
     simulation = simulate(
-        it.phantom, effects, options, hand=hand(draw), seed=draw.seed, sizes=sizes,
-        workers=workers, cache=cache, progress=progress, staging=staging,
-    )  # fmt: skip
+        it.phantom, effects, options, seed=draw.seed, sizes=sizes, staging=staging, solving=solving
+    )
     truth = {**simulation.truth, "poisson_ratio": it.phantom.poisson_ratio, "nuisances": draw.table()}
     stated = draw.poisson_ratio_stated or it.phantom.poisson_ratio != 0.49
     recording = logged(

@@ -7,25 +7,14 @@ from typing import NamedTuple, Self
 import numpy as np
 from numba import njit
 
+from render.base import State, new_state
+
 
 class FreeAirParameters(NamedTuple):
     """What every renderer has; nothing of it matters in free air."""
 
     friction: np.ndarray
     series_compliance: np.ndarray
-
-
-class FreeAirState(NamedTuple):
-    """The fields that every renderer's state has."""
-
-    forces: np.ndarray
-    touching: np.ndarray
-    points: np.ndarray
-    normals: np.ndarray
-    depths: np.ndarray
-    stiffness: np.ndarray
-    radii_m: np.ndarray
-    dt_s: np.ndarray
 
 
 @njit(cache=True, nogil=True)
@@ -47,22 +36,12 @@ class FreeAir:
         """No points, no triangles."""
         return np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)
 
-    def start(self, radii_m: np.ndarray | None = None, dt_s: float = 0.001) -> FreeAirState:
+    def start(self, radii_m: np.ndarray | None = None, dt_s: float = 0.001) -> State:
         """One entry a tip."""
         radii = np.array([self.tip_radius_m] if radii_m is None else radii_m, dtype=float)
-        m = len(radii)
-        return FreeAirState(
-            np.zeros((m, 3)),
-            np.zeros(m, dtype=np.int64),
-            np.zeros((m, 3)),
-            np.zeros((m, 3)),
-            np.zeros(m),
-            np.zeros(m),
-            radii,
-            np.array([dt_s]),
-        )
+        return new_state(radii, dt_s)
 
-    def step(self, state: FreeAirState, tips: np.ndarray) -> tuple[FreeAirState, np.ndarray]:
+    def step(self, state: State, tips: np.ndarray) -> tuple[State, np.ndarray]:
         """Zero force."""
         _kernel(self.parameters, state, tips)
         return state, state.forces

@@ -9,7 +9,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
-from scenes.variety.objects import POOL
+from benchmarks.varied.objects import POOL
 
 RATES_HZ = (300.0, 500.0, 1000.0, 2000.0)
 ORIENTATIONS = ("given", "constant", "absent")
@@ -24,7 +24,7 @@ class Draw:
     the support's. jitter: rms of the sampling instants, shares of a period. lost_share: of the samples.
     slow_share: of the noise's power below 10 Hz. repeat_share: of the presses that return to a place.
     clusters: 0 presses spread evenly, else in so many heaps. pace, briskness: of the press and of the way
-    through the air, 1 the average hand's. script: number of a writing system, of `scenes.variety.writing`.
+    through the air, 1 the average hand's. script: number of a writing system, of `benchmarks.varied.writing`.
     """
 
     seed: int

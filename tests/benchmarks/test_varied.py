@@ -10,16 +10,16 @@ import numpy as np
 import pytest
 
 import reconstruct
+from benchmarks.varied.draws import ORIENTATIONS, RATES_HZ, TRACINGS, draw
+from benchmarks.varied.instrument import logged, sampling_times, weighed
+from benchmarks.varied.objects import DEEPEST_MM, POOL, Thing, thickness, thing
+from benchmarks.varied.recorded import frame, hand, record, touches
+from benchmarks.varied.shapes import CONCAVE, FAMILIES, SLENDER, shape
+from benchmarks.varied.writing import write
 from benchmarks.variety import REMEDIES
 from mechanics.recording import read_recording
 from scenes.laboratory.effects import Readings
 from scenes.laboratory.frame import axes_of
-from scenes.variety.draws import ORIENTATIONS, RATES_HZ, TRACINGS, draw
-from scenes.variety.instrument import logged, sampling_times, weighed
-from scenes.variety.objects import DEEPEST_MM, POOL, Thing, thickness, thing
-from scenes.variety.recorded import frame, hand, record, touches
-from scenes.variety.shapes import CONCAVE, FAMILIES, SLENDER, shape
-from scenes.variety.writing import write
 
 
 @pytest.fixture(scope="module")

@@ -11,14 +11,15 @@ from functools import lru_cache
 
 import numpy as np
 
+from benchmarks.varied.shapes import shape
 from mechanics.nearest import first_hits
 from mechanics.progress import Progress, silent
+from scenes.laboratory.curves import Solving
 from scenes.laboratory.paths import touch_forces
 from scenes.laboratory.presses import Touch, sites
 from scenes.laboratory.solver import LabError
 from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom
-from scenes.variety.shapes import shape
 
 POOL = 20
 """Objects in the pool: one of every family, its size by chance."""
@@ -96,7 +97,8 @@ def solve(number: int, progress: Progress = silent, workers: int | None = 1) -> 
     """Solve every touch of the `number`-th object, and keep them (the laboratory's cache)."""
     it = thing(number)
     touches = [touch for place in it.places for touch in place]
-    touch_forces(it.phantom, specimen(it), touches, workers=workers, progress=progress, label=it.phantom.name)
+    solving = Solving(workers, progress=progress, label=it.phantom.name)
+    touch_forces(it.phantom, specimen(it), touches, solving)
 
 
 def solved(number: int) -> bool:

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.varied.draws import Draw
 from mechanics.recording import Recording
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.frame import quaternions
 from scenes.laboratory.hand import band_noise
-from scenes.variety.draws import Draw
 
 
 def weighed(readings: Readings, draw: Draw) -> Readings:

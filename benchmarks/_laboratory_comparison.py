@@ -4,16 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 from scipy.ndimage import gaussian_filter1d
 
 from mechanics.errors import RecordingError
-from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
-from scenes.laboratory.curves import PathJob, curves
-from scenes.laboratory.specimen import Fineness, Specimen
+from scenes.laboratory.curves import PathJob, Solving, curves
+from scenes.laboratory.specimen import Specimen
 from scenes.phantoms import Phantom
 
 SHARES = np.array([0.0, 0.04, 0.1, 0.18, 0.28, 0.4, 0.52, 0.64, 0.76, 0.88, 0.97])
@@ -110,10 +108,7 @@ def compare(
     nearest: Shape,
     *,
     count: int = 8,
-    fineness: Fineness | None = None,
     workers: int | None = None,
-    cache: Path | None = None,
-    progress: Progress = silent,
 ) -> list[tuple[Press, np.ndarray]]:
     """(press, our force (k, 3) N along its recorded path) for `count` presses spread over the recording."""
     presses = recorded_presses(recording, nearest)
@@ -121,16 +116,7 @@ def compare(
     jobs = [PathJob(p.point.round(3), p.normal, p.travel.round(4)) for p in chosen]
     radius = round(1e3 * recording.tip_radius_m, 6)
     specimen = Specimen(poisson_ratio=recording.poisson_ratio or 0.49, tip_radius=radius, finite=True)
-    solved = curves(
-        phantom,
-        specimen,
-        jobs,
-        fineness=fineness,
-        workers=workers,
-        cache=cache,
-        progress=progress,
-        label=f"comparing the {phantom.name}",
-    )
+    solved = curves(phantom, specimen, jobs, Solving(workers, label=f"comparing the {phantom.name}"))
     modulus = float((recording.truth or {})["young_modulus_pa"])
     return [(press, 1e-6 * modulus * curve.force) for press, curve in zip(chosen, solved, strict=True)]
 

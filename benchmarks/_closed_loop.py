@@ -45,7 +45,6 @@ from render.coupling import (
     series_compliance_m_per_n,
     stable_stiffness_n_per_m,
     stiffest_n_per_m,
-    stiffness_distortion,
 )
 from render.passivity import PassivityOptions, passivity_parameters
 from render.scene import in_the_air
@@ -270,6 +269,6 @@ def closed_loop(
         max(0.0, float(out[:, 10].max())),
         tuple(word for bit, word in WORDS.items() if arrays.shared.reason_counts[bit.bit_length() - 1]),
         compliance,
-        stiffness_distortion(stiffest, compliance),
+        1.0 - 1.0 / (1.0 + stiffest * compliance),
         float(arrays.shared.counts[CONTACT_TICKS]) / n,
     )
