@@ -1,7 +1,7 @@
 """A recording: what a haptic device with a force sensor logs while a person explores one object.
 
 Two files of one stem: `NAME.csv` or `NAME.csv.gz` (samples) and `NAME.toml` (what they mean). The format is
-described in docs/recording-format.md. SI units; device frame; forces are kept as the force on the tool.
+described in docs/reference/recording-format.md. SI units; device frame; forces: on the tool.
 """
 
 from __future__ import annotations

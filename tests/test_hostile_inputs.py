@@ -1021,20 +1021,3 @@ def test_atomic_writes_follow_links_and_leave_them(tmp_path):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert not [p for p in tmp_path.iterdir() if p.name.startswith(".palpate")]
-
-
-NAMED = re.compile(r"`([A-Z]+)\[((?:[^\]\\]|\\.)+)\]`|`(test_\w+)`")
-
-
-@pytest.mark.parametrize(("page", "least"), [("robustness.md", 120), ("safety.md", 15)])
-def test_every_row_of_the_docs_names_tests_that_exist(page, least):
-    from benchmarks._faults import FAULTS
-
-    root, defined = Path(__file__).resolve().parents[1], set()
-    for file in (root / "tests").rglob("test_*.py"):
-        defined |= set(re.findall(r"^def (test_\w+)", file.read_text(encoding="utf-8"), re.MULTILINE))
-    named = NAMED.findall((root / "docs" / page).read_text(encoding="utf-8"))
-    assert len(named) >= least
-    for table, key, name in named:
-        rows = FAULTS if table == "FAULTS" else globals()[table] if table else defined
-        assert (name or key.replace("\\", "")) in rows, f"{table or page} has no '{name or key}'"

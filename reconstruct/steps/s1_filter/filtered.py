@@ -31,7 +31,7 @@ _SLIDE = 8.0
 """Tip radii: touches that go further are slides."""
 _LOOSE = 0.5
 """Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
-presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0210)."""
+presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0102)."""
 _TIPS_M = (1e-3, 0.02)
 """Radii that are believed for that."""
 
