@@ -22,7 +22,8 @@ FILE = {
     "figures": [
         {"what": "modulus of the cylinder", "value": 28.91, "spread": [27.9, 30.0], "unit": "kPa",
          "target": "within 5 %", "met": True},
-        {"what": "time of a tick", "value": 0.31, "spread": [], "unit": "ms", "target": "< 0.3 ms", "met": False},
+        {"what": "time of a tick", "value": 0.31, "spread": [], "unit": "ms",
+         "target": "< 0.3 ms", "met": False},
         {"what": "nodes", "value": 6276, "unit": ""},
     ],
 }  # fmt: skip

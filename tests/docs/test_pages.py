@@ -111,7 +111,8 @@ def test_every_effect_has_its_section_and_its_picture():
 
 def test_every_effect_is_drawn():
     text = (DOCS / "_effects.py").read_text(encoding="utf-8")
-    assert set(re.findall(r'^    "(\w+)": \(', text[text.index("PANELS: dict") :].partition("\n}\n")[0], re.MULTILINE)) == set(NAMES)
+    panels = text[text.index("PANELS: dict") :].partition("\n}\n")[0]
+    assert set(re.findall(r'^    "(\w+)": \(', panels, re.MULTILINE)) == set(NAMES)
 
 
 def test_decisions_are_few_and_short():
