@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import os
 import re
 import sys
 from pathlib import Path
@@ -22,6 +23,7 @@ def commands() -> dict[str, tuple[str, argparse.ArgumentParser]]:
 
 def command_page(name: str, words: str, parser: argparse.ArgumentParser) -> str:
     """Purpose, arguments and options of one command, in the groups of its help."""
+    os.environ["COLUMNS"] = "84"  # argparse asks it for the width
     text = parser.format_help()
     usage, _, rest = text.partition("\n\n")
     description, _, groups = rest.partition("\npositional arguments:\n")
@@ -44,7 +46,8 @@ def _plain(words: str) -> str:
         if paragraph.startswith("    "):
             out.append("```sh\n" + "\n".join(line[4:] for line in paragraph.splitlines()) + "\n```")
         else:
-            out.append(re.sub(r"([*<|])", r"\\\1", paragraph))
+            marked = re.sub(r"(?<![\w`-])(--[a-z][a-z-]*)", r"`\1`", paragraph)
+            out.append(_cell(re.sub(r"'(palpate [^']+)'", r"`\1`", marked)))
     return "\n\n".join(out)
 
 
