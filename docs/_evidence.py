@@ -93,12 +93,11 @@ def page(evidence: Evidence) -> str:
     lines += ["| what | value | spread | unit | target | |", "| --- | --- | --- | --- | --- | --- |"]
     for figure in evidence.figures:
         spread = figure["spread"]
-        said = "" if not spread else f"{spread[0]:.4g} to {spread[1]:.4g}"
+        said = "" if not spread or spread[0] == spread[1] else f"{spread[0]:.4g} to {spread[1]:.4g}"
+        unit = "" if figure["unit"] == "1" else figure["unit"]
         verdict = "" if not figure["target"] else "met" if figure["met"] else "**missed**"
         target = str(figure["target"] or "").replace("<", r"\<")
-        lines.append(
-            f"| {figure['what']} | {figure['value']:.4g} | {said} | {figure['unit']} | {target} | {verdict} |"
-        )
+        lines.append(f"| {figure['what']} | {figure['value']:.4g} | {said} | {unit} | {target} | {verdict} |")
     lines += [
         "",
         f"`{evidence.command}`, commit {evidence.commit[:10]}, {evidence.date}, {evidence.processor}.",

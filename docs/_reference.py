@@ -6,19 +6,42 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
+import inspect
 import os
 import re
 import sys
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 
 def commands() -> dict[str, tuple[str, argparse.ArgumentParser]]:
     """name: (one line, parser). The one place that knows where parsers come from."""
-    from palpate.cli import COMMANDS, parser_of
+    try:
+        from palpate.operations._list import commands as listed
+        from palpate.operations._run import parser_of
 
-    return {name: (words, parser_of(name)) for name, words in COMMANDS.items()}
+        summaries = listed()
+    except ImportError:  # before operations were declared in one place
+        from palpate.cli import COMMANDS as summaries
+        from palpate.cli import parser_of
+
+    return {name: (words, parser_of(name)) for name, words in summaries.items()}
+
+
+def options() -> dict[str, Sequence[Any]]:
+    """Function of `import palpate as pp`: its options, as `pp.options` gives them."""
+    import palpate as pp
+
+    found = {}
+    for name in dir(pp):
+        if inspect.isfunction(getattr(pp, name)):
+            with contextlib.suppress(pp.PalpateError):
+                found[name] = pp.options(name)
+    return found
 
 
 def command_page(name: str, words: str, parser: argparse.ArgumentParser) -> str:
@@ -53,16 +76,14 @@ def _plain(words: str) -> str:
 
 def options_page() -> str:
     """Every keyword of the Python functions, with unit, default and range."""
-    from palpate.keywords import FUNCTIONS, options
-
     lines = [
         "# Options of the Python functions",
         "",
         "A command's flag is the same name with dashes, less its unit.",
         "",
     ]
-    for function in FUNCTIONS:
-        if not (given := options(function)):
+    for function, given in options().items():
+        if not given:
             continue
         lines += [
             f"## pp.{function}",
@@ -92,7 +113,6 @@ def effects_page() -> str:
     for each in effects():
         can = ["goes into a model (`--apply`)" if each.rendered else "is not rendered"]
         can += ["can be taken off a recording (`--corrected`)"] if each.correct else []
-        can += ["not tried with `--fast`"] if each.costly else []
         lines += [f"## {each.name}", "", f"{_cell((each.plain_words or each.words).capitalize())}.", ""]
         lines += [f"Domain {each.domain}; shows {each.scope.value}; {', '.join(can)}.", ""]
         keys = {name: key for name, key in (each.keys or {}).items() if hasattr(key, "words")}

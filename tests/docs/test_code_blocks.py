@@ -16,7 +16,6 @@ import pytest
 
 import palpate as pp
 from palpate.child import module_environment
-from palpate.keywords import FUNCTIONS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 sys.path.insert(0, str(REPOSITORY / "docs"))
@@ -95,8 +94,7 @@ def test_python_parses_and_calls_what_is_there(page):
             function = getattr(pp, name.removeprefix("pp."))
             parameters = inspect.signature(function).parameters
             allowed = set(parameters)
-            if function.__name__ in FUNCTIONS:
-                allowed |= {option.name for option in pp.options(function.__name__)}
+            allowed |= {option.name for option in _reference.options().get(function.__name__, ())}
             assert {k.arg for k in call.keywords} - allowed <= MADE_UP, ast.unparse(call)
 
 

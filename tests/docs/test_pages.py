@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import re
+import sys
 from pathlib import Path
 
 import pytest
 
 from mechanics.effects.registry import NAMES
-from palpate.cli import COMMANDS
 
 REPOSITORY = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(REPOSITORY / "docs"))
+import _reference  # noqa: E402
+
 DOCS = REPOSITORY / "docs"
 PAGES = [REPOSITORY / name for name in ("README.md", "CONVENTIONS.md")] + [
     page for page in sorted(DOCS.rglob("*.md")) if "generated" not in page.parts and "rooms" not in page.parts
@@ -18,7 +21,7 @@ PAGES = [REPOSITORY / name for name in ("README.md", "CONVENTIONS.md")] + [
 LINK = re.compile(r"\]\(([^)\s]+)\)")
 COUNTED = ("tutorials", "howto", "reading", "explanation", "develop")
 MOST_WORDS, MOST_README_WORDS, MOST_COLUMNS, MOST_DECISIONS = 25_000, 900, 120, 40
-GENERATED = {"commands", "options", "effects", *(f"commands/{name}" for name in COMMANDS)}
+GENERATED = {"commands", "options", "effects", *(f"commands/{name}" for name in _reference.commands())}
 
 
 def _prose(page: Path) -> str:
