@@ -32,7 +32,6 @@ exclude_patterns = ["**/README.md"]
 suppress_warnings = ["config.cache", "autoapi.python_import_resolution", "ref.python"]
 
 myst_heading_anchors = 4
-myst_enable_extensions = ["dollarmath"]
 
 ROOMS = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
 autoapi_dirs = [str(ROOT / room) for room in ROOMS]

@@ -68,6 +68,8 @@ def test_commands_and_their_flags_exist(page):
             continue
         assert command in flags(), f"palpate {command}"
         if command == "bench":
+            name = next((word for word in rest if word[0].islower()), "")
+            assert not name or (REPOSITORY / "benchmarks" / f"{name.replace('-', '_')}.py").is_file(), name
             continue
         words = {word.partition("=")[0] for word in rest if re.match(r"--?[a-z]", word)}
         assert words <= flags()[command] | OTHERS, f"palpate {command} {' '.join(rest)}"
