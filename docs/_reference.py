@@ -20,16 +20,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
 
 def commands() -> dict[str, tuple[str, argparse.ArgumentParser]]:
     """name: (one line, parser). The one place that knows where parsers come from."""
-    try:
-        from palpate.operations._list import commands as listed
-        from palpate.operations._run import parser_of
+    from palpate.operations._list import commands as summaries
+    from palpate.operations._run import parser_of
 
-        summaries = listed()
-    except ImportError:  # before operations were declared in one place
-        from palpate.cli import COMMANDS as summaries
-        from palpate.cli import parser_of
-
-    return {name: (words, parser_of(name)) for name, words in summaries.items()}
+    return {name: (words, parser_of(name)) for name, words in summaries().items()}
 
 
 def options() -> dict[str, Sequence[Any]]:
