@@ -21,7 +21,7 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-from diagnose.search.forward import Forward
+from diagnose.forward.prediction import Forward
 from mechanics.box_mesh import box_mesh
 from mechanics.effects.registry import NAMES, effect
 from mechanics.frames import tangents
