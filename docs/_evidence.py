@@ -96,8 +96,10 @@ def page(evidence: Evidence) -> str:
         said = "" if not spread or spread[0] == spread[1] else f"{spread[0]:.4g} to {spread[1]:.4g}"
         unit = "" if figure["unit"] == "1" else figure["unit"]
         verdict = "" if not figure["target"] else "met" if figure["met"] else "**missed**"
-        target = str(figure["target"] or "").replace("<", r"\<")
-        lines.append(f"| {figure['what']} | {figure['value']:.4g} | {said} | {unit} | {target} | {verdict} |")
+        target = _cell(str(figure["target"] or ""))
+        lines.append(
+            f"| {_cell(figure['what'])} | {figure['value']:.4g} | {said} | {unit} | {target} | {verdict} |"
+        )
     lines += [
         "",
         f"`{evidence.command}`, commit {evidence.commit[:10]}, {evidence.date}, {evidence.processor}.",
@@ -106,6 +108,11 @@ def page(evidence: Evidence) -> str:
     if age := _age(evidence):
         lines += [age, ""]
     return "\n".join(lines)
+
+
+def _cell(words: str) -> str:
+    """Words as they stand, in a table."""
+    return re.sub(r"([*<|]|-(?=-))", r"\\\1", words)
 
 
 def _age(evidence: Evidence) -> str:
@@ -137,10 +144,11 @@ def write(folder: Path, source: Path = EVIDENCE) -> None:
     rows, names = [], []
     for evidence in have:
         _keep(folder / f"{evidence.name}.md", page(evidence))
-        missed = [figure["what"] for figure in evidence.figures if figure["target"] and not figure["met"]]
+        aimed = [figure for figure in evidence.figures if figure["target"]]
+        missed = [_cell(figure["what"]) for figure in aimed if not figure["met"]]
         rows.append(
             f"| [{evidence.name}]({evidence.name}.md) | {evidence.date} | {len(evidence.figures)} | "
-            f"{', '.join(missed) or 'none'} |"
+            f"{', '.join(missed) or ('none' if aimed else 'no target')} |"
         )
         names.append(evidence.name)
     lines = ["# Figures", ""]
