@@ -59,7 +59,7 @@ WEIGHT = ("tool_gravity_inertia", "force_bias")
 FINITE = "finite_strain"
 SEEDS = {"development": 0, "calibration": 60_000, "evaluation": 70_000}
 """First seeds. Rules may be chosen on the first; the second are fitted to and not looked at; the third is
-opened once a release, and docs/diagnosis-benchmark.md has a line for every opening."""
+opened once a release, and docs/evidence/blind-benchmark.md has a line for every opening."""
 POOLS = {
     "quick": (0, 3),
     "protocol": (0, 1, 2, 3, 4, 5),

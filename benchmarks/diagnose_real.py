@@ -1,7 +1,7 @@
 """Diagnosis on measured data of other instruments, from folders that are not shipped, all sets by one
 command.
 
-Each set of DATA (docs/real-data.md: origins and licences) goes through `pp.material`, as its owner's would:
+Each set of DATA (docs/reference/data-sets.md) goes through `pp.material`, as its owner's would:
 curves (or, of one curve, blocks of it) are held out, and what predicts them is set beside 1D models as floor
 and a regression without mechanics as ceiling. Errors are rms over rms. Indentations of beef are of other
 animals each, so each force is over its own piece's stiffness; the indenter's shape is not stated, and a

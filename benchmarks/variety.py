@@ -1,6 +1,6 @@
 """Is every exploration understood? Drawn objects, hands, instruments and writing, reconstructed.
 
-Each seed draws one exploration (docs/variety.md); the virtual laboratory answers for its forces. Told are the
+Each seed draws one exploration (scenes.variety); the virtual laboratory answers for its forces. Told are the
 share that is reconstructed, the error of the modulus, the coverage of its interval, the distance of the
 surface, and the presses that were found, by each nuisance; with --diagnose also how many of these sound
 objects the diagnosis calls sound. What was recorded and reconstructed before by the same program is read, not

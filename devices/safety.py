@@ -7,7 +7,8 @@ device's newest raw state. What is wrong falls in two kinds. *Passing* faults (a
 stale or non-finite pose, outside the workspace, a silent parent) give zero at once and a fresh ramp when
 they are over. *Latching* faults (unplugged, calibration lost, device fault, over-speed, a jump of the pose, a
 clock that stands still or runs backwards) give zero until force is enabled anew, which starts from clean
-memory: nothing that came before reaches beyond it. docs/safety.md lists every fault with its bound.
+memory: nothing that came before reaches beyond it. docs/explanation/loop-and-safety.md
+lists every fault.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ class DiagnoseOptions:
 
 @dataclass(frozen=True)
 class AttributionOptions:
-    """When something is named: chances, and sizes that matter; docs/diagnosis.md says what each does."""
+    """When something is named: chances, and sizes that matter; docs/explanation/diagnosis.md lists them."""
 
     sure: float = option(0.5, "probability from which an effect is named")
     doubt: float = option(

@@ -1,7 +1,8 @@
 """The documentation's site: `python -m sphinx -W --keep-going docs site` (extra `docs`).
 
-The pages of this folder are the guide, `examples` is a gallery that runs while it is built, and the reference
-is read from the docstrings without importing anything. A warning is an error.
+The pages of this folder are the guide and `examples` is a gallery that runs while it is built. Commands,
+options and effects are read from the program (`_reference.py`), evidence from the files of the benchmarks
+(`_evidence.py`), modules from their docstrings without importing them. A warning is an error.
 """
 
 import os
@@ -13,7 +14,9 @@ from pathlib import Path
 import pyvista
 
 ROOT = Path(__file__).resolve().parents[1]
-sys.path.insert(0, str(ROOT))
+sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
+import _evidence  # noqa: E402
+import _reference  # noqa: E402
 
 project = "Palpate"
 author = "The Palpate developers"
@@ -29,7 +32,6 @@ exclude_patterns = ["**/README.md"]
 suppress_warnings = ["config.cache", "autoapi.python_import_resolution", "ref.python"]
 
 myst_heading_anchors = 4
-myst_enable_extensions = ["dollarmath"]
 
 ROOMS = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
 autoapi_dirs = [str(ROOT / room) for room in ROOMS]
@@ -98,5 +100,7 @@ def short_navigation(app, page, template, context, doctree):
 
 def setup(app):
     """Sphinx's hook."""
+    _reference.write(ROOT / "docs" / "reference" / "generated")
+    _evidence.write(ROOT / "docs" / "evidence" / "generated")
     app.connect("autodoc-process-docstring", plain_words)
     app.connect("html-page-context", short_navigation, priority=400)

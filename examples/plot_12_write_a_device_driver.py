@@ -71,5 +71,4 @@ axes[1].set(xlabel="time [s]", ylabel="force on the tool [N]")
 
 # %%
 # The handle comes to rest where the block pushes back with the hand's 0.6 N. In the program the safety
-# filter stands between the two, and a conformance suite tries every driver (``docs/devices.md``, "Adding
-# one").
+# filter stands between the two, and a conformance suite tries every driver: "Add a device".

@@ -20,7 +20,7 @@ from mechanics.tetmesh import TetMesh
 
 CONTACT_IN_TIP_RADII = 0.44
 """Width of the Gaussian that stands for a contact 0.8 tip radii deep: by it a nodule is felt as in a contact
-solution (tops 4, 8, 14 mm deep: 1.05, 1.00, 1.00 of the contrast; docs/mechanics.md)."""
+solution (tops 4, 8, 14 mm deep: 1.05, 1.00, 1.00 of the contrast; docs/explanation/mechanics.md)."""
 
 _NEGLIGIBLE = 1e-3  # of the contact's own compliance
 _BATCH = 32

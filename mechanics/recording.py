@@ -1,7 +1,7 @@
 """A recording: what a haptic device with a force sensor logs while a person explores one object.
 
 Two files of one stem: `NAME.csv` or `NAME.csv.gz` (samples) and `NAME.toml` (what they mean). The format is
-described in docs/recording-format.md. SI units; device frame; forces are kept as the force on the tool.
+described in docs/reference/recording-format.md. SI units; device frame; forces: on the tool.
 """
 
 from __future__ import annotations
@@ -162,7 +162,7 @@ class Recording(Result):
         return np.linalg.norm(self.force_on_tool, axis=1)
 
     def save(self, path: Path | str) -> Path:
-        """Write NAME.csv.gz (or .csv) and NAME.toml (docs/recording-format.md); returns the samples' path."""
+        """Write NAME.csv.gz (or .csv) and NAME.toml; returns the samples' path."""
         return write_recording(path, self)
 
     @cached_property

@@ -83,7 +83,7 @@ def touch_solver(
     """A solver fit for touches: quadratic, the surface's elements halved until they are small enough.
 
     A patch as narrow as the contact needs them; with wider ones, places near an edge or the base come out 3
-    to 5 % too soft (docs/mechanics.md). Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
+    to 5 % too soft. Use `solver.mesh` with what it returns; modulus_ratio: (m,) of
     `mesh`, without the balls: their elements are halved too, and they are drawn on what comes out.
     """
     fine, parent = refined_near_surface(mesh, surface_edge_m)

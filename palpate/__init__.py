@@ -6,7 +6,7 @@
 
 `dir(pp)` lists functions, what they return, errors; `help(pp.press)` tells every option with its unit and
 default. Results print themselves, `.plot()` by matplotlib, `.show()` in 3D by PyVista. SI units; device
-frame; forces on the tool. See docs/python.md.
+frame; forces on the tool. See docs/howto/python.md.
 Nothing is loaded until it is used (PEP 562).
 """
 

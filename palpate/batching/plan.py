@@ -20,7 +20,7 @@ STEPS = ("reconstruct", "compare", "diagnose")
 MODEL, THUMBNAIL = "model", "thumbnail.png"
 
 MEMORY_BYTES = {"reconstruct": 1_450_000_000, "compare": 1_300_000_000, "diagnose": 1_300_000_000}
-"""What a step takes at most before anything is measured (docs/batch.md has the measured figures)."""
+"""What a step takes at most before anything is measured."""
 
 _ENDINGS = (".csv.gz", ".csv", ".toml")
 

@@ -37,7 +37,7 @@ def _answer(result: Checkup, asked: CheckOperands, out: Output) -> int:
 
 @operation(CheckOperands, answer=_answer)
 def check(asked: CheckOperands, call: Call) -> Checkup:
-    """What may be wrong with a recording: units, axes, channels, clock, traced base, presses (docs/check.md).
+    """What may be wrong with a recording: units, axes, channels, clock, traced base, presses.
 
     The result has findings, the gravest first, each with a stretch in s; `reconstruct` refuses what is grave.
     Raises RecordingError for what is no recording, and what `reconstruct` raises with `full`.

@@ -3,7 +3,7 @@
 In the virtual laboratory (--phantom NAME) a simulated robot follows the suggestions with errors of place,
 way and depth. In the touch window (--device NAME, --scene) a ghost tip shows where and how to press. A robot
 of your own talks over standard input and output (--robot): one line of JSON a suggestion and a segment, as
-docs/exploring.md tells. The recording so far is written after every touch, so an exploration that was
+docs/howto/robot.md tells. The recording so far is written after every touch, so an exploration that was
 interrupted is whole, and --continue goes on with it. At the end `palpate reconstruct` makes a MODEL of it
 like any other.
 """

@@ -66,7 +66,7 @@ class ImportOperands:
     _: KW_ONLY
     output: str | None = output_operand("recording to write: .csv.gz or .csv", "REC", SAMPLES)
     mapping: str | Path | None = operand(
-        None, "all of this as a file (docs/import-export.md)", metavar="TOML", reads=True
+        None, "all of this as a file (docs/howto/own-data.md)", metavar="TOML", reads=True
     )
     columns: Mapping[str, str] | None = columns_operand("t, x, y, z, fx, fy, fz, qw, qx, qy, qz")
     units: Mapping[str, str] | None = units_operand()

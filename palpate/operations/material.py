@@ -53,8 +53,8 @@ class MaterialOperands:
 def material(asked: MaterialOperands, call: Call) -> Material:
     """The material of a specimen from a machine's curves: indentation, compression, tension or relaxation.
 
-    From 6 indentations on, effects are searched for as `diagnose` does, each curve held out
-    (docs/real-data.md). Lengths m, moduli Pa. Raises RecordingError where a file cannot be read, ContactError
+    From 6 indentations on, effects are searched for as `diagnose` does, each curve held out.
+    Lengths m, moduli Pa. Raises RecordingError where a file cannot be read, ContactError
     where nothing is touched.
     """
     from diagnose.specimen.material import material_of

@@ -25,7 +25,7 @@ class ReadOperands:
 def read_recording(asked: ReadOperands, call: Call) -> Recording:
     """Read a recording: NAME.csv, NAME.csv.gz or NAME.toml, or an embedded one by its name.
 
-    Times s, positions of the tip's centre m, forces on the tool N, device frame (docs/recording-format.md).
+    Times s, positions of the tip's centre m, forces on the tool N, device frame.
     Raises RecordingError for what is missing or impossible.
     """
     from mechanics.recording import Recording as Plain

@@ -40,7 +40,7 @@ class SimulateOperands:
     )
     effects: Mapping[str, float] | None = operand(
         None,
-        "an effect and its strength (repeatable; 1 is the table's in docs/laboratory.md, 0 leaves it out): "
+        "an effect and its strength (repeatable; docs/howto/simulate.md says what 1 is, 0 leaves it out): "
         f"{', '.join(REGISTRY)}",
         flag="--effect",
         metavar="NAME=STRENGTH",

@@ -1,4 +1,4 @@
-"""The servo: the 1 kHz loop in its own process (docs/servo.md)."""
+"""The servo: the 1 kHz loop in its own process (docs/explanation/loop-and-safety.md)."""
 
 from devices.safety import SafetyOptions
 from palpate.servo.client import Servo

@@ -20,7 +20,7 @@ GRAVE = 0.25
 class Finding:
     """One thing that is wrong with a recording.
 
-    name: of the kind (docs/check.md lists them). saw: what was seen, with figures. sure: how sure, by which
+    name: of the kind. saw: what was seen, with figures. sure: how sure, by which
     statistic. todo: what to do. error: relative standard error that it adds to the modulus, infinite where
     nothing can be said. decades: -log10 of the probability on a sound recording, or log10 of the odds.
     stretch: (start, end) s of the recording as it is, worth a look. channels: columns of the recording.

@@ -204,7 +204,7 @@ def _refused(recording: Recording, name: str, error: ContactError) -> Finding:
         name,
         str(error),
         "reconstruction stops there",
-        "see docs/recording-format.md for what a recording holds",
+        "see docs/reference/recording-format.md for what a recording holds",
         np.inf,
         np.inf,
         (float(recording.t[0]), float(recording.t[-1])),

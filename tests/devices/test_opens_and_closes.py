@@ -1,6 +1,6 @@
 """A device is opened and closed a thousand times: no thread, no open file and no memory stays behind.
 
-`pytest -s -m slow` of this file prints the figures of docs/servo.md."""
+`pytest -s -m slow` of this file prints its figures."""
 
 from __future__ import annotations
 

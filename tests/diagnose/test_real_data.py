@@ -1,5 +1,5 @@
 """The real-data table: what held-out curves of others' instruments are predicted to, so that a change that
-spoils it is seen. Limits are the figures of docs/real-data.md with some room."""
+spoils it is seen. Limits are measured figures with some room."""
 
 from __future__ import annotations
 

@@ -31,7 +31,7 @@ _RIPPLE = 1e-4
 a rendered force knows no other noise."""
 _LOOSE = 0.5
 """Of the least contrast: what a touch stands above what free air may have done unseen. All of it costs true
-presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0210)."""
+presses of heavy tools, none of it lets the turn of a tool pass for one (decision 0102)."""
 
 
 @dataclass(frozen=True)

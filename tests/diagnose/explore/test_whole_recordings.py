@@ -82,7 +82,7 @@ def test_a_surface_that_passes_one_touch_is_no_cause(shared_recordings):
 @pytest.mark.slow
 @pytest.mark.xfail(
     strict=True,
-    reason="with 38 presses our own errors at all places alike are larger than stated (docs/exploring.md)",
+    reason="with 38 presses our own errors at all places alike are larger than stated",
 )
 @pytest.mark.parametrize("name", ["silicone-1-cylinder", "silicone-3-halfsphere"])
 def test_nothing_but_finite_strain_rules_none_out(shared_recordings, name):

@@ -95,7 +95,7 @@ def test_every_result_documents_its_units_plot_and_scene(name):
 
 @pytest.mark.parametrize("name", [*FUNCTIONS, *RESULTS])
 def test_the_page_names_it(name):
-    assert f"pp.{name}" in (REPOSITORY / "docs" / "python.md").read_text()
+    assert f"pp.{name}" in (REPOSITORY / "docs" / "reference" / "python.md").read_text()
 
 
 def test_script_without_a_main_guard_runs_once(tmp_path):

@@ -1,4 +1,4 @@
-"""The Python of README and docs/python.md runs as it stands, from an empty folder."""
+"""The Python of README and docs/howto/python.md runs as it stands, from an empty folder."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def run(page: str, folder: Path) -> str:
     return done.stdout
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/python.md"])
+@pytest.mark.parametrize("page", ["README.md", "docs/howto/python.md"])
 def test_what_the_pages_call_is_there(page):
     calls = [n for n in ast.walk(ast.parse(snippets(page))) if isinstance(n, ast.Call)]
     named = [(ast.unparse(call.func), call) for call in calls]
@@ -64,7 +64,7 @@ def test_readme_runs(tmp_path):
 
 @pytest.mark.slow
 def test_page_runs(tmp_path):
-    said = run("docs/python.md", tmp_path)
+    said = run("docs/howto/python.md", tmp_path)
     assert "did you mean mesh_size_m" in said and "{'tool_compliance': 1.0}" in said
     written = "touches.png object.png forces.csv press.png gap.html better-model block.csv.gz"
     assert set(written.split()) <= {p.name for p in tmp_path.iterdir()}

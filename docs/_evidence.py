@@ -1,0 +1,179 @@
+"""Evidence pages and marked numbers, from docs/evidence/NAME.json as benchmarks write them.
+
+`write(folder)` makes a page of every file while the site is built. `python docs/_evidence.py README.md` puts
+the files' numbers between the markers of a page:
+
+    <!-- evidence: NAME what -->28.9<!-- end -->
+
+`what` is a figure's own; the number keeps the decimals with which it is written. A test runs `filled` over
+README and all pages and fails where a number differs or its file or figure is missing.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parents[1]
+EVIDENCE = ROOT / "docs" / "evidence"
+KEYS = {"command", "commit", "date", "processor", "figures"}
+FIGURE_KEYS = {"what", "value", "spread", "unit", "target", "met"}
+MARKED = re.compile(r"(<!-- evidence: (\S+) (.+?) -->)(.*?)(<!-- end -->)", re.DOTALL)
+
+
+class EvidenceError(ValueError):
+    """A file or a marker that does not hold what it should; says which, and what to do."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """One benchmark's file. figures: mappings with FIGURE_KEYS; spread, target and met may be None."""
+
+    name: str
+    command: str
+    commit: str
+    date: str
+    processor: str
+    figures: tuple[dict[str, Any], ...]
+
+    def value(self, what: str) -> float:
+        """The figure of that name; raises EvidenceError where there is none."""
+        for figure in self.figures:
+            if figure["what"] == what:
+                return figure["value"]
+        have = ", ".join(figure["what"] for figure in self.figures)
+        raise EvidenceError(f"docs/evidence/{self.name}.json has no figure '{what}'; it has {have}")
+
+
+def read(path: Path) -> Evidence:
+    """One file; raises EvidenceError where a key is missing."""
+    held = json.loads(path.read_text(encoding="utf-8"))
+    if missing := KEYS - set(held):
+        raise EvidenceError(f"{path.name} lacks {', '.join(sorted(missing))}: run its benchmark again")
+    for figure in held["figures"]:
+        if missing := {"what", "value", "unit"} - set(figure):
+            raise EvidenceError(f"a figure of {path.name} lacks {', '.join(sorted(missing))}")
+    figures = tuple({key: figure.get(key) for key in FIGURE_KEYS} for figure in held["figures"])
+    return Evidence(path.stem, *(held[key] for key in ("command", "commit", "date", "processor")), figures)
+
+
+def all_evidence(folder: Path = EVIDENCE) -> list[Evidence]:
+    """Every file of the folder, by name."""
+    return [read(path) for path in sorted(folder.glob("*.json"))]
+
+
+def filled(text: str, folder: Path = EVIDENCE) -> str:
+    """A page with the files' numbers between its markers; raises EvidenceError where one has no source."""
+
+    def number(found: re.Match[str]) -> str:
+        begin, name, what, stood, end = found.groups()
+        path = folder / f"{name}.json"
+        if not path.is_file():
+            raise EvidenceError(
+                f"'{stood}' is marked as '{what}' of {name}, but docs/evidence/{name}.json is missing"
+            )
+        decimals = len(stood.strip().partition(".")[2])
+        return f"{begin}{read(path).value(what):,.{decimals}f}{end}"
+
+    return MARKED.sub(number, text)
+
+
+def page(evidence: Evidence) -> str:
+    """A table of all figures, missed targets beside met ones."""
+    lines = [f"# {evidence.name.replace('_', ' ').replace('-', ' ').capitalize()}", ""]
+    met = [figure["met"] for figure in evidence.figures if figure["target"]]
+    if met:
+        lines += [f"{sum(map(bool, met))} of {len(met)} targets met.", ""]
+    lines += ["| what | value | spread | unit | target | |", "| --- | --- | --- | --- | --- | --- |"]
+    for figure in evidence.figures:
+        spread = figure["spread"]
+        said = "" if not spread or spread[0] == spread[1] else f"{spread[0]:.4g} to {spread[1]:.4g}"
+        unit = "" if figure["unit"] == "1" else figure["unit"]
+        verdict = "" if not figure["target"] else "met" if figure["met"] else "**missed**"
+        target = _cell(str(figure["target"] or ""))
+        lines.append(
+            f"| {_cell(figure['what'])} | {figure['value']:.4g} | {said} | {unit} | {target} | {verdict} |"
+        )
+    lines += [
+        "",
+        f"`{evidence.command}`, commit {evidence.commit[:10]}, {evidence.date}, {evidence.processor}.",
+        "",
+    ]
+    if age := _age(evidence):
+        lines += [age, ""]
+    return "\n".join(lines)
+
+
+def _cell(words: str) -> str:
+    """Words as they stand, in a table."""
+    return re.sub(r"([*<|]|-(?=-))", r"\\\1", words)
+
+
+def _age(evidence: Evidence) -> str:
+    """A warning where the figures are of an earlier version of the program."""
+    then, now = _version(evidence.commit), _version("")
+    if not then or then == now:
+        return ""
+    return f"**These figures are of version {then}; this is {now}.** Run the command again for today's."
+
+
+def _version(commit: str) -> str:
+    """The program's version at a commit ('': in this folder); '' where that cannot be told."""
+    if not commit:
+        text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
+    else:
+        said = subprocess.run(
+            ["git", "-C", str(ROOT), "show", f"{commit}:pyproject.toml"], capture_output=True, text=True
+        )
+        if said.returncode:
+            return ""
+        text = said.stdout
+    return str(tomllib.loads(text)["project"]["version"])
+
+
+def write(folder: Path, source: Path = EVIDENCE) -> None:
+    """A page a file, and `index.md` with a line each."""
+    folder.mkdir(parents=True, exist_ok=True)
+    have = all_evidence(source)
+    rows, names = [], []
+    for evidence in have:
+        _keep(folder / f"{evidence.name}.md", page(evidence))
+        aimed = [figure for figure in evidence.figures if figure["target"]]
+        missed = [_cell(figure["what"]) for figure in aimed if not figure["met"]]
+        rows.append(
+            f"| [{evidence.name}]({evidence.name}.md) | {evidence.date} | {len(evidence.figures)} | "
+            f"{', '.join(missed) or ('none' if aimed else 'no target')} |"
+        )
+        names.append(evidence.name)
+    lines = ["# Figures", ""]
+    if have:
+        lines += [
+            "| benchmark | measured | figures | targets missed |",
+            "| --- | --- | --- | --- |",
+            *rows,
+            "",
+        ]
+        lines += ["```{toctree}", ":hidden:", "", *names, "```", ""]
+    else:
+        lines += ["No benchmark has written its file for this version yet, so nothing is claimed here.", ""]
+    _keep(folder / "index.md", "\n".join(lines))
+    for page_ in folder.glob("*.md"):
+        if page_.stem not in {"index", *names}:
+            page_.unlink()
+
+
+def _keep(path: Path, text: str) -> None:
+    if not path.is_file() or path.read_text(encoding="utf-8") != text:
+        path.write_text(text, encoding="utf-8")
+
+
+if __name__ == "__main__":
+    for name in sys.argv[1:]:
+        marked = Path(name)
+        marked.write_text(filled(marked.read_text(encoding="utf-8")), encoding="utf-8")
