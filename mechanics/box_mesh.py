@@ -9,14 +9,19 @@ import numpy as np
 from mechanics.tetmesh import TetMesh
 
 
-def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float]) -> TetMesh:
+def box_mesh(cells: tuple[int, int, int], size: tuple[float, float, float], grade: float = 1.0) -> TetMesh:
     """A box, size in m, base at z = 0 fixed, centred in x and y, six tetrahedra a cell.
 
-    cells: along x, y, z.
+    cells: along x, y, z. grade > 1 makes cells finer towards the middle of the top.
     """
-    steps = [np.linspace(0, 1, count + 1) for count in cells]
-    axes = [(2 * t - 1) * length / 2 for t, length in zip(steps[:2], size[:2], strict=True)]
-    axes.append((1 - (1 - steps[2])) * size[2])
+    axes = []
+    for k, (count, length) in enumerate(zip(cells, size, strict=True)):
+        t = np.linspace(0, 1, count + 1)
+        if k < 2:
+            s = 2 * t - 1
+            axes.append(np.sign(s) * np.abs(s) ** grade * length / 2)
+        else:
+            axes.append((1 - (1 - t) ** grade) * length)
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1)
     points = grid.reshape(-1, 3)
     index = np.arange(len(points)).reshape(grid.shape[:3])

@@ -82,7 +82,7 @@ def find(sources: Iterable[str | Path], leave: Path) -> list[Found]:
 
 def _of_source(source: Path, leave: Path) -> Iterable[tuple[Path, Path]]:
     """(samples, root) of the recordings that a source leads to; a named file that is none comes too, so that
-    its reason is told."""
+    its reason is said."""
     if source.is_dir():
         for path in sorted(source.rglob("*.toml")):
             whole = absolute(path)

@@ -103,7 +103,7 @@ def declared(kind: Any) -> list[dataclasses.Field[Any]]:
 
 @dataclass(frozen=True)
 class Call:
-    """One call of an operation. given: what was given, by name; wanted: whether or where progress is told;
+    """One call of an operation. given: what was given, by name; wanted: whether or where progress goes;
     out: what a command says on the way, silent in a Python call."""
 
     given: Mapping[str, Any]
