@@ -1,7 +1,7 @@
 """The precompute against its limit and against its peers, for meshes of three sizes.
 
 limit: the dense inverse (potrf, potri) of a matrix as large as the result. schur:
-mechanics.compliance.condense.
+benchmarks._condensation.
 Times are wall and CPU: on a shared machine the CPU ratios are the fairer ones. columns: a solve a column
 from the same factor, one at a time (SOFA's way) and in batches; timed on a sample of columns and scaled.
 Memory: the greatest resident set of a fresh process that condenses, less that before.
@@ -15,10 +15,10 @@ from multiprocessing.queues import Queue
 
 import numpy as np
 
+from benchmarks._condensation import condense, inverse
 from benchmarks.evidence import Figure
 from benchmarks.timing import measure, table
 from mechanics.box_mesh import box_mesh
-from mechanics.compliance import condense, inverse
 from mechanics.errors import OptionError
 from mechanics.pardiso import Pardiso, available
 from mechanics.solver import Solver

@@ -26,9 +26,31 @@ from benchmarks._diagnosis_tables import TARGETS, pictures, show
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
 from mechanics.errors import OptionError
+from palpate.operations._flags import finite
 from palpate.tasks.driver import Outcome
-from palpate.tasks.engine import add_engine, run_with_bar
+from palpate.tasks.engine import run_with_bar
 from palpate.tasks.graph import Graph, Task
+
+
+def _add_engine(parser: argparse.ArgumentParser) -> None:
+    """--workers, --memory, --scheduler, --force."""
+    group = parser.add_argument_group("who does it")
+    group.add_argument(
+        "--workers",
+        type=int,
+        metavar="INTEGER",
+        help="processes of one thread each on this machine (default: one a core)",
+    )
+    group.add_argument(
+        "--memory",
+        type=finite,
+        metavar="NUMBER",
+        help="what they may take together [GB] (default: 90 %% of what is free)",
+    )
+    group.add_argument(
+        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://HOST:8786, in their place"
+    )
+    group.add_argument("--force", action="store_true", help="do what is finished again")
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,7 +102,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="whose seeds: to look at, to calibrate on unseen, or to be opened once a release",
     )
     parser.add_argument("--seed", type=int, help="first seed, instead of that of --cases")
-    add_engine(parser)
+    _add_engine(parser)
 
 
 class _Late(Exception):

@@ -86,7 +86,12 @@ class Calibration(Result):
 
     def save(self, path: Path | str) -> Path:
         """Write TOOL.toml; returns its path."""
-        return write_calibration(path, self)
+        path = Path(path)
+        if path.suffix != ".toml":
+            raise RecordingError(f"'{path}' must end in .toml")
+        with atomic_file(path, TOOL) as temporary:
+            temporary.write_text(dump_toml(self.as_json()), encoding="utf-8")
+        return path
 
     def as_json(self) -> dict[str, Any]:
         """What the TOML holds."""
@@ -108,16 +113,6 @@ def _played(t: np.ndarray, position: np.ndarray, width: float) -> np.ndarray:
     out = np.empty_like(position)
     play(np.array([0, len(position)]), np.ascontiguousarray(position), width, out)
     return out
-
-
-def write_calibration(path: Path | str, calibration: Calibration) -> Path:
-    """Write TOOL.toml; returns its path."""
-    path = Path(path)
-    if path.suffix != ".toml":
-        raise RecordingError(f"'{path}' must end in .toml")
-    with atomic_file(path, TOOL) as temporary:
-        temporary.write_text(dump_toml(calibration.as_json()), encoding="utf-8")
-    return path
 
 
 def read_calibration(path: Path | str) -> Calibration:

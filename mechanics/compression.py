@@ -91,11 +91,17 @@ def compress(
 
 def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
     """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n)."""
-    n, count = average.shape[1], average.shape[0]
-    loads = np.zeros((n, 3, count, 3))
+    loads = unit_loads(average)
+    return solver.quadratic_forms(loads.reshape(-1, *loads.shape[2:])[solver.free])
+
+
+def unit_loads(average: sp.csr_matrix) -> np.ndarray:
+    """(n, 3, k, 3) nodal forces of unit loads x, y, z on each of k patches, from weights (k, n)."""
+    dense = average.toarray().T
+    loads = np.zeros((len(dense), 3, dense.shape[1], 3))
     for axis in range(3):
-        loads[:, axis, :, axis] = average.toarray().T
-    return solver.quadratic_forms(loads.reshape(3 * n, count, 3)[solver.free])
+        loads[:, axis, :, axis] = dense
+    return loads
 
 
 def _answer(solver: Solver, average: sp.csr_matrix, patterns: np.ndarray) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from mechanics.errors import MeshError
+from mechanics.nearest import triangle_areas
 from mechanics.tetmesh import EDGES, TetMesh
 
 # four points of degree 2 (Stroud): exact for products of the quadratic element's linear gradients
@@ -126,8 +127,7 @@ def stiffness(
 
 def triangle_mass(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     """Integrals of the products of shape functions over straight triangles: (k, 3, 3) or (k, 6, 6), m^2."""
-    p = points[triangles[:, :3]]
-    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+    area = triangle_areas(points, triangles)
     if triangles.shape[1] == 3:
         unit = (np.ones((3, 3)) + np.eye(3)) / 12
     else:

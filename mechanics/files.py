@@ -257,8 +257,9 @@ def check_target(path: Path | str, kind: Kind | FolderKind) -> None:
             if place.is_symlink() or place.parent == place:
                 raise FileNotFoundError(errno.ENOENT, os.strerror(errno.ENOENT), str(place))
             place = place.parent
+        longest = os.pathconf(place, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
         for part in target.relative_to(place).parts:
-            if len(os.fsencode(part)) > _longest_name(place):
+            if len(os.fsencode(part)) > longest:
                 raise OSError(errno.ENAMETOOLONG, os.strerror(errno.ENAMETOOLONG))
         free = shutil.disk_usage(place).free
         if free < kind.likely_bytes:
@@ -481,12 +482,9 @@ def _target(path: Path, kind: Kind | FolderKind) -> Path:
     elif not target.is_file():
         raise FileError(f"'{path}' is no ordinary file: {other}")
     if not kind.replaceable(target):
-        raise FileError(f"'{path}' exists and is no {_bare(kind.words)}: {other}")
+        bare = kind.words.removeprefix("a ").removeprefix("an ")
+        raise FileError(f"'{path}' exists and is no {bare}: {other}")
     return target
-
-
-def _bare(words: str) -> str:
-    return words.removeprefix("a ").removeprefix("an ")
 
 
 def _head(path: Path, most: int) -> bytes:
@@ -497,10 +495,6 @@ def _head(path: Path, most: int) -> bytes:
         with suppress(zlib.error):
             return zlib.decompressobj(wbits=31).decompress(data, most)
     return data
-
-
-def _longest_name(folder: Path) -> int:
-    return os.pathconf(folder, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
 
 
 def _settle(path: Path) -> None:

@@ -1,8 +1,14 @@
-"""The nearest places of a triangulated surface, by VTK's cell locator, and points spread over one."""
+"""Triangulated surfaces: areas, the nearest places by VTK's cell locator, points spread over one, rays."""
 
 from __future__ import annotations
 
 import numpy as np
+
+
+def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(k,) m^2, of straight triangles (k, 3 or 6) of points (n, 3) m."""
+    a, b, c = np.moveaxis(points[triangles[:, :3]], 1, 0)
+    return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
 def closest(
@@ -33,7 +39,7 @@ def sample(vertices: np.ndarray, triangles: np.ndarray, count: int, seed: int = 
     """(count, 3) points spread evenly by area over the surface; the same for the same seed."""
     generator = np.random.default_rng(seed)
     corner = np.asarray(vertices)[np.asarray(triangles)]
-    area = np.linalg.norm(np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]), axis=1)
+    area = triangle_areas(np.asarray(vertices), np.asarray(triangles))
     chosen = corner[generator.choice(len(area), count, p=area / area.sum())]
     r, s = np.sqrt(generator.random(count)), generator.random(count)
     return np.einsum("ik,ikj->ij", np.column_stack([1 - r, r * (1 - s), r * s]), chosen)

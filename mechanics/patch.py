@@ -12,6 +12,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from mechanics.errors import MeshError
+from mechanics.nearest import triangle_areas
 from mechanics.tetmesh import TetMesh
 
 REACH = 4.0  # patch widths beyond which the Gaussian (3e-4) is left out
@@ -56,9 +57,7 @@ class PatchSampler:
         parts = max(1, int(np.ceil(edge / width_m)))
         barycentric, weights = _subdivided(parts)
         shapes = triangle_shapes(mesh.order, barycentric)
-        area = (
-            np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1) / 2
-        )
+        area = triangle_areas(mesh.points, triangles)
         self._triangles = triangles
         self._shapes = shapes
         self._positions = np.einsum("qc,tcx->tqx", barycentric, corners)

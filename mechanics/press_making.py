@@ -78,8 +78,6 @@ def of_places(
     tip_radius_m: float,
     *,
     depth_m: np.ndarray | float = np.nan,
-    onset_s: np.ndarray | None = None,
-    peak_s: np.ndarray | None = None,
     fits: Mapping[str, np.ndarray] | None = None,
 ) -> Presses:
     """A table without samples: surface points (p, 3) m, outward normals (p, 3), and what is known of them."""
@@ -87,16 +85,15 @@ def of_places(
     count = len(point)
     unknown = np.full(count, np.nan)
     fits = {} if fits is None else {n: np.broadcast_to(np.asarray(v, float), count) for n, v in fits.items()}
-    peak = unknown if peak_s is None else peak_s
     return Presses(
         starts=np.zeros(count + 1),
         t=np.zeros(0),
         position=np.zeros((0, 3)),
         force=np.zeros((0, 3)),
         free_air=np.zeros((0, 3)),
-        onset_s=unknown if onset_s is None else onset_s,
-        peak_s=peak,
-        end_s=peak,
+        onset_s=unknown,
+        peak_s=unknown,
+        end_s=unknown,
         centre=point + tip_radius_m * normal,
         contact_normal=normal,
         onset_error_m=np.zeros(count),

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import dataclasses
 import gzip
-import io
 import warnings
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
@@ -29,19 +28,16 @@ from mechanics.files import (
     named_in,
     no_file,
     read_toml,
-    reading,
     sha256_of_file,
 )
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from mechanics.recording_samples import MOST_SAMPLES, QUATERNION_COLUMNS, REQUIRED_COLUMNS, read_samples
 from mechanics.result import Result
 from mechanics.schema import ANY, Key, Listed, Schema, check_table
 from mechanics.segments import STATED, Segment
 from mechanics.store import content_key
 from mechanics.surface_files import UNITS
 from mechanics.toml_text import dump_toml
-
-REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
-QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
 
 SCHEMA: Schema = {
     "recording": {
@@ -86,16 +82,12 @@ SCHEMA: Schema = {
 
 WIDEST_PATH_M = 1.5
 """Greatest extent of a recorded path: objects are at most 1 m."""
-MOST_SAMPLES = 10_000_000
-"""Of a recording, also where its clock is filled at the sample rate: 2.7 hours at 1 kHz."""
 _UNITS = {"micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
 _HAND_M = (0.02, 0.6)
 """Extent of a path that a hand makes round an object, to guess a wrong unit by."""
 _QUICKEST_HZ = 2e4
 """No hand's exploration is sampled faster: a slower clock is then no clock in milliseconds."""
 _RATE_FACTOR = 1.5
-_MOST_TEXT, _MOST_UNPACKED = 2 << 30, 200
-"""Bytes of samples, and of unpacked ones a packed byte (numbers pack to a fifth)."""
 
 
 class NotRead(UserWarning):
@@ -319,7 +311,7 @@ def read_recording(path: Path | str) -> Recording:
         if key not in part:
             words = SCHEMA[name][key].words  # type: ignore[index, union-attr]
             raise RecordingError(f"'{description}': [{name}] {key} is missing: it must be {words}")
-    data = _read_table(samples)
+    data = read_samples(samples)
     force = np.column_stack([data[c] for c in ("fx", "fy", "fz")])
     quaternion = None
     if all(c in data for c in QUATERNION_COLUMNS):
@@ -394,73 +386,6 @@ def base_model_of(recording: Recording) -> Path:
 
 def _optional_float(value: Any) -> float | None:
     return None if value is None else float(value)
-
-
-class _Bounded(io.RawIOBase):
-    """A stream that refuses to go on for ever: a small packed file may hold terabytes."""
-
-    def __init__(self, path: Path, most: int) -> None:
-        packed = path.suffix == ".gz"
-        self._file: Any = gzip.open(path) if packed else open(path, "rb")
-        self._left, self._path = most, path
-
-    def readable(self) -> bool:
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        count = self._file.readinto(buffer)
-        self._left -= count
-        if self._left < 0:
-            raise RecordingError(f"'{self._path}' unpacks to more than any recording holds: it is none")
-        return count
-
-    def close(self) -> None:
-        self._file.close()
-        super().close()
-
-
-def _read_table(path: Path) -> dict[str, np.ndarray]:
-    """Columns by name; raises RecordingError where the header or a row does not fit.
-
-    Numbers are ASCII, so that other columns may hold text of any encoding that begins with ASCII.
-    """
-    with reading(path, RecordingError):
-        size = path.stat().st_size
-        most = min(_MOST_TEXT, _MOST_UNPACKED * size + (1 << 20)) if path.suffix == ".gz" else _MOST_TEXT
-        raw = io.BufferedReader(_Bounded(path, most), 1 << 18)
-        with io.TextIOWrapper(raw, encoding="utf-8-sig", errors="surrogateescape") as file:
-            first = file.readline(1 << 16)
-            if "\0" in first or len(first) >= 1 << 16:
-                raise RecordingError(f"'{path}' is no text of comma-separated numbers: save it as UTF-8 CSV")
-            header = [name.strip() for name in first.split(",")]
-            missing = [c for c in REQUIRED_COLUMNS if c not in header]
-            if missing:
-                shown = ascii(", ".join(header))[1:-1]
-                raise RecordingError(
-                    f"'{path}' lacks the columns {', '.join(missing)} (its header has "
-                    f"{shown if len(shown) < 200 else shown[:200] + '...'}): needed are "
-                    f"{', '.join(REQUIRED_COLUMNS)}"
-                )
-            wanted = [c for c in (*REQUIRED_COLUMNS, *QUATERNION_COLUMNS) if c in header]
-            twice = [c for c in wanted if header.count(c) > 1]
-            if twice:
-                raise RecordingError(f"'{path}' has the column {twice[0]} twice: leave one of them out")
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # of empty lines and files
-                    values = np.loadtxt(
-                        file, delimiter=",", usecols=[header.index(c) for c in wanted], ndmin=2,
-                        comments=None, max_rows=MOST_SAMPLES + 1,
-                    )  # fmt: skip
-            except ValueError as error:
-                raise RecordingError(
-                    f"'{path}' has a row that is not {len(header)} decimal numbers: {ascii(str(error))[1:-1]}"
-                ) from error
-    if len(values) > MOST_SAMPLES:
-        raise RecordingError(
-            f"'{path}' has more than {MOST_SAMPLES} samples: cut it, or sample it more slowly"
-        )
-    return dict(zip(wanted, values.T, strict=True))
 
 
 def samples_path(path: Path | str) -> Path:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechanics.nearest import triangle_areas
 from mechanics.robust import weighted_median
 from mechanics.tetmesh import EDGES, TetMesh
 
@@ -15,7 +16,7 @@ def typical_edge(mesh: TetMesh) -> float:
     """
     p = mesh.points[mesh.touchable_surface[:, :3]]
     edges = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)
-    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    area = triangle_areas(mesh.points, mesh.touchable_surface)
     return weighted_median(edges.ravel(), np.repeat(area, 3))
 
 

@@ -160,18 +160,16 @@ def patch_loads(mesh: TetMesh, patches: Sequence[tuple[np.ndarray, np.ndarray]])
     return forces
 
 
-def mean_curvature(
-    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, *, reach_m: float | None = None
-) -> np.ndarray:
+def mean_curvature(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k,) 1/m mean of the principal curvatures at surface points, convex positive.
 
-    A paraboloid fitted to the nodes within `reach_m` (None: 1.8 surface edges) whose triangles face the
-    normal within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
+    A paraboloid fitted to the nodes within 1.8 surface edges whose triangles face the normal
+    within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
     """
     triangles = mesh.touchable_surface[:, :3]
     nodes = np.unique(triangles)
     facing = vertex_normals(mesh.points, triangles)[nodes]
-    reach = reach_m or 1.8 * typical_edge(mesh)
+    reach = 1.8 * typical_edge(mesh)
     result = np.zeros(len(points))
     for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
         offset = mesh.points[nodes] - point

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import SurfaceError
+from mechanics.nearest import triangle_areas
 from mechanics.surface_files import ClosedSurface
 
 UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
@@ -54,9 +55,9 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
     low = float((vertices[nodes] @ normal).min())
     vertices = vertices.copy()
     vertices[nodes] += np.outer(low - vertices[nodes] @ normal, normal)
-    corners = vertices[triangles[foot]]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
-    return Standing(vertices, triangles, np.average(corners.mean(axis=1), axis=0, weights=area), normal)
+    area = triangle_areas(vertices, triangles[foot])
+    middle = np.average(vertices[triangles[foot]].mean(axis=1), axis=0, weights=area)
+    return Standing(vertices, triangles, middle, normal)
 
 
 def _direction(up: str) -> np.ndarray:
@@ -83,8 +84,7 @@ def _foot(vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray) -> np
 
 
 def _share(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> float:
-    corners = vertices[triangles]
-    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    area = triangle_areas(vertices, triangles)
     return float(area[chosen].sum() / area.sum())
 
 

@@ -12,6 +12,7 @@ import scipy.sparse as sp
 
 from mechanics.elasticity import triangle_mass
 from mechanics.errors import OptionError
+from mechanics.nearest import triangle_areas
 from mechanics.tetmesh import TetMesh
 
 FLOOR = 1e5  # 1/m, stiffness a unit of area over the modulus: far stiffer than an object of centimetres
@@ -46,7 +47,7 @@ class BaseHold:
         if self.bonded_fraction >= 1:
             return base
         p = mesh.points[base[:, :3]]
-        area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+        area = triangle_areas(mesh.points, base)
         order = np.argsort(p.mean(axis=1) @ np.asarray(self.direction), kind="stable")
         share = np.cumsum(area[order]) / area.sum()
         return base[order[share <= self.bonded_fraction + 1e-9]]

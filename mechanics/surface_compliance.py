@@ -13,9 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
-import scipy.sparse as sp
 
-from mechanics.compression import compress, own_compliance
+from mechanics.compression import compress, own_compliance, unit_loads
 from mechanics.floor import carried_by_floor
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
@@ -189,7 +188,7 @@ def patch_blocks(
     for start in range(0, t, _CORNERS):
         part = slice(start, min(start + _CORNERS, t))
         count = part.stop - start
-        moved = solver.solve(_loads(average[part]).reshape(len(mesh.points), 3, 3 * count))
+        moved = solver.solve(unit_loads(average[part]).reshape(len(mesh.points), 3, 3 * count))
         means = average @ moved.reshape(len(mesh.points), -1)
         blocks[:, part] = means.reshape(t, 3, count, 3).transpose(0, 2, 1, 3)
         tell(part.stop / t)
@@ -211,12 +210,3 @@ def own_blocks(
         own[part] = own_compliance(solver, average[part])
         tell(part.stop / len(points))
     return own
-
-
-def _loads(average: sp.csr_matrix) -> np.ndarray:
-    """(n, 3, k, 3) nodal forces of unit loads x, y, z on each of k patches, from weights (k, n)."""
-    dense = average.toarray().T
-    loads = np.zeros((len(dense), 3, dense.shape[1], 3))
-    for axis in range(3):
-        loads[:, axis, :, axis] = dense
-    return loads

@@ -1,9 +1,8 @@
 """Force bias: a constant vector on every reading, seen best in free air."""
 
-import dataclasses
-
 import numpy as np
 
+from mechanics.calibration import Calibration
 from mechanics.effects.base import Effect, Keys, Parameter, Role, Scope
 from mechanics.effects.settings import SHIFTED, Scene, Settings
 from mechanics.recording import Recording
@@ -15,9 +14,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 
 def _correct(recording: Recording, keys: Keys) -> Recording:
-    return dataclasses.replace(
-        recording, force_on_tool=recording.force_on_tool - np.asarray(keys["bias_n"], dtype=float)
-    )
+    return recording.corrected(Calibration(bias_n=np.asarray(keys["bias_n"], dtype=float)))
 
 
 EFFECT = Effect(

@@ -1,9 +1,8 @@
 """Force gain: readings are a matrix times the truth. A common factor is the modulus's and cannot be told."""
 
-import dataclasses
-
 import numpy as np
 
+from mechanics.calibration import Calibration
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import MIXED, Scene, Settings
@@ -16,8 +15,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 
 def _correct(recording: Recording, keys: Keys) -> Recording:
-    back = np.linalg.inv(np.asarray(keys["matrix"], dtype=float))
-    return dataclasses.replace(recording, force_on_tool=recording.force_on_tool @ back.T)
+    return recording.corrected(Calibration(matrix=np.asarray(keys["matrix"], dtype=float)))
 
 
 EFFECT = Effect(

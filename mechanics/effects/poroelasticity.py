@@ -66,8 +66,6 @@ def _in_words(keys: Keys) -> str:
     )
 
 
-_STARTS = tuple(float(np.log(rate)) for rate in (0.1, 0.5, 2.0, 8.0))
-
 EFFECT = Effect(
     name="poroelasticity",
     domain="object",

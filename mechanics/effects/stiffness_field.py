@@ -63,9 +63,9 @@ def _made(places: Places, prior: Prior, answer: np.ndarray, weight: np.ndarray) 
     own = prior.log_sd**2 * correlation(at, at, prior.length_m)
     values, vectors = np.linalg.eigh(own)
     root = vectors * np.sqrt(np.maximum(values, 0))
-    told = shares.weight @ elements @ root
-    told = np.sqrt(weight)[:, None] * (told - (weight @ told) / weight.sum())
-    strongest = np.linalg.svd(told, full_matrices=False)[2][:MODES]
+    seen = shares.weight @ elements @ root
+    seen = np.sqrt(weight)[:, None] * (seen - (weight @ seen) / weight.sum())
+    strongest = np.linalg.svd(seen, full_matrices=False)[2][:MODES]
     patterns = np.zeros((MODES, len(at)))
     patterns[: len(strongest)] = strongest @ root.T
     return Basis(prior, at, patterns, elements)

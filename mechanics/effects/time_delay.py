@@ -1,10 +1,9 @@
 """Time delay: the force reads late (or early). A loop whose width grows with the rate of force; same in any
 place."""
 
-import dataclasses
-
 import numpy as np
 
+from mechanics.calibration import Calibration
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import LATE, Scene, Settings
@@ -19,8 +18,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 
 def _correct(recording: Recording, keys: Keys) -> Recording:
-    force = delayed([slice(None)], recording.t, recording.force_on_tool, -float(keys["delay_s"]))
-    return dataclasses.replace(recording, force_on_tool=force)
+    return recording.corrected(Calibration(delay_s=float(keys["delay_s"])))
 
 
 EFFECT = Effect(

@@ -1,9 +1,8 @@
 """Tool compliance: a spring between the position sensor and the tip. Felt more where the object is stiff."""
 
-import dataclasses
-
 import numpy as np
 
+from mechanics.calibration import Calibration
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
@@ -16,8 +15,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
 
 
 def _correct(recording: Recording, keys: Keys) -> Recording:
-    moved = recording.force_on_tool / keys["stiffness_n_per_m"]
-    return dataclasses.replace(recording, position=recording.position + moved)
+    return recording.corrected(Calibration(stiffness_n_per_m=keys["stiffness_n_per_m"]))
 
 
 EFFECT = Effect(

@@ -36,7 +36,7 @@ class Found:
 @dataclass(frozen=True)
 class Choice:
     """What is to be done with every recording. steps: of STEPS, in order; options: step -> keywords of the
-    door's function; reports: HTML pages too."""
+    operation; reports: HTML pages too."""
 
     steps: tuple[str, ...] = STEPS
     options: Mapping[str, Mapping[str, Any]] | None = None
@@ -82,11 +82,12 @@ def find(sources: Iterable[str | Path], leave: Path) -> list[Found]:
 
 def _of_source(source: Path, leave: Path) -> Iterable[tuple[Path, Path]]:
     """(samples, root) of the recordings that a source leads to; a named file that is none comes too, so that
-    its reason is told."""
+    its reason is said."""
     if source.is_dir():
         for path in sorted(source.rglob("*.toml")):
             whole = absolute(path)
-            if not whole.is_relative_to(leave) and _is_recording(path):
+            described = any(path.with_suffix(ending).is_file() for ending in _ENDINGS[:2])
+            if not whole.is_relative_to(leave) and described:
                 yield recording_files(whole)[0], absolute(source)
     elif source.exists():
         yield _samples(source), absolute(source).parent
@@ -112,10 +113,6 @@ def undescribed(sources: Iterable[str | Path], leave: Path) -> list[Path]:
         if not absolute(path).is_relative_to(leave)
         and not path.with_name(path.name.removesuffix(ending) + ".toml").is_file()
     )
-
-
-def _is_recording(description: Path) -> bool:
-    return any(description.with_suffix(ending).is_file() for ending in _ENDINGS[:2])
 
 
 def _samples(path: Path) -> Path:
@@ -191,7 +188,7 @@ def tasks_of(found: Found, choice: Choice, out: Path) -> list[Task]:
                     "seed": choice.seed,
                     "reports": choice.reports,
                 },
-                record=record_path(folder, step),
+                record=folder / ".finished" / f"{step}.json",
                 places=places,
                 products=(
                     folder / f"{step}.json",
@@ -205,8 +202,3 @@ def tasks_of(found: Found, choice: Choice, out: Path) -> list[Task]:
             )
         )
     return made
-
-
-def record_path(folder: Path, step: str) -> Path:
-    """Where it is written that a step is finished."""
-    return folder / ".finished" / f"{step}.json"

@@ -9,7 +9,7 @@ from pathlib import Path
 from mechanics.errors import PalpateError
 from mechanics.files import Kind, atomic_file, sole_writer
 from mechanics.progress import Progress
-from palpate.batching.plan import Choice, Found, absolute, find, tasks_of, undescribed
+from palpate.batching.plan import Choice, absolute, find, tasks_of, undescribed
 from palpate.batching.summary import Batch, agreements, entry_of, write_csv, write_parquet
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
@@ -45,6 +45,18 @@ def batch(
         except PalpateError as error:
             bad[recording.name] = " ".join(str(error).split())
     outcomes: dict[str, Outcome] = {}
+
+    def made() -> Batch:
+        entries = []
+        for recording in found:
+            own = tasks.get(recording.name, [])
+            ended = {task.stage: outcomes[task.name] for task in own if task.name in outcomes}
+            entries.append(entry_of(recording.name, ended, bad.get(recording.name), choice.steps))
+        reused = sum(outcome.reused for outcome in outcomes.values())
+        planned = sum(map(len, tasks.values()))
+        agreeing = tuple(agreements(entries))
+        return Batch(folder, tuple(entries), agreeing, planned, reused, steps=tuple(choice.steps))
+
     graph = Graph(task for own in tasks.values() for task in own)
     with sole_writer(folder):
         try:
@@ -59,31 +71,11 @@ def batch(
                 outcomes=outcomes,
             )
         except KeyboardInterrupt:
-            _write(_made(folder, found, choice, tasks, bad, outcomes))
+            _write(made())
             raise
-        made = _made(folder, found, choice, tasks, bad, outcomes)
-        made = replace(made, undescribed=tuple(undescribed(sources, folder)))
-        _write(made)
-    return made
-
-
-def _made(
-    folder: Path,
-    found: list[Found],
-    choice: Choice,
-    tasks: dict[str, list[Task]],
-    bad: dict[str, str],
-    outcomes: dict[str, Outcome],
-) -> Batch:
-    entries = []
-    for recording in found:
-        own = tasks.get(recording.name, [])
-        ended = {task.stage: outcomes[task.name] for task in own if task.name in outcomes}
-        entries.append(entry_of(recording.name, ended, bad.get(recording.name), choice.steps))
-    reused = sum(outcome.reused for outcome in outcomes.values())
-    planned = sum(map(len, tasks.values()))
-    agreeing = tuple(agreements(entries))
-    return Batch(folder, tuple(entries), agreeing, planned, reused, steps=tuple(choice.steps))
+        whole = replace(made(), undescribed=tuple(undescribed(sources, folder)))
+        _write(whole)
+    return whole
 
 
 def _write(made: Batch) -> None:

@@ -1,4 +1,4 @@
-"""What a worker does with one recording: the door's own functions, and files beside one another.
+"""What a worker does with one recording: the operations themselves, and files beside one another.
 
 FOLDER/model is the MODEL, FOLDER/STEP.json what `--json` of the command gives, FOLDER/STEP.html its report,
 FOLDER/thumbnail.png the object. Each returns what the summary needs.

@@ -103,7 +103,7 @@ def declared(kind: Any) -> list[dataclasses.Field[Any]]:
 
 @dataclass(frozen=True)
 class Call:
-    """One call of an operation. given: what was given, by name; wanted: whether or where progress is told;
+    """One call of an operation. given: what was given, by name; wanted: whether or where progress goes;
     out: what a command says on the way, silent in a Python call."""
 
     given: Mapping[str, Any]
@@ -183,12 +183,18 @@ class Operation:
     def documentation(self) -> str:
         """The function's own words, then a line an operand or option: unit, meaning, what is allowed."""
         lines = [inspect.getdoc(self.function) or "", ""]
-        for field in self.fields.values():
-            if written(field).only != "command":
-                lines.append(f"{field.name}{_unit(field)}: {field.metadata['help']}{_allowed(field)}")
+        lines += [each.words for each in self.listed()]
         if self.has_progress:
             lines.append("progress: False for none; or a function of (stage, share done) that is told of it")
         return "\n".join(lines)
+
+    def listed(self) -> list[Option]:
+        """What a Python call takes: operands in their order, then every option."""
+        return [
+            Option(f.name, f.default, meta["unit"], meta["help"], meta["choices"], *span_of(f))
+            for f in self.fields.values()
+            if written(f).only != "command" and (meta := f.metadata)
+        ]
 
     def run(
         self, given: Mapping[str, Any], wanted: bool | Progress = True, out: Output | None = None
@@ -310,10 +316,19 @@ class Option:
     low: float
     high: float
 
-    def __str__(self) -> str:
+    @property
+    def words(self) -> str:
+        """Name, unit, meaning, and what is allowed."""
+        return f"{self.name}{self._said}"
+
+    @property
+    def _said(self) -> str:
         unit = f" [{self.unit}]" if self.unit else ""
         allowed = f"; one of {', '.join(self.choices)}" if self.choices else ""
-        return f"{self.name} = {self.default!r}{unit}: {self.help}{allowed}"
+        return f"{unit}: {self.help}{allowed}"
+
+    def __str__(self) -> str:
+        return f"{self.name} = {self.default!r}{self._said}"
 
 
 class Options(tuple[Option, ...]):
@@ -331,18 +346,4 @@ def options(function: str) -> Options:
     function: the name of any function of `palpate` that is an operation. Each option has a name, default,
     unit and words. Raises OptionError for another name.
     """
-    this = operation_of(function)
-    return Options(
-        Option(f.name, f.default, f.metadata["unit"], f.metadata["help"], f.metadata["choices"], *span_of(f))
-        for f in this.fields.values()
-        if f.default is not dataclasses.MISSING and written(f).only != "command"
-    )
-
-
-def _unit(field: dataclasses.Field[Any]) -> str:
-    return f" [{field.metadata['unit']}]" if field.metadata["unit"] else ""
-
-
-def _allowed(field: dataclasses.Field[Any]) -> str:
-    choices = field.metadata["choices"]
-    return f"; one of {', '.join(choices)}" if choices else ""
+    return Options(o for o in operation_of(function).listed() if o.default is not dataclasses.MISSING)

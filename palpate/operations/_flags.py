@@ -6,7 +6,7 @@ import argparse
 import dataclasses
 import math
 import re
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, NoReturn
 
 from mechanics.errors import OptionError
@@ -78,19 +78,6 @@ def add_operation(parser: argparse.ArgumentParser, operation: Operation) -> None
             help="write the result as JSON; '-' for standard output alone",
         )
         action.on_command_line = OnCommandLine(writes=JSON)  # type: ignore[attr-defined]
-
-
-def add_options(parser: argparse.ArgumentParser, kind: type) -> None:
-    """Add one flag a field of an options dataclass, with its help, unit and default."""
-    group = parser.add_argument_group(_title(kind))
-    for field in declared(kind):
-        _add(group, field)
-
-
-def options_from(arguments: argparse.Namespace, kind: type) -> Any:
-    """The options dataclass with what the command line gave; fields not given keep their defaults."""
-    given: Mapping[str, Any] = vars(arguments)
-    return kind(**{f.name: given[f.name] for f in declared(kind) if f.name in given})
 
 
 def _title(kind: type) -> str:

@@ -78,9 +78,9 @@ def poisson_operand(words: str, default: float | None = None, **more: Any) -> An
     return operand(default, words, **more)
 
 
-def renderer_operand(words: str = "what answers", default: str | None = "fem") -> Any:
+def renderer_operand() -> Any:
     """--renderer NAME."""
-    return operand(default, words, choices=names())
+    return operand("fem", "what answers", choices=names())
 
 
 @dataclass(frozen=True)

@@ -106,7 +106,7 @@ def changes(asked: ChangesOperands, call: Call) -> Changes:
     from diagnose.compare.before_after import changes as weighed
 
     sides = []
-    both = read_recording(asked.before), read_recording(asked.after)  # a name that is wrong is told at once
+    both = read_recording(asked.before), read_recording(asked.after)  # a wrong name is refused at once
     with call.progress("changes") as tell:
         for k, measured in enumerate(both):
 

@@ -21,7 +21,6 @@ from palpate.operations._shared import (
     save_operand,
     tip_radius_operand,
 )
-from palpate.output import Output
 
 if TYPE_CHECKING:
     from mechanics.model import Model
@@ -47,23 +46,7 @@ class ModelOperands:
     mesh_size_m: float | None = operand(None, "edge of the tetrahedra; None: 0.010 or an eighth", unit="m")
 
 
-def _answer(model: Model, asked: ModelOperands, out: Output) -> int:
-    out.say(*model.lines())
-    out.json(
-        {
-            "model": asked.save,
-            "young_modulus_pa": model.material.young_modulus_pa,
-            "volume_m3": float(model.mesh.volumes.sum()),
-            "nodes": len(model.mesh.points),
-            "tetrahedra": len(model.mesh.tetrahedra),
-            "support_point_m": model.support.point,
-            "support_normal": model.support.normal,
-        }
-    )
-    return 0
-
-
-@operation(ModelOperands, MeshFileOptions, answer=_answer)
+@operation(ModelOperands, MeshFileOptions)
 def model_of(asked: ModelOperands, call: Call) -> Model:
     """The model of an object whose shape is known, in the frame of its file.
 

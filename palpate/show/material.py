@@ -1,4 +1,4 @@
-"""The material that a bench test told: modulus, law, held-out errors."""
+"""The material found from a bench test: modulus, law, held-out errors."""
 
 from __future__ import annotations
 

@@ -12,7 +12,7 @@ from pyvista import Plotter
 from mechanics.model import Model
 from mechanics.model_files import write_model
 from palpate.show.model_view import thing_of, usual_colourings
-from palpate.show.object3d import draw_object
+from palpate.show.object3d import draw_touched
 from palpate.show.quantities import KELVIN_VOIGT, MODULUS, with_unit
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import View
@@ -48,9 +48,8 @@ def as_json(result: Model) -> dict[str, Any]:
 
 def draw(result: Model, ax: Axes) -> None:
     """The object with the places touched."""
-    draw_object(ax, result, touches=result.presses.point, show_base=True)
+    draw_touched(ax, result)
     ax.set_title(f"{result.name}: {modulus_words(result)}", fontsize=10)
-    ax.legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
 
 
 def view(result: Model) -> View:

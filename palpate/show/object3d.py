@@ -123,3 +123,9 @@ def draw_object(
     ax.autoscale_view()
     ax.set_axis_off()
     return ax
+
+
+def draw_touched(ax: Axes, model: Model) -> None:
+    """The object with the places touched and its fixed base, both named below."""
+    draw_object(ax, model, touches=model.presses.point, show_base=True)
+    ax.legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)

@@ -111,7 +111,6 @@ def add_dots(
     limits: tuple[float, float] | None = None,
     colour: str = "#c1121f",
     colour_map: str = "viridis",
-    size_m: float = 2e-3,
 ) -> None:
     """Small balls at points (k, 3) m, in one colour or by values (k,) named `label`; limits: of the
     colours."""
@@ -123,7 +122,7 @@ def add_dots(
         cloud[label] = np.asarray(values, dtype=float)
         look = {"scalars": label, "cmap": colour_map, "scalar_bar_args": {"title": label, **_BAR}}
         look["clim"] = limits
-    ball = pyvista.Sphere(radius=size_m, theta_resolution=16, phi_resolution=16)
+    ball = pyvista.Sphere(radius=2e-3, theta_resolution=16, phi_resolution=16)
     balls: Any = cloud.glyph(geom=ball, scale=False, orient=False)
     plotter.add_mesh(balls, **look)
 

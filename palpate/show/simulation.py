@@ -112,8 +112,7 @@ def _meaning(result: Simulation) -> str:
 def view(result: Simulation) -> View:
     """The phantom in the device's frame; each touch as read, without noise, and of the ideal object."""
     motion, recording = result.motion, result.recording
-    turn = np.array(result.truth["device_from_object_rotation"])
-    shift = np.array(result.truth["device_from_object_shift_mm"])
+    turn, shift = _device(result)
     rows = [
         np.flatnonzero((motion.touch == k) & (motion.s > -_BEFORE_MM)) for k in range(len(result.touches))
     ]
@@ -154,6 +153,12 @@ def view(result: Simulation) -> View:
     )
     traces = Traces(starts, depth_m, (chosen - first) * (motion.t[1] - motion.t[0]), lines)
     return View(thing, places * 1e-3, colourings, traces)
+
+
+def _device(result: Simulation) -> tuple[np.ndarray, np.ndarray]:
+    """(rotation (3, 3), shift (3,) mm) from the object's to the device's frame."""
+    truth = result.truth
+    return np.array(truth["device_from_object_rotation"]), np.array(truth["device_from_object_shift_mm"])
 
 
 def _turned(frame: np.ndarray, force_n: np.ndarray) -> np.ndarray:
@@ -231,8 +236,7 @@ def _curves(ax, result: Simulation) -> None:
     the depth that the instrument reads.
     """
     motion = result.motion
-    turn = np.array(result.truth["device_from_object_rotation"])
-    shift = np.array(result.truth["device_from_object_shift_mm"])
+    turn, shift = _device(result)
     read = (1e3 * result.recording.position - shift) @ turn
     presses = [k for k, touch in enumerate(result.touches) if touch.kind == "press"]
     presses.sort(key=lambda k: result.touches[k].depth)

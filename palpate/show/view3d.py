@@ -44,14 +44,14 @@ class View:
     force: str = "into"
 
     @property
-    def told(self) -> list[Colouring]:
+    def known(self) -> list[Colouring]:
         """The colourings of which something is known."""
         return [c for c in self.colourings if _known(c)]
 
     def html(self, still: str) -> str:
         """The section; still: HTML of what is shown without scripts."""
         data = json.dumps(_data(self), separators=(",", ":"), allow_nan=False).replace("</", "<\\/")
-        options = "".join(f"<option>{html.escape(c.title)}</option>" for c in self.told)
+        options = "".join(f"<option>{html.escape(c.title)}</option>" for c in self.known)
         live = _file("view3d.html").replace("<!-- options -->", options)
         if self.traces is None:
             live = re.sub("<!-- curve -->.*<!-- end of curve -->", "", live, flags=re.DOTALL)
@@ -84,7 +84,7 @@ def _data(view: View) -> dict[str, Any]:
         "elevation": view.elevation_deg,
         "selected": int(view.selected),
         "force": view.force,
-        "colourings": _scaled([_colouring(c, view) for c in view.told]),
+        "colourings": _scaled([_colouring(c, view) for c in view.known]),
         "table": {"head": head, "rows": rows},
     }
     return data | ({"curves": packed_curves(view.traces)} if view.traces else {})
@@ -126,14 +126,14 @@ def _scaled(colourings: list[dict[str, Any]]) -> list[dict[str, Any]]:
 
 def _rows(view: View) -> tuple[list[str], list[list[str]]]:
     """Head and rows, in words, of the presses: place, and what each colouring says of it."""
-    told = [(c, c.presses * c.quantity.scale) for c in view.told if c.presses is not None]
-    told = [(c, values) for c, values in told if c.quantity is not ORDER]
+    shown = [(c, c.presses * c.quantity.scale) for c in view.known if c.presses is not None]
+    shown = [(c, values) for c, values in shown if c.quantity is not ORDER]
     head = ["press", "at x, y, z [mm]"]
-    head += [c.title + (f" [{c.quantity.unit}]" if c.quantity.unit else "") for c, _ in told]
+    head += [c.title + (f" [{c.quantity.unit}]" if c.quantity.unit else "") for c, _ in shown]
     rows = []
     for i, place in enumerate(1e3 * view.places):
         row = [str(i + 1), ", ".join(f"{v:.0f}" for v in place.round() + 0.0)]
-        rows.append(row + ["–" if not np.isfinite(v[i]) else f"{v[i]:.3g}" for _, v in told])
+        rows.append(row + ["–" if not np.isfinite(v[i]) else f"{v[i]:.3g}" for _, v in shown])
     return head, rows
 
 

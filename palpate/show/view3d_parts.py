@@ -75,7 +75,7 @@ def packed_curves(traces: Traces) -> dict[str, Any]:
     lengths = np.diff(traces.starts)
     most = int(np.clip(SAMPLES // max(len(lengths), 1), FEWEST, MOST))
     kept = [
-        first + _telling(traces.depth_m[first : first + count], most)
+        first + _kept_rows(traces.depth_m[first : first + count], most)
         for first, count in zip(traces.starts, lengths, strict=False)
     ]
     chosen = np.concatenate(kept) if kept else np.zeros(0, dtype=int)
@@ -98,7 +98,7 @@ def packed_curves(traces: Traces) -> dict[str, Any]:
     }
 
 
-def _telling(depth_m: np.ndarray, most: int) -> np.ndarray:
+def _kept_rows(depth_m: np.ndarray, most: int) -> np.ndarray:
     """Rows of a press, `most` at most: half spread over its time, half over the way that the tip goes."""
     count = len(depth_m)
     if count <= most:

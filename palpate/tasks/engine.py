@@ -1,8 +1,7 @@
-"""Which executor: the flags that choose it, and a run with a bar."""
+"""Which executor, and a run with a bar."""
 
 from __future__ import annotations
 
-import argparse
 import shutil
 import sys
 from contextlib import AbstractContextManager
@@ -11,30 +10,8 @@ from typing import Any
 
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
-from palpate.operations._flags import finite
 from palpate.tasks.driver import Outcome, Status, run
 from palpate.tasks.graph import Graph
-
-
-def add_engine(parser: argparse.ArgumentParser) -> None:
-    """--workers, --memory, --scheduler, --force."""
-    group = parser.add_argument_group("who does it")
-    group.add_argument(
-        "--workers",
-        type=int,
-        metavar="INTEGER",
-        help="processes of one thread each on this machine (default: one a core)",
-    )
-    group.add_argument(
-        "--memory",
-        type=finite,
-        metavar="NUMBER",
-        help="what they may take together [GB] (default: 90 %% of what is free)",
-    )
-    group.add_argument(
-        "--scheduler", metavar="ADDRESS", help="of a Dask cluster, such as tcp://HOST:8786, in their place"
-    )
-    group.add_argument("--force", action="store_true", help="do what is finished again")
 
 
 def executor(

@@ -165,7 +165,7 @@ def cores() -> int:
 def available_bytes() -> int:
     """What processes that start now may take: free or quickly freed, and within the memory limits of this
     process's control groups (version 2), as containers and SLURM set them; psutil reads no such limits."""
-    room = [int(psutil.virtual_memory().available)]
+    free = [int(psutil.virtual_memory().available)]
     with contextlib.suppress(OSError, ValueError, IndexError):
         own = Path("/proc/self/cgroup").read_text().strip().splitlines()[-1].split("::")[1].strip("/")
         root = Path("/sys/fs/cgroup")
@@ -174,5 +174,5 @@ def available_bytes() -> int:
                 break
             with contextlib.suppress(OSError, ValueError):
                 limit = int((group / "memory.max").read_text())
-                room.append(limit - int((group / "memory.current").read_text()))
-    return min(room)
+                free.append(limit - int((group / "memory.current").read_text()))
+    return min(free)

@@ -7,6 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 
 
+def level(up: np.ndarray) -> np.ndarray:
+    """(3,) unit vector across a unit vector `up` (3,): from the object away from the person."""
+    away = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
+    return away / np.linalg.norm(away)
+
+
 @dataclass(frozen=True)
 class View:
     """One renderer's side of a frame: force on the tool (3,) N and the surface's displacement (n, 3) m."""

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 import pyvista
 
+from palpate.window.picture import arrow_matrix
+
 
 @dataclass(frozen=True)
 class Ghost:
@@ -42,10 +44,5 @@ class GhostTip:
             return
         self._tips[0].SetPosition(*ghost.centre)
         self._tips[1].SetPosition(*(ghost.centre + ghost.depth_m * ghost.into))
-        x = ghost.into
-        y = np.cross([0.0, 0.0, 1.0] if abs(x[2]) < 0.9 else [1.0, 0.0, 0.0], x)
-        y /= np.linalg.norm(y)
-        matrix = np.eye(4)
-        matrix[:3, :3] = STAFF_M * np.column_stack([x, y, np.cross(x, y)])
-        matrix[:3, 3] = ghost.centre - self._radius * x
-        self._staff.SetUserMatrix(pyvista.vtkmatrix_from_array(matrix))
+        start = ghost.centre - self._radius * ghost.into
+        self._staff.SetUserMatrix(arrow_matrix(start, ghost.into, STAFF_M))

@@ -11,6 +11,8 @@ import math
 import numpy as np
 import vtk
 
+from palpate.window.frames import level
+
 TURN_A_HEIGHT = math.pi
 """Radians that a drag over the whole picture turns."""
 LOWEST, HIGHEST = math.radians(2.0), math.radians(88.0)
@@ -30,14 +32,13 @@ class Orbit:
     ) -> None:
         self._camera = camera
         self._up = np.array(up, dtype=float)
-        away = np.cross(self._up, [1.0, 0.0, 0.0] if abs(self._up[0]) < 0.9 else [0.0, 1.0, 0.0])
-        away /= np.linalg.norm(away)
+        away = level(self._up)
         self._axes = np.column_stack([np.cross(away, self._up), away])
         offset = np.asarray(from_m, dtype=float) - middle_m
         self._begin_m = float(np.linalg.norm(offset))
-        level = self._axes.T @ offset
+        flat = self._axes.T @ offset
         height = float(np.arcsin(offset @ self._up / self._begin_m))
-        self._home = (float(np.arctan2(level[1], level[0])), height, self._begin_m)
+        self._home = (float(np.arctan2(flat[1], flat[0])), height, self._begin_m)
         self._home_middle = np.array(middle_m, dtype=float)
         self.reset()
 
@@ -76,8 +77,8 @@ class Orbit:
         self._apply()
 
     def _apply(self) -> None:
-        level = self._axes @ [math.cos(self._azimuth), math.sin(self._azimuth)]
-        eye = math.cos(self._height) * level + math.sin(self._height) * self._up
+        flat = self._axes @ [math.cos(self._azimuth), math.sin(self._azimuth)]
+        eye = math.cos(self._height) * flat + math.sin(self._height) * self._up
         camera = self._camera
         camera.SetFocalPoint(*self._middle)
         camera.SetPosition(*(self._middle + self._distance_m * eye))

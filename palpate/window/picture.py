@@ -166,7 +166,7 @@ class ObjectPicture:
         self._arrow.SetVisibility(size > LEAST_ARROW_N)
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
-            self._arrow.SetUserMatrix(_arrow_matrix(start, force, ARROW_M_PER_N * size))
+            self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
 
 
 def _placed(point: np.ndarray, normal: np.ndarray) -> object:
@@ -177,7 +177,7 @@ def _placed(point: np.ndarray, normal: np.ndarray) -> object:
     return pyvista.vtkmatrix_from_array(matrix)
 
 
-def _arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> object:
+def arrow_matrix(start: np.ndarray, direction: np.ndarray, length: float) -> object:
     """A matrix that takes the unit arrow along x to `start`, along `direction`."""
     x = direction / np.linalg.norm(direction)
     y = np.cross([0.0, 0.0, 1.0] if abs(x[2]) < 0.9 else [1.0, 0.0, 0.0], x)

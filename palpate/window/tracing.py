@@ -6,6 +6,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from mechanics.model import Model
+from palpate.window.frames import level
 
 SECTORS = 72
 ENOUGH = 0.95
@@ -25,9 +26,7 @@ class BaseTracing:
         base = model.mesh.points[model.mesh.fixed]
         self._middle = base.mean(axis=0)
         up = model.support.normal
-        e1 = np.cross(up, [1.0, 0.0, 0.0] if abs(up[0]) < 0.9 else [0.0, 1.0, 0.0])
-        e1 /= np.linalg.norm(e1)
-        self._axes = np.column_stack([e1, np.cross(up, e1)])
+        self._axes = np.column_stack([level(up), np.cross(up, level(up))])
         self._foot = cKDTree((_outline(model) - self._middle) @ self._axes)
         self._seen = np.zeros(SECTORS, dtype=bool)
         self.first: int | None = None

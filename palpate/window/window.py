@@ -20,7 +20,7 @@ from devices.channel import PoseChannel
 from mechanics.files import PNG, atomic_file
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
-from palpate.window.frames import Frame
+from palpate.window.frames import Frame, level
 from palpate.window.game import Game
 from palpate.window.ghost import GhostTip
 from palpate.window.keys import help_text
@@ -209,11 +209,9 @@ class TouchWindow:
         """From the person's side, a little above; both pictures share the camera."""
         model = self.session.model
         up = model.support.normal
-        away = np.cross(up, [1.0, 0.0, 0.0]) if abs(up[0]) < 0.9 else np.cross(up, [0.0, 1.0, 0.0])
-        away /= np.linalg.norm(away)
         middle = 0.5 * (model.mesh.points.min(axis=0) + model.mesh.points.max(axis=0))
         distance = 2.1 * np.linalg.norm(np.ptp(model.mesh.points, axis=0))
-        eye = middle + distance * (-0.8 * away + 0.6 * up)
+        eye = middle + distance * (-0.8 * level(up) + 0.6 * up)
         self.plotter.subplot(0, 0)
         camera = self.plotter.camera
         for renderer in self.picture_renderers[1:]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.compliance import ComplianceOptions, condense
+from benchmarks._condensation import condense
+from mechanics.compliance import ComplianceOptions
 from mechanics.errors import MeshError, OptionError
 from mechanics.nearest import closest
 from mechanics.pardiso import available
@@ -21,7 +22,7 @@ if available():  # schur: all at once for a small result, in two parts for a lar
 
 @pytest.mark.parametrize(("method", "backend", "small"), WAYS)
 def test_condensed_equals_full_solves(box, monkeypatch, method, backend, small):
-    monkeypatch.setattr("mechanics.compliance._SMALL", small)
+    monkeypatch.setattr("benchmarks._condensation._SMALL", small)
     mesh = box((3, 3, 2), (0.1, 0.1, 0.05)).quadratic()
     ratio = np.random.default_rng(0).uniform(0.5, 6, len(mesh.tetrahedra))
     compliance = condense(mesh, 0.49, ratio, method=method, backend=backend)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from mechanics.compliance import condense
+from benchmarks._condensation import condense
 from mechanics.errors import MeshError
 from mechanics.inclusion import Region
 from mechanics.moduli import inclusion_ratio, share_inside

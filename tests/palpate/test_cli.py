@@ -14,7 +14,8 @@ import pytest
 
 from mechanics.options import option
 from palpate import cli
-from palpate.operations._flags import add_options, options_from
+from palpate.operations._declare import Call, operation
+from palpate.operations._flags import add_operation
 from palpate.operations._list import commands
 from palpate.output import emit_json
 
@@ -28,10 +29,20 @@ class SampleOptions:
     repeats: int = option(3, "how many")
 
 
+@dataclass(frozen=True)
+class NoOperands:
+    pass
+
+
+@operation(NoOperands, SampleOptions, json=False)
+def sample(asked: NoOperands, call: Call) -> SampleOptions:
+    return call.of(SampleOptions)
+
+
 def parse(*words: str) -> SampleOptions:
     parser = argparse.ArgumentParser()
-    add_options(parser, SampleOptions)
-    return options_from(parser.parse_args(words), SampleOptions)
+    add_operation(parser, sample.operation)
+    return sample.operation.run(vars(parser.parse_args(words)))[1]
 
 
 def test_options_become_flags_and_come_back():

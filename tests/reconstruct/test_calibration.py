@@ -11,7 +11,7 @@ import pytest
 import palpate as pp
 from diagnose.calibrate.on_object import STIFFEST, instrument_of
 from diagnose.calibrate.on_plate import calibrate_on_plate
-from mechanics.calibration import Calibration, read_calibration, write_calibration
+from mechanics.calibration import Calibration, read_calibration
 from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.samples import delayed
@@ -80,7 +80,7 @@ def test_a_recording_that_names_a_calibration_is_read_as_an_ideal_instrument_had
         clean, position=bent, force_on_tool=delayed([slice(None)], clean.t, read, 0.02)
     )
     path = write_recording(tmp_path / "rec.csv.gz", spoilt)
-    write_calibration(tmp_path / "tool.toml", tool)
+    tool.save(tmp_path / "tool.toml")
     described = tmp_path / "rec.toml"
     described.write_text(described.read_text().replace("[tool]", '[tool]\ncalibration = "tool.toml"'))
     back = read_recording(path)

@@ -30,7 +30,7 @@ class Cell:
 
 def report(result: Batch, path: Path | str) -> Path:
     """Write the page; thumbnails and reports are linked where they lie, below the page's folder."""
-    page = Page(f"Batch of {_count(len(result.entries), 'recording')}")
+    page = Page(f"Batch of {_count(result)}")
     page.part(f"<style>\n{_file('batch.css')}</style>")
     page.lead(lead(result))
     page.paragraph(meaning(result))
@@ -58,7 +58,7 @@ def _file(name: str) -> str:
 def lead(result: Batch) -> str:
     """How many are done, failed and waiting, in a sentence."""
     count = {s: sum(e.row.status == s for e in result.entries) for s in ("done", "failed", "waiting")}
-    parts = [f"{count['done']} of {_count(len(result.entries), 'recording')} done"]
+    parts = [f"{count['done']} of {_count(result)} done"]
     if count["failed"]:
         parts.append(f"{count['failed']} failed, with the reason beside")
     if count["waiting"]:
@@ -90,8 +90,8 @@ def _what_next(result: Batch) -> str:
     return f"What to do next: open a recording's page by its name; feel one: {feel}."
 
 
-def _count(number: int, noun: str) -> str:
-    return f"{number} {noun}" + ("s" if number != 1 else "")
+def _count(result: Batch) -> str:
+    return f"{len(result.entries)} recording" + ("s" if len(result.entries) != 1 else "")
 
 
 def _agreement(page: Page, result: Batch) -> None:

@@ -10,7 +10,7 @@ from matplotlib.ticker import LogLocator, NullFormatter
 from palpate.demo import DemoResult
 from palpate.servo.histogram import lower_edge_ns
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
-from palpate.show.object3d import Colours, draw_object
+from palpate.show.object3d import Colours, draw_object, draw_touched
 from palpate.show.quantities import ERROR, UNCERTAINTY
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.view3d import View
@@ -113,12 +113,9 @@ def figures(result: DemoResult) -> dict[str, Figure]:
     force, ax = plt.subplots(figsize=(9, 3), layout="constrained")
     force_over_time(ax, result.reconstruction.exploration)
     thing, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
-    model = result.model
-    touches = model.presses.point
-    draw_object(axes[0], model, touches=touches, show_base=True)
-    axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
-    doubt = felt_surface(model).uncertainty_m
-    draw_object(axes[1], model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
+    draw_touched(axes[0], result.model)
+    doubt = felt_surface(result.model).uncertainty_m
+    draw_object(axes[1], result.model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
     presses, axes = plt.subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True, layout="constrained")
     measured_against_rendered(axes, result)
     loop, axes = plt.subplots(1, 2, figsize=(9, 2.6), layout="constrained")

@@ -14,11 +14,11 @@ _PAPER_THRESHOLD_N, _PAPER_INDENTATION_M = 1.0, 0.010
 
 def differences(result: Reconstruction) -> list[str]:
     """One paragraph each: touches, first touch, surface, load, law, interval, trend with height."""
-    told = [_touches(result), _surface(result), _load(result)]
+    paragraphs = [_touches(result), _surface(result), _load(result)]
     if result.modulus:
-        told[1:1] = [_first_touch(result)]
-        told += [_law(result.modulus)]
-    return [words for words in [*told, _trend(result)] if words]
+        paragraphs[1:1] = [_first_touch(result)]
+        paragraphs += [_law(result.modulus)]
+    return [words for words in [*paragraphs, _trend(result)] if words]
 
 
 def _touches(result: Reconstruction) -> str:

@@ -38,11 +38,6 @@ class Trend:
     change: float
 
 
-def column(model: Model, name: str) -> np.ndarray:
-    """(k,) one fitted column of the presses."""
-    return model.presses.fits[name]
-
-
 def heights(model: Model) -> np.ndarray:
     """(k,) m, heights of the contacts above the support."""
     return model.support.height(model.presses.point)
@@ -58,7 +53,7 @@ def height_trends(model: Model) -> list[Trend]:
     side, height = on_side(model), heights(model)
     trends = []
     for name in ("k_v", "k_h", "e_pa"):
-        values = column(model, name)
+        values = model.presses.fits[name]
         used = side & np.isfinite(values)
         if used.sum() >= 5:
             r, p = pearsonr(height[used], values[used])
@@ -91,7 +86,7 @@ def undamped_figure(models: dict[str, Model]) -> Figure:
     for ax, name, label, letter in zip(
         axes, ("k_v", "k_c", "r_c", "k_h"), labels, ("a", "b", "b", "c"), strict=True
     ):
-        spread(ax, [column(m, name) for m in models.values()], list(models))
+        spread(ax, [m.presses.fits[name] for m in models.values()], list(models))
         ax.set_ylabel(label)
         ax.set_title(f"({letter})", loc="left", fontsize=10)
         ax.tick_params(axis="x", labelrotation=20, labelsize=8)
@@ -112,7 +107,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
     side, height = on_side(model), heights(model) * 1e3
     reach = 0.1
     for ax, key, label in zip(axes[1], ("k_v", "k_h", "e_pa"), ("$k_V$", "$k_H$", "e"), strict=True):
-        value = column(model, key)
+        value = model.presses.fits[key]
         share = 100 * (value[side] / np.nanmean(value[side]) - 1) if side.any() else np.zeros(0)
         ax.plot(height[side], share, "o", ms=4, color=FORCE_COLOUR)
         ax.axhline(0, color=PEAK_COLOUR, lw=1)
@@ -127,7 +122,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
 
 def _limits(models: list[Model], key: str, quantity: Quantity) -> tuple[float, float]:
     """Of the colours of one column of several models: without the outermost twentieth of the presses."""
-    values = np.concatenate([column(m, key) for m in models]) * quantity.scale
+    values = np.concatenate([m.presses.fits[key] for m in models]) * quantity.scale
     low, high = np.nanpercentile(values, [5, 95])
     return quantity.limits(float(low), float(max(high, low + 1e-9)))
 
@@ -141,7 +136,7 @@ def _coloured(
     elevation_deg: float = 25.0,
 ) -> None:
     """The object coloured by a column of its palpations."""
-    values = column(model, key) * quantity.scale
+    values = model.presses.fits[key] * quantity.scale
     colours = Colours(over_surface(model, values), quantity, limits)
     touches = model.presses.point[np.isfinite(values)]
     draw_object(ax, model, colours, touches=touches, elevation_deg=elevation_deg)
@@ -153,7 +148,7 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
     shown = list(models.items())[:2]
     figure, axes = plt.subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4), layout="constrained")
     stars = [m.material.young_modulus_pa / 1e3 for m in models.values()]
-    spread(axes[0], [column(m, "e_pa") / 1e3 for m in models.values()], list(models), stars)
+    spread(axes[0], [m.presses.fits["e_pa"] / 1e3 for m in models.values()], list(models), stars)
     for i, model in enumerate(models.values()):
         low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
         if np.isfinite([low, high]).all():
@@ -185,8 +180,8 @@ def depth_figure(fit: ModulusFit) -> Figure:
         ax.plot(depth[~agrees], value[~agrees], "o", mfc="white", color=FORCE_COLOUR, label="does not")
     ax.plot(fit.press.depth_m * 1e3, fit.modulus_pa / 1e3, "*", ms=13, color=PEAK_COLOUR, label="chosen")
     low, high = min(value.min(), fit.ci95_pa[0] / 1e3), max(value.max(), fit.ci95_pa[1] / 1e3)
-    room = 0.3 * (high - low)
-    ax.set(xlabel="samples up to depth [mm]", ylabel="modulus [kPa]", ylim=(low - room, high + 2 * room))
+    margin = 0.3 * (high - low)
+    ax.set(xlabel="samples up to depth [mm]", ylabel="modulus [kPa]", ylim=(low - margin, high + 2 * margin))
     ax.legend(frameon=False, fontsize=8, ncols=2)
     return figure
 

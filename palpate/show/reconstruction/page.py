@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from mechanics.model import Model
 from mechanics.touch import forces_at
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
-from palpate.show.object3d import Colours, draw_object
+from palpate.show.object3d import Colours, draw_object, draw_touched
 from palpate.show.page import Page, save_figures
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.reconstruction.differences import differences
@@ -125,15 +125,13 @@ def view(result: Reconstruction) -> View:
 def object_figure(model: Model) -> Figure:
     """First touches and fixed base; the modulus of single presses over the surface."""
     figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
-    touches = model.presses.point
-    draw_object(axes[0], model, touches=touches, show_base=True)
-    axes[0].legend(loc="upper center", frameon=False, bbox_to_anchor=(0.5, 0.0), ncols=2)
+    draw_touched(axes[0], model)
     own = model.presses.fits["e_pa"]
     if np.isfinite(own).any():
         values = own[np.isfinite(own)] * MODULUS.scale
         limits = MODULUS.limits(values.min(), values.max())
         colours = Colours(over_surface(model, own * MODULUS.scale), MODULUS, limits)
-        draw_object(axes[1], model, colours, touches=touches[np.isfinite(own)])
+        draw_object(axes[1], model, colours, touches=model.presses.point[np.isfinite(own)])
     else:
         axes[1].set_axis_off()
     return figure
@@ -182,7 +180,7 @@ def _meaning(result: Reconstruction) -> str:
     """What the modulus and its interval mean, in a sentence or two."""
     model = result.model
     e, (low, high) = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
-    words = f"About as soft as {_soft_as(e)}."
+    words = f"About as soft as {next(words for limit, words in _SOFTNESS if e <= limit)}."
     if np.isfinite([low, high]).all():
         words += (
             f" Another exploration of the same object would be expected to find a modulus within "
@@ -203,10 +201,6 @@ _SOFTNESS = (
     (np.inf, "a firm rubber, or stiffer"),
 )
 """Up to a modulus, Pa: what is about as soft. Orders of magnitude of elastography and of data sheets."""
-
-
-def _soft_as(modulus_pa: float) -> str:
-    return next(words for limit, words in _SOFTNESS if modulus_pa <= limit)
 
 
 def _how(page: Page, result: Reconstruction) -> None:

@@ -13,7 +13,7 @@ from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.sites import patch_compliance, patch_width
 from mechanics.solver import Solver
 from palpate.show.page import Page
-from palpate.show.reconstruction.modulus import Trend, column
+from palpate.show.reconstruction.modulus import Trend
 from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s6_one_d.one_d import OneD, fit_paper, fit_robust, profiles
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
@@ -50,7 +50,7 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
     for name, model in {result.exploration.recording.name: result.model, **beside}.items():
         mine = model is result.model
         known = truth.get("young_modulus_pa", float("nan")) / 1e3 if mine else float("nan")
-        each = column(model, "e_pa") / 1e3
+        each = model.presses.fits["e_pa"] / 1e3
         low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
         shape = truth.get("shape", "") if mine else model.about.get("shape", {}).get("surface", "")
         rows.append([
