@@ -37,7 +37,8 @@ class DemoOptions:
 
     seconds: float = option(10.0, "how long the 1 kHz loop runs against the simulated hand", unit="s")
     renderer: str = option("fem", "which renderer serves the loop and the replay")
-    diagnosis: bool = option(True, "diagnose the gap too, in its fast form", flag="--diagnosis")
+    diagnosis: bool = option(True, "diagnose the gap too", flag="--diagnosis")
+    fast: bool = option(True, "by fewer effects")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -91,7 +92,7 @@ def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int =
     if options.diagnosis:
         with stage("diagnose") as progress:
             most = AttributionOptions().most
-            diagnosis = diagnose(recording, model, fast=True, most=most, seed=seed, progress=progress)
+            diagnosis = diagnose(recording, model, fast=options.fast, most=most, seed=seed, progress=progress)
     return DemoResult(
         recording,
         done,

@@ -53,6 +53,10 @@ ENABLING_S = 0.25
 ZERO = np.zeros(3)
 
 
+FIRST_READING_S = 1.0
+"""How long a device may take to its first reading; slower ones begin with the force off."""
+
+
 class DeviceThread:
     """Owns the open device from `start` to `join`."""
 
@@ -86,7 +90,14 @@ class DeviceThread:
         self._thread = threading.Thread(target=self._run, name="servo device", daemon=True)
 
     def prepare(self) -> None:
-        """Take a first pose, so that the loop's first tick has one and everything here is loaded."""
+        """Take a first pose, so that the loop's first tick has one and everything here is loaded.
+
+        A device on a wire has none before its first reading, and one that is not calibrated yet would latch
+        the force at zero: so the first reading is waited for, FIRST_READING_S at most.
+        """
+        until = time.monotonic() + FIRST_READING_S
+        while self.device.read().sequence < 0 and time.monotonic() < until:
+            time.sleep(1e-3)
         self.read_pose()
         take_command(self._arrays, self._command)
 

@@ -234,7 +234,7 @@ def test_tiny_scales_keep_their_digits(tmp_path):
             {"tip_radius_m": TIP, "units": {"force": "mm"}},
             "no unit of force",
         ),
-        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "force_on": "me"}, "tool and object"),
+        ("t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n", {"tip_radius_m": TIP, "force_on": "me"}, "tool, object"),
         ("hello\nworld\n", {"tip_radius_m": TIP}, "is it a table"),
         (
             "t,x,y,z,fz\n1,2,3,4,5\n2,2,3,4,5\n",
