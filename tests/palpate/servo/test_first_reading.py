@@ -1,4 +1,4 @@
-"""The loop begins with a pose that the device has read; one from before its first reading latches the force."""
+"""The loop begins with a pose that the device has read: one from before that would latch the force at zero."""
 
 from __future__ import annotations
 
