@@ -1,4 +1,4 @@
-"""The loop begins with a pose that the device has read: one from before that would latch the force at zero."""
+"""The loop begins with a pose that the device has read: one from before would latch the force."""
 
 from __future__ import annotations
 
