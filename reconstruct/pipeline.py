@@ -32,7 +32,7 @@ from reconstruct.methods import BY_NAME, Body, Method
 from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
-from reconstruct.steps.s3_contacts.left_out import on_base, without_slides
+from reconstruct.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
@@ -127,7 +127,10 @@ def _reconstructed(
     progress("meshing", 0.3)
     found = exploration.presses
     where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal)
-    presses = found.on_surface(where.points, where.normals)
+    least = options.contact.least_palpations
+    exploration, kept = on_surface(exploration, where.points, where.normals, least)
+    where = where.of(kept)
+    presses = exploration.presses.on_surface(where.points, where.normals)
     curves = profiles(presses, options.filter.cutoff_hz)
     one_d = method.fit_one_d(curves, exploration.noise_n)
     clock.lap("1D models")
@@ -229,6 +232,7 @@ def _with_known_geometry(
     recording, options, within = run.recording, run.method.options, part(progress, 0.02, 0.3)
     least = options.contact.least_palpations
     first = without_slides(run.presses(nowhere(recording), unbroken=True), least)
+    first = within_slab(first, geometry.slab_m)
     within("contacts", 0.3)
     placed = place(
         recording,
