@@ -39,8 +39,8 @@ from reconstruct.steps.s7_modulus.shape_error import PoseError
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be ruled out."""
 _TRUE, _BEYOND = 0.005, 3.0
-"""Of the size: how true to the object a file usually is (a cast shrinks, soft things settle); first touches so
-many standard deviations of that and of their own error off it lie on another object."""
+"""Of the size: how true to the object a file usually is (a cast shrinks, soft things settle); first touches
+so many standard deviations of that and of their own error off it lie on another object."""
 _FAR = 0.1
 """Of the size: a median residual beyond this is another object, unit or frame."""
 
@@ -130,9 +130,9 @@ def _doubt(given: ClosedSurface, found: Registration, touched: Touched, *, free:
     if typical <= _BEYOND * can:
         return ""
     return (
-        f"'{given.name}' may be another object's shape: first touches lie {1e3 * typical:.1f} mm off it (68 % "
-        f"of the places), where {1e3 * _BEYOND * can:.1f} mm is the most that touches and file explain; check "
-        "the file, --unit and --pose"
+        f"'{given.name}' may be another object's shape: first touches lie {1e3 * typical:.1f} mm off it (68 "
+        f"% of the places), where {1e3 * _BEYOND * can:.1f} mm is the most that touches and file explain; "
+        "check the file, --unit and --pose"
     )
 
 

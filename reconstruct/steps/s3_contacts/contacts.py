@@ -168,8 +168,8 @@ def explore(
     error = step.error_s if np.isfinite(step.error_s) else error
     if abs(delay) < _KNOWN * error:
         dropped = (
-            f"the force reads {1e3 * delay:.0f} +- {1e3 * error:.0f} ms late by first and last touch, which is "
-            "less than twice its error: not corrected"
+            f"the force reads {1e3 * delay:.0f} +- {1e3 * error:.0f} ms late by first and last touch, which "
+            "is less than twice its error: not corrected"
         )
         return replace(_tabled(recording, first, method, options, before), dropped=(dropped,))
     return _tabled(recording, found, method, options, (delay, error))

@@ -16,8 +16,11 @@ _BLOCK_S = 0.004
 
 @dataclass(frozen=True)
 class HeldOut:
-    """N, rms of the 3-vector over contact samples of presses whose place was held out: model_n, of the
-    modulus that the other places tell; constant_n, of their mean push along the normal, whatever the depth."""
+    """N, rms of the 3-vector over contact samples of presses whose place was held out.
+
+    model_n: of the modulus that the other places tell. constant_n: of their mean push along the normal,
+    whatever the depth.
+    """
 
     model_n: float
     constant_n: float
