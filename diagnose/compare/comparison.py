@@ -93,8 +93,8 @@ class Comparison(Result):
 
     @property
     def constant_n(self) -> float:
-        """rms error, N, of the ceiling: a constant push along the normal, the mean of the other folds' presses,
-        whatever the depth."""
+        """rms error, N, of the ceiling: a constant push along the normal, the mean of the other folds', at
+        every depth."""
         presses = self.presses
         normal = presses.normal[presses.press]
         push = np.einsum("ij,ij->i", presses.force, normal)
