@@ -32,13 +32,14 @@ from reconstruct.methods import BY_NAME, Body, Method
 from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
-from reconstruct.steps.s3_contacts.left_out import on_base, without_slides
+from reconstruct.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.background import BackgroundMesher
 from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
 from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
+from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
 from reconstruct.steps.s7_modulus.modulus_paper import PaperFit
@@ -50,7 +51,8 @@ class Reconstruction(Result):
 
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
-    findings: of the check-up, grave ones first; the interval is as wide as they make it. `plot`: force over
+    findings: of the check-up, grave ones first; the interval is as wide as they make it. held_out: how the
+    modulus predicts places that were held out; None by the method paper, or of one place. `plot`: force over
     time with the touches that were found. `show`: the model.
     """
 
@@ -67,6 +69,15 @@ class Reconstruction(Result):
     paper_fit: PaperFit | None = None
     placed: Placed | None = None
     findings: tuple[Finding, ...] = ()
+    held_out: HeldOut | None = None
+
+    @property
+    def doubt(self) -> str:
+        """Why the answer is not to be believed, in one line: the known shape is another object's, or places
+        that were held out are not predicted. '' where nothing speaks against it."""
+        by_shape = "" if self.placed is None else self.placed.doubt
+        by_force = "" if self.held_out is None else self.held_out.doubt
+        return "; ".join(filter(None, (by_shape, by_force)))
 
     @property
     def recording(self) -> Recording:
@@ -127,7 +138,10 @@ def _reconstructed(
     progress("meshing", 0.3)
     found = exploration.presses
     where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal)
-    presses = found.on_surface(where.points, where.normals)
+    least = options.contact.least_palpations
+    exploration, kept = on_surface(exploration, where.points, where.normals, least)
+    where = where.of(kept)
+    presses = exploration.presses.on_surface(where.points, where.normals)
     curves = profiles(presses, options.filter.cutoff_hz)
     one_d = method.fit_one_d(curves, exploration.noise_n)
     clock.lap("1D models")
@@ -136,6 +150,9 @@ def _reconstructed(
     progress("factorise", 0.5)
     body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n)
     fitted = method.fit(body, progress, clock)
+    predicted = None
+    if fitted.sites is not None and fitted.modulus is not None:
+        predicted = held_out(presses, fitted.sites, fitted.modulus)
     interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
     progress("model", 0.95)
@@ -169,6 +186,7 @@ def _reconstructed(
         paper_fit=fitted.paper_fit,
         placed=placed,
         findings=checkup.found,
+        held_out=predicted,
     )
 
 
@@ -229,6 +247,7 @@ def _with_known_geometry(
     recording, options, within = run.recording, run.method.options, part(progress, 0.02, 0.3)
     least = options.contact.least_palpations
     first = without_slides(run.presses(nowhere(recording), unbroken=True), least)
+    first = within_slab(first, geometry.slab_m)
     within("contacts", 0.3)
     placed = place(
         recording,

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from mechanics.errors import NoBaseError
+import numpy as np
+
+from mechanics.errors import ContactError, NoBaseError
 from mechanics.model import Model
 from mechanics.presses import Presses
 from mechanics.recording import Recording
 from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
-from reconstruct.steps.s3_contacts.left_out import without_slides
+from reconstruct.steps.s3_contacts.left_out import off_surface, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
 from reconstruct.steps.s4_surface.casting import cast
 
@@ -19,15 +21,21 @@ _ANY = ContactOptions(least_palpations=1)
 def presses_on(recording: Recording, model: Model) -> Presses:
     """The model's own table where it was made from this recording; else its presses, found and cast onto the
     model's surface. A recording that does not trace a base, or states what it lies on, stands on the model's.
+    Presses that are not on that surface (`left_out.off_surface`) are left out.
 
-    Raises ContactError where the recording holds no press.
+    Raises ContactError where the recording holds no press on the model.
     """
     own = model.presses
     if own.sampled and own.recording == recording.content:
         return own
     found = _found(recording, model)
     where = cast(model.mesh.points, model.mesh.touchable_surface, found.point, found.contact_normal)
-    return found.on_surface(where.points, where.normals)
+    base = base_of_model(model, recording.tip_radius_m)
+    reasons = off_surface(found, where.points, where.normals, base)
+    kept = np.array([not reason for reason in reasons])
+    if not kept.any():
+        raise ContactError(f"none of the {len(kept)} presses is on the model: the first {reasons[0]}")
+    return found.of(kept).on_surface(where.points[kept], where.normals[kept])
 
 
 def _found(recording: Recording, model: Model) -> Presses:

@@ -91,6 +91,18 @@ class Comparison(Result):
         """Contact samples of all presses; force net of free air."""
         return self.prepared.presses
 
+    @property
+    def constant_n(self) -> float:
+        """rms error, N, of the ceiling: a constant push along the normal, the mean of the other folds', at
+        every depth."""
+        presses = self.presses
+        normal = presses.normal[presses.press]
+        push = np.einsum("ij,ij->i", presses.force, normal)
+        fold = self.fold[presses.press]
+        total, count = np.bincount(fold, weights=push), np.bincount(fold)
+        others = (push.sum() - total) / np.maximum(len(push) - count, 1)
+        return rms(others[fold, None] * normal - presses.force)
+
     def wins(self, name: str) -> int:
         """On how many held-out presses the model errs least."""
         names = ("fem", *RIVALS)

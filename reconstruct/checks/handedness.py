@@ -3,7 +3,8 @@
 For a touch that sticks, the force on the tool points against its travel since first touch, to within friction
 and the surface's slope. Of all maps that a wrong axis, sign or handedness makes (the 48 signed permutations,
 and |force| a component) the one under which forces are most nearly where they must be is compared with the
-identity, sites weighed alike.
+identity, sites weighed alike. Only touches that press count, from which the tip comes back; where it slides
+as well, its force must lie no more along the way under that map than as read: it stands on the surface.
 """
 
 from __future__ import annotations
@@ -22,13 +23,20 @@ _LEAST_ANGLE_RAD = 0.15
 """Directions of force and of travel agree no better than this on a sound recording."""
 _FLIPPED, _PRIOR = np.pi / 2, 1e-3
 _FORCE = ("fx", "fy", "fz")
+_COMES_BACK = 0.5
+"""Of its greatest distance from first touch: a press lets go nearer than that, a slide farther."""
+_SLIDE_S, _SLIDE_RADII, _STEADY = 0.2, 0.4, 0.4
+"""The tip slides where it goes so many radii in that time and its force changes by less than that share: a
+press that goes in or out as far changes it by more."""
+_LENGTHWAYS = 0.1
+"""Mean share of its force along the way of a slide that friction and surfaces that lean bring about."""
 
 
 def handedness(data: Samples) -> Iterator[Finding]:
     """A finding where another map than the identity explains the forces' directions far better."""
     touches = data.touches
     length, force = np.linalg.norm(touches.travel, axis=1), np.linalg.norm(touches.push, axis=1)
-    good = (length > 5 * max(float(data.step[:3].max()), 1e-6)) & (force > 0)
+    good = (length > 5 * max(float(data.step[:3].max()), 1e-6)) & (force > 0) & _presses(data)
     if good.sum() < _LEAST_SITES:
         return
     against = -touches.travel[good] / length[good, None]
@@ -49,7 +57,7 @@ def handedness(data: Samples) -> Iterator[Finding]:
     found["abs"] = astray(np.abs(against))
     best = min(found, key=lambda name: found[name])
     decades = sites * float(np.log10(as_read / found[best])) + np.log10(_PRIOR)
-    if decades < np.log10(SURE_ODDS):
+    if decades < np.log10(SURE_ODDS) or not slides_agree(data, best):
         return
     off = np.arccos(np.clip(np.einsum("ij,ij->i", push, against), -1, 1))
     worst = int(np.flatnonzero(good)[np.argmax(off)])
@@ -67,6 +75,36 @@ def handedness(data: Samples) -> Iterator[Finding]:
         (at[0], at[1]),
         _FORCE,
     )
+
+
+def _presses(data: Samples) -> np.ndarray:
+    """(k,) bool, touches that press: the tip comes back to where it touched before it lets go."""
+    found = []
+    for a, b in zip(data.touches.start, data.touches.end, strict=True):
+        way = np.linalg.norm(data.path[a:b] - data.path[a], axis=1)
+        found.append(way[-1] < _COMES_BACK * way.max())
+    return np.array(found, dtype=bool)
+
+
+def slides_agree(data: Samples, best: str) -> bool:
+    """Whether the force of sliding contact lies no more along its way by the map `best` than as read. True
+    where nothing slides."""
+    ends = np.arange(0, len(data.path), max(1, round(_SLIDE_S * data.rate_hz)))
+    moved, size = np.diff(data.path[ends], axis=0), data.size[ends]
+    way, changed = np.linalg.norm(moved, axis=1), np.abs(np.diff(size))
+    touching = data.contact[ends[1:]] & data.contact[ends[:-1]]
+    steady = changed < _STEADY * np.minimum(size[1:], size[:-1])
+    sliding = touching & steady & (way > _SLIDE_RADII * data.tip_radius_m)
+    if best == "abs" or sliding.sum() < _LEAST_SITES:
+        return True
+    along = moved[sliding] / way[sliding, None]
+    force = (data.net[ends[1:]] + data.net[ends[:-1]])[sliding]
+    force = force / np.maximum(np.linalg.norm(force, axis=1, keepdims=True), 1e-300)
+
+    def lengthways(read: np.ndarray) -> float:
+        return float(np.abs(np.einsum("ij,ij->i", read, along)).mean())
+
+    return lengthways(force @ _MAPS[best]) <= lengthways(force) + _LENGTHWAYS
 
 
 def _maps() -> dict[str, np.ndarray]:

@@ -6,6 +6,7 @@ into the modulus's interval (reconstruct.steps.s7_modulus.shape_error).
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import numpy as np
@@ -37,6 +38,9 @@ from reconstruct.steps.s7_modulus.shape_error import PoseError
 
 _ALIKE = 1.5
 """A rival pose whose residual is less than this times the best one's cannot be ruled out."""
+_TRUE, _BEYOND = 0.005, 3.0
+"""Of the size: how true to the object a file usually is (a cast shrinks, soft things settle); first touches
+so many standard deviations of that and of their own error off it lie on another object."""
 _FAR = 0.1
 """Of the size: a median residual beyond this is another object, unit or frame."""
 
@@ -67,7 +71,8 @@ def place(
     found = register(body, touched, free=options.pose == "auto")
     progress("registration", 1.0)
     _check(given, found, options)
-    return _placed(given, stood, found, options, spacing_m, recording.tip_radius_m)
+    placed = _placed(given, stood, found, options, spacing_m, recording.tip_radius_m)
+    return dataclasses.replace(placed, doubt=_doubt(given, found, touched, free=options.pose == "auto"))
 
 
 def _touched(presses: Presses, support: tuple[np.ndarray, np.ndarray] | None) -> Touched:
@@ -107,6 +112,27 @@ def _check(given: ClosedSurface, found: Registration, options: GeometryOptions) 
     raise SurfaceError(
         f"'{given.name}' cannot be registered: first touches stay {1e3 * off:.1f} mm off (median; it is "
         f"{1e3 * given.size_m:.0f} mm across): is --unit {options.unit} right, and is it this object?"
+    )
+
+
+def _doubt(given: ClosedSurface, found: Registration, touched: Touched, *, free: bool) -> str:
+    """Why the shape is another object's; '' where first touches lie on it as they can, or are too few.
+
+    Of 68 % of the places, with what the six numbers of a registered pose have taken off.
+    """
+    places = np.unique(touched.site)
+    left = len(places) - 6 * free
+    if left < 1:
+        return ""
+    off = np.array([np.median(np.abs(found.residual_m[touched.site == s])) for s in places])
+    typical = float(np.percentile(off, 68.3)) * float(np.sqrt(len(places) / left))
+    can = float(np.hypot(np.median(touched.error_m), _TRUE * given.size_m))
+    if typical <= _BEYOND * can:
+        return ""
+    return (
+        f"'{given.name}' may be another object's shape: first touches lie {1e3 * typical:.1f} mm off it (68 "
+        f"% of the places), where {1e3 * _BEYOND * can:.1f} mm is the most that touches and file explain; "
+        "check the file, --unit and --pose"
     )
 
 

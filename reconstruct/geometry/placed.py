@@ -24,7 +24,8 @@ class Placed:
     surface: closed, its uncertainty that of pose and file together. local_sd_m: of the file alone. pose: its
     error, None where it is taken as given. mesh: of a slab, which needs no mesher; None for a shape. base:
     as a tracing would give it. residual_m: (k,) of the first touches. about: what model.toml keeps,
-    [geometry]. notes: what the user should know, one line each.
+    [geometry]. notes: what the user should know, one line each. doubt: why it may be another object's, ''
+    where the touches lie on it.
     """
 
     surface: Surface
@@ -35,6 +36,7 @@ class Placed:
     residual_m: np.ndarray
     about: dict[str, Any]
     notes: tuple[str, ...]
+    doubt: str = ""
 
     @property
     def by_itself(self) -> Surface:

@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 
+from reconstruct.steps.s3_contacts import contacts
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore, read_earlier
+from reconstruct.steps.s3_contacts.force_delay import Delay
 
 from .exploration_of_cylinder import HEIGHT, RADIUS, TILTED, TIP, explore_cylinder
 
@@ -55,3 +57,15 @@ def test_the_papers_mode_takes_the_force_as_it_is(on_time):
     options = ContactOptions(contact_threshold_n=0.3)
     late = read_earlier(on_time, -0.02)
     assert explore(late, method="paper", contact_options=options).delay_s == 0
+
+
+def test_a_delay_smaller_than_twice_its_error_is_not_corrected_and_said(on_time, monkeypatch):
+    """It seemed sure at first, and is not once the force is shifted by it."""
+    plain = explore(on_time, contact_options=ContactOptions(correct_delay=False))
+    told = [Delay(-0.045, 0.005, 9), Delay(0.0, 0.239, 9)]
+    monkeypatch.setattr(contacts, "force_delay", lambda *_: told.pop(0))
+    exploration = explore(on_time)
+    assert exploration.delay_s == exploration.delay_error_s == 0.0
+    assert np.array_equal(exploration.presses.onset_s, plain.presses.onset_s)
+    (words,) = exploration.dropped
+    assert "-45 +- 239 ms late" in words and "not corrected" in words

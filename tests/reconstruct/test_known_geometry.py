@@ -22,6 +22,7 @@ from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s3_contacts.left_out import without_slides
 from scenes.scene import Scene
 
+from .flat_contact import points
 from .flat_ground import MODULUS_PA, TIP_M, raster
 
 
@@ -100,10 +101,8 @@ def test_one_line_for_units_open_meshes_unregistered_shapes_and_points(tmp_path,
         with pytest.raises(error, match=words) as refused:
             pp.reconstruct(recording, progress=False, **options)
         assert len(str(refused.value).splitlines()) == 1
-    points = raster()
-    object.__setattr__(points, "description", {"recording": {"quasi_static": True}})
-    with pytest.raises(ContactError, match="--rate HZ"):
-        pp.reconstruct(points, half_space=True, progress=False)
+    with pytest.raises(ContactError, match="4800 spots, more than 4000.*--rate HZ"):
+        pp.reconstruct(points((80, 60), rows=2), half_space=True, progress=False)
     capsys.readouterr()
     assert (
         cli.main(["press", "block", "--unit", "mm", *"--at 0,0,1 --direction 0,0,-1 --depth 0.001".split()])

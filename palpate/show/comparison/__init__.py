@@ -31,7 +31,11 @@ def lines(result: Comparison) -> list[str]:
     text.append(row("folds over sites", len(result.presses), result.rmse_n, result.relative_rmse, None))
     for r in result.regions:
         text.append(row(r.region.name, int(r.region.members.sum()), r.rmse_n, r.relative_rmse, r.bias))
-    return [*text, f"sensor noise {result.noise_n:.3f} N; {verdict(result)}"]
+    floor, ceiling = result.noise_n, result.constant_n
+    return [
+        *text,
+        f"floor: the sensor noise {floor:.3f} N; ceiling: a constant push {ceiling:.3f} N; {verdict(result)}",
+    ]
 
 
 def as_json(result: Comparison) -> dict[str, Any]:
@@ -52,6 +56,7 @@ def as_json(result: Comparison) -> dict[str, Any]:
         ],
         "wins": {name: result.wins(name) for name in MODELS if name != HOMOGENEOUS},
         "noise_n": result.noise_n,
+        "constant_rmse_n": result.constant_n,
         "young_modulus_pa": result.moduli_pa,
         "folds_with_a_field": sum(field is not None for field in result.fields),
     }

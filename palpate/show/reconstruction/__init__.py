@@ -33,6 +33,8 @@ def lines(result: Reconstruction) -> list[str]:
         f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
         f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
     ]
+    if result.doubt:
+        lines.append(f"not to be believed: {result.doubt}")
     lines += [f.line() for f in result.findings]
     if result.modulus:
         misfit = float((result.modulus.press.rms_n**2).mean() ** 0.5)
@@ -43,6 +45,7 @@ def lines(result: Reconstruction) -> list[str]:
             "ms late (first against last touch); corrected before everything else"
         )
     lines += [
+        *exploration.dropped,
         f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
         *(f"  {note}" for note in (result.placed.notes if result.placed else ())),
         f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
@@ -63,9 +66,13 @@ def as_json(result: Reconstruction) -> dict[str, Any]:
         "palpations": len(exploration.presses),
         "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
         "findings": [f.as_json() for f in result.findings],
+        "doubt": result.doubt,
+        "held_out_rmse_n": result.held_out.model_n if result.held_out else None,
+        "held_out_constant_rmse_n": result.held_out.constant_n if result.held_out else None,
         "noise_n": exploration.noise_n,
         "force_delay_s": exploration.delay_s,
         "force_delay_sd_s": exploration.delay_error_s,
+        "dropped_corrections": list(exploration.dropped),
         "surface": {
             "method": result.surface.method,
             "reason": result.surface.reason,

@@ -11,6 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.optimize import least_squares
 
 from mechanics.robust import spread
 
@@ -18,6 +19,8 @@ _LEAST_COMPLIANCE = 1e-12
 _NEWTON_STEPS = 8
 _LEAST_SQUARES_STEPS = 60
 _SOFT = 3.0  # standard deviations
+_FAR_SHARE = 0.1
+"""Of a depth, which the far field usually is; a factor of e is its standard deviation."""
 _ALIKE = 0.1
 """Least spread of ln stiffness between places that is believed."""
 
@@ -127,12 +130,13 @@ def first_touches(loadings: Sequence[Loading], noise_n: float) -> tuple[np.ndarr
     """(k,) m, travel at which each loading would have met the surface, and its standard error.
 
     Each loading's own law where it has four rows; then the law that all of them share, which a single row is
-    enough for, both weighed by their errors.
+    enough for, both weighed by their errors. Where none has four rows, the law is that of all together.
+    Raises ValueError where even they tell none.
     """
     own = [_own(each, noise_n) for each in loadings]
     known = [r for r in own if r is not None and np.isfinite(r.u0_error_m)]
     if not known:
-        raise ValueError("no loading has four rows")
+        known = [_pooled(loadings, noise_n)]
     # a law's two stiffnesses trade with one another, so laws are ranked by how deep they go at one force
     force = float(np.median([each.push.max() for each in loadings]))
     log = np.log([_depth(r, force) for r in known])
@@ -167,6 +171,30 @@ def _own(each: Loading, noise_n: float) -> Rise | None:
     guess = -level / slope if slope > 0 else each.u.min()
     guess = float(np.clip(guess, each.u.max() - 10 * np.ptp(each.u), each.u.max() - 0.05 * np.ptp(each.u)))
     return fit_rise(each.u, each.push, noise_n, guess_m=guess)
+
+
+def _pooled(loadings: Sequence[Loading], noise_n: float) -> Rise:
+    """The law that loadings of few rows share, each with a first touch of its own. Raises ValueError where
+    they have no three rows more than first touches."""
+    pushed = [(each.u[rows], each.push[rows]) for each in loadings if (rows := each.push > 3 * noise_n).any()]
+    of = np.repeat(np.arange(len(pushed)), [len(u) for u, _ in pushed])
+    if len(of) < len(pushed) + 3:
+        raise ValueError("the places have too few rows in contact")
+    u, push = (np.concatenate(column) for column in zip(*pushed, strict=True))
+    top, reach = float(push.max()), max(float(np.ptp(each[0])) for each in pushed)
+
+    def missed(log: np.ndarray) -> np.ndarray:
+        law = Rise(0.0, 0.0, float(np.exp(log[0])), float(np.exp(log[1])))
+        slope = (_depth(law, 1.01 * push) - _depth(law, push)) / (0.01 * push)
+        weight = 1 / slope
+        off = u - _depth(law, push)
+        mean = np.bincount(of, weights=off * weight**2) / np.bincount(of, weights=weight**2)
+        # places of alike depths tell one number: which share is the far field's is then the usual one
+        return np.append((off - mean[of]) * weight / noise_n, log[1] - start[1])
+
+    start = np.array([np.log(1.5 * top / reach**1.5), np.log(_FAR_SHARE * reach / top)])
+    found = least_squares(missed, start, bounds=(start - 8, start + 8), loss="soft_l1", f_scale=_SOFT)
+    return Rise(0.0, 0.0, float(np.exp(found.x[0])), float(np.exp(found.x[1])))
 
 
 def _depth(law: Rise, push: float | np.ndarray) -> np.ndarray:

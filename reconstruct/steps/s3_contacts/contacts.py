@@ -36,6 +36,8 @@ _DELAY_ROUNDS = 4
 _FAR_S, _UNLIKE_S = 0.04, 0.01
 """A force that reads later than the first is read earlier before touches are looked for, where touches agree
 within the second (standard error): first and last touch alone are found to some 80 ms."""
+_KNOWN = 2.0
+"""Standard errors that a correction is as large as at least."""
 
 
 @dataclass(frozen=True)
@@ -85,7 +87,8 @@ class Exploration:
     off and read earlier by delay_s, as late as it comes (standard error: delay_error_s).
     noise_n: standard deviation of the raw force an axis. presses: the table, forces in it as read; places and
     normals those of the touches themselves. rejected: (t, reason) of contacts not used. threshold_n: tau.
-    method: 'noise' or 'paper'. spans: of all contacts, None for points without a time.
+    method: 'noise' or 'paper'. dropped: corrections that were not made, and why. spans: of all contacts, None
+    for points without a time.
     """
 
     recording: Recording
@@ -99,6 +102,7 @@ class Exploration:
     method: str
     delay_s: float = 0.0
     delay_error_s: float = 0.0
+    dropped: tuple[str, ...] = ()
     spans: ContactSpans | None = field(default=None, repr=False, compare=False)
 
 
@@ -153,6 +157,7 @@ def explore(
     step = force_delay(found.spans.filtered.signals, found.touches)
     if not shifts or not (step.certain or delay):
         return _tabled(recording, found, method, options)
+    first, before = found, (delay, error)
     for _ in range(_DELAY_ROUNDS):
         samples = round(step.seconds * recording.sample_rate_hz)
         if not samples:
@@ -161,6 +166,12 @@ def explore(
         found = find_first_touches(spans_of(read_earlier(recording, delay)), request)
         step = force_delay(found.spans.filtered.signals, found.touches)
     error = step.error_s if np.isfinite(step.error_s) else error
+    if abs(delay) < _KNOWN * error:
+        dropped = (
+            f"the force reads {1e3 * delay:.0f} +- {1e3 * error:.0f} ms late by first and last touch, which "
+            "is less than twice its error: not corrected"
+        )
+        return replace(_tabled(recording, first, method, options, before), dropped=(dropped,))
     return _tabled(recording, found, method, options, (delay, error))
 
 

@@ -1,4 +1,5 @@
-"""Presses that turn out to be none once all are found: they slide, or lie on a support that is known later.
+"""Presses that turn out to be none once all are found: they slide, lie on a support that is known later, or
+not on the object at all.
 
 A slide shows where the surface is and how it rubs; its depth has no first touch that the place shares, so no
 modulus and no 1D law is read off it.
@@ -12,6 +13,7 @@ import numpy as np
 
 from mechanics.errors import ContactError
 from mechanics.presses import Presses
+from mechanics.robust import spread_about_zero
 from mechanics.segments import Segment
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration
@@ -20,6 +22,8 @@ from reconstruct.steps.s3_contacts.on_support import on_it
 SLIDE_RADII = 8.0
 """A contact whose tip wanders further than so many radii along the surface is no press: a drag within one is
 shorter."""
+_FAR_SPREADS = 6.0
+"""A first touch so many spreads of the others off the surface, and a tip's radius, lies on something else."""
 
 
 def sliding(presses: Presses) -> np.ndarray:
@@ -65,6 +69,53 @@ def on_base(exploration: Exploration, base: Boundary, least: int) -> Exploration
             f"least {least} are needed: press the object, or check --unit, --pose and --up"
         )
     return _without(dataclasses.replace(exploration, boundary=base), reasons, None)
+
+
+def within_slab(exploration: Exploration, thickness_m: float | None) -> Exploration:
+    """The exploration without the few presses that would go through the slab that it lies on; as it is where
+    they are not few: then the thickness is wrong."""
+    presses = exploration.presses
+    through = presses.depth_m >= (thickness_m or np.inf)
+    if through.mean() >= 0.5:
+        return exploration
+    reasons = [
+        f"goes {1e3 * depth:.1f} mm deep, through the slab" if out else ""
+        for depth, out in zip(presses.depth_m, through, strict=True)
+    ]
+    return _without(exploration, reasons, None)
+
+
+def off_surface(presses: Presses, points: np.ndarray, normals: np.ndarray, base: Boundary) -> list[str]:
+    """Why each press cannot be pressed into the surface, '' where it can: the nearest point (p, 3) m that
+    faces it, with outward normal (p, 3), is far from its first touch, or on the base that is held."""
+    away = np.linalg.norm(presses.point - points, axis=1)
+    usual = float(np.median(away))
+    most = max(_FAR_SPREADS * max(spread_about_zero(away), usual), presses.tip_radius_m)
+    held = (base.height(points) < 1e-6) & (normals @ base.support_normal < -0.5)
+    reasons = []
+    for far, under in zip(away, held, strict=True):
+        why = f"touches {1e3 * far:.1f} mm off the surface, where others touch {1e3 * usual:.1f} mm off it"
+        reasons.append("has a force that points into the support" if under else why if far > most else "")
+    return reasons
+
+
+def on_surface(
+    exploration: Exploration, points: np.ndarray, normals: np.ndarray, least: int
+) -> tuple[Exploration, np.ndarray]:
+    """The exploration without the presses that are not on the surface (`off_surface`), and which (p,) bool of
+    those before are left.
+
+    Raises ContactError where fewer than `least` presses are left.
+    """
+    reasons = off_surface(exploration.presses, points, normals, exploration.boundary)
+    kept = np.array([not reason for reason in reasons])
+    if kept.sum() < min(least, len(kept)):
+        first = next(reason for reason in reasons if reason)
+        raise ContactError(
+            f"{int(kept.sum())} presses of {len(kept)} lie on the surface (one that does not {first}); at "
+            f"least {least} are needed: check the position's frame, force_on and what the object lies on"
+        )
+    return _without(exploration, reasons, None), kept
 
 
 def _without(exploration: Exploration, reasons: list[str], kind: str | None) -> Exploration:

@@ -18,6 +18,10 @@ class CastPoints:
     normals: np.ndarray
     triangle: np.ndarray
 
+    def of(self, chosen: np.ndarray) -> CastPoints:
+        """Only some of them, (k,) bool."""
+        return CastPoints(self.points[chosen], self.normals[chosen], self.triangle[chosen])
+
 
 def cast(
     vertices: np.ndarray,

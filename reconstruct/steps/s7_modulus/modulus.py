@@ -189,9 +189,9 @@ def _greatest_consistent(
 
 def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) -> bool:
     difference = np.log(np.maximum(deep.modulus_pa, 1e-9) / np.maximum(shallow.modulus_pa, 1e-9))
-    both = (shallow.rows > 10) & (deep.rows > shallow.rows) & (np.abs(difference) < 1)
+    both = shallow.telling & deep.telling & (deep.rows > shallow.rows) & (np.abs(difference) < 1)
     labels = np.unique(site[both])
-    if len(labels) < 4:
+    if len(labels) < 2:  # one place has no scatter to weigh a difference by
         return False
     mean = np.array([np.median(difference[both & (site == s)]) for s in labels])
     compliance = np.array([np.median(far[both & (site == s)]) for s in labels])
@@ -200,8 +200,9 @@ def _disagree(deep: LawFit, shallow: LawFit, site: np.ndarray, far: np.ndarray) 
     error = 1.25 * _scatter(mean - middle) / np.sqrt(len(mean))
     if abs(middle) > max(certain * error, _AGREE):
         return True
-    if len(labels) < 8 or np.ptp(compliance) <= 0:
+    if len(labels) < 3 or np.ptp(compliance) <= 0:  # two places have no scatter about a line
         return False
+    certain = float(student.ppf(0.995, len(mean) - 2))
     # the trend over the sites' whole range, Theil-Sen, with the error of a least-squares line of that scatter
     slope, intercept, _, _ = theilslopes(mean, compliance)
     error = _scatter(mean - intercept - slope * compliance) / (np.sqrt(len(compliance)) * np.std(compliance))

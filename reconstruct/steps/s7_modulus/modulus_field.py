@@ -40,7 +40,9 @@ LEAST_EXPLAINED = 0.2
 LEAST_FELT = 0.05
 """... and by how much the places' moduli must differ by it (standard deviation of ln E): less than that shape
 and mesh bring about as well."""
-LEAST_SITES = 6
+LEAST_SITES = 5
+"""A field is four numbers (level, spread, length, scatter beside it): fewer places than that and one more
+tell no field. How many rows a place has does not matter: its modulus's own error does."""
 REFITS = 1
 LAW_ERROR = 0.03
 LEVEL_BIAS = 0.02
@@ -71,8 +73,7 @@ class PressModuli:
 
     @property
     def usable(self) -> np.ndarray:
-        e, error = self.fit.modulus_pa, self.fit.relative_error
-        return np.isfinite(e) & (e > 0) & np.isfinite(error) & (error < 1) & (self.fit.rows > 10)
+        return self.fit.telling
 
     def beside(self, field: SmoothField) -> LawFit:
         """Every press's modulus as if the object were of one, from a fit with a field where it is: solved in

@@ -18,14 +18,17 @@ from mechanics.touch import forces_at
 _BLOCK_S = 0.004
 _LEAD_S = 0.03
 _NOTHING = 1e-200  # no press that tells its modulus has a determinant so small
-_CORRELATED = 10  # rows of one press that a lasting error of the law binds together
+_CORRELATED, _STRETCHES = 10, 10
+"""A lasting error of the law binds so many rows of a press together, where they are a tenth of it or less:
+it lasts for a tenth of a press at most, so that few rows far apart are independent."""
 
 
 @dataclass(frozen=True)
 class LawFit:
     """Every press fitted by one law up to one depth.
 
-    modulus_pa: (k,). relative_error: (k,) standard error of ln e, infinite where a press does not tell it.
+    modulus_pa: (k,). relative_error: (k,) standard error of ln e, infinite where a press does not tell it;
+    it grows as the rows that tell become few, and no number of rows is too small for it.
     onset_shift_m: (k,) first touch moves by this along the outward normal. rms_n: (k,) vector misfit, N.
     cost: (k,) weighted squared residuals, comparable between laws at the same depth. rows: (k,) rows used.
     """
@@ -38,6 +41,12 @@ class LawFit:
     rms_n: np.ndarray
     cost: np.ndarray
     rows: np.ndarray
+
+    @property
+    def telling(self) -> np.ndarray:
+        """(k,) bool, presses that tell their modulus: it is positive, and its error below the whole of it."""
+        e, error = self.modulus_pa, self.relative_error
+        return np.isfinite(e) & (e > 0) & np.isfinite(error) & (error < 1)
 
 
 def press_data(presses: Presses) -> Presses:
@@ -109,7 +118,8 @@ def fit_law(
     scale = np.maximum(cost / np.maximum(3 * rows, 1), 1.0)
     known = (e > 0) & (det > _NOTHING)
     error = np.full(k, np.inf)
-    error[known] = np.sqrt(_CORRELATED * (scale * a_uu)[known] / det[known]) / e[known]
+    bound = np.clip(np.diff(data.starts) / _STRETCHES, 1, _CORRELATED)
+    error[known] = np.sqrt((bound * scale * a_uu)[known] / det[known]) / e[known]
     return LawFit(law, depth_m, e, error, shift, np.sqrt(squared / np.maximum(rows, 1)), cost, rows)
 
 

@@ -1,0 +1,90 @@
+"""An answer that does not predict, or stands on another object's shape, is said not to be believed."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+
+import numpy as np
+import pytest
+import trimesh
+
+from mechanics.model_files import read_model
+from mechanics.recording import write_recording
+from palpate import cli
+from reconstruct.geometry.known_shape import place
+from reconstruct.geometry.placed import nowhere
+from reconstruct.geometry.stated import GeometryOptions
+from reconstruct.steps.s3_contacts.contacts import explore
+from reconstruct.steps.s7_modulus.held_out import held_out
+from reconstruct.steps.s7_modulus.modulus import fit_modulus
+
+from .exploration_of_cylinder import HEIGHT, RADIUS, explore_cylinder
+from .flat_ground import NOISE_N, raster
+
+SOLIDS = {
+    "right": lambda: trimesh.creation.cylinder(RADIUS, HEIGHT, sections=90),
+    "two per cent too large": lambda: trimesh.creation.cylinder(1.02 * RADIUS, 1.02 * HEIGHT, sections=90),
+    "block": lambda: trimesh.creation.box((0.12, 0.05, 0.03)),
+    "cone": lambda: trimesh.creation.cone(0.05, 0.10, sections=90),
+    "wider cylinder": lambda: trimesh.creation.cylinder(1.25 * RADIUS, HEIGHT, sections=90),
+}
+
+
+def stl(folder, name: str) -> str:
+    """The file of a solid, in metres."""
+    path = folder / f"{name.replace(' ', '_')}.stl"
+    SOLIDS[name]().export(path)
+    return str(path)
+
+
+@pytest.fixture(scope="module")
+def touches():
+    recording, _ = explore_cylinder(without_phase=True)
+    return recording, explore(recording, boundary=nowhere(recording))
+
+
+@pytest.mark.parametrize("name", SOLIDS)
+def test_first_touches_tell_another_objects_shape(touches, tmp_path, name):
+    recording, found = touches
+    options = GeometryOptions(shape=stl(tmp_path, name), unit="m")
+    put = place(recording, found, options, mesh_size_m=0.01, spacing_m=0.003)
+    if name in ("right", "two per cent too large"):
+        assert put.doubt == ""
+    else:
+        assert "another object's shape" in put.doubt and len(put.doubt.splitlines()) == 1
+
+
+@pytest.mark.parametrize("depth_matters", [True, False])
+def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
+    recording = raster(tilt=False)
+    found = explore(recording, boundary=nowhere(recording)).presses
+    if not depth_matters:
+        # full force at once, and less as the tip goes in
+        push = np.where(found.depth > 1e-4, 0.5 - 60 * found.depth, 0.0)
+        found = dataclasses.replace(found, force=push[:, None] * found.normal[found.press])
+    sites = _half_space(found)
+    told = held_out(found, sites, fit_modulus(found, sites, NOISE_N))
+    assert told is not None
+    assert (told.doubt == "") == depth_matters
+    if depth_matters:
+        assert told.model_n < 0.2 * told.constant_n
+
+
+def _half_space(presses):
+    from mechanics.sites import TouchSites
+
+    none = np.zeros(len(presses))
+    return TouchSites(presses.point, presses.normal, none, np.zeros((len(presses), 3, 3)), 0.005, 0.49)
+
+
+def test_the_command_ends_with_one_and_writes_everything(tmp_path, capsys):
+    samples = write_recording(tmp_path / "cylinder.csv", explore_cylinder(without_phase=True)[0])
+    model, figures = tmp_path / "MODEL", tmp_path / "figures.json"
+    words = ["reconstruct", str(samples), "-o", str(model), "--json", str(figures), "--unit", "m"]
+    assert cli.main([*words, "--shape", stl(tmp_path, "block")]) == 1
+    said = capsys.readouterr().out
+    (line,) = [line for line in said.splitlines() if line.startswith("not to be believed")]
+    assert "another object's shape" in line
+    assert read_model(model).material.young_modulus_pa > 0
+    assert json.loads(figures.read_text())["doubt"] in line
