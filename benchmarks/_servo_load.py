@@ -7,12 +7,12 @@ import time
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
 from mechanics.files import cache_folder
+from mechanics.kernels import free_kernel, kept
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.model_files import read_model, write_model
@@ -27,7 +27,7 @@ from palpate.servo.layout import (
     total_bytes,
     views,
 )
-from palpate.servo.loop import Program, kept, make_program, one_tick
+from palpate.servo.loop import Program, make_program, one_tick
 from palpate.servo.realtime import real_time_thread
 from palpate.servo.tick import (
     IN_CALIBRATED,
@@ -97,7 +97,7 @@ def sliding_path(model: Model, ticks: int) -> np.ndarray:
     return np.ascontiguousarray(path)
 
 
-@njit(cache=True, nogil=True)
+@free_kernel
 def _timed(
     kernel, model, state, support, arrays, parameters, path, ticks, start, wait, cpu_bins, cpu_extremes
 ):
@@ -179,7 +179,7 @@ class Load:
 
     def _call(self, ticks: int, wait: bool) -> None:
         scene, kernel, _, state, parameters = self.program
-        kept(_timed, scene.renderer)(
+        kept(_timed, scene.renderer.parameters)(
             kernel,
             scene.renderer.parameters,
             state,

@@ -16,7 +16,7 @@ from render.base import Renderer, check_radii
 from render.bvh import STACK, closest_triangle
 from render.drawing import draw_dent
 from render.effects import effect_arrays, rendered_touch
-from render.fem_kernel import fem_path, fem_step
+from render.fem_kernel import fem_step
 from render.fem_state import FemParameters, FemState, new_fem_state
 from render.field import far_field
 from render.options import RenderOptions
@@ -31,7 +31,6 @@ class FemRenderer(Renderer):
 
     name = NAME
     kernel = staticmethod(fem_step)
-    path_kernel = staticmethod(fem_path)
 
     def __init__(
         self,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.kernels import kernel, part
+from mechanics.kernels import inner, part
 
 FOOT_STEPS = 12
 WALK_EDGES = 64
@@ -32,7 +32,7 @@ def place(surface, triangle, weights, point, normal):
         normal[k] /= length
 
 
-@kernel
+@inner
 def walk(surface, triangle, weights, move):
     """Carry the anchor along the surface by `move` (3,) m, unfolding it over edges; returns its triangle.
 
@@ -129,7 +129,7 @@ def walk(surface, triangle, weights, move):
     return triangle
 
 
-@kernel
+@inner
 def foot(surface, triangle, weights, tip, point, normal, move):
     """Walk the anchor to where the contact normal points at the tip: no tangential offset is left.
 

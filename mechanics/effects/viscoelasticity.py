@@ -37,7 +37,7 @@ def recall(weight, spans, k, memory, change, force):
 def changed(memory, force):
     """Put into memory[3:6] how the quasi-static force changed since the last step, and that into memory[:3].
 
-    Nothing is returned: a renderer's kernels count no references (render.kernels), so they return no view.
+    Nothing is returned: a renderer's kernels count no references (mechanics.kernels), so they return no view.
     """
     for axis in range(3):
         memory[3 + axis] = force[axis] - memory[axis]
