@@ -7,12 +7,13 @@ import time
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import njit
 
 from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
 from mechanics.files import cache_folder
-from mechanics.kernels import free_kernel, kept
+from mechanics.kernels import kept
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.model_files import read_model, write_model
@@ -97,7 +98,7 @@ def sliding_path(model: Model, ticks: int) -> np.ndarray:
     return np.ascontiguousarray(path)
 
 
-@free_kernel
+@njit(cache=True, nogil=True)
 def _timed(
     kernel, model, state, support, arrays, parameters, path, ticks, start, wait, cpu_bins, cpu_extremes
 ):

@@ -28,9 +28,9 @@ def kernel(function: Any) -> Any:
     return njit(**_OPTIONS)(function)
 
 
-def free_kernel(function: Any) -> Any:
-    """Compile a kernel that lets other Python threads run meanwhile."""
-    return njit(nogil=True, **_OPTIONS)(function)
+def loop_kernel(function: Any) -> Any:
+    """Compile a kernel that only Python calls, and that lets other threads run meanwhile."""
+    return njit(nogil=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
 
 
 def part(function: Any) -> Any:
@@ -41,6 +41,11 @@ def part(function: Any) -> Any:
 def inner(function: Any) -> Any:
     """Compile a function that only kernels call."""
     return njit(**_FROM_KERNELS)(function)
+
+
+def fresh_part(function: Any) -> Any:
+    """A part that is made while the program runs: not kept by itself, but with the kernels that call it."""
+    return njit(**{**_FROM_KERNELS, "cache": False})(function)
 
 
 def pointer(step: Any, *arguments: Any) -> Any:
@@ -73,4 +78,5 @@ def _is_ours(argument: Any) -> bool:
 
 @cache
 def _fresh_copy(function: Any) -> Any:
-    return njit(**{**function.targetoptions, "cache": False})(function.py_func)
+    options = {name: value for name, value in function.targetoptions.items() if name != "nopython"}
+    return njit(**options)(function.py_func)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 
 from mechanics.errors import OptionError
-from mechanics.kernels import kept, kernel, pointer
+from mechanics.kernels import kept, loop_kernel, pointer
 from mechanics.model import Model
 from render.surface import ContactSurface
 
@@ -131,7 +131,7 @@ def _own(array: np.ndarray) -> np.ndarray:
     return np.require(array, float, ["C", "W"])
 
 
-@kernel
+@loop_kernel
 def _follow(step, parameters, state, steps_s, path, forces):
     """`step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
     for i in range(path.shape[0]):

@@ -14,11 +14,12 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numba import njit
 
 from devices.base import DeviceSpec
 from devices.impedance import HandImpedance, follow
 from devices.safety import WORDS, SafetyOptions, safety_parameters
-from mechanics.kernels import free_kernel, kept
+from mechanics.kernels import kept
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
 from palpate.servo.loop import make_program, one_tick
 from palpate.servo.tick import (
@@ -118,7 +119,7 @@ class Timing:
         return cls(SUBSTEPS * np.arange(ticks + 1), np.zeros(ticks, dtype=np.int64))
 
 
-@free_kernel
+@njit(cache=True, nogil=True)
 def _run(
     kernel,
     model,

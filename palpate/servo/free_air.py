@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 import numpy as np
-from numba import njit
+
+from mechanics.kernels import kernel
 
 
 class FreeAirParameters(NamedTuple):
@@ -28,9 +29,11 @@ class FreeAirState(NamedTuple):
     dt_s: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _kernel(parameters, state, tips):
-    state.forces[:] = 0.0
+    for t in range(state.forces.shape[0]):
+        for i in range(3):
+            state.forces[t, i] = 0.0
 
 
 class FreeAir:

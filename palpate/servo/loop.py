@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
-from mechanics.kernels import free_kernel, kept, pointer
+from mechanics.kernels import kept, loop_kernel, pointer
 from palpate.servo.clock import COMPILED, c_function, compiled_now_ns, compiled_sleep_until, sleep_until
 from palpate.servo.layout import DEADLINE, STATUS, STOP
 from palpate.servo.tick import TickArrays, TickParameters, account, after, before
@@ -53,7 +53,7 @@ def answer(kernel, model, state, support, arrays, parameters, now_ns, deadline_n
     )
 
 
-@free_kernel
+@loop_kernel
 def compiled_loop(kernel, model, state, support, arrays, parameters, wake, most_ticks):
     """Tick until told to stop or swap; `wake` is a file descriptor told after each tick, -1 for none."""
     for _ in range(most_ticks):
