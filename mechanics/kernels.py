@@ -20,6 +20,7 @@ from mechanics.kernel_cache import PACKAGES
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 if hasattr(DefaultOptions, "_nrt"):
     _OPTIONS["_nrt"] = False
+_ALONE: dict[str, Any] = {**_OPTIONS, "nogil": True, "no_cfunc_wrapper": True}
 _FROM_KERNELS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
@@ -30,16 +31,21 @@ def kernel(function: Any) -> Any:
 
 def loop_kernel(function: Any) -> Any:
     """Compile a kernel that only Python calls, and that lets other threads run meanwhile."""
-    return njit(nogil=True, no_cfunc_wrapper=True, **_OPTIONS)(function)
+    return njit(**_ALONE)(function)
 
 
 def part(function: Any) -> Any:
-    """Compile a piece that only kernels call, woven into each: its arrays need not be passed."""
+    """Compile a piece that only kernels call, woven into each: its arrays need not be passed. Not from Python."""
     return njit(forceinline=True, **_FROM_KERNELS)(function)
 
 
+def shared_part(function: Any) -> Any:
+    """Compile a part that Python calls as well."""
+    return njit(forceinline=True, **_OPTIONS)(function)
+
+
 def inner(function: Any) -> Any:
-    """Compile a function that only kernels call."""
+    """Compile a function that only kernels call. From Python it must not be called: that ends the process."""
     return njit(**_FROM_KERNELS)(function)
 
 

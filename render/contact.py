@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import inner
+from mechanics.kernels import inner, kernel
 from render.bvh import closest_triangle
 from render.walking import foot
 
@@ -19,7 +19,7 @@ OVERLAP = 0.5  # of the depth below the anchor's plane: a tip that overlaps the 
 FAR = 0.02  # m beyond the tip's radius that a search looks; clearances above it are as good as that
 
 
-@inner
+@kernel
 def outside(surface, triangle, weights, tip):
     """Whether `tip` (3,) lies outside, told by the pseudonormal at its closest point (Baerentzen & Aanaes
     2005)."""

@@ -28,7 +28,7 @@ import numpy as np
 
 from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
-from mechanics.kernels import inner
+from mechanics.kernels import inner, kernel
 from mechanics.options import check_ranges, option
 
 LONGEST_DELAY_TICKS = 64
@@ -175,7 +175,7 @@ def passivity_restart(state):
     state.cut[0] = 0.0
 
 
-@inner
+@kernel
 def passivity_before(parameters, state, wanted, position, work_j, fresh, between_s, dt_s, age_s):
     """Observe what held forces did and change `wanted` (3,) in place; True where it was changed.
 
@@ -297,7 +297,7 @@ def _guard(parameters, state, wanted, age_s):
         state.hold[0] = max(min(hold, LONGEST_HOLD_S), horizon)
 
 
-@inner
+@kernel
 def passivity_after(state, wanted, sent):
     """Remember the force `sent`, which safety made of the `wanted` that `passivity_before` left."""
     wanted2, sent2 = 0.0, 0.0

@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import inner, part
+from mechanics.kernels import inner, kernel, shared_part
 
 FOOT_STEPS = 12
 WALK_EDGES = 64
 
 
-@part
+@shared_part
 def place(surface, triangle, weights, point, normal):
     """Write the point (3,) m and unit contact normal (3,) at barycentric weights (3,) of a triangle."""
     length = 0.0
@@ -129,7 +129,7 @@ def walk(surface, triangle, weights, move):
     return triangle
 
 
-@inner
+@kernel
 def foot(surface, triangle, weights, tip, point, normal, move):
     """Walk the anchor to where the contact normal points at the tip: no tangential offset is left.
 

@@ -180,7 +180,7 @@ def after(
     dt_s = _elapsed(arrays, parameters, now_ns)
     age_s = now_ns * 1e-9 - pose[IN_TIME]
     velocity = pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3]
-    contacts = 0
+    contacts = np.int64(0)  # a plain 0 would have numba compile twice what takes it
     # loops, not slice assignments, which take numba seconds to compile
     for i in range(3):
         rendered[i] = 0.0
