@@ -35,7 +35,7 @@ def loop_kernel(function: Any) -> Any:
 
 
 def part(function: Any) -> Any:
-    """Compile a piece that only kernels call, woven into each: its arrays need not be passed. Not from Python."""
+    """Compile a piece for kernels alone (see `inner`), woven into each: its arrays need not be passed."""
     return njit(forceinline=True, **_FROM_KERNELS)(function)
 
 
