@@ -19,8 +19,9 @@ from numba import njit
 from devices.base import DeviceSpec
 from devices.impedance import HandImpedance, follow
 from devices.safety import WORDS, SafetyOptions, safety_parameters
+from mechanics.kernels import kept
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
-from palpate.servo.loop import kept, make_program, one_tick
+from palpate.servo.loop import make_program, one_tick
 from palpate.servo.tick import (
     IN_CALIBRATED,
     IN_CONNECTED,
@@ -243,7 +244,7 @@ def closed_loop(
         hand.mass_kg, hand.damping_n_s_per_m, hand.stiffness_n_per_m, period_ns * 1e-9 / SUBSTEPS
     )
     noise = loop.tremor_m * np.random.default_rng(loop.seed).standard_normal((n, 3))
-    kept(_run, renderer)(
+    kept(_run, renderer.parameters)(
         program.kernel,
         renderer.parameters,
         program.state,

@@ -9,9 +9,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from benchmarks._free_air import FreeAir
+from mechanics.kernels import kernel
 from mechanics.progress import Progress
 from render.base import State
 
@@ -24,7 +24,7 @@ class PlaneParameters(NamedTuple):
     series_compliance: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _kernel(parameters, state, tips):
     stiffness = parameters.stiffness[0]
     stiffness = stiffness / (1.0 + stiffness * parameters.series_compliance[0])

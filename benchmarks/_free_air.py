@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple, Self
 
 import numpy as np
-from numba import njit
 
+from mechanics.kernels import kernel
 from render.base import State, new_state
 
 
@@ -17,9 +17,11 @@ class FreeAirParameters(NamedTuple):
     series_compliance: np.ndarray
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def _kernel(parameters, state, tips):
-    state.forces[:] = 0.0
+    for t in range(state.forces.shape[0]):
+        for i in range(3):
+            state.forces[t, i] = 0.0
 
 
 class FreeAir:

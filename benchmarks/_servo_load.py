@@ -13,6 +13,7 @@ from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
 from mechanics.files import cache_folder
+from mechanics.kernels import kept
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.model_files import read_model, write_model
@@ -27,7 +28,7 @@ from palpate.servo.layout import (
     total_bytes,
     views,
 )
-from palpate.servo.loop import Program, kept, make_program, one_tick
+from palpate.servo.loop import Program, make_program, one_tick
 from palpate.servo.realtime import real_time_thread
 from palpate.servo.tick import (
     IN_CALIBRATED,
@@ -188,7 +189,7 @@ class Load:
 
     def _call(self, ticks: int, wait: bool) -> None:
         scene, kernel, _, state, parameters = self.program
-        kept(_timed, scene.renderer)(
+        kept(_timed, scene.renderer.parameters)(
             kernel,
             scene.renderer.parameters,
             state,

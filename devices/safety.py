@@ -18,11 +18,11 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from devices.base import DeviceSpec
 from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
+from mechanics.kernels import inner, kernel
 from mechanics.options import check_ranges, option
 
 OFF, NOT_FINITE, STALE, OUTSIDE, DISCONNECTED, UNCALIBRATED, FAULT, OVER_SPEED, JUMP, CLOCK = (
@@ -202,12 +202,12 @@ LONGEST_STEP_S = 0.005
 LONGEST_GAP_S = 10.0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _norm3(vector):
     return math.sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2])
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _start_clean(state):
     """As made by `safety_state`, but for the workspace and the counts."""
     for i in range(3):
@@ -220,7 +220,7 @@ def _start_clean(state):
     state.latched[0] = 0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _clock_faults(state, reading, dt_s):
     """A sequence that runs backwards, a pose from the future, fresh poses while time stands still."""
     backwards = reading.sequence < state.sequence[0] or reading.age_s < -0.001
@@ -228,7 +228,7 @@ def _clock_faults(state, reading, dt_s):
     return CLOCK if backwards or stands else 0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _motion_faults(parameters, state, reading, dt_s):
     """Over-speed and jump, from fresh poses that can be ones."""
     faults = 0
@@ -259,7 +259,7 @@ def _motion_faults(parameters, state, reading, dt_s):
     return faults
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _fade(parameters, state, position):
     """1 inside the workspace, falling to 0 at 1.05 of its radius; negative outside that."""
     radius, distance = parameters.workspace_radius_m, 0.0
@@ -273,7 +273,7 @@ def _fade(parameters, state, position):
     return 1.0 - (distance / radius - 1.0) / 0.05
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def safety_step(parameters, state, wanted, reading, enable, dt_s, faults=0):
     """Filter one tick's force; writes `state.force`, returns the reasons (bits; `reason_words` reads them).
 
@@ -332,7 +332,7 @@ def safety_step(parameters, state, wanted, reading, enable, dt_s, faults=0):
     return reasons
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _limit(parameters, state, wanted, gain, dt_s):
     """Clamp keeping direction, then slew: falling towards zero is free, rising and turning are limited."""
     reasons = 0

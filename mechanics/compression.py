@@ -15,6 +15,7 @@ import scipy.sparse as sp
 from numba import njit
 
 from mechanics.errors import MeshError
+from mechanics.kernels import kernel
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
@@ -137,10 +138,12 @@ def _errors_by_rank(rows: np.ndarray, exact: np.ndarray) -> np.ndarray:
 # with three weights
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def mix_factor(factor, corners, weights, out):
     """out (3, r): the rows of a low-rank factor (t, 3, r) at a place."""
-    out[:] = 0.0
+    for a in range(3):
+        for k in range(factor.shape[2]):
+            out[a, k] = 0.0
     for i in range(3):
         if corners[i] >= 0:
             for a in range(3):

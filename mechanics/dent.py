@@ -16,9 +16,9 @@ from functools import lru_cache
 from pathlib import Path
 
 import numpy as np
-from numba import njit
 
 from mechanics.errors import OptionError
+from mechanics.kernels import kernel
 from mechanics.quantities import USUAL_POISSON_RATIO
 
 DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
@@ -120,7 +120,7 @@ _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
 }
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def dent_force(table, depth, radius, plane_strain_modulus):
     """(force N, stiffness N/m, stick radius R tau x^0.5 m) at an indentation, m; zeros where it is not
     positive."""
@@ -153,7 +153,7 @@ def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> floa
     return 1.0 / np.maximum(1.0 / tip_radius_m + curvature, 0.25 / tip_radius_m)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def dent_load(depth_m):
     """A measure of the load on a place, m^2.5, at a depth, m: its stored energy grows as a dent's."""
     return depth_m**2.5 if depth_m > 0.0 else 0.0

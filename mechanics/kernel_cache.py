@@ -21,7 +21,7 @@ from mechanics.files import cache_folder
 PACKAGES = ("mechanics", "reconstruct", "render", "devices", "diagnose", "scenes", "palpate")
 _KEPT = 6  # folders, the newest; several checkouts and versions may take turns
 _VARIABLE = "NUMBA_CACHE_DIR"
-_DECORATORS = (b"njit", b"render.kernels")  # numba's own, and where ours are
+_DECORATORS = (b"njit", b"mechanics.kernels")  # numba's own, and where ours are
 _IMPORT = re.compile(
     rb"^(?:from|import)[ \t]+((?:" + "|".join(PACKAGES).encode() + rb")\b[\w.]*)"
     rb"(?:[ \t]+import[ \t]+(\([^)]*\)|[^\n]*))?",

@@ -23,6 +23,7 @@ from numba import njit
 
 from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
 from mechanics.frames import local_frames
+from mechanics.kernels import kernel
 from mechanics.sites import TouchSites
 
 _STIFFEST = 0.8  # of a contact's own compliance, the most that a near support may take away
@@ -31,7 +32,7 @@ STATE_SIZE = 4 + 3 * _RINGS
 """state[0]: rings held; [1]: dent along -n, m; [2:4]: tangential dent, m; then (radius, cumulated origin)."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _origin_integral(state, a):
     """Integral over the radius 0..a of the tangential origin of each ring, for a within what is held."""
     count = int(state[0])
@@ -52,7 +53,7 @@ def _origin_integral(state, a):
     return low, u0 + f * (state[end + 1] - u0), v0 + f * (state[end + 2] - v0)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     """Tangential force and dent for contact radius a: free = d_t - C_tn F_n, stick = k_t / a."""
     count = int(state[0])
@@ -78,7 +79,7 @@ def _tangential(state, a, stick, cuu, cuv, cvv, free_u, free_v):
     return k * du - stick * mu, k * dv - stick * mv, du, dv
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touch_remember(state, dent, a, du, dv, radius):
     """Write what touch_solve found into the memory; a dent of 0 forgets everything (the tip has let go)."""
     if not dent > 0.0:
@@ -105,7 +106,7 @@ def touch_remember(state, dent, a, du, dv, radius):
     state[2], state[3] = du, dv
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
     """Force at displacement d without writing the memory: (f_n, f_u, f_v, dent, a, d_u, d_v, k_n).
 
@@ -152,7 +153,7 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
     return fn, -fu, -fv, dent, a, du, dv, stiffness / (1.0 + compliance * stiffness)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
     """Advance one touch to displacement d: (f_n, f_u, f_v) on the tool, N, local frame (n, u, v).
 

@@ -77,13 +77,14 @@ def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int =
         seconds[label] = time.perf_counter() - start
 
     recording = read_recording(source)
-    with warming_up() as compiling, stage("reconstruct") as progress:
-        done = reconstruct(recording, save=folder / "model", seed=seed, progress=progress)
-        model = done.model
-        progress("compiling", 0.99)
-        compiling()
-    with stage("precompute") as progress:
-        rendering = renderer(model, options.renderer, progress=progress)
+    with warming_up() as compiling:
+        with stage("reconstruct") as progress:
+            done = reconstruct(recording, save=folder / "model", seed=seed, progress=progress)
+            model = done.model
+        with stage("precompute") as progress:
+            rendering = renderer(model, options.renderer, progress=progress)
+            progress("compiling", 0.99)
+            compiling()
     with stage("replay") as progress:
         replayed = replay(rendering, recording, progress=progress)
     with stage("feel at 1 kHz") as progress:

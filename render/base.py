@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Self
 import numpy as np
 
 from mechanics.errors import OptionError
+from mechanics.kernels import kept, loop_kernel, pointer
 from mechanics.model import Model
 from render.surface import ContactSurface
 
@@ -62,7 +63,6 @@ class Renderer(ABC):
     contact: ContactSurface
     parameters: Any
     kernel: Callable[[Any, Any, np.ndarray], None]
-    path_kernel: Callable[[Any, Any, np.ndarray, np.ndarray, np.ndarray], None]
 
     @abstractmethod
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> Any:
@@ -121,7 +121,7 @@ class Renderer(ABC):
         The state is changed in place and returned; the forces are its own array, overwritten by the next
         step. A tip that is not finite gets zero force and loses its contact.
         """
-        self.kernel(self.parameters, state, tips)
+        self.kernel(self.parameters, state, _own(tips))
         return state, state.forces
 
     def follow(self, state: Any, path: np.ndarray, steps_s: np.ndarray) -> np.ndarray:
@@ -129,8 +129,12 @@ class Renderer(ABC):
 
         steps_s: (n,) s, the time that each step covers.
         """
+        path, steps_s = _own(path), _own(steps_s)
         forces = np.zeros_like(path)
-        self.path_kernel(self.parameters, state, steps_s, path, forces)
+        if len(path):
+            step = pointer(self.kernel, self.parameters, state, path[0])
+            follow = kept(_follow, self.parameters, state)
+            follow(step, self.parameters, state, steps_s, path, forces)
         return forces
 
     def displacement(self, state: Any) -> np.ndarray:
@@ -168,6 +172,22 @@ def _draw_dent(
     floor = -np.sqrt(np.maximum(radius**2 - flat, 0.0))
     push = np.where(inside & (height > floor) & (height < radius), floor - height, 0.0)
     moved[near] += push[:, None] * normal
+
+
+def _own(array: np.ndarray) -> np.ndarray:
+    """Contiguous and writable floats: kernels are compiled for these alone."""
+    return np.require(array, float, ["C", "W"])
+
+
+@loop_kernel
+def _follow(step, parameters, state, steps_s, path, forces):
+    """`step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
+    for i in range(path.shape[0]):
+        state.dt_s[0] = steps_s[i]
+        step(parameters, state, path[i])
+        for t in range(path.shape[1]):
+            for k in range(3):
+                forces[i, t, k] = state.forces[t, k]
 
 
 class Grip(NamedTuple):

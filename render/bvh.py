@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
+
+from mechanics.kernels import kernel
 
 _LEAF = 4
 STACK = 128
@@ -57,7 +58,7 @@ def build_bvh(corners: np.ndarray) -> Bvh:
     return Bvh(np.array(corner_low), np.array(corner_high), left, right, start, held, order)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def closest_on_triangle(p, a, b, c):
     """(squared distance from p to the triangle a b c, and the closest point's three barycentric weights).
 
@@ -100,7 +101,7 @@ def closest_on_triangle(p, a, b, c):
     return squared, u, v, w
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _box_distance(p, low, high):
     squared = 0.0
     for k in range(3):
@@ -109,7 +110,7 @@ def _box_distance(p, low, high):
     return squared
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def closest_triangle(bvh, vertices, triangles, p, limit, weights, stack):
     """(triangle, distance) of the closest point within `limit` m, or (-1, limit); writes its weights (3,).
 

@@ -9,8 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechanics.kernels import inner, kernel
 from render.bvh import closest_triangle
-from render.kernels import kernel
 from render.walking import foot
 
 SWEEP_STEPS = 24
@@ -58,7 +58,7 @@ def outside(surface, triangle, weights, tip):
     return dot > 0.0
 
 
-@kernel
+@inner
 def approach(surface, grip, tip, i, radius, point, normal, work, stack):
     """Sweep tip i from where it was last seen to `tip` (3,); take hold at the first touch from outside.
 
@@ -109,7 +109,7 @@ def approach(surface, grip, tip, i, radius, point, normal, work, stack):
     return 0
 
 
-@kernel
+@inner
 def _arm(surface, grip, tip, i, radius, weights, stack):
     """A tip that starts inside or at the surface feels nothing until it has been off it by CLEAR."""
     triangle, distance = closest_triangle(
@@ -122,7 +122,7 @@ def _arm(surface, grip, tip, i, radius, weights, stack):
         grip.previous[i, k] = tip[k]
 
 
-@kernel
+@inner
 def strayed(surface, tip, point, normal, radius, weights, stack):
     """Whether a tip that was carried away from its anchor is off the object, or nearly so.
 
@@ -144,7 +144,7 @@ def strayed(surface, tip, point, normal, radius, weights, stack):
     return radius - distance < OVERLAP * (radius - along)
 
 
-@kernel
+@inner
 def release(grip, i, tip):
     """Let go of tip i; it is outside, where it is now."""
     grip.triangle[i] = -1
@@ -153,7 +153,7 @@ def release(grip, i, tip):
         grip.previous[i, k] = tip[k]
 
 
-@kernel
+@inner
 def lose(grip, i):
     """Forget tip i: its next reading counts as its first."""
     grip.triangle[i] = -1

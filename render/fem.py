@@ -15,7 +15,7 @@ from mechanics.surface_compliance import SurfaceCompliance
 from render.base import Renderer, check_radii
 from render.bvh import STACK, closest_triangle
 from render.effects import effect_arrays, rendered_touch
-from render.fem_kernel import fem_path, fem_step
+from render.fem_kernel import fem_step
 from render.fem_state import FemParameters, FemState, new_fem_state
 from render.field import far_field
 from render.options import RenderOptions
@@ -30,7 +30,6 @@ class FemRenderer(Renderer):
 
     name = NAME
     kernel = staticmethod(fem_step)
-    path_kernel = staticmethod(fem_path)
 
     def __init__(
         self,

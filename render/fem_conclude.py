@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from mechanics.dent import dent_load
 from mechanics.effects.path import sharp_laws, smooth_laws
+from mechanics.kernels import part
 from mechanics.touch import touch_remember
 from render.contact import release
-from render.kernels import part
 from render.walking import foot
 
 

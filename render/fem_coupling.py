@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.compression import between_mixed, mix_factor
-from render.kernels import kernel, part
+from mechanics.kernels import inner, part
 
 NOWHERE = -2
 
@@ -54,7 +54,7 @@ def renew(p, state):
             state.nodes[i, 0] = NOWHERE
 
 
-@kernel
+@inner
 def _gather(blocks, nodes_i, nodes_j, corners):
     """The nine blocks between the corners of two places, side by side; held corners (-1) do not move."""
     for a in range(3):
@@ -95,7 +95,7 @@ def link(p, state, i):
                 state.links[i, r, c, j] = flat[3 * r + c]
 
 
-@kernel
+@inner
 def carry(links, carried, x, y, z):
     """Add to `carried` (3, m) what a force (x, y, z) N on the tool with these links (3, 3, m) takes away."""
     for k in range(3):

@@ -15,12 +15,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechanics.kernels import kernel
 from render.contact import approach, lose, release, strayed
 from render.fem_conclude import conclude, forget
 from render.fem_coupling import carry_all, leave, link, locate, renew
 from render.fem_solve import settle, solve_one, unsettled
 from render.frames import new_frame
-from render.kernels import kernel
 
 SWEEPS = 60
 
@@ -85,14 +85,3 @@ def fem_step(p, state, tips):
     for i in range(m):
         if grip.triangle[i] >= 0:
             conclude(p, state, tips, i)
-
-
-@kernel
-def fem_path(p, state, steps_s, path, forces):
-    """`fem_step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
-    for i in range(path.shape[0]):
-        state.dt_s[0] = steps_s[i]
-        fem_step(p, state, path[i])
-        for t in range(path.shape[1]):
-            for k in range(3):
-                forces[i, t, k] = state.forces[t, k]

@@ -6,10 +6,10 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
+from mechanics.kernels import part
 from mechanics.touch import touch_solve
 from render.fem_coupling import carry
 from render.frames import turn_frame
-from render.kernels import part
 from render.walking import place, walk
 
 CONVERGED_N = 1e-5

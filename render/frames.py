@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.kernels import kernel, part
+from mechanics.kernels import inner, part
 
 
 @part
@@ -25,7 +25,7 @@ def turn_frame(frame, normal):
         frame[2, k] = normal[i] * frame[1, j] - normal[j] * frame[1, i]
 
 
-@kernel
+@inner
 def new_frame(frame, normal):
     """Any right-handed rows (n, u, v), chosen by the normal alone."""
     axis = 0

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 from mechanics.errors import ModelError, OptionError
 from mechanics.model import Model
 from render.base import Renderer, check_radii
-from render.one_d_kernel import OneDParameters, OneDState, new_one_d_state, one_d_path, one_d_step
+from render.one_d_kernel import OneDParameters, OneDState, new_one_d_state, one_d_step
 from render.options import RenderOptions
 from render.snapping import touched_surface
 
@@ -75,7 +75,6 @@ class OneDRenderer(Renderer):
     """A 1D law whose parameters vary over the surface; `law` holds one entry a palpation."""
 
     kernel = staticmethod(one_d_step)
-    path_kernel = staticmethod(one_d_path)
 
     def __init__(self, name: str, model: Model, law: Law, options: RenderOptions) -> None:
         self.name = name

@@ -11,10 +11,10 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.kernels import inner, kernel
 from render.base import Grip, new_grip, new_state
 from render.bvh import STACK
 from render.contact import approach, lose, release
-from render.kernels import kernel
 from render.surface import SurfaceArrays
 from render.walking import foot
 
@@ -63,7 +63,7 @@ def new_one_d_state(radii: np.ndarray, dt_s: float) -> OneDState:
     )
 
 
-@kernel
+@inner
 def law_force(k, b, r, s, depth, rate):
     """(force N, stiffness N/m) along the normal at a depth, m, and its rate, m/s; never pulls."""
     if not depth > 0.0:
@@ -73,7 +73,7 @@ def law_force(k, b, r, s, depth, rate):
     return max(elastic + damping * rate, 0.0), r * elastic / depth + max(s * damping / depth * rate, 0.0)
 
 
-@kernel
+@inner
 def _through_spring(k, b, r, s, depth, rate, compliance):
     """`law_force` behind a spring in series: depth = u + compliance f(u)."""
     if compliance == 0.0:
@@ -139,14 +139,3 @@ def one_d_step(p, state, tips):
         state.stiffness[i] = stiffness
         for c in range(3):
             state.forces[i, c] = force * normal[c] if force > 0.0 else 0.0
-
-
-@kernel
-def one_d_path(p, state, steps_s, path, forces):
-    """`one_d_step` along the path (n, m, 3) m, steps_s (n,) apart; writes the forces (n, m, 3) N."""
-    for i in range(path.shape[0]):
-        state.dt_s[0] = steps_s[i]
-        one_d_step(p, state, path[i])
-        for t in range(path.shape[1]):
-            for k in range(3):
-                forces[i, t, k] = state.forces[t, k]

@@ -25,10 +25,10 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mechanics.bounds import FARTHEST_M, LARGEST_N, within
 from mechanics.errors import OptionError
+from mechanics.kernels import inner, kernel
 from mechanics.options import check_ranges, option
 
 LONGEST_DELAY_TICKS = 64
@@ -159,7 +159,7 @@ def passivity_state() -> PassivityState:
     )
 
 
-@njit(cache=True, nogil=True)
+@inner
 def passivity_restart(state):
     """As at rest with nothing exchanged; the least net energy so far stays for the report.
 
@@ -175,7 +175,7 @@ def passivity_restart(state):
     state.cut[0] = 0.0
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def passivity_before(parameters, state, wanted, position, work_j, fresh, between_s, dt_s, age_s):
     """Observe what held forces did and change `wanted` (3,) in place; True where it was changed.
 
@@ -226,7 +226,7 @@ def passivity_before(parameters, state, wanted, position, work_j, fresh, between
     return _control(parameters, state, wanted, dt_s, age_s)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _under_way(parameters, state):
     """The greatest force, N, that was sent and may still act or come to act."""
     greatest2 = 0.0
@@ -238,7 +238,7 @@ def _under_way(parameters, state):
     return math.sqrt(greatest2)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _control(parameters, state, wanted, dt_s, age_s):
     velocity, energies = state.velocity, state.energies
     speed2 = velocity[0] ** 2 + velocity[1] ** 2 + velocity[2] ** 2
@@ -258,7 +258,7 @@ def _control(parameters, state, wanted, dt_s, age_s):
     return changed or state.cut[0] > 0.0
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _guard(parameters, state, wanted, age_s):
     """Cut what could give out more than the energy that is left, and say for how long the rest may act.
 
@@ -297,7 +297,7 @@ def _guard(parameters, state, wanted, age_s):
         state.hold[0] = max(min(hold, LONGEST_HOLD_S), horizon)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def passivity_after(state, wanted, sent):
     """Remember the force `sent`, which safety made of the `wanted` that `passivity_before` left."""
     wanted2, sent2 = 0.0, 0.0

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-from numba import njit
 
+from mechanics.kernels import inner, kernel
 from mechanics.options import check_ranges, option
 
 if TYPE_CHECKING:
@@ -68,7 +68,7 @@ def support_plane(model: Model, options: SupportOptions | None = None) -> Suppor
     )
 
 
-@njit(cache=True, nogil=True)
+@inner
 def add_support_force(parameters, tip, velocity, radius_m, force):
     """Add the plane's force on the tool (N, (3,), in place); returns whether the tip touches it.
 
@@ -94,7 +94,7 @@ def add_support_force(parameters, tip, velocity, radius_m, force):
     return True
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def add_support_path(parameters, radii_m, previous, velocity, steps_s, path, forces):
     """`add_support_force` along a path (n, m, 3) m of m tips, steps_s (n,) apart, to forces (n, m, 3) N.
 

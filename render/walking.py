@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from render.kernels import kernel, part
+from mechanics.kernels import inner, kernel, shared_part
 
 FOOT_STEPS = 12
 WALK_EDGES = 64
 
 
-@part
+@shared_part
 def place(surface, triangle, weights, point, normal):
     """Write the point (3,) m and unit contact normal (3,) at barycentric weights (3,) of a triangle."""
     length = 0.0
@@ -32,7 +32,7 @@ def place(surface, triangle, weights, point, normal):
         normal[k] /= length
 
 
-@kernel
+@inner
 def walk(surface, triangle, weights, move):
     """Carry the anchor along the surface by `move` (3,) m, unfolding it over edges; returns its triangle.
 

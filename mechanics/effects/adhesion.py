@@ -9,12 +9,12 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Touch
+from mechanics.kernels import kernel
 from mechanics.model import Model
 from mechanics.schema import Key
 
@@ -22,7 +22,7 @@ _TURN = 0.25  # of the range: the way back over which the pull sets in, so that 
 _TURN_INSIDE = 0.2  # of the tip's radius: the same deeper in the contact
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside, turn_m):
     """Pull towards the object, N, at least 0; depth (negative: above the surface), the touch's deepest, m.
 
@@ -38,7 +38,7 @@ def adhesive_pull(depth_m, deepest_m, pull_off_n, range_m, inside, turn_m):
     return pull_off_n * reach
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     pull = adhesive_pull(depth, deepest, numbers[0], numbers[1], numbers[2], numbers[3])
     for k in range(3):

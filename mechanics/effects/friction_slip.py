@@ -6,11 +6,10 @@ it, a secant step on what is too much; renderer and prediction take the same wal
 
 from __future__ import annotations
 
-from numba import njit
-
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Touch
+from mechanics.kernels import kernel
 from mechanics.model import Model
 from mechanics.schema import Key
 
@@ -19,7 +18,7 @@ CAUTION, SECANT_CAUTION = 0.9, 0.98
 LEAST_N, SLIPPED = 1e-9, 1e-4
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def slip_excess(slip, pull, push, mu):
     """(what the tangential force `pull` has too much, N; the share of it that is to be kept) after `slip`
     walks; nothing too much where it is within a hair of the cone, or after the last walk."""
@@ -31,7 +30,7 @@ def slip_excess(slip, pull, push, mu):
     return excess, 1.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def slip_length(slip, excess, before, length, compliance, lever):
     """How far the anchor walks, m, for an excess, N; before: that of the last walk of `length`.
 

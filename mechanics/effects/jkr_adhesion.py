@@ -16,12 +16,12 @@ import math
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
+from mechanics.kernels import kernel
 from mechanics.model import Model
 from mechanics.schema import Key
 
@@ -30,14 +30,14 @@ _OBJECT_GIVES = 4.0
 """Of the pull-off's distance on a half-space: as far as an object that gives as a whole follows the tip."""
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _travel(a, lift, pull, give):
     """Of the tip, where the contact has radius a: all in tip radii and E* R^2."""
     neck = np.sqrt(lift * a)
     return a * a - neck + give * (4.0 / 3.0 * a * a * a - 2.0 * a * neck - pull)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _least(lift, give):
     """The contact radius at which a tip that is drawn back lets go."""
     if lift <= 0.0:
@@ -54,7 +54,7 @@ def _least(lift, give):
     return high
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def contact_radius(travel, lift, pull, give):
     """The stable contact's radius at a travel, 0 where nothing holds; all over the tip's radius and E* R^2.
 
@@ -77,7 +77,7 @@ def contact_radius(travel, lift, pull, give):
     return 0.5 * (low + high)
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def jkr_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     """numbers: lift and pull of the work on first touch, of that of separation, the range over R, R m,
     E* R^2 N. memory: contact radius over R, the object's give as the way in told it, how

@@ -9,19 +9,19 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numba import njit
 
 from mechanics.dent import dent_load
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Touch
+from mechanics.kernels import kernel
 from mechanics.model import Model
 from mechanics.schema import Key
 
 _NONE = 1e-6  # 1 / r that counts as none
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def softening(load, most, r, m):
     """Factor on the force, 1 while loading afresh; load, most and m in the measure of `dent_load`."""
     if most <= load:
@@ -29,7 +29,7 @@ def softening(load, most, r, m):
     return 1.0 - math.erf((most - load) / m) / r
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def _step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     factor = softening(load, most, numbers[0], numbers[1])
     for k in range(3):

@@ -10,11 +10,11 @@ from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.law import Law
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import Touch
+from mechanics.kernels import fresh_part
 
 LAWS: tuple[Law, ...] = tuple(sorted((e.law for e in effects() if e.law is not None), key=lambda x: x.order))
 """In the order in which they follow one another."""
@@ -51,7 +51,7 @@ def new_memory(numbers: PathNumbers, touches: int) -> np.ndarray:
     return np.zeros((touches, len(LAWS), int(numbers.memory[0])))
 
 
-@njit(error_model="numpy")
+@fresh_part
 def _nothing(numbers, memory, depth, deepest, load, most, dt, normal, force):
     pass
 
@@ -62,7 +62,7 @@ def _woven(laws: Sequence[tuple[int, Any]]) -> Any:
         return _nothing
     (row, own), rest = laws[0], _woven(laws[1:])
 
-    @njit(error_model="numpy")
+    @fresh_part
     def step(numbers, memory, depth, deepest, load, most, dt, normal, force):
         if numbers[row, 0] != 0.0:
             own(numbers[row, 1:], memory[row], depth, deepest, load, most, dt, normal, force)

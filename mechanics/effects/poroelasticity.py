@@ -12,13 +12,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, check, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Touch
 from mechanics.effects.viscoelasticity import changed, let_go, recall
+from mechanics.kernels import kernel
 from mechanics.model import Model
 from mechanics.schema import Key
 
@@ -29,7 +29,7 @@ _TERMS = len(WEIGHTS)
 _DRAINED = 1e3  # time constants that are more than any memory lasts
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def poroelastic_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     """Add what the fluid bears. numbers: share, D / R, m/s; memory: as of `prony_step`."""
     changed(memory, force)

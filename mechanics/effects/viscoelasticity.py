@@ -10,18 +10,18 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
 
 from mechanics.effects.base import Effect, Keys, Parameter, Scope, unchanged
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.law import Law
 from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
+from mechanics.kernels import kernel
 from mechanics.model import Model
 from mechanics.schema import Key
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def recall(weight, spans, k, memory, change, force):
     """Let branch k of a memory fade over `spans` of its time constants and follow a change (3,) of the
     quasi-static force that ran straight meanwhile; add it to the force."""
@@ -33,25 +33,25 @@ def recall(weight, spans, k, memory, change, force):
         force[axis] += weight * memory[branch]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def changed(memory, force):
     """Put into memory[3:6] how the quasi-static force changed since the last step, and that into memory[:3].
 
-    Nothing is returned: a renderer's kernels count no references (render.kernels), so they return no view.
+    Nothing is returned: a renderer's kernels count no references (mechanics.kernels), so they return no view.
     """
     for axis in range(3):
         memory[3 + axis] = force[axis] - memory[axis]
         memory[axis] = force[axis]
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def let_go(normal, force):
     """No force where it would pull: the tip has left the slower surface."""
     if not force[0] * normal[0] + force[1] * normal[1] + force[2] * normal[2] > 0.0:
         force[0] = force[1] = force[2] = 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@kernel
 def prony_step(numbers, memory, depth, deepest, load, most, dt, normal, force):
     """Add the memory of the force. numbers: (2 k,) pairs of g and tau, s; memory: (6 + 3 k,) the last force,
     its change, then each branch."""

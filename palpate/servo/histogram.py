@@ -5,13 +5,14 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numba import njit
+
+from mechanics.kernels import kernel
 
 SUB = 32
 BINS = 36 * SUB
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def bin_of(value_ns):
     """The bin of a duration: exact below 64 ns, then 32 bins an octave; negative values count as 0."""
     if value_ns < 0:
@@ -24,7 +25,7 @@ def bin_of(value_ns):
     return min(shift * SUB + rest, BINS - 1)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def count(bins, extremes, value_ns):
     """Add one duration; extremes: (3,) int64 of number, greatest and sum."""
     bins[bin_of(value_ns)] += 1

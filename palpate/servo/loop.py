@@ -9,12 +9,12 @@ from __future__ import annotations
 import os
 import threading
 import time
-from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import cfunc, njit, typeof, types
+from numba import njit, types
 
+from mechanics.kernels import kept, loop_kernel, pointer
 from palpate.servo.clock import COMPILED, c_function, compiled_now_ns, compiled_sleep_until, sleep_until
 from palpate.servo.layout import DEADLINE, STATUS, STOP
 from palpate.servo.tick import TickArrays, TickParameters, account, after, before
@@ -53,7 +53,7 @@ def answer(kernel, model, state, support, arrays, parameters, now_ns, deadline_n
     )
 
 
-@njit(cache=True, nogil=True)
+@loop_kernel
 def compiled_loop(kernel, model, state, support, arrays, parameters, wake, most_ticks):
     """Tick until told to stop or swap; `wake` is a file descriptor told after each tick, -1 for none."""
     for _ in range(most_ticks):
@@ -70,23 +70,6 @@ def compiled_loop(kernel, model, state, support, arrays, parameters, wake, most_
         account(arrays, parameters, deadline, started, ended)
         if wake >= 0:
             _write(wake, arrays.word.ctypes, 8)
-
-
-def kernel_pointer(renderer: Any, state: Any) -> Any:
-    """The renderer's kernel as a typed function pointer.
-
-    Passing the compiled function itself would make the loop a new one in every process; behind a pointer it
-    is compiled once for each kind of renderer and kept on disk.
-    """
-    signature = types.void(typeof(renderer.parameters), typeof(state), types.float64[:, ::1])
-    return _pointer(renderer.kernel, signature, _is_ours(renderer))
-
-
-@cache
-def _pointer(kernel: Any, signature: Any, ours: bool) -> Any:
-    """Once a process for each kind of renderer: a swap loads no code that is there already."""
-    options = {k: v for k, v in kernel.targetoptions.items() if k in ("fastmath", "error_model", "_nrt")}
-    return cfunc(signature, cache=ours, **options)(kernel.py_func)
 
 
 class Program(NamedTuple):
@@ -106,30 +89,12 @@ def make_program(scene: TouchScene, arrays: TickArrays, parameters: TickParamete
     state = renderer.start(radii_m=radii, dt_s=parameters.period_ns * 1e-9)
     warm_up(renderer, state)
     state = renderer.start(radii_m=radii, dt_s=parameters.period_ns * 1e-9)
-    kernel = kernel_pointer(renderer, state)
+    kernel = pointer(renderer.kernel, renderer.parameters, state, arrays.tips)
     loop = None
     if COMPILED:
-        loop = kept(compiled_loop, renderer)
+        loop = kept(compiled_loop, renderer.parameters)
         loop(kernel, renderer.parameters, state, scene.support, arrays, parameters, -1, 0)
     return Program(scene, kernel, loop, state, parameters)
-
-
-def _is_ours(renderer: Any) -> bool:
-    return type(renderer.parameters).__module__.split(".")[0] in ("render", "palpate")
-
-
-def kept(function: Any, renderer: Any) -> Any:
-    """A compiled function that takes this renderer, from disk where that is safe.
-
-    Numba's index of a function names the types of every call ever compiled, and cannot be read in a process
-    that cannot import one of them (a script's own renderer, say); such a renderer gets a fresh copy.
-    """
-    return function if _is_ours(renderer) else _fresh_copy(function)
-
-
-@cache
-def _fresh_copy(function: Any) -> Any:
-    return njit(nogil=True)(function.py_func)
 
 
 def warm_up(renderer: Any, state: Any, places: int = 100) -> None:

@@ -10,8 +10,10 @@ from collections.abc import Callable
 from typing import cast
 
 import numpy as np
-from numba import njit, types
+from numba import types
 from numba.extending import intrinsic
+
+from mechanics.kernels import kernel
 
 TRIES = 1000
 
@@ -28,21 +30,21 @@ fence = cast(Callable[[], None], intrinsic(_fence))
 """A full memory fence; compiled code calls it without the typing context that numba passes."""
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def begin_write(counter):
     """Before writing the block."""
     counter[0] += 1
     fence()
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def end_write(counter):
     """After writing the block."""
     fence()
     counter[0] += 1
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def write_block(counter, block, values):
     """block[...] = values, as one."""
     begin_write(counter)
@@ -51,7 +53,7 @@ def write_block(counter, block, values):
     end_write(counter)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def read_block(counter, block, values):
     """values[...] = block as one; returns the block's version, or -1 where the writer never let go."""
     for _ in range(TRIES):

@@ -11,7 +11,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from devices.safety import (
     LATCHING,
@@ -25,6 +24,7 @@ from devices.safety import (
     safety_step,
 )
 from mechanics.bounds import FARTHEST_M, LARGEST_N, within
+from mechanics.kernels import inner, kernel
 from palpate.servo.histogram import count
 from palpate.servo.layout import (
     BEAT,
@@ -135,7 +135,7 @@ def tick_arrays(shared: SharedArrays, offsets_m: np.ndarray, workspace_centre_m:
     )
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def before(arrays):
     """Take the newest pose and place the tips (scene frame)."""
     # a writer that died half way leaves the last good pose, which then ages
@@ -160,7 +160,7 @@ def before(arrays):
                 arrays.tips[t, i] = np.nan
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def after(
     arrays,
     parameters,
@@ -180,7 +180,7 @@ def after(
     dt_s = _elapsed(arrays, parameters, now_ns)
     age_s = now_ns * 1e-9 - pose[IN_TIME]
     velocity = pose[IN_TIP_VELOCITY : IN_TIP_VELOCITY + 3]
-    contacts = 0
+    contacts = np.int64(0)  # a plain 0 would have numba compile twice what takes it
     # loops, not slice assignments, which take numba seconds to compile
     for i in range(3):
         rendered[i] = 0.0
@@ -255,7 +255,7 @@ def after(
     _publish_tips(arrays, forces, points, normals, depths, touching, stiffness)
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _parent_is_silent(arrays, parameters, dt_s):
     """Whether the parent's heartbeat has stood still for longer than it may."""
     previous, beat = arrays.previous, float(arrays.shared.control[BEAT])
@@ -267,7 +267,7 @@ def _parent_is_silent(arrays, parameters, dt_s):
     return 0.0 < parameters.silence_s < previous[SILENT_S]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _elapsed(arrays, parameters, now_ns):
     """Seconds since the last tick started; what moved meanwhile is told by the readings' own times."""
     elapsed = parameters.period_ns * 1e-9
@@ -277,7 +277,7 @@ def _elapsed(arrays, parameters, now_ns):
     return elapsed
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _publish(arrays, reasons, contacts, depth, now_ns, deadline_ns, period_ns):
     """The tick's row in the ring and the statistics."""
     pose, command, counts = arrays.pose, arrays.safety.force, arrays.shared.counts
@@ -317,7 +317,7 @@ def _publish(arrays, reasons, contacts, depth, now_ns, deadline_ns, period_ns):
         arrays.shared.energies[k] = arrays.passivity.energies[k]
 
 
-@njit(cache=True, nogil=True)
+@inner
 def _publish_tips(arrays, forces, points, normals, depths, touching, stiffness):
     """The newest row and every tip's contact, for a window."""
     block = arrays.shared.snapshot
@@ -339,7 +339,7 @@ def _publish_tips(arrays, forces, points, normals, depths, touching, stiffness):
     end_write(arrays.shared.snapshot_version)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def account(arrays, parameters, deadline_ns, started_ns, ended_ns):
     """Count the tick and set the next deadline: absolute, in phase; those that passed wholly are missed."""
     counts = arrays.shared.counts
@@ -358,13 +358,13 @@ def account(arrays, parameters, deadline_ns, started_ns, ended_ns):
     counts[DEADLINE] = following
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def put_pose(arrays, pose):
     """Hand a pose (IN_WIDTH,) to the next tick."""
     write_block(arrays.inbox_version, arrays.inbox, pose)
 
 
-@njit(cache=True, nogil=True)
+@kernel
 def take_command(arrays, command):
     """Copy the newest command (OUT_WIDTH,); returns its version, -1 where it could not be read."""
     return read_block(arrays.outbox_version, arrays.outbox, command)

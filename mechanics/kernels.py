@@ -1,0 +1,88 @@
+"""How our kernels are compiled: on disk, dividing as C does, without counting references, each part once.
+
+A step is handed some 90 arrays in its parameters and state. Numba counts a reference to each of them at every
+call, with atomic operations that cost more than the physics; the kernels allocate nothing, so nothing is lost
+where that is left out. For every compiled function it also writes code that takes these arrays out of Python
+objects, and it optimises a callee again within each caller. So what only kernels call is a `part` or `inner`,
+without such code, and a loop over a whole step calls it by a `pointer`.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+from numba import njit, typeof, types
+from numba.core.options import DefaultOptions
+
+from mechanics.kernel_cache import PACKAGES
+
+_OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
+if hasattr(DefaultOptions, "_nrt"):
+    _OPTIONS["_nrt"] = False
+_ALONE: dict[str, Any] = {**_OPTIONS, "nogil": True, "no_cfunc_wrapper": True}
+_FROM_KERNELS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
+
+
+def kernel(function: Any) -> Any:
+    """Compile a function that works on arrays in place and allocates nothing."""
+    return njit(**_OPTIONS)(function)
+
+
+def loop_kernel(function: Any) -> Any:
+    """Compile a kernel that only Python calls, and that lets other threads run meanwhile."""
+    return njit(**_ALONE)(function)
+
+
+def part(function: Any) -> Any:
+    """Compile a piece for kernels alone (see `inner`), woven into each: its arrays need not be passed."""
+    return njit(forceinline=True, **_FROM_KERNELS)(function)
+
+
+def shared_part(function: Any) -> Any:
+    """Compile a part that Python calls as well."""
+    return njit(forceinline=True, **_OPTIONS)(function)
+
+
+def inner(function: Any) -> Any:
+    """Compile a function that only kernels call. From Python it must not be called: that ends the process."""
+    return njit(**_FROM_KERNELS)(function)
+
+
+def fresh_part(function: Any) -> Any:
+    """A part that is made while the program runs: not kept by itself, but with the kernels that call it."""
+    return njit(**{**_FROM_KERNELS, "cache": False})(function)
+
+
+def pointer(step: Any, *arguments: Any) -> Any:
+    """A kernel as a typed function pointer for arguments of these types; it returns nothing.
+
+    A kernel that is handed the compiled function itself would be a new one in every process, and optimise the
+    step again; behind a pointer it is compiled once for each kind of arguments and kept on disk.
+    """
+    return _pointer(step, types.void(*map(typeof, arguments)))
+
+
+@cache
+def _pointer(step: Any, signature: Any) -> Any:
+    """Once a process for each kind of arguments."""
+    return types.CompileResultWAP(step.get_compile_result(signature))
+
+
+def kept(function: Any, *arguments: Any) -> Any:
+    """A kernel that takes named tuples like these, from disk where that is safe.
+
+    Numba's index of a function names the types of every call ever compiled, and cannot be read in a process
+    that cannot import one of them (a script's own renderer, say); for such types it is a fresh copy.
+    """
+    return function if all(map(_is_ours, arguments)) else _fresh_copy(function)
+
+
+def _is_ours(argument: Any) -> bool:
+    return type(argument).__module__.split(".")[0] in PACKAGES
+
+
+@cache
+def _fresh_copy(function: Any) -> Any:
+    options = {name: value for name, value in function.targetoptions.items() if name != "nopython"}
+    return njit(**options)(function.py_func)

@@ -1,0 +1,63 @@
+"""What is compiled for kernels alone is called by them alone: from Python the call would end the process."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+import mechanics
+
+ROOT = Path(mechanics.__file__).parents[1]
+ALONE = {"part", "inner", "fresh_part"}
+COMPILED = ALONE | {"kernel", "loop_kernel", "shared_part", "njit"}
+
+
+def decorators(function: ast.FunctionDef) -> set[str]:
+    """Names of its decorators, called or not."""
+    bare = (d.func if isinstance(d, ast.Call) else d for d in function.decorator_list)
+    return {d.attr if isinstance(d, ast.Attribute) else getattr(d, "id", "") for d in bare}
+
+
+def python_calls(node: ast.AST) -> set[str]:
+    """Names called outside of compiled functions."""
+    if isinstance(node, ast.FunctionDef) and decorators(node) & COMPILED:
+        return set()
+    own = {node.func.id} if isinstance(node, ast.Call) and isinstance(node.func, ast.Name) else set()
+    return own.union(*(python_calls(child) for child in ast.iter_child_nodes(node)))
+
+
+@pytest.fixture(scope="module")
+def trees() -> dict[str, ast.Module]:
+    """Dotted name -> source of everything that may call a kernel."""
+    folders = ("mechanics", "render", "devices", "diagnose", "palpate", "scenes", "benchmarks", "tests")
+    files = [path for folder in folders for path in (ROOT / folder).rglob("*.py")]
+    return {
+        ".".join(path.relative_to(ROOT).with_suffix("").parts): ast.parse(path.read_text(encoding="utf-8"))
+        for path in files
+    }
+
+
+def test_python_calls_nothing_that_is_compiled_for_kernels_alone(trees):
+    alone = {
+        (module, node.name)
+        for module, tree in trees.items()
+        for node in ast.walk(tree)
+        if isinstance(node, ast.FunctionDef) and decorators(node) & ALONE
+    }
+    assert ("render.fem_solve", "settle") in alone
+    wrong = []
+    for module, tree in trees.items():
+        seen = {
+            (node.module, name.name): name.asname or name.name
+            for node in ast.walk(tree)
+            if isinstance(node, ast.ImportFrom)
+            for name in node.names
+        }
+        calls = python_calls(tree)
+        wrong += [
+            f"{module} calls {name} of {home}"
+            for home, name in alone
+            if (name if home == module else seen.get((home, name))) in calls
+        ]
+    # the laws of a path are made there, and handed to kernels
+    assert [word for word in wrong if "effects.path" not in word] == []
