@@ -41,6 +41,7 @@ def run_command(name: str, words: Sequence[str], parser: argparse.ArgumentParser
     given = vars(arguments)
     out = Output(given.pop("json", None))
     operation, _ = command_operation(name)
+    importlib.import_module("palpate.show")  # results know how they look
     asked, result = operation.run(given, out=out)
     return (operation.answer or answer)(result, asked, out)
 
