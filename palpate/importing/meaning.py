@@ -24,18 +24,18 @@ _EXPONENTS = (1.0, 1.5, 2.0)
 _ROWS_TOLD, _MODEL_ERROR = 8.0, 0.02
 """A curve tells as much as so many independent rows, and a law misses so much of its variance."""
 _PULL, _OUTSIDE, _WORK, _DRIFT = 8.0, 2.0, 3.0, 0.02
-_CLOCK_TOLD, _SENSE_TOLD = 10.0, 14.0
+_CLOCK_TOLD, _SENSE_TOLD, _TWICE_TOLD = 10.0, 14.0, 60.0
 
 
 class Unclear(RecordingError):
-    """Two readings are both likely. option: the operand that decides (`force_on`), choices: its values,
-    question: in plain words."""
+    """Two readings are both likely. option: the operand that decides (`force_on`), choices: its values
+    (none: a number), question: in plain words."""
 
     def __init__(self, question: str, option: str, choices: Sequence[str]) -> None:
         self.question, self.option, self.choices = question, option, tuple(choices)
-        flag = "--" + option.replace("_", "-")
+        flag = "--" + option.removesuffix("_m").replace("_", "-")
         either = " or ".join(f"{flag} {choice}" for choice in choices)
-        super().__init__(f"{question}: say {either}")
+        super().__init__(f"{question}: say {either or flag + ' NUMBER'}")
 
 
 @dataclass(frozen=True)
@@ -155,6 +155,8 @@ def clock_of(t: np.ndarray, values: np.ndarray) -> Reading:
     told = _CLOCK_TOLD * float(np.log(max(as_written, 1e-12) / max(in_time, 1e-12)))
     if abs(told) < 1e-3:  # rows that are merely reversed
         told = np.log(MOST_ODDS)
+    # one clock does not show a time twice
+    told -= _TWICE_TOLD * (1 - len(np.unique(t)) / len(t))
     return best({(1,): told / 2, (-1,): -told / 2})
 
 

@@ -17,7 +17,7 @@ from diagnose.specimen.bench import Curve
 from diagnose.specimen.result import Tests
 from mechanics.errors import OptionError, RecordingError
 from palpate.importing.curves import LEAST_ROWS, SaidOfCurves, numbers_in, read_curves, stated_radius
-from palpate.importing.meaning import MOST_ODDS
+from palpate.importing.meaning import MOST_ODDS, Unclear
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables
 from reconstruct.external.indentation import read_chiaro
 from reconstruct.external.uniaxial import of_compression, read_tension
@@ -99,7 +99,7 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCurves) -> Tests:
-    chiaro = [not said.columns and _is_chiaro(path) for path in paths]
+    chiaro = [not said.columns and is_chiaro(path) for path in paths]
     curves, stated, notes, odds = [], [], [], MOST_ODDS
     for path in (p for p, own in zip(paths, chiaro, strict=True) if own):
         data = read_chiaro(path)
@@ -113,7 +113,7 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
         if tip_radius_m is not None:
             notes.append(f"tip radius {1e3 * tip_radius_m:.4g} mm, as the file says")
     if tip_radius_m is None:
-        raise RecordingError("the tip's radius is in no file: give --tip-radius M")
+        raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
     if not _TIPS_M[0] <= tip_radius_m <= _TIPS_M[1]:
         raise OptionError(
             f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and "
@@ -131,7 +131,8 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
     )  # fmt: skip
 
 
-def _is_chiaro(path: Path) -> bool:
+def is_chiaro(path: Path) -> bool:
+    """Whether a text is an export of a Chiaro."""
     head = path.read_bytes()[:_LOOK].decode("latin-1")
     return "Tip radius (um)" in head and "Cantilever (nm)" in head
 

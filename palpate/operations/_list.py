@@ -20,6 +20,9 @@ class Entry(NamedTuple):
 
 
 OPERATIONS = {
+    "open": Entry(
+        "whatever it is: understood, checked, reconstructed or measured", "open", "palpate.operations.open_"
+    ),
     "demo": Entry("the main job on the embedded example; prints the report's path"),
     "check": Entry("what may be wrong with a recording, before it is believed", "check"),
     "reconstruct": Entry("a recording becomes a model", "reconstruct"),
@@ -44,7 +47,7 @@ OPERATIONS = {
     "batch": Entry("many recordings at once", "batch"),
     "completion": Entry("what lets a shell complete all this: bash, zsh or fish"),
     "load": Entry("the model of a folder or scene", "load", command=False),
-    "read_recording": Entry("a recording's file", "read_recording", command=False),
+    "read_recording": Entry("a recording's file or arrays", "read_recording recording", command=False),
     "renderer": Entry("what answers a tip at 1 kHz", "renderer", command=False),
 }
 

@@ -73,6 +73,12 @@ def material(asked: MaterialOperands, call: Call) -> Material:
     (docs/real-data.md). Lengths m, moduli Pa. Raises RecordingError where a file cannot be read, ContactError
     where nothing is touched.
     """
+    from palpate.importing.questions import with_answers
+
+    return with_answers(_made, asked, call)
+
+
+def _made(asked: MaterialOperands, call: Call) -> Material:
     from diagnose.specimen.material import material_of
     from palpate.importing.curves import SaidOfCurves
     from palpate.importing.specimens import read_tests
