@@ -131,7 +131,8 @@ def bench_of(
     if not used.any():
         raise ContactError(
             f"none of the {len(curves)} curves rises above its noise as the tip goes in: are travel and load "
-            "the right columns, and their signs (travel into the sample, load that pushes the tip out)?"
+            "the right columns, and their signs (travel into the sample, load that pushes the tip out)? say "
+            "--column depth=NAME, --column load=NAME, --travel out or --compression negative"
         )
     kept = [(c, f) for c, f in zip(ready, found, strict=True) if f is not None]
     noise = float(np.median([n for _, (_, _, n) in kept]))

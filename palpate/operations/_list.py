@@ -20,13 +20,13 @@ class Entry(NamedTuple):
 
 
 OPERATIONS = {
-    "open": Entry(
-        "whatever it is: understood, checked, reconstructed or measured", "open", "palpate.operations.open_"
-    ),
     "demo": Entry("the main job on the embedded example; prints the report's path"),
     "check": Entry("what may be wrong with a recording, before it is believed", "check"),
     "reconstruct": Entry("a recording becomes a model", "reconstruct"),
     "model": Entry("a MODEL from a surface's file and a modulus", "model_of"),
+    "open": Entry(
+        "whatever it is: understood, checked, reconstructed or measured", "open", "palpate.operations.open_"
+    ),
     "import": Entry(
         "other programs' files become a recording",
         "import_table read_table",

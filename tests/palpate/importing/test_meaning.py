@@ -1,4 +1,4 @@
-"""What a solid does tells signs, blocks and units that no header says; what stays open is asked in one line."""
+"""What a solid does tells signs, blocks and units that no header says; what stays open is asked."""
 
 from __future__ import annotations
 
@@ -70,9 +70,7 @@ def test_blocks_with_restarting_clocks_and_a_position_that_counts_down(tmp_path)
     for k in range(9):
         t, depth, force = press(k)
         lines += ["<DATA>", "Time, s\tPosition (z), mm\tFz, N"]
-        lines += [
-            f"{a:.4f}\t{-147 - 1e3 * b:.6f}\t{-c:.6f}" for a, b, c in zip(t, depth, force, strict=True)
-        ]
+        lines += [f"{a:.4f}\t{-147 - 1e3 * b:.6f}\t{-c:.6f}" for a, b, c in zip(t, depth, force, strict=True)]
         lines += ["<END DATA>"]
     (tmp_path / "mach.txt").write_text("\n".join(lines))
     with pytest.warns(UserWarning, match="lack a number"):
