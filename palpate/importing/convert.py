@@ -27,6 +27,7 @@ from palpate.importing.meaning import (
     clock_starts,
     force_sense,
     joined,
+    press_scores,
 )
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
@@ -97,7 +98,10 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     position, force = _framed(position, force, quaternion, said, notes)
     force = _tared(t, force, said, notes)
     _doubted({role: c for role, c in columns.items() if c.assumed})
-    on_tool, odds = _on_tool(position, force, said, notes)
+    if said.force_on is None and columns["x"].table is None and columns["y"].table is None:
+        position, on_tool, odds = _one_axis(columns["z"], position, force, notes)
+    else:
+        on_tool, odds = _on_tool(position, force, said, notes)
     thing = dict(said.thing)
     recording = Recording(
         t=t,
@@ -411,6 +415,28 @@ def _framed(
         force = force + sign * np.array([0.0, 0.0, said.mass_kg * GRAVITY_M_PER_S2])
         notes.append(f"weight of {said.mass_kg:g} kg beyond the sensor taken off")
     return position, force
+
+
+def _one_axis(
+    z: Column, position: np.ndarray, force: np.ndarray, notes: list[str]
+) -> tuple[np.ndarray, bool, float]:
+    """(position with z out of the sample, whether the force is that on the tool, odds) of a machine that
+    moves along z alone. Raises Unclear."""
+    scores = press_scores(-position[:, 2], force[:, 2])
+    signs = best({key: score for key, score in scores.items() if z.guessed or key[0] > 0})
+    if not signs.sure:
+        raise Unclear(
+            f"whether the force is that on the tool or on the object cannot be told from how it goes with "
+            f"'{z.name}' ({signs.words})",
+            "force_on",
+            ("tool", "object"),
+        )
+    travel, load = signs.value
+    notes.append(
+        f"'{z.name}' counts {'into' if travel * z.factor < 0 else 'out of'} the sample, the force is that on "
+        f"the {'tool' if load > 0 else 'object'} ({signs.words})"
+    )
+    return position * [1.0, 1.0, float(travel)], load > 0, signs.odds
 
 
 def _on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[str]) -> tuple[bool, float]:

@@ -101,6 +101,18 @@ def test_the_force_on_an_object_is_told_from_that_on_a_tool():
     assert not force_sense(position, np.random.default_rng(0).standard_normal(force.shape)).sure
 
 
+@pytest.mark.parametrize("travel", [1, -1])
+@pytest.mark.parametrize("load", [1, -1])
+def test_a_machine_of_one_axis_is_imported_with_z_out_of_the_sample(tmp_path, travel, load):
+    t, depth, force = press()
+    columns = [t, 5 + travel * 1e3 * depth, load * force]
+    file = write(tmp_path / "a.csv", columns, "Time (s),Position (mm),Load (N)")
+    read = pp.read_table(file, tip_radius_m=RADIUS)
+    top = int(np.argmax(read.force_on_tool[:, 2]))
+    assert read.force_on_tool[top, 2] == pytest.approx(force.max())
+    assert read.position[top, 2] == pytest.approx(read.position[:, 2].min(), abs=1e-5)
+
+
 def test_what_stays_open_is_one_line_that_names_the_flag(tmp_path, capsys):
     t, depth, _ = press()
     noise = np.random.default_rng(0).standard_normal(len(t))
