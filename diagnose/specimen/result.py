@@ -20,6 +20,8 @@ FLOORS = {
     "indentation": ("kelvin-voigt", "hunt-crossley"),
 }
 """1D models, by kind of test."""
+BETTER = 0.95
+"""Share of an error below which another is called smaller."""
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,7 @@ class Material(Result):
 
     @property
     def beaten_by(self) -> str | None:
-        """The 1D model that predicts held-out data better, if one does."""
-        floors = [name for name in FLOORS[self.kind] if self.error.get(name, float("inf")) < self.missed]
+        """The 1D model that predicts held-out data better by more than `BETTER`, if one does."""
+        limit = BETTER * self.missed
+        floors = [name for name in FLOORS[self.kind] if self.error.get(name, float("inf")) < limit]
         return min(floors, key=lambda name: self.error[name]) if floors else None

@@ -24,8 +24,8 @@ def lines(result: Material) -> list[str]:
     ranked = sorted(result.error.items(), key=lambda item: item[1])
     text.append(f"held out ({result.held_out}): " + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked))
     if result.closed is not None and result.closed_ci95 is not None:
-        low, high = result.closed_ci95
-        text.append(f"closed {result.closed:.0%} of the gap (95 % interval {low:.0%} to {high:.0%})")
+        closed, low, high = (min(share, 1.0) for share in (result.closed, *result.closed_ci95))
+        text.append(f"closed {closed:.0%} of the gap (95 % interval {low:.0%} to {high:.0%})")
     text += [f"  {name.replace('_', ' ')}: {in_words(name, v)}" for name, v in result.parameters.items()]
     text += [f"  {note}" for note in result.notes]
     if result.unknown:
