@@ -47,6 +47,7 @@ _BETWEEN_S = 2.0
 _FLOOR = {False: 0.005, True: 0.02}
 """Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""
 _CELLS = 20
+_WAY_ROWS = 60
 _MARGIN = 2.0
 _BASELINE = 0.1
 _LEAST_NOISE = 1e-3
@@ -187,7 +188,8 @@ def bench_of(
 def _levelled(curve: Curve, pace: float) -> Curve:
     """At a hand's pace, of at most RATE_HZ by means."""
     rate = (len(curve.t) - 1) / float(curve.t[-1] - curve.t[0]) / pace
-    block = max(1, round(rate / RATE_HZ))
+    # a long hold must not thin a quick way in
+    block = max(1, min(round(rate / RATE_HZ), int(np.argmax(curve.force)) // _WAY_ROWS))
     count = len(curve.t) // block
     t, travel, force = (
         v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
