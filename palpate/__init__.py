@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from mechanics.recording import Recording as Recording
     from palpate.batching.summary import Batch as Batch
     from palpate.importing.imported import Imported as Imported
+    from palpate.importing.opened import Opened as Opened
     from palpate.operations._declare import options as options
     from palpate.operations.batch import batch as batch
     from palpate.operations.calibrate import calibrate as calibrate
@@ -55,8 +56,10 @@ if TYPE_CHECKING:
     from palpate.operations.load import load as load
     from palpate.operations.material import material as material
     from palpate.operations.model import model_of as model_of
+    from palpate.operations.open_ import open as open
     from palpate.operations.press import press as press
     from palpate.operations.read_recording import read_recording as read_recording
+    from palpate.operations.read_recording import recording as recording
     from palpate.operations.reconstruct import reconstruct as reconstruct
     from palpate.operations.renderer import renderer as renderer
     from palpate.operations.replay import replay as replay
@@ -76,6 +79,7 @@ _OTHERS = {
     "palpate.operations._declare": "options",
     "mechanics.recording": "Recording",
     "palpate.importing.imported": "Imported",
+    "palpate.importing.opened": "Opened",
     "mechanics.calibration": "Calibration",
     "diagnose.compare.before_after": "Changes",
     "reconstruct.checks.checkup": "Checkup",

@@ -80,6 +80,11 @@ class Reconstruction(Result):
         return "; ".join(filter(None, (by_shape, by_force)))
 
     @property
+    def predicts(self) -> bool:
+        """Whether nothing speaks against it: `doubt` is empty."""
+        return not self.doubt
+
+    @property
     def recording(self) -> Recording:
         """What it was made from."""
         return self.exploration.recording

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 from scipy.integrate import trapezoid
+from scipy.stats import t as student
 
 from diagnose.forward.touches import LEAST_PRESSES
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
@@ -46,6 +47,7 @@ _BETWEEN_S = 2.0
 _FLOOR = {False: 0.005, True: 0.02}
 """Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""
 _CELLS = 20
+_WAY_ROWS = 60
 _MARGIN = 2.0
 _BASELINE = 0.1
 _LEAST_NOISE = 1e-3
@@ -130,7 +132,8 @@ def bench_of(
     if not used.any():
         raise ContactError(
             f"none of the {len(curves)} curves rises above its noise as the tip goes in: are travel and load "
-            "the right columns, and their signs (travel into the sample, load that pushes the tip out)?"
+            "the right columns, and their signs (travel into the sample, load that pushes the tip out)? say "
+            "--column depth=NAME, --column load=NAME, --travel out or --compression negative"
         )
     kept = [(c, f) for c, f in zip(ready, found, strict=True) if f is not None]
     noise = float(np.median([n for _, (_, _, n) in kept]))
@@ -185,7 +188,8 @@ def bench_of(
 def _levelled(curve: Curve, pace: float) -> Curve:
     """At a hand's pace, of at most RATE_HZ by means."""
     rate = (len(curve.t) - 1) / float(curve.t[-1] - curve.t[0]) / pace
-    block = max(1, round(rate / RATE_HZ))
+    # a long hold must not thin a quick way in
+    block = max(1, min(round(rate / RATE_HZ), int(np.argmax(curve.force)) // _WAY_ROWS))
     count = len(curve.t) // block
     t, travel, force = (
         v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
@@ -315,14 +319,35 @@ _BLOCKS = 8
 _SHIFTS = np.linspace(-0.1, 0.1, 41)
 
 
+def modulus_interval(bench: Bench, made: Diagnosis) -> tuple[float, float]:
+    """Pa, 95 %, in the machine's size, of the fit whose modulus the diagnosis states: it is fitted again
+    without each group of curves (delete-a-group jackknife of log E)."""
+    forward, found = made.forward, made.attribution
+    assert forward is not None and found is not None
+    t, fit = forward.touches, found.final.found
+    settings = settings_of(forward, fit.effects, fit.values, fit.onset)
+    whitener = Whitener(forward, settings, _nuisance(bench))
+    folds = min(_FOLDS, len(t))
+    again = []
+    for k in range(folds):
+        kept = np.arange(len(t)) % folds != k
+        weights = np.where([kept[t.site == s].any() for s in range(t.sites)], 1.0, 0.0)
+        left = Descent(forward, whitener, fit.effects, weights).run(fit.values, fit.onset, _ITERATIONS)
+        again.append(float(left.values[0]))
+    error = np.sqrt((folds - 1) / folds * ((np.array(again) - np.mean(again)) ** 2).sum())
+    half = float(np.exp(student.ppf(0.975, folds - 1) * error))
+    e = fit.modulus / bench.similarity.modulus
+    return e / half, e * half
+
+
 @dataclass(frozen=True)
 class Approach:
     """What a few curves tell, none of which can be held out: each way in, block by block of it left out in
     turn.
 
-    error: dent law (and 'hunt-crossley', 'regression') -> rms error over rms force, median of the curves.
-    law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does not come back
-    (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
+    error: dent law (and 'hunt-crossley', 'regression', 'constant') -> rms error over rms force, median of
+    the curves. law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does
+    not come back (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
     """
 
     error: dict[str, float]
@@ -348,6 +373,7 @@ def approach_of(bench: Bench) -> Approach:
             moduli.setdefault(name, []).append(modulus)
         for name, order in (("hunt-crossley", 0), ("regression", 5)):
             errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
+        errors.setdefault("constant", []).append(_constant(ways[1]))
         back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
         given = max(trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
         # a curve that ends in its hold gives nothing back to be weighed
@@ -400,6 +426,13 @@ def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
         best = int(np.argmin(cost))
         predicted[~seen] = k[best] * x[~seen] ** exponents[best]
     return _relative(predicted, push, block)
+
+
+def _constant(push: np.ndarray) -> float:
+    """The same of the mean force: what says nothing of the depth."""
+    block = _blocks(len(push))
+    inner = push[(block > 0) & (block < _BLOCKS - 1)]
+    return _relative(np.full(len(push), inner.mean() if len(inner) else 0.0), push, block)
 
 
 def _relative(predicted: np.ndarray, push: np.ndarray, block: np.ndarray) -> float:

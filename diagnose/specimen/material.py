@@ -3,14 +3,27 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from scipy.stats import t as student
 
 from diagnose.forward.touches import touches_of
-from diagnose.specimen.bench import Approach, Bench, approach_of, bench_of, diagnose_bench, unseen_holds
+from diagnose.specimen.bench import (
+    Approach,
+    Bench,
+    approach_of,
+    bench_of,
+    diagnose_bench,
+    modulus_interval,
+    unseen_holds,
+)
 from diagnose.specimen.result import Material, Tests
 from diagnose.specimen.rivals import held_out_rivals
+from diagnose.specimen.yielding import Machine, Way, machine_of, way_of
+from diagnose.verdict.result import Diagnosis
 from mechanics.effects.finite_strain import EFFECT as FINITE
 from mechanics.effects.registry import effects
 from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
@@ -73,6 +86,7 @@ def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
     fitted = fit_law(ready, law)
     own = np.array([fit_law([c], law).young_modulus_pa for c in ready])
     spread = 1.96 * own.std(ddof=1) / np.sqrt(len(own)) if len(own) > 1 else np.nan
+    error["constant"] = float(np.median([c.stress.std() / np.sqrt((c.stress**2).mean()) for c in ready]))
     c = fitted.coefficients
     parameters = {"law": law.name, "strain_zero": fitted.zero}
     if law.name.startswith("yeoh"):
@@ -138,76 +152,163 @@ def _relaxation(tests: Tests, names: tuple[str, ...]) -> Material:
 def _indentation(
     tests: Tests, bench: Bench, names: tuple[str, ...], fast: bool, seed: int, progress: Progress
 ) -> Material:
-    own = bench.modulus_pa[bench.used]
-    unused = [n for n, u in zip(names, bench.used, strict=True) if not u]
-    notes = [f"without a contact, left out: {', '.join(unused)}"] if unused else []
+    unused = [c.name for c, u in zip(tests.curves, bench.used, strict=True) if not u]
+    notes = list(tests.notes)
+    notes += [f"without a contact, left out: {', '.join(unused)}"] if unused else []
     if np.isfinite(tests.stated_modulus_pa):
         notes.append(f"the maker's software states {tests.stated_modulus_pa:.4g} Pa")
     approach = approach_of(bench)
     made = diagnose_bench(bench, fast=fast, seed=seed, progress=progress)
     if made is None:
-        return _few(bench, approach, names, notes)
-    touches = touches_of(bench.model.presses.net)
-    rows = touches.counted
-    size = float(np.sqrt((touches.push[rows] ** 2).mean()))
-    error = {
-        name: float(np.sqrt(((force - touches.push)[rows] ** 2).mean())) / size
-        for name, force in held_out_rivals(touches).items()
-    }
-    error |= {"ideal": made.gap_before_n / size, "verdict": made.gap_after_n / size}
+        return _few(tests, bench, approach, names, notes)
+    own = bench.modulus_pa[bench.used]
+    error = _held_out_errors(bench, made)
     holds = unseen_holds(bench, made)
     if holds is not None:
         error |= {"ideal, holds": holds[0], "verdict, holds": holds[1]}
         notes.append(f"of unseen holds {100 * (1 - (holds[1] / holds[0]) ** 2):.0f} % is closed")
-    low, high = np.quantile(own, [0.025, 0.975]) if bench.specimens else _mean_interval(own)
-    factor = bench.similarity.modulus
-    entries = {e.name: bench.similarity.back(e.parameters) for e in made.entries if e.name in made.effects}
+    if bench.specimens:
+        modulus, interval = float(np.median(own)), tuple(map(float, np.quantile(own, [0.025, 0.975])))
+    else:
+        modulus = made.young_modulus_pa / bench.similarity.modulus
+        interval = modulus_interval(bench, made)
+    assert made.attribution is not None
+    if made.effects:
+        ideal = made.attribution.ideal.found.modulus / bench.similarity.modulus
+        notes.append(f"without {_listed(made.effects)} the modulus would be {ideal:.4g} Pa")
     told = {e.name for e in effects()} - set(made.left_out)
     return Material(
         kind="indentation",
         files=names,
         curves=len(own),
         held_out="curve by curve, normal force",
-        young_modulus_pa=float(np.median(own)) if bench.specimens else made.young_modulus_pa / factor,
-        young_modulus_ci95_pa=(float(low), float(high)),
+        young_modulus_pa=modulus,
+        young_modulus_ci95_pa=(interval[0], interval[1]),
         law=bench.model.material.dent_law,
         error=error,
         verdict=made.summary,
         effects=made.effects,
         closed=made.gap_closed,
         closed_ci95=made.gap_closed_ci95,
-        parameters=entries,
+        parameters=_named_parameters(bench, made),
+        at_bound=_at_bound(made),
         notes=(*notes, *made.reasons),
         unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - told)),
         diagnosis=made,
+        odds=tests.odds,
     )
 
 
+def _held_out_errors(bench: Bench, made: Diagnosis) -> dict[str, float]:
+    """rms over rms force of what was held out: 1D models, ceiling, a constant, the ideal model, the
+    verdict."""
+    touches = touches_of(bench.model.presses.net)
+    rows = touches.counted
+    push = touches.push[rows]
+    size = float(np.sqrt((push**2).mean()))
+    error = {
+        name: float(np.sqrt(((force - touches.push)[rows] ** 2).mean())) / size
+        for name, force in held_out_rivals(touches).items()
+    }
+    return error | {
+        "constant": float(push.std()) / size,
+        "ideal": made.gap_before_n / size,
+        "verdict": made.gap_after_n / size,
+    }
+
+
+def _named_parameters(bench: Bench, made: Diagnosis) -> dict[str, dict[str, Any]]:
+    """Those of the effects that were named, by the fit that the modulus is of, in the machine's size."""
+    assert made.attribution is not None and made.forward is not None
+    fit = made.attribution.final.found
+    return {
+        e.name: bench.similarity.back(e.report(fit.of(e.name), made.forward, fit.modulus))
+        for e in fit.effects
+        if e.name in made.effects
+    }
+
+
+def _at_bound(made: Diagnosis) -> tuple[str, ...]:
+    """Parameters of the effects named that stand where the search ends: 'effect: parameter'."""
+    assert made.attribution is not None
+    fit, found = made.attribution.final.found, []
+    for e in fit.effects:
+        for p, value in zip(e.parameters, fit.of(e.name), strict=True):
+            near = 1e-3 * (p.high - p.low)
+            absent = abs(value - p.ideal) <= near
+            if e.name in made.effects and not absent and (value <= p.low + near or value >= p.high - near):
+                found.append(f"{e.name.replace('_', ' ')}: {p.name}")
+    return tuple(found)
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(n.replace("_", " ") for n in names)
+
+
 def _mean_interval(own: np.ndarray) -> tuple[float, float]:
-    error = 1.96 * own.std(ddof=1) / np.sqrt(len(own)) if len(own) > 1 else np.nan
-    return float(own.mean() - error), float(own.mean() + error)
+    if len(own) < 2:
+        return float("nan"), float("nan")
+    half = student.ppf(0.975, len(own) - 1) * own.std(ddof=1) / np.sqrt(len(own))
+    return float(own.mean() - half), float(own.mean() + half)
 
 
-def _few(bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]) -> Material:
+def _ways(tests: Tests, bench: Bench) -> list[Way]:
+    """The ways in, in the machine's size."""
+    return [
+        way_of(curve.travel, curve.force, float(at))
+        for curve, at, used in zip(tests.curves, bench.onset_m, bench.used, strict=True)
+        if used
+    ]
+
+
+def _few(
+    tests: Tests, bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]
+) -> Material:
+    """Fewer curves than can be held out: the laws of the dent, the machine beside them."""
     own = approach.modulus_pa
-    low, high = _mean_interval(own)
     gone = f"{100 * approach.hysteresis:.0f} % of the work does not come back"
     if not np.isfinite(approach.hysteresis):
         gone = "it ends in its hold"
     pull = float(approach.pull_n.max())
     if pull > 0:
         gone += f", and it pulls by up to {pull:.2g} N on the way out"
-    return Material(
+    assert tests.tip_radius_m is not None
+    ways = _ways(tests, bench)
+    slopes = [w.slope_n_per_m for w in ways if w.slope_n_per_m]
+    if slopes:
+        notes.append(f"free air slopes by {np.median(slopes):.3g} N/m of travel, which is taken off")
+    machine: Machine | None = None
+    if len(ways) > 1 or np.isfinite(approach.hysteresis):
+        nu = bench.model.material.poisson_ratio
+        machine = machine_of(ways, nu, tests.tip_radius_m, float(np.median(own)))
+    onset = {"onset_m": bench.onset_m[bench.used].tolist()}
+    common = Material(
         kind="indentation",
         files=names,
         curves=len(own),
         held_out="blocks of each way in",
         young_modulus_pa=float(own.mean()),
-        young_modulus_ci95_pa=(low, high),
+        young_modulus_ci95_pa=_mean_interval(own),
         law=approach.law,
         error=approach.error,
         verdict=f"{approach.law} follows the way in best; {gone}",
-        parameters={"onset_m": bench.onset_m[bench.used].tolist()},
-        notes=(*notes, "fewer than 6 curves: none can be held out, so no effect is named"),
+        parameters=onset,
+        notes=(*notes, "fewer than 6 curves: none can be held out, so no effect of the material is named"),
         unknown=(*INDENTATION_UNKNOWN, "which effect, for want of curves"),
+        odds=tests.odds,
+    )
+    if machine is None:
+        return common
+    low, high = machine.stiffness_ci95_n_per_m
+    return replace(
+        common,
+        young_modulus_pa=machine.modulus_pa,
+        young_modulus_ci95_pa=machine.modulus_ci95_pa,
+        law=machine.law,
+        error={**approach.error, "on a rigid machine": machine.rigid_error, "verdict": machine.error},
+        verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "
+        f"({low / 1e3:.3g} to {high / 1e3:.3g}); {gone}",
+        effects=("tool_compliance",),
+        parameters={**onset, "tool_compliance": {"stiffness_n_per_m": machine.stiffness_n_per_m}},
+        notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
     )

@@ -20,13 +20,15 @@ FLOORS = {
     "indentation": ("kelvin-voigt", "hunt-crossley"),
 }
 """1D models, by kind of test."""
+BETTER = 0.95
+"""Share of an error below which another is called smaller."""
 
 
 @dataclass(frozen=True)
 class Tests:
     """The curves of one kind: curves of an indentation, with the tip's radius; tests of compression or
     tension; holds (t s, value) of relaxation. stated_modulus_pa: by the maker's own software, NaN where not
-    said."""
+    said. notes: what was understood of the files; odds: of the least sure of it."""
 
     kind: str
     curves: tuple[Curve, ...] = ()
@@ -34,6 +36,8 @@ class Tests:
     holds: tuple[tuple[np.ndarray, np.ndarray], ...] = ()
     tip_radius_m: float | None = None
     stated_modulus_pa: float = float("nan")
+    notes: tuple[str, ...] = ()
+    odds: float = float("inf")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,7 +47,9 @@ class Material(Result):
     rms (of N, Pa): 1D models are the floor, 'regression' has no physics and is the ceiling. closed: share of
     the gap beyond the noise that the verdict closes on held-out curves, with its interval. effects: what was
     named. parameters: by law or effect, SI. unknown: what such a test cannot tell. seen: (x, measured,
-    predicted, axes' words). `plot`: measured and predicted. `show`: nothing, it has no place in space.
+    predicted, axes' words). at_bound: parameters at the end of the search. odds: of the least sure of
+    what was understood of the files. `plot`: measured and predicted. `show`: nothing, it has no place in
+    space.
     """
 
     kind: str
@@ -63,3 +69,22 @@ class Material(Result):
     unknown: tuple[str, ...] = ()
     seen: tuple[np.ndarray, np.ndarray, np.ndarray, str, str] | None = None
     diagnosis: Diagnosis | None = None
+    at_bound: tuple[str, ...] = ()
+    odds: float = float("inf")
+
+    @property
+    def missed(self) -> float:
+        """Held-out rms error over the rms of what predicts here: the verdict, else the law."""
+        return self.error.get("verdict", self.error[self.law] if self.law in self.error else float("nan"))
+
+    @property
+    def predicts(self) -> bool:
+        """Whether held-out data are predicted better than by a constant."""
+        return not self.missed > self.error.get("constant", float("inf"))
+
+    @property
+    def beaten_by(self) -> str | None:
+        """The 1D model that predicts held-out data better by more than `BETTER`, if one does."""
+        limit = BETTER * self.missed
+        floors = [name for name in FLOORS[self.kind] if self.error.get(name, float("inf")) < limit]
+        return min(floors, key=lambda name: self.error[name]) if floors else None

@@ -8,7 +8,7 @@ tool frame by the orientation; the tip's centre is the stated position plus the 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +18,17 @@ from scipy.spatial.transform import Rotation, Slerp
 from mechanics.errors import RecordingError
 from mechanics.recording import Recording
 from palpate.importing.mapping import ROLES, Column, Said, find_columns, time_of
+from palpate.importing.meaning import (
+    MOST_ODDS,
+    Reading,
+    Unclear,
+    best,
+    clock_of,
+    clock_starts,
+    force_sense,
+    joined,
+    press_scores,
+)
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
 from reconstruct.steps.s1_filter.low_pass import white_noise_std
@@ -27,6 +38,8 @@ _SEARCH_S, _SURE = 3.0, 0.5
 _MOST_HZ = 2000.0
 _WIDEST_M, _HARDEST_N, _SLOWEST_S = 3.0, 100.0, 0.5
 """A unit that was only assumed is doubted beyond an arm's reach, a hand's push, a reading's interval."""
+_USUAL_WIDTH_M, _WIDTH_FACTOR = 0.05, 4.0
+"""How wide a path is, and by which factor that varies."""
 POINTS_HZ = 100.0
 """Rows without a time are numbered by this clock, and slower readings put on it; a recording needs one."""
 LEAST_HZ = 60.0
@@ -36,20 +49,22 @@ LEAST_HZ = 60.0
 @dataclass(frozen=True)
 class Understood:
     """recording: SI, device frame, force on the tool. columns: by role. notes: what was done, one line each.
-    quasi_static: rows without a time. read_hz: rate of the readings, where they lie on a faster clock."""
+    quasi_static: rows without a time. read_hz: rate of the readings, where they lie on a faster clock.
+    odds: that the force is whose it was taken to be."""
 
     recording: Recording
     columns: dict[str, Column]
     notes: tuple[str, ...]
     quasi_static: bool = False
     read_hz: float | None = None
+    odds: float = MOST_ODDS
 
 
 def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
     """The recording that the tables hold. Raises RecordingError where something needed is missing or
     impossible."""
     if said.tip_radius_m is None:
-        raise RecordingError("the tip's radius is in no table: give --tip-radius M (or [tool] tip_radius_m)")
+        raise Unclear("the tip's radius in m is in no table", "tip_radius_m", ())
     columns = find_columns(tables, said)
     notes = _sizes(columns)
     streams = {
@@ -82,12 +97,16 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
         quaternion = streams["orientation"].values if "orientation" in streams else None
     position, force = _framed(position, force, quaternion, said, notes)
     force = _tared(t, force, said, notes)
-    notes += _signs(position, force if said.force_on == "tool" else -force)
+    _doubted({role: c for role, c in columns.items() if c.assumed})
+    if said.force_on is None and columns["x"].table is None and columns["y"].table is None:
+        position, on_tool, odds = _one_axis(columns["z"], position, force, notes)
+    else:
+        on_tool, odds = _on_tool(position, force, said, notes)
     thing = dict(said.thing)
     recording = Recording(
         t=t,
         position=position,
-        force_on_tool=force if said.force_on == "tool" else -force,
+        force_on_tool=force if on_tool else -force,
         sample_rate_hz=rate,
         tip_radius_m=float(said.tip_radius_m),
         quaternion=quaternion,
@@ -96,7 +115,7 @@ def understand(tables: Sequence[Table], said: Said, name: str) -> Understood:
         poisson_ratio=None if thing.get("poisson_ratio") is None else float(thing["poisson_ratio"]),
         description=_description(said, not timed, read_hz),
     )
-    return Understood(recording, columns, tuple(notes), not timed, read_hz)
+    return Understood(recording, columns, tuple(notes), not timed, read_hz, odds)
 
 
 def _sizes(columns: dict[str, Column]) -> list[str]:
@@ -106,7 +125,6 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
     for kind, roles, most, units in (
         ("position", ("x", "y", "z"), _WIDEST_M, ("mm", "um", "nm")),
         ("force", ("fx", "fy", "fz"), _HARDEST_N, ("mN", "uN", "nN")),
-        ("time", ("t",), _SLOWEST_S, ("ms", "us", "ns")),
     ):
         held = [columns[r] for r in roles if r in columns and columns[r].assumed]
         size = max((_size(kind, np.asarray(c.values)) for c in held), default=0.0)
@@ -115,7 +133,6 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
         seen = {
             "position": f"the path is {size:.3g} m wide",
             "force": f"the force goes up to {size:.3g} N",
-            "time": f"a row comes every {size:.3g} s",
         }[kind]
         likely = next((u for u in units if size * SI[kind][u] <= most), units[-1])
         hint = f"{seen} in the unit assumed: is it {likely}? say --units {kind}={likely}"
@@ -123,6 +140,30 @@ def _sizes(columns: dict[str, Column]) -> list[str]:
             raise RecordingError(hint)
         found.append(f"WARNING: {hint}")
     return found
+
+
+def _doubted(assumed: Mapping[str, Column]) -> None:
+    """Raise Unclear where positions or times whose unit nobody said may as well be in mm or ms."""
+    if "t" in assumed and _size("time", np.asarray(assumed["t"].values)) > _SLOWEST_S:
+        step = _size("time", np.asarray(assumed["t"].values))
+        raise Unclear(
+            f"a row comes every {step:.3g}, and nobody said whether ms or s", "units", ("time=ms", "time=s")
+        )
+    held = [np.asarray(assumed[role].values) for role in ("x", "y", "z") if role in assumed]
+    width_m = max((_size("position", values) for values in held), default=0.0)
+    if not width_m > 0:
+        return
+    scores: dict[tuple[int, ...], float] = {
+        (k,): -0.5 * (np.log(width_m * SI["position"][unit] / _USUAL_WIDTH_M) / np.log(_WIDTH_FACTOR)) ** 2
+        for k, unit in enumerate(("m", "mm"))
+    }
+    reading = best(scores)
+    if reading.value == (1,) or not reading.sure:
+        raise Unclear(
+            f"the path is {width_m:.3g} wide, and nobody said whether in m or mm",
+            "units",
+            ("position=mm", "position=m"),
+        )
 
 
 def _size(kind: str, values: np.ndarray) -> float:
@@ -193,10 +234,7 @@ def _stream(
     if len(values) < 2:
         raise RecordingError(f"the {part} has fewer than two rows of numbers")
     if t is not None:
-        order = np.argsort(t, kind="stable")
-        if (np.diff(order) < 0).any():
-            notes.append(f"{part}: rows sorted by time")
-        t, values = t[order], values[order]
+        t, values = _in_order(part, t, values, said, notes)
         fresh = np.concatenate([[True], np.diff(t) > 0])
         if not fresh.all():
             notes.append(f"{part}: {int((~fresh).sum())} rows repeat an earlier time and are left out")
@@ -207,6 +245,33 @@ def _stream(
             raise RecordingError("qw,qx,qy,qz are no unit quaternions (w first): name the right columns")
         values = values / length
     return _Stream(t, values, table.name)
+
+
+def _in_order(
+    part: str, t: np.ndarray, values: np.ndarray, said: Said, notes: list[str]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Rows in order of time: sorted, or blocks with clocks of their own one after the other."""
+    blocks = len(clock_starts(t))
+    if blocks == 1:
+        return t, values
+    reading = clock_of(t, values) if blocks <= len(t) // 4 else Reading((1,), MOST_ODDS)
+    if said.clock is not None:
+        reading = Reading((1 if said.clock == "one" else -1,), MOST_ODDS)
+    if not reading.sure:
+        raise Unclear(
+            f"{part}: the time goes back {blocks - 1} times, and neither sorted rows nor {blocks} blocks "
+            "with clocks of their own are clearly right",
+            "clock",
+            ("one", "blocks"),
+        )
+    if reading.value[0] < 0:
+        notes.append(
+            f"{part}: {blocks} blocks with their own clocks are put one after the other ({reading.words})"
+        )
+        return joined(t), values
+    order = np.argsort(t, kind="stable")
+    notes.append(f"{part}: rows sorted by time")
+    return t[order], values[order]
 
 
 def _clock_of(table: Table, columns: dict[str, Column], said: Said) -> Column | None:
@@ -346,26 +411,60 @@ def _framed(
             position = position + turned.apply(arm)
             notes.append(f"tip's centre {1e3 * np.linalg.norm(arm):.4g} mm off the stated position")
     if said.mass_kg:
-        sign = 1.0 if said.force_on == "tool" else -1.0
+        sign = -1.0 if said.force_on == "object" else 1.0
         force = force + sign * np.array([0.0, 0.0, said.mass_kg * GRAVITY_M_PER_S2])
         notes.append(f"weight of {said.mass_kg:g} kg beyond the sensor taken off")
     return position, force
 
 
-def _signs(position: np.ndarray, force: np.ndarray) -> list[str]:
-    """A warning where the force on the tool grows as the tip moves along it, not against it."""
-    moved, size = position - np.median(position, axis=0), np.linalg.norm(force, axis=1)
-    along = force[size > np.percentile(size, 90)].mean(axis=0)
-    along /= max(np.linalg.norm(along), 1e-300)
-    path = moved @ along
-    if np.ptp(path) <= 0 or np.ptp(size) <= 0:
-        return []
-    together = float(np.corrcoef(path, size)[0, 1])
-    if together < 0.5:
-        return []
-    return [
-        f"WARNING: the force grows as the tip moves along it ({together:.2f}): is a sign or force_on wrong?"
-    ]
+def _one_axis(
+    z: Column, position: np.ndarray, force: np.ndarray, notes: list[str]
+) -> tuple[np.ndarray, bool, float]:
+    """(position with z out of the sample, whether the force is that on the tool, odds) of a machine that
+    moves along z alone. Raises Unclear."""
+    scores = press_scores(-position[:, 2], force[:, 2])
+    signs = best({key: score for key, score in scores.items() if z.guessed or key[0] > 0})
+    if not signs.sure:
+        raise Unclear(
+            f"whether the force is that on the tool or on the object cannot be told from how it goes with "
+            f"'{z.name}' ({signs.words})",
+            "force_on",
+            ("tool", "object"),
+        )
+    travel, load = signs.value
+    notes.append(
+        f"'{z.name}' counts {'into' if travel * z.factor < 0 else 'out of'} the sample, the force is that on "
+        f"the {'tool' if load > 0 else 'object'} ({signs.words})"
+    )
+    return position * [1.0, 1.0, float(travel)], load > 0, signs.odds
+
+
+def _on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[str]) -> tuple[bool, float]:
+    """(whether the force is that on the tool, odds): as said, else by what a solid does. Raises Unclear."""
+    sense = force_sense(position, force)
+    if said.force_on is not None:
+        if sense.sure and (sense.value[0] > 0) != (said.force_on == "tool"):
+            other = "object" if said.force_on == "tool" else "tool"
+            notes.append(
+                f"WARNING: the force grows as the tip moves along it, not against it ({sense.words}): is a "
+                f"sign wrong, or is it --force-on {other}?"
+            )
+        return said.force_on == "tool", MOST_ODDS
+    if not sense.sure:
+        raise Unclear(
+            f"whether the force is that on the tool or on the object cannot be told from {len(force)} rows "
+            f"({sense.words})",
+            "force_on",
+            ("tool", "object"),
+        )
+    if sense.value[0] < 0:
+        notes.append(
+            "WARNING: the force grows as the tip moves along it, so it is taken as that on the object "
+            f"({sense.words}; --force-on tool if it is not)"
+        )
+    else:
+        notes.append(f"the force is that on the tool ({sense.words})")
+    return sense.value[0] > 0, sense.odds
 
 
 def _matrix(value: Any) -> np.ndarray:

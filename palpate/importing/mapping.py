@@ -69,22 +69,26 @@ class Said:
     tip_radius_m: float | None = None
     mass_kg: float = 0.0
     flange_to_tip_m: Sequence[float] | None = None
-    force_on: str = "tool"
+    force_on: str | None = None
     frame: str = "device"
     rotation: Any = None
     offset_s: float | str | None = None
     rate_hz: float | None = None
+    clock: str | None = None
     tare_s: tuple[float, float] | None = None
     thing: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Raises RecordingError for a role, unit, frame or body that does not exist."""
         for name, value, allowed in (
-            ("force_on", self.force_on, ("tool", "object")),
+            ("force_on", self.force_on, (None, "tool", "object")),
+            ("clock", self.clock, (None, "one", "blocks")),
             ("frame", self.frame, ("device", "tool")),
         ):
             if value not in allowed:
-                raise RecordingError(f"{name} is {value!r}; allowed are {' and '.join(allowed)}")
+                raise RecordingError(
+                    f"{name} is {value!r}; allowed are {' and '.join(filter(None, allowed))}"
+                )
         for role in self.columns:
             if role not in ROLES:
                 raise RecordingError(f"'{role}' is no column of a recording; allowed are {', '.join(ROLES)}")

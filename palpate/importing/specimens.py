@@ -8,7 +8,6 @@ import` reads them.
 from __future__ import annotations
 
 import re
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -16,18 +15,15 @@ import numpy as np
 
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.result import Tests
-from mechanics.bounds import LARGEST_N
 from mechanics.errors import OptionError, RecordingError
-from mechanics.recording import WIDEST_PATH_M, NotRead
-from palpate.importing.mapping import Said, find_columns
-from palpate.importing.tables import Table, read_tables
-from palpate.importing.units import without_unit
+from palpate.importing.curves import LEAST_ROWS, SaidOfCurves, numbers_in, read_curves, stated_radius
+from palpate.importing.meaning import MOST_ODDS, Unclear
+from palpate.importing.tables import TEXT_SUFFIXES, read_tables
 from reconstruct.external.indentation import read_chiaro
 from reconstruct.external.uniaxial import of_compression, read_tension
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
-_LEAST_ROWS = 8
 _BEYOND = 1e15
 _TIPS_M = (1e-9, 0.1)
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
@@ -38,8 +34,7 @@ def read_tests(
     *,
     kind: str = "auto",
     tip_radius_m: float | None = None,
-    columns: dict[str, str] | None = None,
-    units: dict[str, str] | None = None,
+    said: SaidOfCurves | None = None,
 ) -> Tests:
     """All files, which must be of one kind. Raises RecordingError where one cannot be read or is of another
     kind, OptionError for a kind that does not exist."""
@@ -61,7 +56,7 @@ def read_tests(
         return Tests("tension", tests=tuple(map(read_tension, paths)))
     if told[0] == "relaxation":
         return Tests("relaxation", holds=tuple(_hold(p) for p in paths))
-    return _indentations(paths, tip_radius_m, columns or {}, units or {})
+    return _indentations(paths, tip_radius_m, said or SaidOfCurves())
 
 
 def kind_of(path: Path) -> str:
@@ -92,7 +87,7 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
     if len(table.columns) < 2:
         raise RecordingError(f"'{path}' has one column: a relaxation needs time and modulus, force or stress")
     t, value = (np.asarray(v, float) for v in list(table.columns.values())[:2])
-    good = _numbers(path, t, value)
+    good = numbers_in(path, t, value)
     order = np.argsort(t[good], kind="stable")
     t, value = t[good][order], value[good][order]
     fresh = _in_order(path, t)
@@ -103,90 +98,48 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return t[fresh], value[fresh]
 
 
-def _indentations(
-    paths: list[Path], tip_radius_m: float | None, columns: dict[str, str], units: dict[str, str]
-) -> Tests:
-    curves, stated = [], []
-    for path in paths:
-        if not columns and _is_chiaro(path):
-            data = read_chiaro(path)
-            curves.append(Curve(data.t, data.travel, data.force, path.name))
-            tip_radius_m = tip_radius_m or data.tip_radius_m
-            stated.append(data.stated_modulus_pa)
-        else:
-            curves.append(_generic(path, columns, units))
+def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCurves) -> Tests:
+    chiaro = [not said.columns and is_chiaro(path) for path in paths]
+    curves, stated, notes, odds = [], [], [], MOST_ODDS
+    for path in (p for p, own in zip(paths, chiaro, strict=True) if own):
+        data = read_chiaro(path)
+        curves.append(Curve(data.t, data.travel, data.force, path.name))
+        tip_radius_m = tip_radius_m or data.tip_radius_m
+        stated.append(data.stated_modulus_pa)
+    others = [p for p, own in zip(paths, chiaro, strict=True) if not own]
     if tip_radius_m is None:
-        raise RecordingError("the tip's radius is in no file: give --tip-radius M")
+        radii = {stated_radius(p) for p in others if p.suffix.lower() in TEXT_SUFFIXES} - {None}
+        tip_radius_m = radii.pop() if len(radii) == 1 else None
+        if tip_radius_m is not None:
+            notes.append(f"tip radius {1e3 * tip_radius_m:.4g} mm, as the file says")
+    if tip_radius_m is None:
+        raise Unclear("the tip's radius in m is in no file", "tip_radius_m", ())
     if not _TIPS_M[0] <= tip_radius_m <= _TIPS_M[1]:
         raise OptionError(
             f"--tip-radius is {tip_radius_m:g} m; it must lie between {_TIPS_M[0]:g} and "
             f"{_TIPS_M[1]:g} m: give metres"
         )
+    if others:
+        read = read_curves(others, said, tip_radius_m)
+        curves += read.curves
+        notes += read.notes
+        odds = read.odds
     good = [s for s in stated if np.isfinite(s)]
     return Tests(
         "indentation", curves=tuple(curves), tip_radius_m=tip_radius_m,
-        stated_modulus_pa=float(np.median(good)) if good else float("nan"),
+        stated_modulus_pa=float(np.median(good)) if good else float("nan"), notes=tuple(notes), odds=odds,
     )  # fmt: skip
 
 
-def _is_chiaro(path: Path) -> bool:
+def is_chiaro(path: Path) -> bool:
+    """Whether a text is an export of a Chiaro."""
     head = path.read_bytes()[:_LOOK].decode("latin-1")
     return "Tip radius (um)" in head and "Cantilever (nm)" in head
-
-
-def _generic(path: Path, columns: dict[str, str], units: dict[str, str]) -> Curve:
-    tables = read_tables(path)
-    found = find_columns(tables, Said(columns=columns, units=units))
-    if "t" not in found:
-        raise RecordingError(
-            f"'{path}' has no column of time, and there are {_names(tables)}: --column t=NAME"
-        )
-    t, z, push = (np.asarray(found[role].values, float) for role in ("t", "z", "fz"))
-    if t.ndim == 0 or z.ndim == 0 or push.ndim == 0 or len({len(t), len(z), len(push)}) > 1:
-        raise RecordingError(
-            f"'{path}' needs time, travel and load in columns of one length: {_names(tables)}"
-        )
-    good = _numbers(path, t, z, push)
-    t, travel, push = t[good], -z[good], push[good]
-    fresh = _in_order(path, t)
-    if np.ptp(travel) > WIDEST_PATH_M:
-        raise RecordingError(
-            f"'{path}': the tip travels {np.ptp(travel):.4g} m, which may be {WIDEST_PATH_M:g} m: name "
-            "the unit, as in --units position=um"
-        )
-    if np.abs(push).max() > LARGEST_N:
-        raise RecordingError(
-            f"'{path}' holds a load above {LARGEST_N:g} N: name its unit, as in --units force=uN"
-        )
-    return Curve(t[fresh], travel[fresh], push[fresh], path.name)
-
-
-def _numbers(path: Path, *columns: np.ndarray) -> np.ndarray:
-    """(n,) bool: rows that hold a number in every column, more than half of them; the others are told of."""
-    good = np.isfinite(np.column_stack(columns)).all(axis=1)
-    lost = int((~good).sum())
-    if 2 * lost > len(good):
-        raise RecordingError(
-            f"'{path}': {lost} of {len(good)} rows lack a number, the first is row {np.argmin(good) + 1}: "
-            "name the columns, as in --column fz=Load"
-        )
-    if lost:
-        warnings.warn(
-            f"'{path}': {lost} of {len(good)} rows lack a number and are left out, the first is row "
-            f"{np.argmin(good) + 1}",
-            NotRead,
-            stacklevel=2,
-        )
-    return good
 
 
 def _in_order(path: Path, t: np.ndarray) -> np.ndarray:
     """(n,) bool: rows whose time is later than the one before."""
     fresh = np.concatenate([[True], np.diff(t) > 0])[: len(t)]
-    if fresh.sum() < _LEAST_ROWS:
-        raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {_LEAST_ROWS} are needed")
+    if fresh.sum() < LEAST_ROWS:
+        raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {LEAST_ROWS} are needed")
     return fresh
-
-
-def _names(tables: list[Table]) -> str:
-    return ", ".join(without_unit(n) for t in tables for n in t.columns)

@@ -29,8 +29,9 @@ class Table:
 
 
 _HOME = "palpate.importing"
+TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _READERS: dict[str, tuple[str, str]] = {
-    **dict.fromkeys((".csv", ".tsv", ".txt", ".dat", ".asc", ".gz"), (f"{_HOME}.text", "")),
+    **dict.fromkeys((*TEXT_SUFFIXES, ".gz"), (f"{_HOME}.text", "")),
     ".npz": (f"{_HOME}.arrays:npz", ""),
     ".mat": (f"{_HOME}.arrays:matlab", "h5py"),
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), (f"{_HOME}.arrays:hdf5", "h5py")),

@@ -24,6 +24,9 @@ OPERATIONS = {
     "check": Entry("what may be wrong with a recording, before it is believed", "check"),
     "reconstruct": Entry("a recording becomes a model", "reconstruct"),
     "model": Entry("a MODEL from a surface's file and a modulus", "model_of"),
+    "open": Entry(
+        "whatever it is: understood, checked, reconstructed or measured", "open", "palpate.operations.open_"
+    ),
     "import": Entry(
         "other programs' files become a recording",
         "import_table read_table",
@@ -44,7 +47,7 @@ OPERATIONS = {
     "batch": Entry("many recordings at once", "batch"),
     "completion": Entry("what lets a shell complete all this: bash, zsh or fish"),
     "load": Entry("the model of a folder or scene", "load", command=False),
-    "read_recording": Entry("a recording's file", "read_recording", command=False),
+    "read_recording": Entry("a recording's file or arrays", "read_recording recording", command=False),
     "renderer": Entry("what answers a tip at 1 kHz", "renderer", command=False),
 }
 

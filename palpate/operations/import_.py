@@ -71,7 +71,9 @@ class ImportOperands:
     columns: Mapping[str, str] | None = columns_operand("t, x, y, z, fx, fy, fz, qw, qx, qy, qz")
     units: Mapping[str, str] | None = units_operand()
     tip_radius_m: float | None = tip_radius_operand("of the tool's spherical tip")
-    force_on: str | None = operand(None, "whose force it is; None: tool", choices=("tool", "object"))
+    force_on: str | None = operand(
+        None, "whose force it is; None: by what a solid does", choices=("tool", "object")
+    )
     frame: str | None = operand(None, "of the force; None: device", choices=("device", "tool"))
     rotation: Any = operand(None, "(3, 3) from the file's axes to the device frame", only="python")
     flange_to_tip_m: Sequence[float] | None = operand(
@@ -85,6 +87,9 @@ class ImportOperands:
     )
     offset_s: float | str | None = operand(
         None, "of the force's clock, or auto (cross-correlation)", unit="s", metavar="NUMBER", parse=_offset
+    )
+    clock: str | None = operand(
+        None, "where time goes back: one clock, or blocks with their own", choices=("one", "blocks")
     )
     rate_hz: float | None = operand(None, "to resample to, or of rows without a time", unit="Hz")
     thing: Mapping[str, Any] | None = operand(None, "what [object] of the recording is to say", only="python")
@@ -103,7 +108,7 @@ class ImportOperands:
 
 _SAID = (
     "columns", "units", "tip_radius_m", "force_on", "frame", "rotation", "flange_to_tip_m", "mass_kg",
-    "tare_s", "offset_s", "rate_hz", "thing",
+    "tare_s", "offset_s", "clock", "rate_hz", "thing",
 )  # fmt: skip
 
 
@@ -138,6 +143,12 @@ def import_table(asked: ImportOperands, call: Call) -> Imported:
     The recording is in m, s and N, forces on the tool. Raises RecordingError where something needed is
     missing.
     """
+    from palpate.importing.questions import with_answers
+
+    return with_answers(_understood, asked, call)
+
+
+def _understood(asked: ImportOperands, call: Call) -> Imported:
     from palpate.importing.convert import understand
     from palpate.importing.imported import Imported
     from palpate.importing.mapping import Said, read_mapping

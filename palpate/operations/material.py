@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 
 from palpate.importing.specimens import KINDS
 from palpate.operations._declare import Call, operand, operation
+from palpate.operations._run import answer
 from palpate.operations._shared import (
     columns_operand,
     named,
@@ -23,6 +24,7 @@ from palpate.operations._shared import (
     tip_radius_operand,
     units_operand,
 )
+from palpate.output import Output
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -43,13 +45,27 @@ class MaterialOperands:
     layer_m: float | None = operand(None, "thickness of the sample; None: a half-space", unit="m")
     poisson_ratio: float = poisson_operand("of the material", 0.49)
     specimens: bool = operand(False, "each indentation is of another piece; default: one piece")
-    columns: Mapping[str, str] | None = columns_operand("t, z, fz")
+    columns: Mapping[str, str] | None = columns_operand("t, depth (or height), load")
     units: Mapping[str, str] | None = units_operand()
+    travel: str | None = operand(
+        None, "which way the position counts; None: by what a solid does", choices=("into", "out")
+    )
+    compression: str | None = operand(
+        None, "the load's sign as it presses; None: by what a solid does", choices=("positive", "negative")
+    )
+    clock: str | None = operand(
+        None, "where time goes back: one clock, or blocks with their own", choices=("one", "blocks")
+    )
     fast: bool = operand(False, "fewer effects are tried")
     seed: int = seed_operand()
 
 
-@operation(MaterialOperands)
+def _answer(result: Material, asked: MaterialOperands, out: Output) -> int:
+    answer(result, asked, out)
+    return 0 if result.predicts else 1
+
+
+@operation(MaterialOperands, answer=_answer)
 def material(asked: MaterialOperands, call: Call) -> Material:
     """The material of a specimen from a machine's curves: indentation, compression, tension or relaxation.
 
@@ -57,15 +73,27 @@ def material(asked: MaterialOperands, call: Call) -> Material:
     Lengths m, moduli Pa. Raises RecordingError where a file cannot be read, ContactError
     where nothing is touched.
     """
+    from palpate.importing.questions import with_answers
+
+    return with_answers(_made, asked, call)
+
+
+def _made(asked: MaterialOperands, call: Call) -> Material:
     from diagnose.specimen.material import material_of
+    from palpate.importing.curves import SaidOfCurves
     from palpate.importing.specimens import read_tests
 
     tests = read_tests(
         asked.files,
         kind=asked.kind,
         tip_radius_m=asked.tip_radius_m,
-        columns=named(asked.columns, "columns"),
-        units=named(asked.units, "units"),
+        said=SaidOfCurves(
+            named(asked.columns, "columns"),
+            named(asked.units, "units"),
+            asked.travel,
+            asked.compression,
+            asked.clock,
+        ),
     )
     with call.progress("material") as tell:
         return material_of(

@@ -46,6 +46,7 @@ _KINDS: dict[str, str | ModuleType] = {
     "diagnose.specimen.result.Material": "material",
     "scenes.laboratory.simulate.Simulation": "simulation",
     "palpate.importing.imported.Imported": "imported",
+    "palpate.importing.opened.Opened": "opened",
     "palpate.batching.summary.Batch": "batch",
     "palpate.demo.DemoResult": "demo",
 }

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from diagnose.specimen.result import Material
+from mechanics.quantities import read_unit, split_key, unit_of_key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -14,7 +16,7 @@ if TYPE_CHECKING:
 
 def lines(result: Material) -> list[str]:
     """What `print` says, with units."""
-    text = [f"{result.kind}: {result.curves} curve{'s' * (result.curves != 1)}; {result.verdict}"]
+    text = [f"{result.kind}: {result.curves} curve{'s' * (result.curves != 1)}; {_first(result)}"]
     if np.isfinite(result.young_modulus_pa):
         low, high = result.young_modulus_ci95_pa
         between = f" (95 % interval {low:.4g} to {high:.4g} Pa)" if np.isfinite(low) else ""
@@ -22,13 +24,41 @@ def lines(result: Material) -> list[str]:
     ranked = sorted(result.error.items(), key=lambda item: item[1])
     text.append(f"held out ({result.held_out}): " + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked))
     if result.closed is not None and result.closed_ci95 is not None:
-        low, high = result.closed_ci95
-        text.append(f"closed {result.closed:.0%} of the gap (95 % interval {low:.0%} to {high:.0%})")
-    text += [f"  {name}: {value}" for name, value in result.parameters.items()]
+        closed, low, high = (min(share, 1.0) for share in (result.closed, *result.closed_ci95))
+        text.append(f"closed {closed:.0%} of the gap (95 % interval {low:.0%} to {high:.0%})")
+    text += [f"  {name.replace('_', ' ')}: {in_words(name, v)}" for name, v in result.parameters.items()]
     text += [f"  {note}" for note in result.notes]
     if result.unknown:
         text.append(f"not told by such a test: {', '.join(result.unknown)}")
     return text
+
+
+def _first(result: Material) -> str:
+    """The verdict, after what makes it worth less."""
+    doubts = []
+    if not result.predicts:
+        doubts.append(
+            f"NO ANSWER: held-out errors of {result.missed:.0%} exceed the "
+            f"{result.error['constant']:.0%} of a constant"
+        )
+    elif result.beaten_by is not None:
+        doubts.append(f"{result.beaten_by} predicts held-out data better")
+    doubts += [f"{each} stands at the end of its range" for each in result.at_bound]
+    return "; ".join([*doubts, result.verdict])
+
+
+def in_words(name: str, value: Any) -> str:
+    """A parameter, or those of an effect, as people write them: 'stiffness 68 N/mm'."""
+    if isinstance(value, Mapping):
+        return ", ".join(
+            f"{split_key(key)[0].replace('_', ' ')} {in_words(key, v)}" for key, v in value.items()
+        )
+    if isinstance(value, list | tuple):
+        return ", ".join(in_words(name, v) for v in value) or "none"
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return str(value)
+    unit, factor = read_unit(unit_of_key(name))
+    return f"{value * factor:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
 
 
 def as_json(result: Material) -> dict[str, Any]:
@@ -52,6 +82,8 @@ def as_json(result: Material) -> dict[str, Any]:
         "parameters": result.parameters,
         "notes": list(result.notes),
         "unknown": list(result.unknown),
+        "predicts": result.predicts,
+        "at_bound": list(result.at_bound),
     }
 
 

@@ -134,8 +134,10 @@ def test_what_is_no_test_or_two_kinds_is_one_line(tmp_path, capsys):
         pp.material(tmp_path / "up.csv", progress=False)
     with pytest.raises(OptionError, match="give metres"):
         pp.material(tmp_path / "up.csv", tip_radius_m=5, progress=False)
-    with pytest.raises(ContactError, match="signs"):
+    with pytest.raises(RecordingError, match="--units force=mN or --units force=N"):
         pp.material(tmp_path / "up.csv", tip_radius_m=0.005, progress=False)
+    with pytest.raises(ContactError, match="92 of its radii.*signs"):
+        pp.material(tmp_path / "up.csv", tip_radius_m=0.005, units={"position": "m"}, progress=False)
     assert cli.main(["material", *map(str, files), "--json", str(tmp_path / "out.json")]) == 0
     held = json.loads((tmp_path / "out.json").read_text())
     assert held["kind"] == "compression" and held["relative_error"]["neo-hookean"] < 0.02

@@ -35,11 +35,12 @@ def test_import_loads_nothing_heavy():
 
 def test_door_is_what_was_promised():
     promised = "read_recording reconstruct load renderer replay press compare diagnose simulate batch "
-    promised += "check import_table read_table model_of export options material calibrate changes"
+    promised += "check import_table read_table model_of export options material calibrate changes "
+    promised += "open recording"
     assert set(FUNCTIONS) == set(promised.split())
     assert set(RESULTS) == set(
         "Recording Model Reconstruction ReplayResult Curve Comparison Diagnosis Simulation Batch "
-        "Checkup Imported Material Calibration Changes".split()
+        "Checkup Imported Opened Material Calibration Changes".split()
     )
     assert all(issubclass(getattr(pp, name), pp.PalpateError) for name in ERRORS)
     with pytest.raises(AttributeError, match="no attribute 'replay_recording'.*replay"):

@@ -1,0 +1,193 @@
+"""What a few curves tell of the machine beside the material: how far it yields, how free air slopes.
+
+A machine of stiffness K adds F / K to the travel, u = u0 + d(F / E) + F / K, where d is the depth at which
+the law gives F. For each E the rest is linear, so one search over E fits all curves at once, each with
+a first touch u0 of its own (which may be late). A machine is named only where every law on a rigid one misses
+the blocks of force that were left out by more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import minimize_scalar, nnls
+
+from mechanics.dent import dent_law
+
+LAWS = ("sphere", "hertz", "linear", "neo-hookean")
+_BETTER, _ALIKE = 0.93, 1.1
+"""Another law than the sphere's must miss at most the first share of what that misses; the intervals cover
+laws that miss at most the second share of the least."""
+_POINTS, _BLOCKS = 60, 6
+_LOWEST = 0.03
+"""Share of the peak below which noise and pull decide where the contact is."""
+_GAIN = 0.75
+"""A machine that yields must miss at most this share of what the best rigid one misses."""
+_MATTERS, _SURE = 0.05, 4.0
+"""Share of the travel in contact, and standard errors of its compliance, from which a machine is named."""
+_DECADES, _TIMES = 2.0, 2.0
+_SLOPE_SURE, _SLOPE_MATTERS = 4.0, 0.01
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way in, thinned to even steps of force: travel (n,) m from any zero, push (n,) N over free air's
+    level and slope. slope_n_per_m: of free air, taken off (0: none shown)."""
+
+    travel: np.ndarray
+    push: np.ndarray
+    slope_n_per_m: float
+
+
+@dataclass(frozen=True)
+class Machine:
+    """modulus_pa with its 95 % interval, and stiffness_n_per_m of the machine with its own, by one fit of all
+    curves with `law`; rigid_modulus_pa: of the same law on a rigid machine; rigid_law: of the best on one.
+    error, rigid_error: held-out rms over rms of the force."""
+
+    modulus_pa: float
+    modulus_ci95_pa: tuple[float, float]
+    stiffness_n_per_m: float
+    stiffness_ci95_n_per_m: tuple[float, float]
+    law: str
+    rigid_modulus_pa: float
+    rigid_law: str
+    error: float
+    rigid_error: float
+
+
+def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
+    """The way in to the peak of one press: (n,) m, (n,) N; onset: travel at first touch, m."""
+    peak = int(np.argmax(force))
+    u, f = travel[: peak + 1], force[: peak + 1]
+    air = u < onset - 0.03 * (u[-1] - onset)
+    slope = 0.0
+    level = float(np.median(f[air])) if air.any() else float(f[0])
+    if air.sum() >= 12 and np.ptp(u[air]) > 0:
+        (slope, at_zero), covariance = np.polyfit(u[air] - onset, f[air], 1, cov=True)
+        sure = abs(slope) > _SLOPE_SURE * np.sqrt(covariance[0, 0])
+        if sure and abs(slope) * (u[-1] - onset) > _SLOPE_MATTERS * (f[-1] - level):
+            level = at_zero
+        else:
+            slope = 0.0
+    net = f - level - slope * (u - onset)
+    top = float(net[-1])
+    edges = np.linspace(_LOWEST * top, top, _POINTS + 1)
+    step = np.clip(np.searchsorted(edges, net) - 1, -1, _POINTS - 1)
+    step = np.where(u > onset - 0.1 * (u[-1] - onset), step, -1)
+    kept = np.unique(step[step >= 0])
+    mean = [(float(u[step == k].mean()), float(net[step == k].mean())) for k in kept]
+    thin_u, thin_f = (np.array(v) for v in zip(*mean, strict=True))
+    return Way(thin_u, thin_f, float(slope))
+
+
+class _Fit:
+    """One law, a machine that yields or not: E, c = 1 / K, and each way's first touch, least squares in N."""
+
+    def __init__(self, law: str, poisson_ratio: float, radius_m: float, deepest_m: float) -> None:
+        self.law = dent_law(law)
+        self.depth = np.concatenate([[0.0], np.geomspace(1e-4, 3.0, 400) * deepest_m])
+        self.unit = np.maximum.accumulate(
+            np.asarray(self.law.force(self.depth, 1.0, poisson_ratio, radius_m), dtype=float)
+        )
+
+    def solved(
+        self, ways: Sequence[Way], kept: Sequence[np.ndarray], log_e: float, yields: bool
+    ) -> tuple[float, float, list[np.ndarray]]:
+        """(half the squares of what is kept, c, residual N of every row of each way) at one modulus."""
+        c = 0.0
+        for _ in range(2 if yields else 1):
+            rows, misses, weights = [], [], []
+            for way in ways:
+                depth = np.interp(way.push / np.exp(log_e), self.unit, self.depth)
+                gives = np.gradient(depth, way.push) if len(depth) > 2 else np.ones(len(depth))
+                weights.append(1 / np.maximum(np.abs(gives) + c, 1e-12))
+                misses.append(way.travel - depth)
+                rows.append(way.push)
+            centred, pushed = [], []
+            for miss, push, w, keep in zip(misses, rows, weights, kept, strict=True):
+                share = (w * keep) ** 2 / max(float(((w * keep) ** 2).sum()), 1e-300)
+                centred.append(miss - share @ miss)
+                pushed.append(push - share @ push)
+            if yields:
+                a = np.concatenate([w * k * p for w, k, p in zip(weights, kept, pushed, strict=True)])
+                b = np.concatenate([w * k * m for w, k, m in zip(weights, kept, centred, strict=True)])
+                c = float(nnls(a[:, None], b)[0][0])
+        left = [w * (m - c * p) for w, m, p in zip(weights, centred, pushed, strict=True)]
+        return sum(float(((r * k) ** 2).sum()) for r, k in zip(left, kept, strict=True)), c, left
+
+    def fitted(
+        self, ways: Sequence[Way], kept: Sequence[np.ndarray], log_e: float, yields: bool
+    ) -> tuple[float, float, list[np.ndarray]]:
+        """(log E, c, residuals)."""
+
+        def cost(x: float) -> float:
+            return self.solved(ways, kept, x, yields)[0]
+
+        grid = log_e + np.linspace(-_DECADES / 2, _DECADES, 25) * np.log(10)
+        start = float(grid[int(np.argmin([cost(x) for x in grid]))])
+        step = float(grid[1] - grid[0])
+        found = float(minimize_scalar(cost, bounds=(start - step, start + step), method="bounded").x)
+        _, c, left = self.solved(ways, kept, found, yields)
+        return found, c, left
+
+
+def machine_of(
+    ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float
+) -> Machine | None:
+    """The machine that yields, where that shows beside every law of the material. modulus_pa: a first guess.
+
+    Needs two ways in or more; None where a rigid machine does as well.
+    """
+    deepest = max(float(w.travel[-1] - w.travel[0]) for w in ways)
+    rms = float(np.sqrt(np.mean(np.concatenate([w.push for w in ways]) ** 2)))
+    everything = [np.ones(len(w.push)) for w in ways]
+    blocks = [np.minimum(np.arange(len(w.push)) * _BLOCKS // max(len(w.push), 1), _BLOCKS - 1) for w in ways]
+    guess = float(np.log(modulus_pa))
+    errors: dict[tuple[str, bool], float] = {}
+    whole: dict[tuple[str, bool], tuple[float, float, list[np.ndarray]]] = {}
+    apart: dict[tuple[str, bool], list[tuple[float, float]]] = {}
+    for name in LAWS:
+        fit = _Fit(name, poisson_ratio, radius_m, deepest)
+        for yields in (False, True):
+            whole[name, yields] = fit.fitted(ways, everything, guess, yields)
+            missed, again = 0.0, []
+            for k in range(_BLOCKS):
+                kept = [(b != k).astype(float) for b in blocks]
+                log_e, c, left = fit.fitted(ways, kept, whole[name, yields][0], yields)
+                again.append((log_e, c))
+                missed += sum(float((r[b == k] ** 2).sum()) for r, b in zip(left, blocks, strict=True))
+            apart[name, yields] = again
+            errors[name, yields] = float(np.sqrt(missed / sum(map(len, blocks)))) / rms
+    rigid = min(LAWS, key=lambda name: errors[name, False])
+    law = min(LAWS, key=lambda name: errors[name, True])
+    if errors[law, True] > _BETTER * errors[LAWS[0], True]:
+        law = LAWS[0]
+    spread = _jackknifed(apart[law, True])
+    log_e, c, _ = whole[law, True]
+    push = max(float(w.push.max()) for w in ways)
+    matters = c * push > _MATTERS * deepest
+    if not matters or errors[law, True] > _GAIN * errors[rigid, False] or c < _SURE * spread[1]:
+        return None
+    likely = [name for name in LAWS if errors[name, True] <= _ALIKE * errors[law, True]]
+    ends = np.array(
+        [
+            np.array(whole[name, True][:2]) + sign * _TIMES * _jackknifed(apart[name, True])
+            for name in {law, *likely}
+            for sign in (-1, 1)
+        ]
+    )
+    low, high = ends.min(0), ends.max(0)
+    return Machine(
+        float(np.exp(log_e)), (float(np.exp(low[0])), float(np.exp(high[0]))),
+        1 / c, (1 / high[1], 1 / max(low[1], 1e-12)),
+        law, float(np.exp(whole[law, False][0])), rigid, errors[law, True], errors[rigid, False],
+    )  # fmt: skip
+
+
+def _jackknifed(again: Sequence[tuple[float, float]]) -> np.ndarray:
+    """(2,) standard errors of (log E, c) from fits that leave out a block each."""
+    values = np.array(again)
+    return np.sqrt((_BLOCKS - 1) / _BLOCKS * ((values - values.mean(0)) ** 2).sum(0))

@@ -1,0 +1,98 @@
+"""A few curves tell the machine beside the material: a modulus with and without, a stiffness where it
+matters, and no number outside its own interval."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnose.specimen.bench import Curve
+from diagnose.specimen.material import material_of
+from diagnose.specimen.result import Tests
+from diagnose.specimen.yielding import machine_of, way_of
+from mechanics.dent import dent_law
+from palpate.show.material import as_json, in_words, lines
+
+RADIUS = 0.005
+
+
+def curves(modulus: float, stiffness: float, count: int = 3, slope: float = 0.0) -> list[Curve]:
+    """In and out of a sphere on a deep sample by a machine of that stiffness (N/m), 0.3 % of noise."""
+    rng, found = np.random.default_rng(1), []
+    for k in range(count):
+        deepest = RADIUS * rng.uniform(0.2, 0.35)
+        way = np.concatenate([np.linspace(-0.4e-3, 0, 80)[:-1], np.linspace(0, deepest, 400)])
+        dent = np.concatenate([way, way[::-1]])
+        force = np.asarray(dent_law("sphere").force(np.maximum(dent, 0), modulus, 0.49, RADIUS))
+        travel = dent + force / stiffness + 1e-3 * k
+        read = force + slope * (travel - travel[0]) + 0.003 * force.max() * rng.standard_normal(len(force))
+        found.append(Curve(np.arange(len(dent)) / 100, travel, read + 0.1, f"curve {k}"))
+    return found
+
+
+def stiffness_for(modulus: float, share: float) -> float:
+    """N/m that adds that share of a dent of 1.5 mm."""
+    deep = 0.3 * RADIUS
+    return 16 / 9 * modulus * np.sqrt(RADIUS) * deep**1.5 / (share * deep)
+
+
+def material(given: list[Curve]):
+    tests = Tests("indentation", curves=tuple(given), tip_radius_m=RADIUS)
+    return material_of(tests, [c.name for c in given], fast=True)
+
+
+@pytest.mark.parametrize("modulus", [2e4, 1e6])
+@pytest.mark.parametrize("share", [0.2, 0.5])
+def test_a_machine_that_yields_is_told_with_its_stiffness(modulus, share):
+    made = material(curves(modulus, stiffness_for(modulus, share)))
+    assert made.effects == ("tool_compliance",)
+    found = made.parameters["tool_compliance"]["stiffness_n_per_m"]
+    assert found == pytest.approx(stiffness_for(modulus, share), rel=0.2)
+    assert made.young_modulus_pa == pytest.approx(modulus, rel=0.07)
+    low, high = made.young_modulus_ci95_pa
+    assert low <= made.young_modulus_pa <= high
+    assert "on a rigid machine the modulus would be" in str(lines(made))
+    assert "{" not in "\n".join(lines(made)) and "N/mm" in "\n".join(lines(made))
+
+
+@pytest.mark.parametrize("law", ["sphere", "neo-hookean", "linear"])
+def test_a_rigid_machine_is_not_named_whatever_the_law(law):
+    rng, ways = np.random.default_rng(3), []
+    for _ in range(3):
+        dent = np.concatenate([np.linspace(-0.4e-3, 0, 80)[:-1], np.linspace(0, 0.3 * RADIUS, 400)])
+        force = np.asarray(dent_law(law).force(np.maximum(dent, 0), 5e4, 0.49, RADIUS))
+        ways.append(way_of(dent, force + 0.003 * force.max() * rng.standard_normal(len(dent)), 0.0))
+    assert machine_of(ways, 0.49, RADIUS, 4e4) is None
+
+
+def test_a_slope_of_free_air_is_taken_off_and_said():
+    made = material(curves(2e4, 1e9, slope=60.0))
+    assert made.effects == ()
+    assert "free air slopes by" in str(lines(made))
+
+
+def test_the_modulus_of_many_curves_lies_inside_its_interval():
+    stiffness = stiffness_for(1e6, 0.3)
+    made = material(curves(1e6, stiffness, count=8))
+    low, high = made.young_modulus_ci95_pa
+    assert low <= made.young_modulus_pa <= high
+    assert made.young_modulus_pa == pytest.approx(1e6, rel=0.1)
+    assert made.effects == ("tool_compliance",)
+    assert made.parameters["tool_compliance"]["stiffness_n_per_m"] == pytest.approx(stiffness, rel=0.2)
+    assert "without tool compliance the modulus would be" in str(lines(made))
+
+
+def test_an_answer_that_misses_more_than_a_constant_says_so_first():
+    rng = np.random.default_rng(0)
+    travel = 1e-3 * np.linspace(-0.15, 1, 400)
+    swings = (travel > 0) * (1 + 0.5 * np.sin(1.3e4 * travel) + 0.01 * rng.standard_normal(400))
+    swings[-1] = 1.7
+    made = material([Curve(np.arange(400) / 100, travel, swings, name) for name in "ab"])
+    assert made.missed > made.error["constant"] and not made.predicts
+    assert "NO ANSWER" in lines(made)[0] and as_json(made)["predicts"] is False
+
+
+def test_parameters_are_written_as_people_write_them():
+    assert in_words("tool_compliance", {"stiffness_n_per_m": 64e3}) == "stiffness 64 N/mm"
+    words = in_words("viscoelasticity", {"g": [0.3, 0.2], "tau_s": [0.5, 20.0]})
+    assert words == "g 0.3, 0.2, tau 500 ms, 2e+04 ms"
