@@ -27,8 +27,8 @@ from mechanics.effects.registry import NAMES, effect
 from mechanics.frames import tangents
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.places import Places, solve_places
 from mechanics.press_making import of_paths
+from mechanics.pressed_places import Places, solve_places
 
 FOLDER = Path(__file__).resolve().parent / "images" / "effects"
 MODULUS_PA, NU, TIP_M, RATE_HZ = 20e3, 0.49, 0.005, 500.0

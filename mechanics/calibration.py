@@ -16,11 +16,11 @@ import numpy as np
 
 from mechanics.errors import RecordingError
 from mechanics.files import Kind, atomic_file, read_toml
-from mechanics.leads import leads, play
 from mechanics.quantities import TIP_RADIUS
 from mechanics.result import Result
 from mechanics.samples import delayed
 from mechanics.schema import ANY, Key, Schema, check_table
+from mechanics.side_of_play import leads, play
 from mechanics.toml_text import dump_toml
 
 SCHEMA: Schema = {

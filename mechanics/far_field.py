@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 
 from mechanics.elasticity import element_stiffness
 from mechanics.patch import PatchSampler, half_space_compliance
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.sites import PATCH_WIDTH_IN_EDGES, typical_edge
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh

@@ -10,7 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.smooth_field import TIP_DEPTH_IN_RADII, Shares
 
 

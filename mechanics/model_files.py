@@ -6,7 +6,7 @@ MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, shape
                        where the material has one; young_modulus_pa, for people who look: never read back
 MODEL/presses.bin      the table of presses, samples and all (mechanics.presses)
 MODEL/palpations.csv   one row a palpation
-MODEL/surface.vtp      what a tip meets, written by the shell (render.felt), keyed by content
+MODEL/surface.vtp      what a tip meets, written by the shell (render.felt_surface), keyed by content
 MODEL/compliance-*.bin the cached compliance (mechanics.compliance), keyed by content"""
 
 from __future__ import annotations

@@ -18,7 +18,7 @@ from mechanics.elasticity import stiffness, triangle_mass
 from mechanics.far_field import energy_fields
 from mechanics.floor import resting
 from mechanics.frames import local_frames
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.support import base_triangles
 from mechanics.tetmesh import EDGES, TetMesh
 

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.effects.path import PathNumbers, path_numbers
+from mechanics.effects.laws_along_path import PathNumbers, path_numbers
 from mechanics.effects.registry import effects
 from mechanics.effects.settings import STICKS, Touch
 from mechanics.model import Model

@@ -17,9 +17,9 @@ import numpy as np
 
 from mechanics.kernels import kernel
 from render.contact import approach, lose, release, strayed
-from render.fem_conclude import conclude, forget
 from render.fem_coupling import carry_all, leave, link, locate, renew
-from render.fem_solve import settle, solve_one, unsettled
+from render.fem_end_of_tick import conclude, forget
+from render.fem_stick_slip import settle, solve_one, unsettled
 from render.frames import new_frame
 
 SWEEPS = 60

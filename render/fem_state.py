@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.effects.path import new_memory
+from mechanics.effects.laws_along_path import new_memory
 from mechanics.touch import STATE_SIZE
 from render.base import Grip, new_grip, new_state
 from render.bvh import STACK
@@ -47,7 +47,7 @@ class FemState(NamedTuple):
 
     grip: where each tip is held. frames: (m, 3, 3) rows n, u, v. elastic: (m, 3) N, quasi-static forces on
     the tools. memory: (m, STATE_SIZE) of the sticks. remembered: (m, laws, k) by the laws along each touch's
-    path (mechanics.effects.path). young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,)
+    path (`laws_along_path`). young: (m,) Pa under each tip. deepest: (m,) m of this touch. felt: (v,)
     greatest load of each fine vertex.
     Between contacts (render.fem_coupling): nodes (m, 3), node_weights (m, 3) interpolate at each tip; moved
     (m, 2) whether nodes or weights changed this tick; corners (m, m, 9, 9) 1/m, blocks of the corners of

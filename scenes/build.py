@@ -18,13 +18,13 @@ import numpy as np
 
 from mechanics.errors import ModelError, SceneError
 from mechanics.files import atomic_folder, cache_folder, reading
+from mechanics.flat_foot import Standing, standing
 from mechanics.material import Ball, Material
 from mechanics.model import Model, Support, Tool
 from mechanics.model_files import MODEL, read_model, write_model
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from mechanics.recording import read_recording, recording_files
-from mechanics.standing import Standing, standing
 from mechanics.surface_files import surface_of
 from reconstruct.pipeline import reconstruct
 from reconstruct.shapes.coarse_drawing import decimated

@@ -14,8 +14,8 @@ import numpy as np
 
 from mechanics.errors import SceneError
 from mechanics.files import no_file
+from mechanics.flat_foot import standing
 from mechanics.quantities import USUAL_POISSON_RATIO
-from mechanics.standing import standing
 from mechanics.surface_files import SUFFIXES, is_surface_file, read_surface
 
 SPACING_M = 0.0018

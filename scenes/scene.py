@@ -80,7 +80,7 @@ class Scene:
 
     young_modulus_pa, poisson_ratio: None keeps the object's own. inclusions: None keeps the phantom's own.
     beside: a second renderer that the same tip drives, '' for none. friction: Coulomb coefficient, None
-    sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.standing). mesh_size_m: None takes 10 mm,
+    sticks. unit, up, sink_m: how a mesh's file is meant (mechanics.flat_foot). mesh_size_m: None takes 10 mm,
     less for a small object. find: the inclusions are hidden, to be found.
     """
 

@@ -17,9 +17,9 @@ from functools import partial
 import numpy as np
 
 from mechanics.model import Model
-from mechanics.places import Places
 from mechanics.press_making import of_paths
 from mechanics.press_sites import sites_of
+from mechanics.pressed_places import Places
 from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
 from mechanics.sites import TouchSites, touch_sites

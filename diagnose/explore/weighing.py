@@ -31,7 +31,7 @@ from mechanics.effects.settings import Settings
 from mechanics.gaussian import squared_exponential
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.presses import Presses
 from reconstruct.steps.s5_mesh.meshing import uncertainty_at
 

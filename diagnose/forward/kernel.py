@@ -4,7 +4,7 @@ it.
 Local frame of a place: axis 0 is the outward normal, axes 1 and 2 are tangents. `y` is how far the tip's
 centre has gone INTO the object since first touch (y[0] is the depth), `f` the force on the tool, so that
 pressing gives f[0] > 0. The touch is mechanics.touch, slip that of mechanics.effects.friction_slip, and what
-follows the path mechanics.effects.path: what is fitted is what is rendered.
+follows the path mechanics.effects.laws_along_path: what is fitted is what is rendered.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import numpy as np
 
 from mechanics.dent import dent_load
 from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
-from mechanics.effects.path import sharp_laws, smooth_laws
+from mechanics.effects.laws_along_path import sharp_laws, smooth_laws
 from mechanics.touch import STATE_SIZE, touch_remember, touch_solve
 
 SUB_PLACES = 5
@@ -82,7 +82,7 @@ def follow(start, t, depth, site, felt, numbers, reach_m, sub_places, memory, f)
     """Let the laws along the path act on the quasi-static force f (n, 3) N of every press, in place.
 
     depth: (n,) m. site: (p,) and felt: (s,) greatest load of each site, changed. numbers, reach_m: of
-    mechanics.effects.path; memory: (laws, m). sub_places: of a sample's path over which sharp laws are
+    `laws_along_path`; memory: (laws, m). sub_places: of a sample's path over which sharp laws are
     averaged, 1 where samples are no means.
     """
     normal = np.array([1.0, 0.0, 0.0])

@@ -14,11 +14,11 @@ import numpy as np
 from diagnose.forward import kernel
 from diagnose.forward.touches import place_of
 from mechanics.dent import effective_radius
-from mechanics.effects.path import new_memory, path_numbers
+from mechanics.effects.laws_along_path import new_memory, path_numbers
 from mechanics.effects.settings import Settings
 from mechanics.kinematics import acceleration
 from mechanics.model import Model
-from mechanics.places import Places, solve_places
+from mechanics.pressed_places import Places, solve_places
 from mechanics.presses import Presses
 
 KEPT = 8
@@ -66,7 +66,7 @@ class Forward:
 
     @property
     def lead(self) -> np.ndarray:
-        """(n, 3) side of the tip in a play that the reading follows (mechanics.leads)."""
+        """(n, 3) side of the tip in a play that the reading follows (mechanics.side_of_play)."""
         return self.touches.columns["lead"]
 
     @property

@@ -10,8 +10,8 @@ import numpy as np
 from mechanics.effects.base import Role, Scope
 from mechanics.effects.registry import effects
 from mechanics.errors import DiagnosisError
-from mechanics.leads import leads
 from mechanics.presses import LEAD_S, STEP_S, Presses
+from mechanics.side_of_play import leads
 
 REACH_M = 2.4e-3
 """Most by which a first touch is moved."""
@@ -31,7 +31,7 @@ def reached(presses: Presses) -> np.ndarray:
 
 
 def touches_of(presses: Presses, *, step_s: float = STEP_S) -> Presses:
-    """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (mechanics.leads).
+    """The thinned view of a table; its columns hold `lead`, the side of the tip in a play (`side_of_play`).
 
     Presses of fewer places than 4 are a group each: they are held out press by press, and show nothing from
     place to place (`unobservable_effects`). Raises DiagnosisError with fewer than 6 presses: nothing can be

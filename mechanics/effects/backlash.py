@@ -10,8 +10,8 @@ import numpy as np
 from mechanics.effects.base import Effect, Parameter, Scope
 from mechanics.effects.hints import SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.leads import play
 from mechanics.schema import Key
+from mechanics.side_of_play import play
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -20,7 +20,7 @@ from mechanics.material import BALL, Ball
 from mechanics.model import Model
 from mechanics.moduli import inclusion_ratio
 from mechanics.patch import PatchSampler
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.refine import typical_edge
 from mechanics.sites import PATCH_WIDTH_IN_EDGES
 from mechanics.solver import Solver

@@ -10,7 +10,7 @@ import numpy as np
 
 from mechanics.dent import DentLaw, dent_law
 from mechanics.effects.law import Law
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 
 STICKS = float("inf")
 

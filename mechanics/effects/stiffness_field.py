@@ -20,7 +20,7 @@ from mechanics.far_field import energy_fields
 from mechanics.field_response import far_of, shares_in_elements, tips_of
 from mechanics.material import LENGTH
 from mechanics.model import Model
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.schema import ANY, Key
 from mechanics.smooth_field import (
     Prior,

@@ -11,7 +11,7 @@ from mechanics.files import atomic_file
 from mechanics.recording import Recording
 from mechanics.result import Result
 from palpate.importing.convert import Understood
-from palpate.importing.written import PICTURE, picture, write_imported
+from palpate.importing.write_imported import PICTURE, picture, write_imported
 
 
 @dataclass(frozen=True, eq=False, repr=False)

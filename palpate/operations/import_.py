@@ -100,7 +100,7 @@ class ImportOperands:
         None,
         "what was understood; default: beside REC, 'none' for no picture",
         metavar="PNG",
-        writes="palpate.importing.written:PICTURE",
+        writes="palpate.importing.write_imported:PICTURE",
         only="command",
     )
     dry_run: bool = operand(False, "picture and summary only: write no recording", only="command")

@@ -88,7 +88,7 @@ def reconstruct(asked: ReconstructOperands, call: Call) -> Reconstruction:
     """
     from mechanics.model_files import read_model
     from reconstruct.pipeline import reconstruct_fully
-    from render.felt import felt_surface
+    from render.felt_surface import felt_surface
 
     for name in asked.beside:
         read_model(name)  # before the work

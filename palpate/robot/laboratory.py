@@ -20,7 +20,6 @@ from diagnose.explore.segments import Instrument, Segment
 from mechanics.errors import SceneError
 from mechanics.nearest import closest, first_hits
 from mechanics.options import option
-from scenes.laboratory.beside import on_the_support, waving
 from scenes.laboratory.curves import ALONE, Solving
 from scenes.laboratory.effects import Readings, effect
 from scenes.laboratory.frame import quaternions
@@ -28,6 +27,7 @@ from scenes.laboratory.hand import HandOptions, minimum_jerk
 from scenes.laboratory.presses import Touch
 from scenes.laboratory.session import SimulateOptions, Staging
 from scenes.laboratory.simulate import Simulation, simulate
+from scenes.laboratory.support_and_air import on_the_support, waving
 from scenes.laboratory.tracing import RATE_HZ
 from scenes.phantoms import Phantom
 

@@ -12,7 +12,7 @@ from palpate.show.object3d import AZIMUTH_DEG, level_axes
 from palpate.show.quantities import DEPTH, MODULUS, ORDER, STIFFNESS, UNCERTAINTY
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 
 def view_of_presses(

@@ -19,7 +19,7 @@ from scipy.spatial.distance import cdist
 
 from mechanics.model import Model
 from palpate.show.quantities import Quantity
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 PLAIN_COLOUR = "#ead7bf"
 TOUCH_COLOUR = "#c1121f"
@@ -77,7 +77,7 @@ def draw_object(
     elevation_deg: float = ELEVATION_DEG,
     azimuth_deg: float = AZIMUTH_DEG,
 ) -> Axes:
-    """Draw what a tip meets of the object (render.felt) and return `ax`.
+    """Draw what a tip meets of the object (render.felt_surface) and return `ax`.
 
     colours: what the felt surface is coloured by, with a bar beside it. touches: (k, 3) m, points as
     dots, pale where hidden; show_base: the fixed corner nodes as dots.

@@ -14,7 +14,7 @@ from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
 from palpate.show.object3d import view_axes
 from render.base import Renderer
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 OBJECT_COLOUR, SUPPORT_COLOUR, TIP_COLOUR, ARROW_COLOUR = "#ead7bf", "#d9dee5", "#d95f02", "#1b4f9c"
 ARROW_M_PER_N = 0.03

@@ -23,15 +23,15 @@ from mechanics.compliance import load_or_condense
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
-from palpate.window.beside import Beside
 from palpate.window.frames import Frame, View
 from palpate.window.inclusion import InclusionMover
 from palpate.window.recording import SessionRecording
+from palpate.window.second_renderer import Beside
 from palpate.window.trace import Trace
 from palpate.window.worker import Worker
 from render.base import Renderer
 from render.effects import rendered_touch
-from render.felt import with_own_stiffness
+from render.felt_surface import with_own_stiffness
 from render.fem import FemRenderer
 from render.options import RenderOptions
 from render.registry import create, names

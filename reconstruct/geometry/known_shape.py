@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 from mechanics.errors import ContactError, SurfaceError
+from mechanics.flat_foot import Standing, standing
 from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
-from mechanics.standing import Standing, standing
 from mechanics.surface_files import ClosedSurface, read_surface
 from mechanics.tetmesh import vertex_normals
 from reconstruct.geometry.known_base import base_of_rim

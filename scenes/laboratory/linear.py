@@ -13,8 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.laboratory.assembly import Assembly
+from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import Grip, SphereContact
-from scenes.laboratory.factor import Condensation
 from scenes.laboratory.solid import Solid
 from scenes.laboratory.solver import LabError
 from scenes.laboratory.touching import Touching

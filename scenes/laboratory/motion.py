@@ -9,10 +9,10 @@ import numpy as np
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial.transform import Rotation
 
-from scenes.laboratory.beside import on_the_support, waving
 from scenes.laboratory.hand import HandOptions, band_noise, minimum_jerk, straying
 from scenes.laboratory.paths import SIDEWAYS, WAY_IN, WAY_OUT
 from scenes.laboratory.presses import Touch
+from scenes.laboratory.support_and_air import on_the_support, waving
 from scenes.laboratory.surface import Surface
 from scenes.laboratory.tracing import RATE_HZ, Trace
 from scenes.phantoms import Phantom

@@ -13,8 +13,8 @@ import numpy as np
 
 from mechanics.errors import PalpateError
 from scenes.laboratory.assembly import Assembly
+from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import Grip, SphereContact
-from scenes.laboratory.factor import Condensation
 from scenes.laboratory.solid import History, Solid
 from scenes.laboratory.touching import Touching
 

@@ -21,8 +21,8 @@ from mechanics.effects.registry import effect, effects
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.frames import tangents
 from mechanics.near_field import surface_softness
-from mechanics.places import solve_places
 from mechanics.press_making import of_paths
+from mechanics.pressed_places import solve_places
 from mechanics.sites import touch_solver
 from render.fem import FemRenderer
 from render.options import RenderOptions

@@ -16,7 +16,7 @@ from pyvista import examples
 
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import SurfaceError
-from mechanics.standing import standing
+from mechanics.flat_foot import standing
 from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 
 SIZE_MM = (60, 50, 40)

@@ -13,7 +13,7 @@ from mechanics.model_files import read_model, write_model
 from mechanics.press_making import no_presses, of_places
 from mechanics.sites import TouchSites
 from palpate.cli import main
-from render.felt import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
+from render.felt_surface import FILE, OWN_DEPTH_M, PRESSES, TOUCHES, felt_surface, with_own_stiffness
 from render.options import RenderOptions
 from render.press import Stroke, press
 from render.snapping import ONSET_NOISE_M, touched_surface

@@ -14,7 +14,7 @@ from palpate.show.object3d import Colours, draw_object, spread_over
 from palpate.show.quantities import ERROR
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f"}
 COLOURS |= {HOMOGENEOUS: "#8d99ae", "measured": "#c1121f"}

@@ -16,7 +16,7 @@ from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from reconstruct.steps.s6_one_d.one_d import low_passed
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 SHOWN_PRESSES = 4
 _STEP_S = 0.05

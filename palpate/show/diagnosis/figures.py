@@ -32,7 +32,7 @@ from palpate.show.object3d import Colours, draw_object, view_axes
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 MEASURED, IDEAL, IMPROVED, PALE = "#1d3557", "#e76f51", "#2a9d8f", "#c9c9c9"
 

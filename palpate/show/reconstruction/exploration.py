@@ -16,7 +16,7 @@ from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s6_one_d.one_d import profiles
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 
 def force_over_time(ax: Axes, exploration: Exploration) -> Axes:

@@ -17,7 +17,7 @@ from palpate.show.quantities import KELVIN_VOIGT, MODULUS, Quantity
 from palpate.show.reconstruction.exploration import spread
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
-from render.felt import felt_surface
+from render.felt_surface import felt_surface
 
 SIDE = 0.3  # |n . support normal| below this: a press on the side
 

@@ -18,7 +18,7 @@ from mechanics.field_response import shares_of, tips_of
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.patch import half_space_compliance
-from mechanics.places import Places
+from mechanics.pressed_places import Places
 from mechanics.presses import Presses
 from mechanics.sites import LoadPatch, TouchSites, touch_sites, touch_solver
 from mechanics.smooth_field import (

@@ -7,7 +7,7 @@ import pytest
 
 from devices.intention import FreeExploration
 from devices.simulated import SimulatedHand
-from palpate.servo.held import HeldForce
+from palpate.servo.held_force import HeldForce
 
 PUSH = np.array([0.0, 0.0, 2.0])
 

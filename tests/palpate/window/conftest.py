@@ -9,7 +9,7 @@ import pytest
 
 from mechanics.model import Model
 from mechanics.model_files import read_model
-from render.felt import with_own_stiffness
+from render.felt_surface import with_own_stiffness
 from render.registry import create
 
 from ...support.once import folder_made_once

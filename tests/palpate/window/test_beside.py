@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import palpate as pp
-from palpate.window.beside import Beside
+from palpate.window.second_renderer import Beside
 from render.scene import scene_of
 
 

@@ -10,9 +10,9 @@ import scipy.sparse as sp
 from scipy.integrate import trapezoid
 
 from mechanics.dent import dent_law
+from scenes.laboratory.condensation import Condensation
 from scenes.laboratory.contact import SphereContact
 from scenes.laboratory.effects.contact import relaxed
-from scenes.laboratory.factor import Condensation
 from scenes.laboratory.linear import LinearProblem
 from scenes.laboratory.refine import boundary_faces
 from scenes.laboratory.solid import Material, Solid
@@ -124,7 +124,7 @@ def test_condensation_is_the_same_without_pardiso(monkeypatch: pytest.MonkeyPatc
     kept, b, found = rng.random(30) < 0.3, rng.normal(size=30), []
     for there in (True, False):
         if not there:
-            monkeypatch.setattr("scenes.laboratory.factor.PyPardisoSolver", None)
+            monkeypatch.setattr("scenes.laboratory.condensation.PyPardisoSolver", None)
         factor = Condensation(kept)
         schur, half = factor.refresh(sp.csr_matrix(np.triu(matrix))), factor.forward(b)
         found.append((schur, half[kept], factor.backward(half, half[kept])))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from mechanics.dent import dent_load
-from mechanics.effects.path import sharp_laws, smooth_laws
+from mechanics.effects.laws_along_path import sharp_laws, smooth_laws
 from mechanics.kernels import part
 from mechanics.touch import touch_remember
 from render.contact import release
