@@ -27,6 +27,7 @@ from diagnose.verdict.result import Diagnosis
 from mechanics.effects.finite_strain import EFFECT as FINITE
 from mechanics.effects.registry import effects
 from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
+from mechanics.effects.tool_compliance import EFFECT as TOOL
 from mechanics.effects.viscoelasticity import EFFECT as PRONY
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
@@ -308,7 +309,7 @@ def _few(
         error={**approach.error, "on a rigid machine": machine.rigid_error, "verdict": machine.error},
         verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "
         f"({low / 1e3:.3g} to {high / 1e3:.3g}); {gone}",
-        effects=("tool_compliance",),
-        parameters={**onset, "tool_compliance": {"stiffness_n_per_m": machine.stiffness_n_per_m}},
+        effects=(TOOL.name,),
+        parameters={**onset, TOOL.name: {"stiffness_n_per_m": machine.stiffness_n_per_m}},
         notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
     )

@@ -28,13 +28,13 @@ class Watch(event.Listener):
 event.register("numba:compile", Watch())
 
 import palpate.warm_up
-from render.press import press
+from render.press import Stroke, press
 
 made = palpate.warm_up.block_renderer()
 with made as renderer:
     for name, work in palpate.warm_up.stages(renderer):
         work()
-    press(renderer, [0.0, 0.0, 0.04], [0.0, 0.0, -1.0], 1e-3, 0.05)
+    press(renderer, [0.0, 0.0, 0.04], [0.0, 0.0, -1.0], Stroke(1e-3, 0.05))
     tips = np.array([[0.0, 0.0, 0.05]])
     tips.setflags(write=False)
     renderer.step(renderer.start(), tips)

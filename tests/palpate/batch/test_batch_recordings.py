@@ -254,14 +254,14 @@ def test_bad_arguments_are_told_in_a_line(tmp_path, words, said, capsys):
 
 def test_values_of_options_are_read_as_toml_and_else_as_words(tmp_path, quick, monkeypatch):
     seen = {}
-    monkeypatch.setattr("palpate.batching.run.find", lambda *given: seen.update(given=given) or [])
-    made_of = run._made
+    whole = run.batch
 
-    def made(folder, found, choice, *more):
+    def watched(sources, out, choice, **more):
         seen.update(choice=choice)
-        return made_of(folder, found, choice, *more)
+        return whole(sources, out, choice, **more)
 
-    monkeypatch.setattr(run, "_made", made)
+    monkeypatch.setattr("palpate.batching.run.find", lambda *given: [])
+    monkeypatch.setattr(run, "batch", watched)
     given = ["diagnose.fast=true", "diagnose.without=adhesion", "reconstruct.mesh_size_m=0.008"]
     cli.main(["batch", ".", "-o", str(tmp_path / "o"), *(w for v in given for w in ("--set", v))])
     assert seen["choice"].options == {
