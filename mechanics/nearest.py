@@ -69,6 +69,8 @@ def first_hits(
     for k, (start, way) in enumerate(zip(starts, directions, strict=True)):
         end = start + (float(np.linalg.norm(start - middle)) + size) * way
         met = np.unique(shell.ray_trace(start, end)[1]).astype(int)
+        # a triangle that the ray runs along has no one place where they meet
+        met = met[np.abs(across[met] @ way) > 1e-9 * np.linalg.norm(across[met], axis=1)]
         # the tree's points are of single precision, so where it meets each triangle's plane is found again
         far = np.einsum("ij,ij->i", corner[met, 0] - start, across[met]) / (across[met] @ way)
         met, far = met[far > beyond], far[far > beyond]

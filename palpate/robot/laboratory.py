@@ -168,7 +168,9 @@ class LaboratoryRobot:
     def _aside(self) -> Touch:
         if self._places is not None:
             return replace(self._places[0], depth=1.0)
-        top = self._surface.vertices[np.argmax(self._surface.vertices[:, 2])]
+        # the middle of a face: a ray that meets a vertex or an edge may pass between its faces
+        middles = self._surface.triangles_center
+        top = middles[np.argmax(middles[:, 2])]
         return self._landed(top + [0, 0, 0.02], np.array([0.0, 0.0, -1.0]), 0.001)
 
     def _touch(self, suggestion: Suggestion) -> Touch:

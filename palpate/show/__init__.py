@@ -24,6 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
 from mechanics.result import Result, present_by
+from palpate.loading import loaded_whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -66,7 +67,8 @@ def _module_of(result: Result) -> ModuleType:
     for kind in type(result).__mro__:
         found = _KINDS.get(_name(kind))
         if isinstance(found, str):
-            found = _KINDS[_name(kind)] = importlib.import_module(f"{__name__}.{found}")
+            with loaded_whole():
+                found = _KINDS[_name(kind)] = importlib.import_module(f"{__name__}.{found}")
         if found is not None:
             return found
     name = type(result).__name__

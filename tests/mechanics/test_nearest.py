@@ -22,3 +22,13 @@ def test_the_near_side_is_passed_over() -> None:
         ball.vertices, ball.faces, np.array([[0, 0, 0.03]]), np.array([[0, 0, -1.0]]), beyond=1e-3
     )
     assert abs(far[0] - 0.06) < 1e-4
+
+
+def test_a_ray_along_a_wall_meets_no_place_of_it() -> None:
+    cube = trimesh.creation.box((0.02, 0.02, 0.02))
+    with np.errstate(all="raise"):
+        far, face = first_hits(
+            cube.vertices, cube.faces, np.array([[0.01, 0.003, 0.05]]), np.array([[0, 0, -1.0]])
+        )
+    assert face[0] < 0 or abs(cube.face_normals[face[0]][2]) == 1
+    assert not np.isnan(far[0])

@@ -107,3 +107,19 @@ def test_a_missing_part_of_the_program_itself_is_no_matter_of_installing(monkeyp
     monkeypatch.setattr(cli, "_loaded", load)
     with pytest.raises(ModuleNotFoundError):
         cli.main(["check", "x.csv"])
+
+
+def test_a_request_to_end_waits_until_a_library_is_loaded():
+    import signal
+
+    from palpate.loading import loaded_whole
+
+    loaded = []
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt), loaded_whole():
+            signal.raise_signal(signal.SIGINT)
+            loaded.append("whole")
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert loaded == ["whole"]

@@ -67,7 +67,7 @@ class Sound:
         """Commands that load and compile what the cases need: also with a MODEL whose cache is not there."""
         fresh, out = self.folder / "fresh", self.folder / "warm"
         shutil.copytree(self.model, fresh, dirs_exist_ok=True)
-        for cache in fresh.glob("*.bin"):
+        for cache in fresh.glob("compliance-*.bin"):
             cache.unlink()
         return [
             ["press", str(fresh), *PRESS, "-o", str(out / "curve.csv")],

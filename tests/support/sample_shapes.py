@@ -5,8 +5,11 @@ Object frame: the base in z = 0, its centre at the origin.
 
 from __future__ import annotations
 
+import contextlib
+
 import numpy as np
 
+from mechanics.errors import MeshError
 from mechanics.tetmesh import TetMesh
 from reconstruct.steps.s5_mesh.tetwild import tetrahedralize
 
@@ -50,6 +53,13 @@ def sample_places(sample: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def sample_mesh(sample: str, size_m: float) -> TetMesh:
     """A fresh tetrahedral mesh of that edge length; meshing is not deterministic."""
+    for _ in range(4):
+        with contextlib.suppress(MeshError):  # a flat tetrahedron now and then
+            return _meshed(sample, size_m)
+    return _meshed(sample, size_m)
+
+
+def _meshed(sample: str, size_m: float) -> TetMesh:
     points, triangles = _surface(sample)
     nodes, tets = tetrahedralize(points, triangles, edge_m=size_m, envelope_m=1.5e-4)
     nodes = np.array(nodes, dtype=float)
