@@ -12,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
+from palpate.loading import listen
 from palpate.operations._list import commands
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ class Ended(KeyboardInterrupt):
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run the command line; returns the exit code."""
-    before = _listen(_leave)
+    before = listen(_leave)
     prog = "palpate"
     try:
         # nothing is open yet, and libraries that are half loaded do not bear an exception: leave at once
@@ -37,7 +38,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         if name is None:
             return code
         prog = command.prog
-        _listen(_interrupt)
+        listen(_interrupt)
         return _run(command, name, words[1:])
     except ModuleNotFoundError as error:
         if _is_ours(error.name):
@@ -118,24 +119,13 @@ def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
             )
 
 
-def _listen(handler: Any) -> dict[int, Any]:
-    """Let `handler` answer Ctrl-C and requests to end; returns what answered before."""
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    try:
-        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-        ours = [n for n in numbers if signal.getsignal(n) not in (signal.SIG_IGN, None)]
-        return {n: signal.signal(n, handler) for n in ours}
-    except ValueError:  # in a thread: signals are the main one's business
-        return {}
-
-
 def _leave(number: int, frame: Any) -> None:
     os.write(2, b"palpate: interrupted\n")
     os._exit(128 + number)
 
 
 def _interrupt(number: int, frame: Any) -> None:
-    _listen(_leave)  # a second time leaves without tidying up
+    listen(_leave)  # a second time leaves without tidying up
     raise KeyboardInterrupt if number == signal.SIGINT else Ended
 
 

@@ -4,21 +4,26 @@ from __future__ import annotations
 
 import contextlib
 import signal
-import threading
 from collections.abc import Iterator
+from typing import Any
+
+
+def listen(handler: Any) -> dict[int, Any]:
+    """Let `handler` answer Ctrl-C and requests to end; returns what answered before."""
+    names = ("SIGINT", "SIGTERM", "SIGHUP")
+    try:
+        numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
+        ours = [n for n in numbers if signal.getsignal(n) not in (signal.SIG_IGN, None)]
+        return {n: signal.signal(n, handler) for n in ours}
+    except ValueError:  # in a thread: signals are the main one's business
+        return {}
 
 
 @contextlib.contextmanager
 def loaded_whole() -> Iterator[None]:
     """Ctrl-C and requests to end wait until what is loaded here is there; then they are answered."""
-    names = ("SIGINT", "SIGTERM", "SIGHUP")
-    numbers = [getattr(signal, name) for name in names if hasattr(signal, name)]
-    ours = [n for n in numbers if callable(signal.getsignal(n))]
-    if threading.current_thread() is not threading.main_thread() or not ours:
-        yield
-        return
     came: list[int] = []
-    before = {n: signal.signal(n, lambda number, frame: came.append(number)) for n in ours}
+    before = listen(lambda number, frame: came.append(number))
     try:
         yield
     finally:

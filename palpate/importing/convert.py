@@ -28,6 +28,7 @@ from palpate.importing.meaning import (
     force_sense,
     joined,
     press_scores,
+    settled_clock,
 )
 from palpate.importing.tables import Table
 from palpate.importing.units import SI
@@ -255,15 +256,7 @@ def _in_order(
     if blocks == 1:
         return t, values
     reading = clock_of(t, values) if blocks <= len(t) // 4 else Reading((1,), MOST_ODDS)
-    if said.clock is not None:
-        reading = Reading((1 if said.clock == "one" else -1,), MOST_ODDS)
-    if not reading.sure:
-        raise Unclear(
-            f"{part}: the time goes back {blocks - 1} times, and neither sorted rows nor {blocks} blocks "
-            "with clocks of their own are clearly right",
-            "clock",
-            ("one", "blocks"),
-        )
+    reading = settled_clock(part, t, said.clock, reading)
     if reading.value[0] < 0:
         notes.append(
             f"{part}: {blocks} blocks with their own clocks are put one after the other ({reading.words})"

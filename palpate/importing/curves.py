@@ -28,6 +28,7 @@ from palpate.importing.meaning import (
     clock_starts,
     joined,
     press_scores,
+    settled_clock,
 )
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import SI, without_unit
@@ -165,15 +166,7 @@ def _one_clock(
     """Rows on one clock that goes forward: sorted by time, or blocks one after the other."""
     blocks = len(clock_starts(t))
     reading = clock_of(t, np.column_stack([z, push]))
-    if said.clock is not None:
-        reading = Reading((1 if said.clock == "one" else -1,), MOST_ODDS)
-    if not reading.sure:
-        raise Unclear(
-            f"'{path}': the time goes back {blocks - 1} times, and neither sorted rows nor {blocks} blocks "
-            "with clocks of their own are clearly right",
-            "clock",
-            ("one", "blocks"),
-        )
+    reading = settled_clock(f"'{path}'", t, said.clock, reading)
     odds.append(reading.odds)
     if reading.value[0] > 0:
         notes.append(f"rows out of order are sorted by time ({reading.words})")

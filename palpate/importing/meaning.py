@@ -160,6 +160,22 @@ def clock_of(t: np.ndarray, values: np.ndarray) -> Reading:
     return best({(1,): told / 2, (-1,): -told / 2})
 
 
+def settled_clock(where: str, t: np.ndarray, stated: str | None, reading: Reading) -> Reading:
+    """The clock as it was stated ("one" or "blocks"), else as it was read. Raises Unclear where neither is
+    sure; where: what the line begins with."""
+    if stated is not None:
+        return Reading((1 if stated == "one" else -1,), MOST_ODDS)
+    if not reading.sure:
+        blocks = len(clock_starts(t))
+        raise Unclear(
+            f"{where}: the time goes back {blocks - 1} times, and neither sorted rows nor {blocks} blocks "
+            "with clocks of their own are clearly right",
+            "clock",
+            ("one", "blocks"),
+        )
+    return reading
+
+
 def joined(t: np.ndarray) -> np.ndarray:
     """Blocks with clocks of their own, one after the other on one clock that increases where theirs do."""
     starts = clock_starts(t)
