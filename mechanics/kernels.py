@@ -66,6 +66,7 @@ def pointer(step: Any, *arguments: Any) -> Any:
 @cache
 def _pointer(step: Any, signature: Any) -> Any:
     """Once a process for each kind of arguments."""
+    step.compile(signature.args)  # as a call does: with the return type its place on disk would be another
     return types.CompileResultWAP(step.get_compile_result(signature))
 
 

@@ -7,9 +7,11 @@ pypardiso).
 
 from __future__ import annotations
 
+import contextlib
 import ctypes
 import sys
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
@@ -19,6 +21,13 @@ _DEFINITE, _INDEFINITE = 2, -2  # the library's names of real symmetric matrices
 
 @cache
 def _library() -> ctypes.CDLL | None:
+    # where MKL's wheels put it; pypardiso walks through the whole environment, seconds in a process
+    for path in (
+        *Path(sys.prefix, "lib").glob("libmkl_rt.*"),
+        *Path(sys.prefix, "Library/bin").glob("mkl_rt.*"),
+    ):
+        with contextlib.suppress(OSError):
+            return ctypes.CDLL(str(path))
     try:
         from pypardiso import PyPardisoSolver
 

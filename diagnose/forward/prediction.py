@@ -8,6 +8,7 @@ elastic object -> what follows the path (softening, memory, adhesion) -> what th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -37,7 +38,13 @@ class Forward:
 
     def __post_init__(self) -> None:
         self._kept: dict[int, np.ndarray] = {}
-        self.acceleration = _acceleration(self.touches)
+        self._as_read = self.touches
+
+    @cached_property
+    def acceleration(self) -> np.ndarray:
+        """(n, 3) m/s^2, device frame, press by press from the thinned positions as they were read."""
+        t = self._as_read
+        return np.concatenate([acceleration(t.t[part], t.position[part]) for part in t.parts])
 
     @property
     def model(self) -> Model:
@@ -147,8 +154,3 @@ class Forward:
 def build_forward(touches: Presses, model: Model) -> Forward:
     """Solve the far field at every press's place (one factorisation, three solves a place)."""
     return Forward(touches, solve_places(model, touches.point, touches.normal, touches.frame))
-
-
-def _acceleration(t: Presses) -> np.ndarray:
-    """(n, 3) m/s^2, device frame, press by press from the thinned positions."""
-    return np.concatenate([acceleration(t.t[part], t.position[part]) for part in t.parts])

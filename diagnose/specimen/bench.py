@@ -15,23 +15,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from scipy.integrate import trapezoid
-from scipy.stats import t as student
 
-from diagnose.forward.touches import LEAST_PRESSES
-from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
-from diagnose.pipeline import diagnose
-from diagnose.search.descent import Descent
-from diagnose.search.fit import settings_of
-from diagnose.search.whiten import Whitener
-from diagnose.verdict.result import Diagnosis
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.press_cutting import FoundAround, FoundPresses, cut
-from mechanics.presses import HOLDING
-from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M, parse_unit, unit_of_key
 from mechanics.recording import Recording
 from mechanics.robust import spread_about_zero
@@ -44,8 +33,6 @@ HAND_TIP_M, PEAK_N = USUAL_TIP_RADIUS_M, 1.0
 HAND_S, RATE_HZ = 2.0, 200.0
 """The pace to which they are brought: how long the middle curve takes, and readings a second at most."""
 _BETWEEN_S = 2.0
-_FLOOR = {False: 0.005, True: 0.02}
-"""Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""
 _CELLS = 20
 _WAY_ROWS = 60
 _MARGIN = 2.0
@@ -244,199 +231,3 @@ def _side_by_side(
         object_name="specimen",
     )
     return recording, spans
-
-
-def diagnose_bench(
-    bench: Bench, *, fast: bool = False, seed: int = 0, progress: Progress = silent
-) -> Diagnosis | None:
-    """The sim-to-real gap of the curves, each held out; None with fewer than 6, of which none can be."""
-    if len(bench.model.presses) < LEAST_PRESSES:
-        return None
-    return diagnose(
-        bench.recording,
-        bench.model,
-        DiagnoseOptions(fast=fast, seed=seed),
-        progress,
-        nuisance=_nuisance(bench),
-        attribution=AttributionOptions(most=1 if fast else 3),
-    )
-
-
-def _nuisance(bench: Bench) -> NuisanceOptions:
-    """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is: the
-    floor is a share of the greatest."""
-    floor = _FLOOR[bench.specimens] * PEAK_N
-    plain = NuisanceOptions(floor_n=floor, floor_share=0.0)
-    if not bench.specimens:
-        return plain
-    return dataclasses.replace(plain, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
-
-
-_FOLDS, _ITERATIONS, _LEAST_HOLD = 6, 6, 8
-
-
-def unseen_holds(bench: Bench, made: Diagnosis) -> tuple[float, float] | None:
-    """rms error over rms force of holds that nothing has seen, by the ideal model and by the verdict: law
-    and effects from the other curves, the curve's own stiffness from its way in. None where fewer than 6
-    curves hold."""
-    forward, found = made.forward, made.attribution
-    if forward is None or found is None:
-        return None
-    t = forward.touches
-    hold = (t.phase == HOLDING) & (t.t > t.peak_s[t.press])
-    way = t.counted & (t.t <= t.peak_s[t.press]) & (t.travel[:, 0] > 0)
-    holds = np.flatnonzero(np.bincount(t.press[hold], minlength=len(t)) >= _LEAST_HOLD)
-    if len(holds) < LEAST_PRESSES:
-        return None
-    errors = []
-    named = set(made.effects)
-    for candidate in (found.ideal, found.final):
-        fit = candidate.found
-        effects = tuple(
-            e for e in fit.effects if candidate is found.ideal or e.name in named or not e.parameters
-        )
-        values = np.concatenate([fit.values[:1], *(fit.of(e.name) for e in effects)])
-        settings = settings_of(forward, effects, values, fit.onset)
-        whitener = Whitener(forward, settings, _nuisance(bench))
-        missed = 0.0
-        for k in range(_FOLDS):
-            held = np.arange(len(t)) % _FOLDS == k
-            weights = np.where([held[t.site == s].any() for s in range(t.sites)], 0.0, 1.0)
-            again = Descent(forward, whitener, effects, weights).run(values, fit.onset, _ITERATIONS)
-            predicted = forward.predict(settings_of(forward, effects, again.values, again.likeliest))[:, 0]
-            for press in np.intersect1d(holds, np.flatnonzero(held)):
-                own, rest = way & (t.press == press), hold & (t.press == press)
-                f = predicted[own]
-                scale = float(f @ t.local_force[own, 0] / max(float(f @ f), 1e-300))
-                missed += float(((scale * predicted[rest] - t.local_force[rest, 0]) ** 2).sum())
-        rows = hold & np.isin(t.press, holds)
-        errors.append(float(np.sqrt(missed / (t.local_force[rows, 0] ** 2).sum())))
-    return errors[0], errors[1]
-
-
-APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
-_BLOCKS = 8
-_SHIFTS = np.linspace(-0.1, 0.1, 41)
-
-
-def modulus_interval(bench: Bench, made: Diagnosis) -> tuple[float, float]:
-    """Pa, 95 %, in the machine's size, of the fit whose modulus the diagnosis states: it is fitted again
-    without each group of curves (delete-a-group jackknife of log E)."""
-    forward, found = made.forward, made.attribution
-    assert forward is not None and found is not None
-    t, fit = forward.touches, found.final.found
-    settings = settings_of(forward, fit.effects, fit.values, fit.onset)
-    whitener = Whitener(forward, settings, _nuisance(bench))
-    folds = min(_FOLDS, len(t))
-    again = []
-    for k in range(folds):
-        kept = np.arange(len(t)) % folds != k
-        weights = np.where([kept[t.site == s].any() for s in range(t.sites)], 1.0, 0.0)
-        left = Descent(forward, whitener, fit.effects, weights).run(fit.values, fit.onset, _ITERATIONS)
-        again.append(float(left.values[0]))
-    error = np.sqrt((folds - 1) / folds * ((np.array(again) - np.mean(again)) ** 2).sum())
-    half = float(np.exp(student.ppf(0.975, folds - 1) * error))
-    e = fit.modulus / bench.similarity.modulus
-    return e / half, e * half
-
-
-@dataclass(frozen=True)
-class Approach:
-    """What a few curves tell, none of which can be held out: each way in, block by block of it left out in
-    turn.
-
-    error: dent law (and 'hunt-crossley', 'regression', 'constant') -> rms error over rms force, median of
-    the curves. law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does
-    not come back (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
-    """
-
-    error: dict[str, float]
-    law: str
-    modulus_pa: np.ndarray
-    hysteresis: float
-    pull_n: np.ndarray
-
-
-def approach_of(bench: Bench) -> Approach:
-    """The ways in of a bench's curves on a half-space."""
-    presses, nu = bench.model.presses, bench.model.material.poisson_ratio
-    errors: dict[str, list[float]] = {}
-    moduli: dict[str, list[float]] = {}
-    work, pull = [], []
-    for part in presses.parts:
-        u, push = presses.depth[part], presses.push[part]
-        top = int(np.argmax(push))
-        ways = u[: top + 1], push[: top + 1]
-        for name in APPROACH_LAWS:
-            error, modulus = _left_out(*ways, dent_law(name), nu)
-            errors.setdefault(name, []).append(error)
-            moduli.setdefault(name, []).append(modulus)
-        for name, order in (("hunt-crossley", 0), ("regression", 5)):
-            errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
-        errors.setdefault("constant", []).append(_constant(ways[1]))
-        back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
-        given = max(trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
-        # a curve that ends in its hold gives nothing back to be weighed
-        gone = 1 + trapezoid(push[back], u[back]) / given
-        work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
-        pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
-    medians = {name: float(np.median(values)) for name, values in errors.items()}
-    law = min(APPROACH_LAWS, key=lambda name: medians[name])
-    own = np.array(moduli[law]) / bench.similarity.modulus
-    return Approach(medians, law, own, float(np.median(work)), np.array(pull))
-
-
-def _blocks(count: int) -> np.ndarray:
-    return np.minimum(np.arange(count) * _BLOCKS // max(count, 1), _BLOCKS - 1)
-
-
-def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[float, float]:
-    """(held-out rms over rms, modulus) of one way in; first touch and modulus are free."""
-    span = float(u.max())
-    shapes = np.array([law.force(np.maximum(u - s * span, 0.0), 1.0, nu, HAND_TIP_M) for s in _SHIFTS])
-
-    def fitted(seen: np.ndarray) -> tuple[int, float]:
-        power = np.maximum((shapes[:, seen] ** 2).sum(axis=1), 1e-300)
-        e = shapes[:, seen] @ push[seen] / power
-        k = int(np.argmin(((e[:, None] * shapes[:, seen] - push[seen]) ** 2).sum(axis=1)))
-        return k, float(e[k])
-
-    block, predicted = _blocks(len(u)), np.zeros(len(u))
-    for b in range(1, _BLOCKS - 1):
-        k, e = fitted(block != b)
-        predicted[block == b] = e * shapes[k, block == b]
-    return _relative(predicted, push, block), fitted(np.ones(len(u), dtype=bool))[1]
-
-
-def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
-    """The same of k u^r (order 0) or of a polynomial of the depth."""
-    block, predicted = _blocks(len(u)), np.zeros(len(u))
-    x = np.maximum(u, 0.0) / max(float(u.max()), 1e-300)
-    exponents = np.linspace(0.5, 3.0, 26)
-    for b in range(1, _BLOCKS - 1):
-        seen = block != b
-        if order:
-            basis = x[:, None] ** np.arange(1, order + 1)
-            predicted[~seen] = basis[~seen] @ np.linalg.lstsq(basis[seen], push[seen], rcond=None)[0]
-            continue
-        k = np.array(
-            [(x[seen] ** r) @ push[seen] / max((x[seen] ** (2 * r)).sum(), 1e-300) for r in exponents]
-        )
-        cost = [float(((k[i] * x[seen] ** r - push[seen]) ** 2).sum()) for i, r in enumerate(exponents)]
-        best = int(np.argmin(cost))
-        predicted[~seen] = k[best] * x[~seen] ** exponents[best]
-    return _relative(predicted, push, block)
-
-
-def _constant(push: np.ndarray) -> float:
-    """The same of the mean force: what says nothing of the depth."""
-    block = _blocks(len(push))
-    inner = push[(block > 0) & (block < _BLOCKS - 1)]
-    return _relative(np.full(len(push), inner.mean() if len(inner) else 0.0), push, block)
-
-
-def _relative(predicted: np.ndarray, push: np.ndarray, block: np.ndarray) -> float:
-    """Over the blocks between the ends, where nothing has to be carried on."""
-    inner = (block > 0) & (block < _BLOCKS - 1)
-    missed, whole = (predicted - push)[inner], push[inner]
-    return float(np.sqrt((missed**2).mean() / max((whole**2).mean(), 1e-300)))

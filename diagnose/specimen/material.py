@@ -11,15 +11,9 @@ import numpy as np
 from scipy.stats import t as student
 
 from diagnose.forward.touches import touches_of
-from diagnose.specimen.bench import (
-    Approach,
-    Bench,
-    approach_of,
-    bench_of,
-    diagnose_bench,
-    modulus_interval,
-    unseen_holds,
-)
+from diagnose.specimen.approach import Approach, approach_of
+from diagnose.specimen.bench import Bench, bench_of
+from diagnose.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
 from diagnose.specimen.result import Material, Tests
 from diagnose.specimen.rivals import held_out_rivals
 from diagnose.specimen.yielding import Machine, Way, machine_of, way_of

@@ -150,9 +150,9 @@ def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) ->
         )
     good = numbers_in(path, t, z, push)
     t, z, push = t[good], np.sign(columns["z"].factor) * z[good], np.sign(columns["fz"].factor) * push[good]
-    restarts = len(clock_starts(t)) - 1
-    if 0 < restarts <= len(t) // 4:
-        t, z, push = _one_clock(path, t, z, push, said, notes, odds)
+    blocks = len(clock_starts(t))
+    if 1 < blocks <= len(t) // 4 + 1:
+        t, z, push = _one_clock(path, blocks, t, z, push, said, notes, odds)
     fresh = np.concatenate([[True], t[1:] > np.maximum.accumulate(t)[:-1]])[: len(t)]
     if fresh.sum() < LEAST_ROWS:
         raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {LEAST_ROWS} are needed")
@@ -160,11 +160,10 @@ def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) ->
 
 
 def _one_clock(
-    path: Path, t: np.ndarray, z: np.ndarray, push: np.ndarray, said: SaidOfCurves, notes: list[str],
-    odds: list[float],
+    path: Path, blocks: int, t: np.ndarray, z: np.ndarray, push: np.ndarray, said: SaidOfCurves,
+    notes: list[str], odds: list[float],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:  # fmt: skip
     """Rows on one clock that goes forward: sorted by time, or blocks one after the other."""
-    blocks = len(clock_starts(t))
     reading = clock_of(t, np.column_stack([z, push]))
     reading = settled_clock(f"'{path}'", t, said.clock, reading)
     odds.append(reading.odds)

@@ -5,10 +5,9 @@ from __future__ import annotations
 import gzip
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.figure import Figure
 
 from mechanics.files import Kind, atomic_file
 from mechanics.recording import (
@@ -20,6 +19,10 @@ from mechanics.recording import (
 )
 from mechanics.toml_text import dump_toml
 from palpate.importing.convert import Understood
+from palpate.show.page import subplots
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 PICTURE = Kind(
     "a picture of palpate import", (b"\x89PNG", b"<?xml", b"%PDF"), holds=b"Read by palpate import",
@@ -71,11 +74,10 @@ def write_imported(
 def picture(understood: Understood) -> Figure:
     """Position and force over time, the path from the side coloured by force, and what each column was
     taken for."""
-    from matplotlib import pyplot as plt
 
     recording = understood.recording
     size = np.linalg.norm(recording.force_on_tool, axis=1)
-    figure, axes = plt.subplots(2, 2, figsize=(12, 6.4), layout="constrained")
+    figure, axes = subplots(2, 2, figsize=(12, 6.4))
     step = max(1, len(recording.t) // 20000)
     t = recording.t[::step]
     label = "row" if understood.quasi_static else "time [s]"

@@ -11,7 +11,7 @@ A module has those of these functions that its result needs, each with the resul
     save(result, path)                     what reads it back, where its own class does not write it
 
 `register(TYPE, module)` adds one. Importing this package lets every result know; a module is imported when a
-result of its type is first printed or drawn.
+result of its type is first printed or drawn, matplotlib and PyVista when one is first drawn.
 """
 
 from __future__ import annotations
@@ -67,12 +67,16 @@ def _module_of(result: Result) -> ModuleType:
     for kind in type(result).__mro__:
         found = _KINDS.get(_name(kind))
         if isinstance(found, str):
-            with loaded_whole():
-                found = _KINDS[_name(kind)] = importlib.import_module(f"{__name__}.{found}")
+            found = _KINDS[_name(kind)] = _loaded(f"{__name__}.{found}")
         if found is not None:
             return found
     name = type(result).__name__
     raise OptionError(f"no module shows a {name}: palpate.show.register({name}, module) names one")
+
+
+def _loaded(name: str) -> ModuleType:
+    with loaded_whole():
+        return importlib.import_module(name)
 
 
 def _function(result: Result, name: str, words: str) -> Callable[..., Any]:
@@ -94,9 +98,7 @@ class _Presenter:
     def plot(self, result: Result, ax: Axes | None) -> Axes:
         draw = _function(result, "draw", "plot")
         if ax is None:
-            from matplotlib import pyplot
-
-            _, ax = pyplot.subplots(figsize=(8, 4), layout="constrained")
+            _, ax = _loaded("matplotlib.pyplot").subplots(figsize=(8, 4), layout="constrained")
         draw(result, ax)
         return ax
 
@@ -106,6 +108,7 @@ class _Presenter:
         from palpate.show.scenery import new_plotter
 
         place = _function(result, "place", "place in space: use .plot()")
+        _loaded("pyvista")
         if plotter is not None:
             place(result, plotter)
             return plotter
@@ -127,7 +130,9 @@ class _Presenter:
         return None if found is None else found(result)
 
     def report(self, result: Result, path: Path | str, **more: Any) -> Path:
-        return _function(result, "report", "page")(result, path, **more)
+        page = _function(result, "report", "page")
+        _loaded("matplotlib.backends.backend_agg")
+        return page(result, path, **more)
 
     def save(self, result: Result, path: Path | str) -> Any:
         return _function(result, "save", "file of its own")(result, path)
@@ -138,9 +143,10 @@ class _Presenter:
         return words_and_picture(str(result), self._picture(result))
 
     def _picture(self, result: Result) -> Figure:
-        from matplotlib.figure import Figure
+        from palpate.show.page import new_figure
 
-        figure = Figure(figsize=(7, 3.2), layout="constrained")
+        _loaded("matplotlib.backends.backend_agg")
+        figure = new_figure(7, 3.2, layout="constrained")
         _function(result, "draw", "plot")(result, figure.subplots())
         return figure
 

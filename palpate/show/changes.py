@@ -3,20 +3,21 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from pyvista import Plotter
 
 from diagnose.compare.before_after import Changes, Side
 from palpate.show.model_view import thing_of, usual_colourings
-from palpate.show.page import Page
+from palpate.show.page import Page, new_figure
 from palpate.show.quantities import Quantity
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
 
 _COLOURS = ("#1d3557", "#c1121f")
 _RATIO = Quantity("second over first modulus", "", 1.0, "coolwarm", least_share=0.2)
@@ -117,7 +118,7 @@ def report(result: Changes, path: Path | str) -> Path:
          else "the two recordings share too few places, or no frame"),
     ])  # fmt: skip
     page.next_step(_what_next(result))
-    figure = Figure(figsize=(8, 3.4))
+    figure = new_figure(8, 3.4)
     draw(result, figure.subplots())
     page.view(
         view(result), figure, "Moduli with 95 % intervals, or the ratio at every place that both pressed."

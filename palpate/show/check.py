@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from pyvista import Plotter
 
 from mechanics.recording import Recording
-from palpate.show.page import Page, save_figures
+from palpate.show.page import Page, save_figures, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
 from reconstruct.checks.checkup import Checkup
 from reconstruct.checks.finding import Finding
 from reconstruct.checks.samples import CHANNELS
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from pyvista import Plotter
 
 QUIET = ("#8d99ae", "#b8b08d", "#a3b899")
 _LOUD = ("#c1121f", "#9d4edd", "#d97706")
@@ -79,7 +80,7 @@ def report(result: Checkup, path: Path | str) -> Path:
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
     figures = {f"finding-{k + 1}": stretch_figure(result.recording, f) for k, f in enumerate(result.findings)}
-    whole, ax = plt.subplots(figsize=(10, 3), layout="constrained")
+    whole, ax = subplots(1, 1, figsize=(10, 3))
     draw(result, ax)
     figures["whole"] = whole
     save_figures(path.with_suffix(""), figures)
@@ -101,8 +102,6 @@ def report(result: Checkup, path: Path | str) -> Path:
         page.figure(figures[f"finding-{k + 1}"], _caption(finding))
     page.heading("What was measured")
     page.table(["quantity", "here", "usual"], [_seen(*row) for row in result.seen])
-    for figure in figures.values():
-        plt.close(figure)
     return page.write(path)
 
 
@@ -127,7 +126,7 @@ def _what_next(result: Checkup) -> str:
 
 def stretch_figure(recording: Recording, finding: Finding) -> Figure:
     """Position (mm, from its mean) and force (N) around the finding's stretch; its channels stand out."""
-    figure, axes = plt.subplots(2, 1, figsize=(10, 4.6), sharex=True, layout="constrained")
+    figure, axes = subplots(2, 1, figsize=(10, 4.6), sharex=True)
     whole = (float(recording.t[0]), float(recording.t[-1]))
     begin, end = finding.stretch or whole
     margin = max(_MARGIN * (end - begin), 10 * float(np.median(np.diff(recording.t))))

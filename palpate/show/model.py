@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from pyvista import Plotter
 
 from mechanics.model import Model
 from mechanics.model_files import write_model
@@ -16,6 +14,10 @@ from palpate.show.object3d import draw_touched
 from palpate.show.quantities import KELVIN_VOIGT, MODULUS, with_unit
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import View
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
 
 
 def lines(result: Model) -> list[str]:

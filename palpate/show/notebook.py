@@ -5,11 +5,13 @@ from __future__ import annotations
 import base64
 import html
 import sys
-
-from matplotlib.figure import Figure
+from typing import TYPE_CHECKING
 
 from palpate.show.page import Page, png_bytes
 from palpate.show.view3d import View
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 HEIGHT_PX = 620
 

@@ -7,19 +7,18 @@ which a bare machine may lack.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.collections import PolyCollection
-from matplotlib.colors import Normalize, to_rgb
 from scipy.spatial import cKDTree
 from scipy.spatial.distance import cdist
 
 from mechanics.model import Model
 from palpate.show.quantities import Quantity
 from render.felt_surface import felt_surface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PLAIN_COLOUR = "#ead7bf"
 TOUCH_COLOUR = "#c1121f"
@@ -82,6 +81,11 @@ def draw_object(
     colours: what the felt surface is coloured by, with a bar beside it. touches: (k, 3) m, points as
     dots, pale where hidden; show_base: the fixed corner nodes as dots.
     """
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.collections import PolyCollection
+    from matplotlib.colors import Normalize, to_rgb
+
     mesh, surface = model.mesh, felt_surface(model)
     view = view_axes(model.support.normal, elevation_deg, azimuth_deg)
     seen = (surface.points - mesh.points.mean(axis=0)) @ view.T * 1e3

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.importing.opened import Opened
-from palpate.show.page import Page
+from palpate.show.page import Page, subplots
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -46,8 +46,6 @@ def place(result: Opened, plotter: Plotter) -> None:
 
 def report(result: Opened, path: Path | str) -> Path:
     """One page: what it was taken for, the answer in lines, its plot and the object to be turned."""
-    from matplotlib import pyplot as plt
-
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
     page = Page(", ".join(result.sources))
@@ -59,12 +57,11 @@ def report(result: Opened, path: Path | str) -> Path:
     page.table(["what", "as"], [[key, value] for key, value in result.understood.items()])
     for note in result.notes:
         page.paragraph(note)
-    figure, ax = plt.subplots(figsize=(8, 4), layout="constrained")
+    figure, ax = subplots(1, 1, figsize=(8, 4))
     result.result.plot(ax)
     view = result.result.view()
     if view is None:
         page.figure(figure, "The result")
     else:
         page.view(view, figure, "The result")
-    plt.close(figure)
     return page.write(path)

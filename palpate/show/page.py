@@ -16,6 +16,8 @@ from typing import TYPE_CHECKING, Any
 from mechanics.files import PNG, Kind, atomic_file, reading
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from palpate.show.view3d import View
 
 PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
@@ -132,6 +134,21 @@ def _figure(picture: Any, caption: str) -> str:
 def _width(png: bytes) -> int:
     """Pixels across, of a PNG's first chunk."""
     return int.from_bytes(png[16:20], "big")
+
+
+def new_figure(width_in: float, height_in: float, **more: Any) -> Figure:
+    """A matplotlib figure that no window holds; more: what `matplotlib.figure.Figure` takes."""
+    from matplotlib.figure import Figure
+
+    return Figure(figsize=(width_in, height_in), **more)
+
+
+def subplots(
+    rows: int, columns: int, *, figsize: tuple[float, float], layout: Any = "constrained", **more: Any
+) -> tuple[Figure, Any]:
+    """A figure and its axes; figsize: inches; more: what `Figure.subplots` takes."""
+    figure = new_figure(*figsize, layout=layout)
+    return figure, figure.subplots(rows, columns, **more)
 
 
 def png_bytes(picture: Any) -> bytes:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import os
 import sys
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista
 
 from mechanics.errors import OptionError
 from mechanics.model import Model
@@ -15,6 +14,9 @@ from mechanics.tetmesh import vertex_normals
 from palpate.show.object3d import view_axes
 from render.base import Renderer
 from render.felt_surface import felt_surface
+
+if TYPE_CHECKING:
+    import pyvista
 
 OBJECT_COLOUR, SUPPORT_COLOUR, TIP_COLOUR, ARROW_COLOUR = "#ead7bf", "#d9dee5", "#d95f02", "#1b4f9c"
 ARROW_M_PER_N = 0.03
@@ -24,6 +26,8 @@ _BAR = {"n_labels": 2, "fmt": "%.3g", "color": "black", "title_font_size": 18, "
 
 def new_plotter(*, off_screen: bool) -> pyvista.Plotter:
     """A plotter of our own; raises OptionError where it would open a window and there is no screen."""
+    import pyvista
+
     plotter = pyvista.Plotter(off_screen=off_screen or None, window_size=[1000, 750])
     screen = any(os.environ.get(name) for name in ("DISPLAY", "WAYLAND_DISPLAY"))
     if sys.platform.startswith("linux") and not (screen or plotter.off_screen or plotter.notebook):
@@ -75,6 +79,8 @@ def _add_surface(
     label: str,
     colour_map: str,
 ) -> None:
+    import pyvista
+
     surface = pyvista.PolyData.from_regular_faces(np.array(points), triangles)
     # shaded as a tip feels it, not by its triangles
     surface.point_data["normals"] = normals
@@ -114,6 +120,8 @@ def add_dots(
 ) -> None:
     """Small balls at points (k, 3) m, in one colour or by values (k,) named `label`; limits: of the
     colours."""
+    import pyvista
+
     if not len(points):
         return
     cloud = pyvista.PolyData(np.asarray(points, dtype=float))
@@ -131,6 +139,8 @@ def add_path(
     plotter: pyvista.Plotter, points: np.ndarray, values: np.ndarray | None = None, label: str = ""
 ) -> None:
     """A line through points (n, 3) m, grey or coloured by values (n,) named `label`; thinned where long."""
+    import pyvista
+
     kept = slice(None, None, max(1, len(points) // _LINE_POINTS))
     line = pyvista.lines_from_points(np.asarray(points, dtype=float)[kept])
     look: dict[str, Any] = {"color": "#8a96a5"}
@@ -142,11 +152,15 @@ def add_path(
 
 def add_tip(plotter: pyvista.Plotter, centre: np.ndarray, radius_m: float) -> None:
     """The tool's tip, a ball with its centre (3,) m."""
+    import pyvista
+
     plotter.add_mesh(pyvista.Sphere(radius=radius_m, center=centre), color=TIP_COLOUR, specular=0.4)
 
 
 def add_arrow(plotter: pyvista.Plotter, start: np.ndarray, along: np.ndarray, length_m: float) -> None:
     """An arrow from `start` (3,) m along a vector (3,)."""
+    import pyvista
+
     plotter.add_mesh(pyvista.Arrow(start=start, direction=along, scale=length_m), color=ARROW_COLOUR)
 
 

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from pyvista import Plotter
 
 from mechanics.frames import tangents
 from palpate.show import recording as measured
-from palpate.show.page import Page
+from palpate.show.page import Page, new_figure
 from palpate.show.quantities import DEPTH, ERROR, ORDER
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
 from scenes.laboratory.paths import SIDEWAYS
 from scenes.laboratory.simulate import Simulation
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+    from pyvista import Plotter
 
 _COLOURS = ("#c0392b", "#27ae60", "#2c6fbb")
 
@@ -174,7 +176,7 @@ def simulation_figure(result: Simulation) -> Figure:
     """Four panels: path, force in time, one touch, force against depth; grey and dashed is what the ideal
     object would answer to the same hand, where the simulation holds it.
     """
-    figure = Figure(figsize=(13, 9), layout="constrained")
+    figure = new_figure(13, 9, layout="constrained")
     axes = figure.subplots(2, 2)
     _path(axes[0, 0], result)
     _time(axes[0, 1], result)

@@ -16,8 +16,6 @@ from importlib.resources import files
 from typing import Any
 
 import numpy as np
-from matplotlib import colormaps
-from matplotlib.colors import to_hex
 
 from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, level_axes, spread_over
 from palpate.show.quantities import ORDER
@@ -91,6 +89,9 @@ def _data(view: View) -> dict[str, Any]:
 
 
 def _colouring(colouring: Colouring, view: View) -> dict[str, Any]:
+    from matplotlib import colormaps
+    from matplotlib.colors import to_hex
+
     quantity, own, thing = colouring.quantity, colouring.presses, view.thing
     values, known = colouring.surface, None
     if values is None and own is not None and quantity is not ORDER:

@@ -31,6 +31,7 @@ from .fake_inverse import Chain, FakeInverse
 from .kernel.uhid import KernelUnit
 
 STUBS = Path(__file__).parent / "vendor_stubs.c"
+LONGEST_ANSWER_S = 10.0
 
 
 class Bench:
@@ -121,14 +122,16 @@ class StickBench(HidBench):
 
 
 class HaplyBench(Bench):
-    def __init__(self, key: str = "vector", chain: Chain | None = None) -> None:
+    def __init__(
+        self, key: str = "vector", chain: Chain | None = None, answer_s: float = LONGEST_ANSWER_S
+    ) -> None:
         self.key = key
         self.service = FakeInverse(key, chain=chain)
         state, events = self.ports = self.service.ports
-        # the emulator shares this process and a machine with noisy neighbours: it may well pause for 0.1 s,
+        # the emulator shares this process and a machine with noisy neighbours: it may well pause for seconds,
         # and a link lost to that needs a new enable_force, as it should
         options = HaplyOptions(
-            uri=f"ws://localhost:{state}", events_uri=f"ws://localhost:{events}", answer_s=2.0
+            uri=f"ws://localhost:{state}", events_uri=f"ws://localhost:{events}", answer_s=answer_s
         )
         self.device = make_haply(options)
         self.running = True

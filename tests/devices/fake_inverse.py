@@ -18,6 +18,7 @@ from websockets.exceptions import ConnectionClosed
 from websockets.sync.server import serve
 
 IDLE_S = 0.01
+PERIOD_S = 0.001  # as a device; without it driver and service would talk as fast as the machine can
 MOST_N = 10.0
 
 
@@ -158,6 +159,7 @@ class FakeInverse:
                         force = commanded[self.key]  # the other spelling is an error to this service
                         self.commanded_n = [force["x"], force["y"], force["z"]]
                         self._force_s = time.perf_counter()
+                time.sleep(PERIOD_S)
                 while self.silent.is_set():
                     time.sleep(0.002)
                 socket.send(self._message("force_render_full_state" in session))

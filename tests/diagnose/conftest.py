@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -45,7 +46,9 @@ class Bench:
     """The block, its places and `record(alter)`: presses of known speeds and depths, altered as a test
     likes."""
 
-    def __init__(self) -> None:
+    def __init__(self, folder: Path | None = None) -> None:
+        """folder: where what the model's places answer is kept, solved once for all tests."""
+        self.folder = folder
         self.mesh = _block()
         top = [(x, y, 0.04) for x in (-0.02, 0.0, 0.02) for y in (-0.02, 0.0, 0.02)]
         side = [(0.04, y, 0.022) for y in (-0.018, 0.0, 0.018)]
@@ -105,7 +108,7 @@ class Bench:
         model = Model(
             mesh=self.mesh, material=Material(MODULUS, NU),
             support=Support(np.zeros(3), np.array([0, 0, 1.0])), tool=Tool(RADIUS), mesh_size_m=0.02,
-            presses=self.table(recording),
+            presses=self.table(recording), path=self.folder,
         )  # fmt: skip
         return recording, model
 
@@ -119,6 +122,6 @@ class Bench:
 
 
 @pytest.fixture(scope="session")
-def bench() -> Bench:
+def bench(tmp_path_factory: pytest.TempPathFactory) -> Bench:
     """One block for all tests of this folder."""
-    return Bench()
+    return Bench(tmp_path_factory.mktemp("block"))

@@ -47,6 +47,12 @@ def delayed(bench):
     return recording, model, diagnose(recording, model, FAST)
 
 
+@pytest.fixture(scope="module")
+def nameless(delayed):
+    """The diagnosis of the same presses where no delay may be named."""
+    return diagnose(*delayed[:2], dataclasses.replace(FAST, without="time_delay"))
+
+
 def test_noise_is_noise(bench):
     result = diagnose(*bench.record(), FAST)
     assert not any(result.where.bins["press_n"])
@@ -136,10 +142,8 @@ def test_a_press_that_no_law_carries_through_is_not_proposed(delayed, monkeypatc
     assert np.linalg.norm(places[lost] - [other.x, other.y, other.z], axis=1).min() > 0
 
 
-def test_without_its_name_the_delay_is_not_called_something_else_alone(bench):
-    options = DiagnoseOptions(fast=True, bootstrap=100, without="time_delay")
-    result = diagnose(*bench.record(_late), options)
-    assert result.kind in ("unknown", "effect+unknown", "ambiguous")
+def test_without_its_name_the_delay_is_not_called_something_else_alone(nameless):
+    assert nameless.kind in ("unknown", "effect+unknown", "ambiguous")
 
 
 def test_the_stated_gap_of_a_delay_is_its_own_force_where_the_tip_moves(delayed, bench):
@@ -162,12 +166,10 @@ def test_the_stated_gap_of_a_delay_is_its_own_force_where_the_tip_moves(delayed,
     assert len(bins["press_s"]) == len(bins["site"]) == len(bins["press_n"]) == len(presses)
 
 
-def test_a_gap_without_a_name_is_stated_by_its_size(delayed):
-    options = DiagnoseOptions(fast=True, bootstrap=100, without="time_delay")
-    result = diagnose(*delayed[:2], options)
-    assert "unknown" in result.kind
-    excess = np.sqrt(result.gap_before_n**2 - result.noise_n**2)
-    assert 0.3 * excess < np.mean(result.where.bins["time_n"]) < 1.2 * excess
+def test_a_gap_without_a_name_is_stated_by_its_size(nameless):
+    assert "unknown" in nameless.kind
+    excess = np.sqrt(nameless.gap_before_n**2 - nameless.noise_n**2)
+    assert 0.3 * excess < np.mean(nameless.where.bins["time_n"]) < 1.2 * excess
 
 
 def test_json_has_the_contract(delayed):

@@ -61,22 +61,26 @@ def test_a_changed_callee_and_a_changed_number_are_seen(copy: Path, tmp_path: Pa
     assert run(code, copy, tmp_path / "cache") == "46.0 0"
 
 
-@pytest.mark.parametrize(
-    "module",
-    ["mechanics.dent", "render.support", "devices.safety", "diagnose.forward.kernel"]
-    + ["scenes.laboratory.laws", "palpate.servo.clock"],
-)
-@pytest.mark.parametrize("first", ["", "import numba; "])
-def test_every_room_keeps_its_kernels_there(module: str, first: str, tmp_path: Path) -> None:
+MODULES = ("mechanics.dent", "render.support", "devices.safety", "diagnose.forward.kernel",
+           "scenes.laboratory.laws", "palpate.servo.clock")  # fmt: skip
+
+
+@pytest.mark.parametrize("first, modules", [("", [m]) for m in MODULES] + [("import numba; ", MODULES)])
+def test_every_package_keeps_its_kernels_there(first: str, modules: list[str], tmp_path: Path) -> None:
     # a kernel that is woven at import has no file of its own; its callers' caches hold it
-    code = (
-        f"{first}import {module} as module; import numba; print(*{{value._cache._cache_path for value in "
-        "vars(module).values() if isinstance(value, numba.core.registry.CPUDispatcher) "
-        "and hasattr(value._cache, '_cache_path')})"
-    )
+    code = f"""
+{first}import importlib
+for name in {modules}:
+    module = importlib.import_module(name)
+    import numba
+    kernels = [v for v in vars(module).values() if isinstance(v, numba.core.registry.CPUDispatcher)]
+    print(name, *{{v._cache._cache_path for v in kernels if hasattr(v._cache, "_cache_path")}})
+"""
     folder = tmp_path / "kernels" / source_key(ROOT)
-    used = run(code, ROOT, tmp_path).split()
-    assert used and all(Path(path).parent == folder for path in used)
+    lines = [line.split() for line in run(code, ROOT, tmp_path).splitlines()]
+    assert [name for name, *_ in lines] == list(modules)
+    for _, *used in lines:
+        assert used and all(Path(path).parent == folder for path in used)
 
 
 def test_every_kernel_of_ours_counts(tmp_path: Path) -> None:

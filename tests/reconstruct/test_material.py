@@ -9,7 +9,8 @@ import pytest
 
 import palpate as pp
 from diagnose.forward.touches import touches_of
-from diagnose.specimen.bench import Curve, Similarity, approach_of, bench_of
+from diagnose.specimen.approach import approach_of
+from diagnose.specimen.bench import Curve, Similarity, bench_of
 from diagnose.specimen.rivals import held_out_rivals
 from mechanics.dent import dent_law
 from mechanics.errors import ContactError, OptionError, RecordingError

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-import pyvista
-from matplotlib.axes import Axes
-from pyvista import Plotter
 
 from mechanics.model_files import read_model
 from palpate.batching.run import Batch
@@ -16,6 +13,10 @@ from palpate.batching.steps import MODEL
 from palpate.show.batch.figures import draw_agreement
 from palpate.show.batch.page import lead, report, verdict_words
 from palpate.show.scenery import OBJECT_COLOUR, surface_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
 
 __all__ = ["as_json", "draw", "lines", "place", "report"]
 
@@ -79,6 +80,8 @@ def draw(result: Batch, ax: Axes) -> None:
 
 def place(result: Batch, plotter: Plotter) -> None:
     """The first objects side by side."""
+    import pyvista
+
     folders = [
         result.folder / row.recording / MODEL for row in result.rows if row.young_modulus_pa is not None
     ]

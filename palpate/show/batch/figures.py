@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 
 from palpate.batching.run import Batch
+from palpate.show.page import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 MOST_OBJECTS = 12
 """That are drawn; the table beside has all."""
@@ -15,7 +20,7 @@ MOST_OBJECTS = 12
 def agreement_figure(result: Batch) -> Figure:
     """Moduli of the explorations of every object with their intervals, over the object's mean."""
     count = min(len(result.agreements), MOST_OBJECTS)
-    figure = Figure(figsize=(7, 1.1 + 0.55 * count), layout="constrained")
+    figure = new_figure(7, 1.1 + 0.55 * count, layout="constrained")
     draw_agreement(figure.subplots(), result)
     return figure
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
-
-from pyvista import Plotter
+from typing import TYPE_CHECKING, Any
 
 from diagnose.compare.comparison import Comparison, verdict
 from diagnose.compare.models import HOMOGENEOUS, MODELS
@@ -12,6 +10,9 @@ from palpate.show.comparison.figures import draw, view
 from palpate.show.comparison.page import report
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_dots, add_object
+
+if TYPE_CHECKING:
+    from pyvista import Plotter
 
 __all__ = ["as_json", "draw", "lines", "place", "report", "view"]
 

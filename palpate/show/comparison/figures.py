@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogFormatter
 
 from diagnose.compare.comparison import Comparison
 from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS, stiffness_along
 from palpate.show.model_view import facing, local, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, spread_over
+from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from render.felt_surface import felt_surface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f"}
 COLOURS |= {HOMOGENEOUS: "#8d99ae", "measured": "#c1121f"}
@@ -47,7 +51,7 @@ def view(result: Comparison) -> View:
 def still(result: Comparison) -> Figure:
     """The same as a picture: the object by FEM's error, and the press that it predicts worst."""
     presses, model, worst = result.presses, result.model, _worst(result)
-    figure = Figure(figsize=(10, 3.9), layout="constrained")
+    figure = new_figure(10, 3.9, layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1.05])
     each = result.press_rmse_n["fem"] * ERROR.scale
     values = spread_over(felt_surface(model).points, presses.point, each)[0]
@@ -70,13 +74,15 @@ def _worst(result: Comparison) -> int:
 
 def by_press(result: Comparison) -> Figure:
     """Error of each press for each model."""
-    figure = Figure(figsize=(8, 3.2))
+    figure = new_figure(8, 3.2)
     draw(result, figure.subplots())
     return figure
 
 
 def draw(result: Comparison, ax: Axes) -> None:
     """Error of each press for each model."""
+    from matplotlib.ticker import LogFormatter
+
     order = np.argsort(result.press_rmse_n["fem"])
     place = np.arange(len(order))
     for k, name in enumerate(compared(result)):
@@ -96,7 +102,7 @@ def draw(result: Comparison, ax: Axes) -> None:
 def scatter(result: Comparison) -> Figure:
     """Predicted against measured normal force."""
     presses = result.presses
-    figure = Figure(figsize=(9, 3.2))
+    figure = new_figure(9, 3.2)
     axes = figure.subplots(1, len(compared(result)), sharex=True, sharey=True)
     press = presses.press
     normal = presses.normal[press]
@@ -127,7 +133,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     forces = stiffness_along(
         result.prepared, np.flatnonzero(~members), places, presses.normal[family], model, DEPTH_M
     )
-    figure = Figure(figsize=(7, 3.4))
+    figure = new_figure(7, 3.4)
     ax = figure.subplots()
     x = coordinate[family][order] * 1e3
     for name in compared(result):

@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-import matplotlib.pyplot as plt
 import numpy as np
-from matplotlib.axes import Axes
-from pyvista import Plotter
 
 from diagnose.verdict.result import Diagnosis
 from palpate.demo import DemoResult
@@ -18,6 +15,10 @@ from palpate.show.demo.figures import figures, view
 from palpate.show.diagnosis.gaps import known
 from palpate.show.page import Page, save_figures
 from palpate.show.reconstruction.exploration import force_over_time
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
 
 __all__ = ["as_json", "draw", "lines", "place", "report", "view"]
 
@@ -84,8 +85,6 @@ def report(result: DemoResult, path: Path | str) -> Path:
     page.next_step(f"What to do next: feel it: `palpate touch {model.path or folder / 'model'}`.")
     drawn = figures(result)
     saved = save_figures(folder, drawn)
-    for figure in drawn.values():
-        plt.close(figure)
     page.view(
         view(result),
         saved["object"],

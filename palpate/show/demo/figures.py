@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
-import matplotlib.pyplot as plt
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullFormatter
 
 from palpate.demo import DemoResult
 from palpate.servo.histogram import lower_edge_ns
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
+from palpate.show.page import subplots
 from palpate.show.quantities import ERROR, UNCERTAINTY
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from reconstruct.steps.s6_one_d.one_d import low_passed
 from render.felt_surface import felt_surface
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 SHOWN_PRESSES = 4
 _STEP_S = 0.05
@@ -90,6 +93,8 @@ def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
 
 def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
     """Compute time and lateness of every tick, logarithmic counts."""
+    from matplotlib.ticker import LogLocator, NullFormatter
+
     for ax, histogram, name in (
         (axes[0], result.servo.compute, "compute time of a tick [µs]"),
         (axes[1], result.servo.lateness, "start after the deadline [µs]"),
@@ -110,14 +115,14 @@ def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
 
 def figures(result: DemoResult) -> dict[str, Figure]:
     """The report's pictures by name."""
-    force, ax = plt.subplots(figsize=(9, 3), layout="constrained")
+    force, ax = subplots(1, 1, figsize=(9, 3))
     force_over_time(ax, result.reconstruction.exploration)
-    thing, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    thing, axes = subplots(1, 2, figsize=(10, 4.2))
     draw_touched(axes[0], result.model)
     doubt = felt_surface(result.model).uncertainty_m
     draw_object(axes[1], result.model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
-    presses, axes = plt.subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True, layout="constrained")
+    presses, axes = subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True)
     measured_against_rendered(axes, result)
-    loop, axes = plt.subplots(1, 2, figsize=(9, 2.6), layout="constrained")
+    loop, axes = subplots(1, 2, figsize=(9, 2.6))
     servo_histogram(axes, result)
     return {"force": force, "object": thing, "presses": presses, "servo": loop}

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from pyvista import Plotter
 
 from diagnose.verdict.result import Diagnosis
 from palpate.show.diagnosis.figures import draw, view
@@ -11,6 +12,9 @@ from palpate.show.diagnosis.gaps import diagnosed, gap_at, sites_of
 from palpate.show.diagnosis.page import report
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_arrow, add_dots, add_object, surface_of
+
+if TYPE_CHECKING:
+    from pyvista import Plotter
 
 __all__ = ["draw", "place", "report", "view"]
 

@@ -6,7 +6,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from matplotlib.figure import Figure
 from scipy.spatial.distance import cdist
 
 from diagnose.verdict.result import Diagnosis
@@ -29,6 +28,7 @@ from palpate.show.diagnosis.gaps import (
 from palpate.show.diagnosis.words import percent
 from palpate.show.model_view import facing, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, view_axes
+from palpate.show.page import new_figure
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
@@ -39,7 +39,7 @@ MEASURED, IDEAL, IMPROVED, PALE = "#1d3557", "#e76f51", "#2a9d8f", "#c9c9c9"
 
 def first_picture(model: Model, result: Diagnosis) -> Any:
     """Where on the object, and how it looks in the press that differs most."""
-    figure = Figure(figsize=(10, 3.9), layout="constrained")
+    figure = new_figure(10, 3.9, layout="constrained")
     left, right = figure.subplots(1, 2, width_ratios=[1.1, 1.05])
     _object(left, model, result)
     _press(right, result, worst_press(result))
@@ -51,7 +51,7 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
 def gains_picture(result: Diagnosis) -> Any:
     """What each effect takes away."""
     bars = len(shown_entries(result))
-    figure = Figure(figsize=(9, 1.3 + 0.36 * bars), layout="constrained")
+    figure = new_figure(9, 1.3 + 0.36 * bars, layout="constrained")
     draw(result, figure.subplots())
     return figure
 
@@ -103,7 +103,7 @@ def modulus_picture(better: Model, result: Diagnosis) -> Any:
     modulus = better.material.young_modulus_pa * better.surface_ratio[mesh.touchable_elements]
     centres = mesh.points[mesh.touchable_surface[:, :3]].mean(axis=1)
     near = np.exp(-((cdist(felt_surface(better).points, centres) / better.mesh_size_m) ** 2)) + 1e-12
-    figure = Figure(figsize=(6, 3.9), layout="constrained")
+    figure = new_figure(6, 3.9, layout="constrained")
     colours = Colours(near @ modulus / near.sum(axis=1) / 1e3, replace(MODULUS, name="Young's modulus"))
     draw_object(figure.subplots(), better, colours, touches=sites_of(result))
     return figure
@@ -171,7 +171,7 @@ def draw(result: Diagnosis, ax: Any) -> None:
 
 def curves_picture(result: Diagnosis) -> Any:
     """The mean gap along depth and along speed."""
-    figure = Figure(figsize=(11, 3.0), layout="constrained")
+    figure = new_figure(11, 3.0, layout="constrained")
     names = ("depth (mm)", "speed of pressing (mm/s)")
     for ax, name, colour in zip(figure.subplots(1, 2, sharey=True), names, (MEASURED, MEASURED), strict=True):
         x, mean, error = result.where.curves[name]
@@ -188,7 +188,7 @@ def curves_picture(result: Diagnosis) -> Any:
 def presses_picture(result: Diagnosis, count: int = 4) -> Any:
     """Force against time of the presses with the largest gap, after the first."""
     shown = [press for press in ranked(result) if press != worst_press(result)][:count]
-    figure = Figure(figsize=(13, 3.2), layout="constrained")
+    figure = new_figure(13, 3.2, layout="constrained")
     for ax, press in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
         _press(ax, result, int(press))
     figure.axes[0].legend(fontsize=8, frameon=False)

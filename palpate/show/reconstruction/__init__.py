@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from matplotlib.axes import Axes
-from pyvista import Plotter
 
 from palpate.show import model as made
 from palpate.show.reconstruction.exploration import force_over_time
 from palpate.show.reconstruction.page import report, view
 from reconstruct.pipeline import Reconstruction
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
 
 __all__ = ["as_json", "draw", "lines", "place", "report", "view"]
 

@@ -2,21 +2,24 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.collections import LineCollection
-from matplotlib.figure import Figure
 from scipy.spatial import cKDTree
 
 from mechanics.model import Model
 from palpate.show.object3d import draw_object, view_axes
+from palpate.show.page import subplots
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR, TOUCH_COLOUR
 from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s6_one_d.one_d import profiles
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
 from render.felt_surface import felt_surface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 
 def force_over_time(ax: Axes, exploration: Exploration) -> Axes:
@@ -77,6 +80,8 @@ def meshed_object(ax: Axes, result: Reconstruction) -> Axes:
 
 def _mesh_edges(ax: Axes, model: Model, view: np.ndarray, pieces: int = 5) -> None:
     """The edges of the mesh's touchable surface, where the felt surface has them and faces the eye."""
+    from matplotlib.collections import LineCollection
+
     surface = felt_surface(model)
     triangles = model.mesh.touchable_surface[:, :3]
     edges = np.unique(np.sort(np.vstack([np.roll(triangles, k, axis=1)[:, :2] for k in range(3)])), axis=0)
@@ -91,15 +96,21 @@ def _mesh_edges(ax: Axes, model: Model, view: np.ndarray, pieces: int = 5) -> No
 
 def force_profiles(ax: Axes, result: Reconstruction) -> Axes:
     """Figure 3(c): force on the object along -n (N) over depth (mm), coloured by height above the support."""
+    from matplotlib import colormaps
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
     exploration = result.exploration
     height = exploration.boundary.height(result.cast.points)
     curves = profiles(result.model.presses)
-    scale = plt.Normalize(0, 1e3 * height.max())
+    scale = Normalize(0, 1e3 * height.max())
     for i, h in enumerate(height):
         rows = curves.rows([i])
         rows = rows[curves.depth[rows] > 0]
-        ax.plot(curves.depth[rows] * 1e3, curves.push[rows], lw=0.8, color=plt.cm.viridis(scale(1e3 * h)))
-    bar = ax.figure.colorbar(plt.cm.ScalarMappable(scale, "viridis"), ax=ax, label="height [mm]")
+        ax.plot(
+            curves.depth[rows] * 1e3, curves.push[rows], lw=0.8, color=colormaps["viridis"](scale(1e3 * h))
+        )
+    bar = ax.figure.colorbar(ScalarMappable(scale, "viridis"), ax=ax, label="height [mm]")
     bar.outline.set_visible(False)
     ax.set(xlabel="depth [mm]", ylabel="force [N]", xlim=(0, None), ylim=(0, None))
     return ax
@@ -135,14 +146,14 @@ def spread(ax: Axes, samples: list[np.ndarray], names: list[str], stars: list[fl
 
 def exploration_figures(result: Reconstruction) -> dict[str, Figure]:
     """`figure-2` and `figure-3`, by file name."""
-    over_time, ax = plt.subplots(figsize=(10, 3.2))
+    over_time, ax = subplots(1, 1, figsize=(10, 3.2), layout=None)
     force_over_time(ax, result.exploration)
-    geometry, axes = plt.subplots(1, 3, figsize=(13.5, 4))
+    geometry, axes = subplots(1, 3, figsize=(13.5, 4), layout=None)
     touched_points(axes[0], result.exploration)
     meshed_object(axes[1], result)
     force_profiles(axes[2], result)
     for ax, name in zip(axes, "abc", strict=True):
         ax.set_title(f"({name})", loc="left", fontsize=10)
-    damped, small = plt.subplots(1, 5, figsize=(13.5, 2.8), layout="constrained")
+    damped, small = subplots(1, 5, figsize=(13.5, 2.8))
     damped_parameters(small, result)
     return {"figure-2": over_time, "figure-3abc": geometry, "figure-3d": damped}

@@ -3,21 +3,24 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
 from scipy.interpolate import RBFInterpolator
 from scipy.stats import pearsonr, spearmanr
 
 from mechanics.model import Model
 from palpate.show.object3d import Colours, draw_object
+from palpate.show.page import subplots
 from palpate.show.quantities import KELVIN_VOIGT, MODULUS, Quantity
 from palpate.show.reconstruction.exploration import spread
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 from render.felt_surface import felt_surface
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 SIDE = 0.3  # |n . support normal| below this: a press on the side
 
@@ -81,7 +84,7 @@ def over_surface(model: Model, values: np.ndarray) -> np.ndarray:
 
 def undamped_figure(models: dict[str, Model]) -> Figure:
     """Figure 4: k_V; k_C and r; k_H, one box a sample."""
-    figure, axes = plt.subplots(1, 4, figsize=(13, 3.4), layout="constrained")
+    figure, axes = subplots(1, 4, figsize=(13, 3.4))
     labels = ("$k_V$ [N/m]", "$k_C$ [N/m$^r$]", "$r$", "$k_H$ [N/m$^r$]")
     for ax, name, label, letter in zip(
         axes, ("k_v", "k_c", "r_c", "k_h"), labels, ("a", "b", "b", "c"), strict=True
@@ -96,7 +99,7 @@ def undamped_figure(models: dict[str, Model]) -> Figure:
 def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None = None) -> Figure:
     """Figure 5: k_V over the surface from the side and from above, and of another sample (else this) aslant,
     all on one scale; k_V, k_H and e over height on the side, each over its mean and on one scale."""
-    figure, axes = plt.subplots(2, 3, figsize=(13, 7.2), layout="constrained")
+    figure, axes = subplots(2, 3, figsize=(13, 7.2))
     aslant = (*(other or (name, model)), 30.0, "aslant")
     views = [(name, model, 8.0, "side"), (name, model, 89.0, "top"), aslant]
     limits = _limits([m for _, m, _, _ in views], "k_v", KELVIN_VOIGT)
@@ -146,7 +149,7 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
     """Figure 6: (a) moduli of single presses, * the global one with its interval; (b) where they hold, on two
     samples, on one scale."""
     shown = list(models.items())[:2]
-    figure, axes = plt.subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4), layout="constrained")
+    figure, axes = subplots(1, 1 + len(shown), figsize=(5 + 4.5 * len(shown), 4.4))
     stars = [m.material.young_modulus_pa / 1e3 for m in models.values()]
     spread(axes[0], [m.presses.fits["e_pa"] / 1e3 for m in models.values()], list(models), stars)
     for i, model in enumerate(models.values()):
@@ -169,7 +172,7 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
 
 def depth_figure(fit: ModulusFit) -> Figure:
     """The global modulus over the greatest depth of the samples used, with the interval of the one chosen."""
-    figure, ax = plt.subplots(figsize=(6, 3.2), layout="constrained")
+    figure, ax = subplots(1, 1, figsize=(6, 3.2))
     depth = np.array([row[0] for row in fit.by_depth]) * 1e3
     value = np.array([row[1] for row in fit.by_depth]) / 1e3
     agrees = np.array([row[2] for row in fit.by_depth])

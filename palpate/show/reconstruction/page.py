@@ -4,16 +4,15 @@ numbers."""
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-from matplotlib import pyplot as plt
-from matplotlib.figure import Figure
 
 from mechanics.model import Model
 from mechanics.touch import forces_at
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
-from palpate.show.page import Page, save_figures
+from palpate.show.page import Page, save_figures, subplots
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.reconstruction.differences import differences
 from palpate.show.reconstruction.exploration import exploration_figures
@@ -37,6 +36,9 @@ from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s6_one_d.one_d import low_passed
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | None = None) -> Path:
@@ -124,7 +126,7 @@ def view(result: Reconstruction) -> View:
 
 def object_figure(model: Model) -> Figure:
     """First touches and fixed base; the modulus of single presses over the surface."""
-    figure, axes = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    figure, axes = subplots(1, 2, figsize=(10, 4.2))
     draw_touched(axes[0], model)
     own = model.presses.fits["e_pa"]
     if np.isfinite(own).any():
@@ -147,7 +149,7 @@ def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figu
     )
     figures["figure-6"] = moduli_figure(models)
     report = result.meshing.report
-    quality, axes = plt.subplots(1, 3, figsize=(12, 2.8), layout="constrained")
+    quality, axes = subplots(1, 3, figsize=(12, 2.8))
     quality_histogram(axes[0], report.radius_edge_ratio, "radius-edge ratio", 2.0)
     quality_histogram(
         axes[1], report.edge_m * 1e3, "edge length [mm]", result.model.mesh_size_m * 1e3, "wanted"

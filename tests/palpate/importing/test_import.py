@@ -15,7 +15,7 @@ from scipy.spatial.transform import Rotation
 import palpate as pp
 from mechanics.errors import FileError, OptionError, RecordingError
 from palpate import cli
-from palpate.importing.convert import cross_correlated
+from palpate.importing.clocks import cross_correlated
 from palpate.importing.dates import seconds_of
 
 RATE, TIP = 500.0, 0.004

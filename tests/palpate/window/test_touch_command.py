@@ -32,7 +32,10 @@ def test_headless_session_with_a_recording(
     result = json.loads(out)
     loosened = "protection loosened: --jump is 0.01 (default 0.005)"
     assert loosened in err and loosened in result["servo"]["words"]
-    assert result["device"] == "simulated" and result["servo"]["ticks"] > 1000
+    servo = result["servo"]
+    assert result["device"] == "simulated" and servo["ticks"] > 0
+    # of the four seconds' deadlines a busy machine misses some, and counts them
+    assert servo["ticks"] + servo["missed_ticks"] > 1000
     recording = read_recording(path)
     assert recording.truth["protection_loosened"] == [loosened]
     assert recording.t[-1] > 2.0 and recording.object_name == block.path.name

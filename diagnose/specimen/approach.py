@@ -1,0 +1,118 @@
+"""What a few curves tell, none of which can be held out: each way in, a part of it left out in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy.integrate import trapezoid
+
+from diagnose.specimen.bench import HAND_TIP_M, Bench
+from mechanics.dent import dent_law
+
+APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
+_BLOCKS = 8
+_SHIFTS = np.linspace(-0.1, 0.1, 41)
+
+
+@dataclass(frozen=True)
+class Approach:
+    """What a few curves tell, none of which can be held out: each way in, block by block of it left out in
+    turn.
+
+    error: dent law (and 'hunt-crossley', 'regression', 'constant') -> rms error over rms force, median of
+    the curves. law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does
+    not come back (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
+    """
+
+    error: dict[str, float]
+    law: str
+    modulus_pa: np.ndarray
+    hysteresis: float
+    pull_n: np.ndarray
+
+
+def approach_of(bench: Bench) -> Approach:
+    """The ways in of a bench's curves on a half-space."""
+    presses, nu = bench.model.presses, bench.model.material.poisson_ratio
+    errors: dict[str, list[float]] = {}
+    moduli: dict[str, list[float]] = {}
+    work, pull = [], []
+    for part in presses.parts:
+        u, push = presses.depth[part], presses.push[part]
+        top = int(np.argmax(push))
+        ways = u[: top + 1], push[: top + 1]
+        for name in APPROACH_LAWS:
+            error, modulus = _left_out(*ways, dent_law(name), nu)
+            errors.setdefault(name, []).append(error)
+            moduli.setdefault(name, []).append(modulus)
+        for name, order in (("hunt-crossley", 0), ("regression", 5)):
+            errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
+        errors.setdefault("constant", []).append(_constant(ways[1]))
+        back = slice(top, top + int(np.argmax(np.append(u[top:] <= 0, True))))
+        given = max(trapezoid(push[: top + 1], u[: top + 1]), 1e-300)
+        # a curve that ends in its hold gives nothing back to be weighed
+        gone = 1 + trapezoid(push[back], u[back]) / given
+        work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
+        pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
+    medians = {name: float(np.median(values)) for name, values in errors.items()}
+    law = min(APPROACH_LAWS, key=lambda name: medians[name])
+    own = np.array(moduli[law]) / bench.similarity.modulus
+    return Approach(medians, law, own, float(np.median(work)), np.array(pull))
+
+
+def _blocks(count: int) -> np.ndarray:
+    return np.minimum(np.arange(count) * _BLOCKS // max(count, 1), _BLOCKS - 1)
+
+
+def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[float, float]:
+    """(held-out rms over rms, modulus) of one way in; first touch and modulus are free."""
+    span = float(u.max())
+    shapes = np.array([law.force(np.maximum(u - s * span, 0.0), 1.0, nu, HAND_TIP_M) for s in _SHIFTS])
+
+    def fitted(seen: np.ndarray) -> tuple[int, float]:
+        power = np.maximum((shapes[:, seen] ** 2).sum(axis=1), 1e-300)
+        e = shapes[:, seen] @ push[seen] / power
+        k = int(np.argmin(((e[:, None] * shapes[:, seen] - push[seen]) ** 2).sum(axis=1)))
+        return k, float(e[k])
+
+    block, predicted = _blocks(len(u)), np.zeros(len(u))
+    for b in range(1, _BLOCKS - 1):
+        k, e = fitted(block != b)
+        predicted[block == b] = e * shapes[k, block == b]
+    return _relative(predicted, push, block), fitted(np.ones(len(u), dtype=bool))[1]
+
+
+def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:
+    """The same of k u^r (order 0) or of a polynomial of the depth."""
+    block, predicted = _blocks(len(u)), np.zeros(len(u))
+    x = np.maximum(u, 0.0) / max(float(u.max()), 1e-300)
+    exponents = np.linspace(0.5, 3.0, 26)
+    for b in range(1, _BLOCKS - 1):
+        seen = block != b
+        if order:
+            basis = x[:, None] ** np.arange(1, order + 1)
+            predicted[~seen] = basis[~seen] @ np.linalg.lstsq(basis[seen], push[seen], rcond=None)[0]
+            continue
+        k = np.array(
+            [(x[seen] ** r) @ push[seen] / max((x[seen] ** (2 * r)).sum(), 1e-300) for r in exponents]
+        )
+        cost = [float(((k[i] * x[seen] ** r - push[seen]) ** 2).sum()) for i, r in enumerate(exponents)]
+        best = int(np.argmin(cost))
+        predicted[~seen] = k[best] * x[~seen] ** exponents[best]
+    return _relative(predicted, push, block)
+
+
+def _constant(push: np.ndarray) -> float:
+    """The same of the mean force: what says nothing of the depth."""
+    block = _blocks(len(push))
+    inner = push[(block > 0) & (block < _BLOCKS - 1)]
+    return _relative(np.full(len(push), inner.mean() if len(inner) else 0.0), push, block)
+
+
+def _relative(predicted: np.ndarray, push: np.ndarray, block: np.ndarray) -> float:
+    """Over the blocks between the ends, where nothing has to be carried on."""
+    inner = (block > 0) & (block < _BLOCKS - 1)
+    missed, whole = (predicted - push)[inner], push[inner]
+    return float(np.sqrt((missed**2).mean() / max((whole**2).mean(), 1e-300)))

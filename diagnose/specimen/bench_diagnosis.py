@@ -1,0 +1,109 @@
+"""The diagnosis of a bench's curves: each held out, unseen holds, and the interval of the modulus."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+from scipy.stats import t as student
+
+from diagnose.forward.touches import LEAST_PRESSES
+from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.pipeline import diagnose
+from diagnose.search.descent import Descent
+from diagnose.search.fit import settings_of
+from diagnose.search.whiten import Whitener
+from diagnose.specimen.bench import PEAK_N, Bench
+from diagnose.verdict.result import Diagnosis
+from mechanics.presses import HOLDING
+from mechanics.progress import Progress, silent
+
+_FLOOR = {False: 0.005, True: 0.02}
+"""Share of the peak by which the law may miss what no name covers: of one piece, of different ones."""
+_FOLDS, _ITERATIONS, _LEAST_HOLD = 6, 6, 8
+
+
+def diagnose_bench(
+    bench: Bench, *, fast: bool = False, seed: int = 0, progress: Progress = silent
+) -> Diagnosis | None:
+    """The sim-to-real gap of the curves, each held out; None with fewer than 6, of which none can be."""
+    if len(bench.model.presses) < LEAST_PRESSES:
+        return None
+    return diagnose(
+        bench.recording,
+        bench.model,
+        DiagnoseOptions(fast=fast, seed=seed),
+        progress,
+        nuisance=_nuisance(bench),
+        attribution=AttributionOptions(most=1 if fast else 3),
+    )
+
+
+def _nuisance(bench: Bench) -> NuisanceOptions:
+    """Pieces differ in more than their stiffness, and a machine's zero is worth what its load is: the
+    floor is a share of the greatest."""
+    floor = _FLOOR[bench.specimens] * PEAK_N
+    plain = NuisanceOptions(floor_n=floor, floor_share=0.0)
+    if not bench.specimens:
+        return plain
+    return dataclasses.replace(plain, press_stiffness=0.07, law=0.1, onset_m=0.5e-3)
+
+
+def unseen_holds(bench: Bench, made: Diagnosis) -> tuple[float, float] | None:
+    """rms error over rms force of holds that nothing has seen, by the ideal model and by the verdict: law
+    and effects from the other curves, the curve's own stiffness from its way in. None where fewer than 6
+    curves hold."""
+    forward, found = made.forward, made.attribution
+    if forward is None or found is None:
+        return None
+    t = forward.touches
+    hold = (t.phase == HOLDING) & (t.t > t.peak_s[t.press])
+    way = t.counted & (t.t <= t.peak_s[t.press]) & (t.travel[:, 0] > 0)
+    holds = np.flatnonzero(np.bincount(t.press[hold], minlength=len(t)) >= _LEAST_HOLD)
+    if len(holds) < LEAST_PRESSES:
+        return None
+    errors = []
+    named = set(made.effects)
+    for candidate in (found.ideal, found.final):
+        fit = candidate.found
+        effects = tuple(
+            e for e in fit.effects if candidate is found.ideal or e.name in named or not e.parameters
+        )
+        values = np.concatenate([fit.values[:1], *(fit.of(e.name) for e in effects)])
+        settings = settings_of(forward, effects, values, fit.onset)
+        whitener = Whitener(forward, settings, _nuisance(bench))
+        missed = 0.0
+        for k in range(_FOLDS):
+            held = np.arange(len(t)) % _FOLDS == k
+            weights = np.where([held[t.site == s].any() for s in range(t.sites)], 0.0, 1.0)
+            again = Descent(forward, whitener, effects, weights).run(values, fit.onset, _ITERATIONS)
+            predicted = forward.predict(settings_of(forward, effects, again.values, again.likeliest))[:, 0]
+            for press in np.intersect1d(holds, np.flatnonzero(held)):
+                own, rest = way & (t.press == press), hold & (t.press == press)
+                f = predicted[own]
+                scale = float(f @ t.local_force[own, 0] / max(float(f @ f), 1e-300))
+                missed += float(((scale * predicted[rest] - t.local_force[rest, 0]) ** 2).sum())
+        rows = hold & np.isin(t.press, holds)
+        errors.append(float(np.sqrt(missed / (t.local_force[rows, 0] ** 2).sum())))
+    return errors[0], errors[1]
+
+
+def modulus_interval(bench: Bench, made: Diagnosis) -> tuple[float, float]:
+    """Pa, 95 %, in the machine's size, of the fit whose modulus the diagnosis states: it is fitted again
+    without each group of curves (delete-a-group jackknife of log E)."""
+    forward, found = made.forward, made.attribution
+    assert forward is not None and found is not None
+    t, fit = forward.touches, found.final.found
+    settings = settings_of(forward, fit.effects, fit.values, fit.onset)
+    whitener = Whitener(forward, settings, _nuisance(bench))
+    folds = min(_FOLDS, len(t))
+    again = []
+    for k in range(folds):
+        kept = np.arange(len(t)) % folds != k
+        weights = np.where([kept[t.site == s].any() for s in range(t.sites)], 1.0, 0.0)
+        left = Descent(forward, whitener, fit.effects, weights).run(fit.values, fit.onset, _ITERATIONS)
+        again.append(float(left.values[0]))
+    error = np.sqrt((folds - 1) / folds * ((np.array(again) - np.mean(again)) ** 2).sum())
+    half = float(np.exp(student.ppf(0.975, folds - 1) * error))
+    e = fit.modulus / bench.similarity.modulus
+    return e / half, e * half
