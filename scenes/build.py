@@ -26,6 +26,7 @@ from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from mechanics.recording import read_recording, recording_files
 from mechanics.surface_files import surface_of
+from mechanics.true_shape import TrueShape
 from reconstruct.pipeline import reconstruct
 from reconstruct.shapes.coarse_drawing import decimated
 from reconstruct.steps.s4_surface.surface import Surface
@@ -35,7 +36,7 @@ from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene, ball_of
 from scenes.virtual_presses import palpate_model
 
-VERSION = 6
+VERSION = 7
 MESH_SIZE_M, LEAST_EDGES = 0.010, 8
 """Edge length of the tetrahedra, and the least number of edges along an object."""
 
@@ -186,6 +187,7 @@ def _built(
         mesh_size_m=edge,
         effects={"finite_strain": {}} if scene.finite_strain else {},
         provenance=provenance,
+        shape=TrueShape(stood.vertices, stood.triangles),
     )
     return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
 

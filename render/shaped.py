@@ -1,0 +1,135 @@
+"""The contact surface put onto the shape that the mesh fills.
+
+A mesh of 10 mm cuts a fillet of 12 mm by a millimetre, and another mesh cuts it elsewhere. Where the shape is
+known, each vertex of the contact surface lies on it, those of creases on its creases; triangles between them
+are so small, and so placed, that they leave it by some micrometres to either side.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from mechanics.true_shape import TrueShape
+
+SAG_M = 1.2e-5
+"""Between a triangle of the contact surface and a fillet over it, half of it to each side."""
+SHARPEST = 1 / 2.5e-3
+"""1/m: bends tighter than this are edges to the tip; the surface need not follow them."""
+CREASE_SMOOTHING_M = 1.5e-3
+"""Over which the contact normal turns beside a crease."""
+_CREASE_SPACING_M = 1e-4
+_REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
+_CROSSES = np.cos(np.radians(25))
+_ROUNDS = 4
+
+
+def edge_for(shape: TrueShape) -> float:
+    """The edge, m, by which triangles leave the shape's fillets by SAG_M."""
+    bend = shape.sharpest_bend(SHARPEST)
+    return float(np.sqrt(8 * SAG_M / max(bend, 1e-3)))
+
+
+def on_shape(
+    shape: TrueShape, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v, 3) m put onto the shape and their contact normals (v, 3), unit, outward.
+
+    triangles: (k, 3), free: (k,) 1 where they may be touched; the base's inner vertices stay.
+    """
+    touch = triangles[free > 0]
+    used = np.unique(touch)
+    placed, normals = vertices.copy(), np.zeros_like(vertices)
+    normals[np.unique(triangles[free == 0])] = _mean_normal(vertices, triangles[free == 0])
+    placed[used], normals[used] = shape.foot(vertices[used])
+    rim = np.intersect1d(used, triangles[free == 0])
+    edge = float(np.median(np.linalg.norm(vertices[touch[:, 0]] - vertices[touch[:, 1]], axis=1)))
+    creased = _on_creases(shape, placed, normals, touch, rim, edge)
+    placed[used] = _lifted(shape, placed, normals, touch, creased)[used]
+    return placed, _turning(placed, normals, touch, creased)
+
+
+def _on_creases(
+    shape: TrueShape,
+    placed: np.ndarray,
+    normals: np.ndarray,
+    touch: np.ndarray,
+    rim: np.ndarray,
+    edge_m: float,
+) -> np.ndarray:
+    """(v,) bool, the vertices drawn onto creases: `placed` changes.
+
+    Those of the base's rim, and of a triangle's edge whose ends look to either side of a crease the nearer
+    end.
+    """
+    creased = np.zeros(len(placed), dtype=bool)
+    samples = shape.crease_points(_CREASE_SPACING_M)
+    if not len(samples):
+        return creased
+    tree = cKDTree(samples)
+    away, nearest = tree.query(placed)
+    start = np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2)
+    pairs = np.unique(np.sort(start, axis=1), axis=0)
+    wanted = np.zeros(len(placed), dtype=bool)
+    wanted[rim] = away[rim] < edge_m
+    for _ in range(_ROUNDS):
+        for vertex in np.flatnonzero(wanted):
+            creased[vertex] = True
+            placed[vertex] = samples[nearest[vertex]]
+        a, b = pairs.T
+        crosses = np.einsum("kx,kx->k", normals[a], normals[b]) < _CROSSES
+        crosses &= ~creased[a] & ~creased[b]
+        nearer = np.where(away[a] <= away[b], a, b)[crosses]
+        wanted = np.zeros(len(placed), dtype=bool)
+        wanted[nearer[away[nearer] < _REACH * edge_m]] = True
+        if not wanted.any():
+            break
+    return creased
+
+
+def _lifted(
+    shape: TrueShape, placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray
+) -> np.ndarray:
+    """Vertices moved along their normals by half of what the triangles around them leave the shape by."""
+    gap = -shape.distance(placed[touch].mean(axis=1))
+    facing = normals[touch]
+    smooth = ~creased[touch].any(axis=1) & ((facing * np.roll(facing, 1, axis=1)).sum(axis=2).min(axis=1) > 0.8)
+    total = np.bincount(touch[smooth].ravel(), np.repeat(gap[smooth], 3), len(placed))
+    count = np.bincount(touch[smooth].ravel(), minlength=len(placed))
+    lift = 0.5 * total / np.maximum(count, 1)
+    return placed + lift[:, None] * normals
+
+
+def _turning(
+    placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray
+) -> np.ndarray:
+    """The shape's normals, but beside creases those of the triangles, averaged over CREASE_SMOOTHING_M."""
+    if not creased.any():
+        return np.ascontiguousarray(normals)
+    p = placed[touch]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    size = np.linalg.norm(area, axis=1)
+    near = cKDTree(placed[creased]).query(placed)[0]
+    beside = np.flatnonzero((near < 3 * CREASE_SMOOTHING_M) & (np.bincount(touch.ravel(), minlength=len(placed)) > 0))
+    places = ((p + np.roll(p, -1, axis=1)) / 2).reshape(-1, 3)
+    parts = np.repeat(area / 3, 3, axis=0)
+    pairs = cKDTree(placed[beside]).sparse_distance_matrix(
+        cKDTree(places), 3 * CREASE_SMOOTHING_M, output_type="ndarray"
+    )
+    weight = np.exp(-((pairs["v"] / CREASE_SMOOTHING_M) ** 2) / 2)
+    around = sp.csr_matrix((weight, (pairs["i"], pairs["j"])), shape=(len(beside), len(places)))
+    mean = around @ parts
+    mean /= np.maximum(np.linalg.norm(mean, axis=1, keepdims=True), 1e-300)
+    share = np.clip(3 - near[beside] / CREASE_SMOOTHING_M, 0, 1)[:, None]
+    share = share * share * (3 - 2 * share)
+    result = normals.copy()
+    result[beside] = share * mean + (1 - share) * normals[beside]
+    result /= np.maximum(np.linalg.norm(result, axis=1, keepdims=True), 1e-300)
+    return np.ascontiguousarray(result)
+
+
+def _mean_normal(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    p = vertices[triangles]
+    total = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
+    return total / max(float(np.linalg.norm(total)), 1e-300)
