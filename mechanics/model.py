@@ -24,7 +24,6 @@ from mechanics.presses import Presses
 from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.result import Result
 from mechanics.tetmesh import TetMesh, vertex_normals
-from mechanics.true_shape import TrueShape
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,7 +66,6 @@ class Tool:
 class Model(Result):
     """An object that can be felt, everything that a renderer needs; m, N, Pa, device frame.
 
-    shape: the object's surface itself where it is known; None where the mesh is all there is.
     shape_uncertainty_m: (n,) standard deviation of the surface along its normal at each node, or None.
     presses: the table of what was pressed. effects: parameters of every effect that a diagnosis added, by
     name; what of one is material stands in the material, and only that counts. provenance: where it came
@@ -87,7 +85,6 @@ class Model(Result):
     provenance: Mapping[str, Any] = field(default_factory=dict)
     about: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     path: Path | None = None
-    shape: TrueShape | None = None
 
     def __post_init__(self) -> None:
         given, needed = self.material.field, len(self.mesh.tetrahedra)

@@ -129,8 +129,8 @@ def write_model(path: Path | str, model: Model) -> Path:
     with atomic_folder(path, MODEL) as folder:
         (folder / "model.toml").write_text(text, encoding="utf-8")
         (folder / "mesh.vtu").write_bytes(vtk_bytes(grid))
-        if model.shape is not None:
-            shell = pyvista.PolyData.from_regular_faces(model.shape.vertices, model.shape.triangles)
+        if mesh.shape is not None:
+            shell = pyvista.PolyData.from_regular_faces(mesh.shape.vertices, mesh.shape.triangles)
             (folder / SHAPE).write_bytes(vtk_bytes(shell))
         write_csv(folder / "palpations.csv", model.presses)
         write_presses(folder / "presses.bin", model.presses)
@@ -184,7 +184,7 @@ def read_model(path: Path | str) -> Model:
     _checked(table, path / "model.toml")
     try:
         grid = read_vtk(path / "mesh.vtu", ModelError)
-        mesh = _mesh_of(grid)
+        mesh = dataclasses.replace(_mesh_of(grid), shape=_shape_of(path / SHAPE))
         if table["mesh"]["nodes"] != len(mesh.points):
             raise ModelError(
                 f"model.toml says {table['mesh']['nodes']} nodes, mesh.vtu holds {len(mesh.points)}: "
@@ -204,7 +204,6 @@ def read_model(path: Path | str) -> Model:
             provenance=table.get("provenance", {}),
             about={k: v for k, v in table.items() if k not in SCHEMA and isinstance(v, dict)},
             path=path,
-            shape=_shape_of(path / SHAPE),
         )
     except ModelError as error:
         raise ModelError(f"'{path}': {error}") from error

@@ -11,7 +11,7 @@ from mechanics.errors import MeshError
 from mechanics.frames import tangents
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
-from mechanics.near_field import sharpening
+from mechanics.near_field import contact_width, sharpening
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_TIP_RADIUS_M
@@ -21,6 +21,7 @@ from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
+PATCH_WIDTH_M, PATCH_SHARE = 0.004, 1 / 30
 SURFACE_EDGE_M = 0.006
 _BATCH = 16
 
@@ -97,8 +98,10 @@ def touch_solver(
 
 
 def patch_width(mesh: TetMesh) -> float:
-    """The width, m, of the narrowest patch that a quadratic mesh resolves: 0.8 edges of its surface."""
-    return PATCH_WIDTH_IN_EDGES * typical_edge(mesh)
+    """The width, m, of the patch of a touch: PATCH_WIDTH_M, for a small object PATCH_SHARE of its diagonal, so
+    that every mesh of an object has the same; but at least the 0.8 edges that quadratic elements resolve."""
+    diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), min(PATCH_WIDTH_M, PATCH_SHARE * diagonal))
 
 
 def touch_sites(
@@ -140,7 +143,7 @@ def touch_sites(
     for i, normal in enumerate(normals):
         far[i] -= half_space_compliance(normal, poisson_ratio, width)
     if curvature is None:
-        curvature = mean_curvature(mesh, points, normals)
+        curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))
     return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio))
 
@@ -160,12 +163,16 @@ def patch_loads(mesh: TetMesh, patches: Sequence[tuple[np.ndarray, np.ndarray]])
     return forces
 
 
-def mean_curvature(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+def mean_curvature(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
+) -> np.ndarray:
     """(k,) 1/m mean of the principal curvatures at surface points, convex positive.
 
-    A paraboloid fitted to the nodes within 1.8 surface edges whose triangles face the normal
+    Where the mesh's shape is known, the mean over the width of a tip's contact. Else a paraboloid fitted to the nodes within 1.8 surface edges whose triangles face the normal
     within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
     """
+    if mesh.shape is not None:
+        return mesh.shape.curvatures(points, normals, contact_width(tip_radius_m))[0].mean(axis=1)
     triangles = mesh.touchable_surface[:, :3]
     nodes = np.unique(triangles)
     facing = vertex_normals(mesh.points, triangles)[nodes]

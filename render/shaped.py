@@ -2,7 +2,7 @@
 
 A mesh of 10 mm cuts a fillet of 12 mm by a millimetre, and another mesh cuts it elsewhere. Where the shape is
 known, each vertex of the contact surface lies on it, those of creases on its creases; triangles between them
-are so small, and so placed, that they leave it by some micrometres to either side.
+are so small that they leave it by some micrometres, and lie on it in the mean.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from mechanics.true_shape import TrueShape
 
 SAG_M = 1.2e-5
-"""Between a triangle of the contact surface and a fillet over it, half of it to each side."""
+"""Between a triangle of the contact surface and a fillet over it."""
 SHARPEST = 1 / 2.5e-3
 """1/m: bends tighter than this are edges to the tip; the surface need not follow them."""
 CREASE_SMOOTHING_M = 1.5e-3
@@ -23,6 +23,7 @@ _CREASE_SPACING_M = 1e-4
 _REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
 _CROSSES = np.cos(np.radians(25))
 _ROUNDS = 4
+_MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
 
 
 def edge_for(shape: TrueShape) -> float:
@@ -91,13 +92,13 @@ def _on_creases(
 def _lifted(
     shape: TrueShape, placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray
 ) -> np.ndarray:
-    """Vertices moved along their normals by half of what the triangles around them leave the shape by."""
+    """Vertices moved along their normals until the triangles around them lie on the shape in the mean."""
     gap = -shape.distance(placed[touch].mean(axis=1))
     facing = normals[touch]
     smooth = ~creased[touch].any(axis=1) & ((facing * np.roll(facing, 1, axis=1)).sum(axis=2).min(axis=1) > 0.8)
     total = np.bincount(touch[smooth].ravel(), np.repeat(gap[smooth], 3), len(placed))
     count = np.bincount(touch[smooth].ravel(), minlength=len(placed))
-    lift = 0.5 * total / np.maximum(count, 1)
+    lift = _MEAN_GAP * total / np.maximum(count, 1)
     return placed + lift[:, None] * normals
 
 

@@ -20,7 +20,6 @@ from scipy.spatial import cKDTree
 from mechanics.errors import MeshError
 from mechanics.nearest import neighbours
 from mechanics.tetmesh import TetMesh
-from mechanics.true_shape import TrueShape
 from render.bvh import Bvh, build_bvh
 from render.shaped import edge_for, on_shape
 
@@ -68,14 +67,13 @@ class ContactSurface:
         return float(np.median(np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2)))
 
 
-def contact_surface(
-    mesh: TetMesh, *, shape: TrueShape | None = None, edge_m: float = 2.5e-3, largest: int = 60_000
-) -> ContactSurface:
+def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_000) -> ContactSurface:
     """Round and refine a mesh's boundary to about `edge_m`, with at most about `largest` triangles.
 
-    shape: what the mesh fills, onto which every vertex is put; the edges are then as much shorter as its
+    Where the mesh's shape is known every vertex is put onto it, and the edges are as much shorter as its
     bends need. Raises MeshError where the boundary is not closed.
     """
+    shape = mesh.shape
     corners = mesh.surface[:, :3]
     touchable = ~mesh.fixed[corners].all(axis=1)
     edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]

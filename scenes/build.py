@@ -170,6 +170,7 @@ def _built(
         method="known",
         reason="the shape is given",
         redraw=lambda edge_m: decimated(stood, edge_m),
+        shape=TrueShape(stood.vertices, stood.triangles),
     )
     edge = scene.mesh_size_m or min(MESH_SIZE_M, float(np.ptp(stood.vertices, axis=0).max()) / LEAST_EDGES)
     meshing = mesh_surface(surface, MeshingOptions(mesh_size_m=edge), lambda s, f: progress(s, 0.4 * f))
@@ -187,7 +188,6 @@ def _built(
         mesh_size_m=edge,
         effects={"finite_strain": {}} if scene.finite_strain else {},
         provenance=provenance,
-        shape=TrueShape(stood.vertices, stood.triangles),
     )
     return palpate_model(model, lambda s, f: progress(s, 0.4 + 0.6 * f))
 
