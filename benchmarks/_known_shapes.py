@@ -12,8 +12,8 @@ from functools import lru_cache
 import numpy as np
 from scipy.spatial import cKDTree
 
-from mechanics.nearest import closest, sample
-from scenes.phantoms import circle, column, phantom, rectangle, resampled, stacked
+from mechanics.nearest import sample
+from scenes.phantoms import phantom, rectangle, resampled
 
 Distance = Callable[[np.ndarray], np.ndarray]
 CHORD_M = 1.8e-3
@@ -135,7 +135,10 @@ def _kidney() -> KnownShape:
     middle = np.array([0.0, 0.006])
     for share in np.linspace(1, 0, 14)[1:-1]:
         rings.append(np.column_stack([middle + share * (top - middle), np.full(len(rim), HEIGHT_M)]))
-    inner = [np.column_stack([middle + s * (rim - middle), np.zeros(len(rim))]) for s in np.linspace(0, 1, 14)[1:-1]]
+    inner = [
+        np.column_stack([middle + s * (rim - middle), np.zeros(len(rim))])
+        for s in np.linspace(0, 1, 14)[1:-1]
+    ]
     vertices, triangles = _closed(np.array([*inner, *rings]), [*middle, 0.0], [*middle, HEIGHT_M])
     return KnownShape("kidney", vertices, triangles, distance, np.zeros((0, 3)))
 

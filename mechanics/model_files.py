@@ -82,7 +82,16 @@ MODEL = FolderKind(
     "a MODEL folder",
     "model.toml",
     Kind("a model.toml", (b"format = ", b"[material]"), holds=b"[material]"),
-    ("model.toml", "mesh.vtu", "shape.vtp", "presses.bin", "palpations.csv", "surface.vtp", "*.cache", "compliance-*.bin"),
+    (
+        "model.toml",
+        "mesh.vtu",
+        "shape.vtp",
+        "presses.bin",
+        "palpations.csv",
+        "surface.vtp",
+        "*.cache",
+        "compliance-*.bin",
+    ),
 )
 """What `write_model` writes, and what is kept beside it later."""
 
@@ -166,7 +175,7 @@ def read_model(path: Path | str) -> Model:
     format is another.
     """
     path = Path(path)
-    for name in ("model.toml", "mesh.vtu", "shape.vtp", "presses.bin"):
+    for name in ("model.toml", "mesh.vtu", "presses.bin"):
         if not (path / name).is_file():
             raise ModelError(
                 f"'{path}' is no MODEL folder: it has no {name}; "

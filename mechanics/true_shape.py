@@ -25,7 +25,7 @@ _PLANE_BEND = 0.5
 """1/m: facets that bend less than this over their edge belong to one plane face."""
 _PLANE_TURN = 2e-4  # rad, what the rounding of a file's coordinates turns
 _WIDER = 2.5
-"""A face so many times as wide as its neighbour, across their edge, is plane up to it: a fillet ends there."""
+"""A face so many times as wide as its neighbour, across their edge, is plane up to it."""
 _FEW = 8  # triangles of a face up to which all its corners are looked at
 _SAME_SIDE = np.cos(np.radians(50))
 _FACING = np.cos(np.radians(75))
@@ -80,7 +80,8 @@ class TrueShape:
 
     def sharpest_bend(self, limit: float) -> float:
         """1/m: the greatest curvature of the faces up to `limit`, but for the sharpest 2 % of their area."""
-        bend = np.abs(np.linalg.eigvalsh(_bends(self.vertices[self.triangles], self.corner_normals))).max(axis=1)
+        tensors = _bends(self.vertices[self.triangles], self.corner_normals)
+        bend = np.abs(np.linalg.eigvalsh(tensors)).max(axis=1)
         area = triangle_areas(self.vertices, self.triangles)
         kept = (bend < limit) & (area > 0)
         if not kept.any():
@@ -278,9 +279,7 @@ def _corner_normals(vertices: np.ndarray, triangles: np.ndarray, facets: _Facets
     return normals.reshape(m, 3, 3)
 
 
-def _control(
-    vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, facets: _Facets
-) -> np.ndarray:
+def _control(vertices: np.ndarray, triangles: np.ndarray, normals: np.ndarray, facets: _Facets) -> np.ndarray:
     """(m, 10, 3) control points of the cubic patches, in the order of `_bernstein`."""
     p = vertices[triangles]
     beyond = normals[facets.across]
@@ -304,8 +303,8 @@ def _control(
             made[i, j] = p[:, i] + np.where(sharp[:, None], crease, step) / 3
     mean = sum(made.values()) / 6
     centre = mean + (mean - p.mean(axis=1)) / 2
-    points = [p[:, 0], p[:, 1], p[:, 2], made[0, 1], made[1, 0], made[1, 2], made[2, 1], made[2, 0], made[0, 2]]
-    return np.stack([*points, centre], axis=1)
+    outer = [made[pair] for pair in ((0, 1), (1, 0), (1, 2), (2, 1), (2, 0), (0, 2))]
+    return np.stack([p[:, 0], p[:, 1], p[:, 2], *outer, centre], axis=1)
 
 
 def _bernstein(weights: np.ndarray) -> np.ndarray:

@@ -23,6 +23,7 @@ _CREASE_SPACING_M = 1e-4
 _REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
 _CROSSES = np.cos(np.radians(25))
 _ROUNDS = 4
+_ALIKE = 0.8
 _MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
 
 
@@ -95,24 +96,23 @@ def _lifted(
     """Vertices moved along their normals until the triangles around them lie on the shape in the mean."""
     gap = -shape.distance(placed[touch].mean(axis=1))
     facing = normals[touch]
-    smooth = ~creased[touch].any(axis=1) & ((facing * np.roll(facing, 1, axis=1)).sum(axis=2).min(axis=1) > 0.8)
+    alike = np.einsum("kcx,kcx->kc", facing, np.roll(facing, 1, axis=1)).min(axis=1) > _ALIKE
+    smooth = alike & ~creased[touch].any(axis=1)
     total = np.bincount(touch[smooth].ravel(), np.repeat(gap[smooth], 3), len(placed))
     count = np.bincount(touch[smooth].ravel(), minlength=len(placed))
     lift = _MEAN_GAP * total / np.maximum(count, 1)
     return placed + lift[:, None] * normals
 
 
-def _turning(
-    placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray
-) -> np.ndarray:
+def _turning(placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray) -> np.ndarray:
     """The shape's normals, but beside creases those of the triangles, averaged over CREASE_SMOOTHING_M."""
     if not creased.any():
         return np.ascontiguousarray(normals)
     p = placed[touch]
     area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    size = np.linalg.norm(area, axis=1)
     near = cKDTree(placed[creased]).query(placed)[0]
-    beside = np.flatnonzero((near < 3 * CREASE_SMOOTHING_M) & (np.bincount(touch.ravel(), minlength=len(placed)) > 0))
+    used = np.bincount(touch.ravel(), minlength=len(placed)) > 0
+    beside = np.flatnonzero(used & (near < 3 * CREASE_SMOOTHING_M))
     places = ((p + np.roll(p, -1, axis=1)) / 2).reshape(-1, 3)
     parts = np.repeat(area / 3, 3, axis=0)
     pairs = cKDTree(placed[beside]).sparse_distance_matrix(
