@@ -39,7 +39,7 @@ REACHED_M = 0.003
 """Height over the support from which a tip can touch."""
 RIM_M = 0.005
 """Within this of a sharp edge a place counts as at a rim."""
-_AROUND_M = 0.016
+_AROUND_M = 0.012
 _UP = np.array([0.0, 0.0, 1.0])
 
 

@@ -30,7 +30,9 @@ _FEW = 8  # triangles of a face up to which all its corners are looked at
 _SAME_SIDE = np.cos(np.radians(50))
 _FACING = np.cos(np.radians(75))
 _SAMPLE_M = 1.2e-3
-"""Edge of what curvatures are averaged over."""
+"""Longest edge of the pieces that curvatures are averaged over."""
+_WIDTHS, _PAIRS = 2.7, 300_000
+"""Widths of a Gaussian beyond which it is left out (0.03); pieces that are averaged at once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,10 +125,13 @@ class TrueShape:
         """
         places, facing, area, bend, tree = self._bends
         result, direction = np.zeros((len(points), 2)), np.zeros((len(points), 3))
-        for start in range(0, len(points), 4000):
-            rows = slice(start, start + 4000)
+        reach = _WIDTHS * width_m
+        each = len(places) * np.pi * reach**2 / area.sum()
+        step = max(20, int(_PAIRS / each))
+        for start in range(0, len(points), step):
+            rows = slice(start, start + step)
             p, n = points[rows], normals[rows]
-            pairs = cKDTree(p).sparse_distance_matrix(tree, 3 * width_m, output_type="ndarray")
+            pairs = cKDTree(p).sparse_distance_matrix(tree, reach, output_type="ndarray")
             i, j = pairs["i"], pairs["j"]
             weight = area[j] * np.exp(-((pairs["v"] / width_m) ** 2) / 2)
             weight *= np.einsum("kx,kx->k", n[i], facing[j]) > _SAME_SIDE
@@ -166,20 +171,24 @@ class TrueShape:
     def _bends(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, cKDTree]:
         """Places, normals, areas and curvature tensors of pieces of the surface of at most _SAMPLE_M."""
         bend = _bends(self.vertices[self.triangles], self.corner_normals)
-        corners = self.vertices[self.triangles]
-        longest = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(axis=1)
-        parts = np.clip(np.ceil(longest / _SAMPLE_M).astype(int), 1, 40)
-        area = triangle_areas(self.vertices, self.triangles)
-        chosen, weights, share = [], [], []
-        for count in np.unique(parts):
-            own = np.flatnonzero((parts == count) & (area > 1e-16))
-            middles = _middles(count)
-            chosen.append(np.repeat(own, len(middles)))
-            weights.append(np.tile(middles, (len(own), 1)))
-            share.append(np.repeat(area[own] / len(middles), len(middles)))
-        triangle = np.concatenate(chosen)
-        places, facing = self.on(triangle, np.concatenate(weights))
-        return places, facing, np.concatenate(share), bend[triangle], cKDTree(places)
+        triangle, corners = _pieces(self.vertices[self.triangles], _SAMPLE_M)
+        places, facing = self.on(triangle, corners.mean(axis=1))
+        p = np.einsum("kcw,kwx->kcx", corners, self.vertices[self.triangles[triangle]])
+        area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) / 2
+        # pieces of one cell that look alike count as one: a fine file takes no longer
+        cell = np.hstack([np.floor(places / _SAMPLE_M), np.rint(3 * facing)]).astype(np.int64)
+        _, cell = np.unique(cell, axis=0, return_inverse=True)
+        cell = cell.ravel()
+        total = np.bincount(cell, area)
+
+        def mean(values: np.ndarray) -> np.ndarray:
+            columns = (area[:, None] * values.reshape(len(area), -1)).T
+            sums = np.stack([np.bincount(cell, column) for column in columns], axis=1)
+            return (sums / total[:, None]).reshape(-1, *values.shape[1:])
+
+        places, facing, tensors = mean(places), mean(facing), mean(bend[triangle])
+        facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+        return places, facing, total, tensors, cKDTree(places)
 
 
 @dataclass(frozen=True)
@@ -348,12 +357,25 @@ def _turned(bend: np.ndarray, before: np.ndarray, after: np.ndarray) -> np.ndarr
     return bend - share[:, None, None] * (cross + cross.transpose(0, 2, 1)) + square[:, None, None] * outer
 
 
-def _middles(parts: int) -> np.ndarray:
-    """(parts^2, 3) barycentric middles of a triangle cut into parts^2 equal ones."""
-    found = []
-    for i in range(parts):
-        for j in range(parts - i):
-            found.append([i + 1 / 3, j + 1 / 3, parts - i - j - 2 / 3])
-            if i + j < parts - 1:
-                found.append([i + 2 / 3, j + 2 / 3, parts - i - j - 4 / 3])
-    return np.array(found) / parts
+def _pieces(p: np.ndarray, longest_m: float) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (m, 3, 3) cut at the middles of their longest edges until none is longer than `longest_m`.
+
+    The triangle (k,) that each piece lies in, and its corners' weights there (k, 3, 3).
+    """
+    triangle = np.flatnonzero(np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1) > 1e-16)
+    corners = np.tile(np.eye(3), (len(triangle), 1, 1))
+    done_triangle, done_corners = [], []
+    while len(triangle):
+        at = np.einsum("kcw,kwx->kcx", corners, p[triangle])
+        length = np.linalg.norm(np.roll(at, -1, axis=1) - at, axis=2)
+        long = length.max(axis=1) > longest_m
+        done_triangle.append(triangle[~long])
+        done_corners.append(corners[~long])
+        triangle, corners, length = triangle[long], corners[long], length[long]
+        rows, first = np.arange(len(triangle)), length.argmax(axis=1)
+        second = (first + 1) % 3
+        middle = (corners[rows, first] + corners[rows, second]) / 2
+        one, other = corners.copy(), corners
+        one[rows, second], other[rows, first] = middle, middle
+        triangle, corners = np.concatenate([triangle, triangle]), np.concatenate([one, other])
+    return np.concatenate(done_triangle), np.concatenate(done_corners)
