@@ -37,8 +37,9 @@ TIP_M, MODULUS_PA, NU = 0.005, 20e3, 0.49
 DEPTHS_M = (0.001, 0.003, 0.006)
 REACHED_M = 0.003
 """Height over the support from which a tip can touch."""
-RIM_M = 0.005
-"""Within this of a sharp edge a place counts as at a rim."""
+RIM_M = 0.007
+"""Within this of a sharp edge, which is eased so that friction cannot snap over it, a place counts as at a
+rim."""
 _AROUND_M = 0.012
 _UP = np.array([0.0, 0.0, 1.0])
 
@@ -140,8 +141,8 @@ def report(
     """Print distances by mesh and spreads of force by shape; return both with the figures."""
     rows = []
     for name, one in found.items():
-        off = 1e3 * np.abs(one["off_m"])
-        rim = off[one["rim"]]
+        every = 1e3 * np.abs(one["off_m"])
+        off, rim = every[~one["rim"]], every[one["rim"]]
         rows.append(
             [name, f"{np.sqrt((off**2).mean()):.4f}", f"{np.percentile(off, 95):.4f}", f"{off.max():.4f}",
              f"{rim.max():.4f}" if len(rim) else ""]
@@ -164,10 +165,25 @@ def report(
     deep = [f"{1e3 * d:g} mm: 95 % / max, %" for d in DEPTHS_M]
     print(table(["place", "places", "meshes", *deep], rows))
     off = 1e3 * np.abs(np.concatenate([one["off_m"] for one in found.values()]))
+    rim = np.concatenate([one["rim"] for one in found.values()])
     figures = [
-        Figure("felt from true surface, greatest", float(off.max()), unit="mm").at_most(0.02),
-        Figure("felt from true surface, rms", float(np.sqrt((off**2).mean())), unit="mm"),
+        Figure(
+            "felt from true surface, greatest on faces and fillets", float(off[~rim].max()), unit="mm"
+        ).at_most(0.02),
+        Figure(
+            "felt from true surface, rms on faces and fillets",
+            float(np.sqrt((off[~rim] ** 2).mean())),
+            unit="mm",
+        ),
     ]
+    if rim.any():
+        figures.append(
+            Figure(
+                "felt from true surface, greatest within 7 mm of a sharp edge",
+                float(off[rim].max()),
+                unit="mm",
+            ).at_most(0.02)
+        )
     if spreads:
         every = np.concatenate(spreads)
         figures.append(

@@ -21,13 +21,9 @@ from mechanics.errors import MeshError
 from mechanics.nearest import neighbours
 from mechanics.tetmesh import TetMesh
 from render.bvh import Bvh, build_bvh
-from render.shaped import edge_for, on_shape
+from render.shaped import EASED_AGREEMENT, EDGE_ROUNDING_M, NORMAL_SMOOTHING_M, edge_for, on_shape
 
 CREASE_DEGREES = 35.0
-NORMAL_SMOOTHING_M = 2.5e-3
-EDGE_ROUNDING_M = 2.2e-3
-EASED_AGREEMENT = (0.99, 0.93)
-"""Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
 
 
 class SurfaceArrays(NamedTuple):
