@@ -10,6 +10,7 @@ from benchmarks._tissue import NU, tissue
 from mechanics.recording import Recording
 
 PLACES, ROWS = 110, 10
+CURVES, CURVE_ROWS = 9, 5000
 
 
 def robot_probing(seed: int, places: int = PLACES, rows: int = ROWS) -> tuple[Recording, float]:
@@ -35,3 +36,23 @@ def robot_probing(seed: int, places: int = PLACES, rows: int = ROWS) -> tuple[Re
         },
     )
     return recording, slab.about["height_m"]
+
+
+def machine_curves(folder: Path, seed: int, curves: int = CURVES, rows: int = CURVE_ROWS) -> list[Path]:
+    """Tables of a sphere's indentations at one place: in, held, out, in 5 s each; a solid that relaxes."""
+    random, files = np.random.default_rng(seed), []
+    radius, modulus, share, tau = 1e-3, 30e3, 0.3, 0.5
+    for k in range(curves):
+        t = np.linspace(0.0, 5.0, rows)
+        deepest = random.uniform(1.6e-4, 2.4e-4)
+        depth = np.interp(t, [0.0, 0.5, 1.5, 3.5, 4.5, 5.0], [-2e-5, -2e-5, deepest, deepest, -2e-5, -2e-5])
+        spring = 4 / 3 * modulus / (1 - NU**2) * np.sqrt(radius) * np.maximum(depth, 0.0) ** 1.5
+        memory, keeps = np.zeros(rows), np.exp(-(t[1] - t[0]) / tau)
+        for i in range(1, rows):
+            memory[i] = keeps * memory[i - 1] + share * (spring[i] - spring[i - 1])
+        force = (1 - share) * spring + memory + 2e-5 * random.standard_normal(rows)
+        path = folder / f"curve_{k + 1}.csv"
+        table = np.column_stack([t, 1e6 * depth, 1e3 * force])
+        np.savetxt(path, table, "%.6g", ",", header="Time (s),Indentation (um),Load (mN)", comments="")
+        files.append(path)
+    return files

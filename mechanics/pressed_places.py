@@ -15,7 +15,7 @@ from mechanics.patch import PatchSampler
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.store import content_key, load_or_build
 
-VERSION = 2
+VERSION = 3
 GRAIN_M = 0.0008
 """Presses that lie closer, with nearly one normal, share a solution."""
 
