@@ -7,15 +7,16 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks._tissue import NU, tissue
-from mechanics.recording import Recording
+from mechanics.recording import Recording, description_table
+from mechanics.toml_text import dump_toml
 
 PLACES, ROWS = 110, 10
-CURVES, CURVE_ROWS = 9, 5000
+CURVES, CURVE_ROWS, CURVE_TIP_M = 9, 5000, 1e-3
 
 
-def robot_probing(seed: int, places: int = PLACES, rows: int = ROWS) -> tuple[Recording, float]:
-    """(recording of points without a time, thickness of the slab, m): each place pressed once, in `rows` rows
-    from just above the surface to the deepest."""
+def robot_probing(folder: Path, seed: int, places: int = PLACES, rows: int = ROWS) -> Path:
+    """The recording of points without a time over a slab of known thickness, written to a folder: each place
+    pressed once, in `rows` rows from just above the surface to the deepest."""
     slab = tissue(seed, raster=int(np.ceil(np.sqrt(places))))
     presses = slab.presses
     each = int(np.diff(presses.starts)[0])
@@ -30,18 +31,19 @@ def robot_probing(seed: int, places: int = PLACES, rows: int = ROWS) -> tuple[Re
         force_noise_std_n=slab.about["noise_n"],
         object_name="slab",
         poisson_ratio=NU,
-        description={
-            "recording": {"quasi_static": True, "force_on": "tool"},
-            "object": {"slab_m": slab.about["height_m"], "poisson_ratio": NU},
-        },
     )
-    return recording, slab.about["height_m"]
+    path = recording.save(folder / "robot.csv")
+    told = description_table(recording)
+    told["recording"]["quasi_static"] = True
+    told["object"]["slab_m"] = slab.about["height_m"]
+    path.with_suffix(".toml").write_text(dump_toml(told), encoding="utf-8")
+    return path
 
 
 def machine_curves(folder: Path, seed: int, curves: int = CURVES, rows: int = CURVE_ROWS) -> list[Path]:
     """Tables of a sphere's indentations at one place: in, held, out, in 5 s each; a solid that relaxes."""
     random, files = np.random.default_rng(seed), []
-    radius, modulus, share, tau = 1e-3, 30e3, 0.3, 0.5
+    radius, modulus, share, tau = CURVE_TIP_M, 30e3, 0.3, 0.5
     for k in range(curves):
         t = np.linspace(0.0, 5.0, rows)
         deepest = random.uniform(1.6e-4, 2.4e-4)
