@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 
 from mechanics.elasticity import element_stiffness
 from mechanics.patch import PatchSampler, half_space_compliance
-from mechanics.pressed_places import Places
+from mechanics.pressed_places import UNIFORM, Places
 from mechanics.sites import PATCH_WIDTH_IN_EDGES, typical_edge
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
@@ -48,20 +48,26 @@ class EnergyFields:
         """(q, 3, 3) 1/m, the sum of all elements."""
         return self.energy.sum(axis=1, dtype=float)
 
+    @cached_property
+    def _by_element(self) -> np.ndarray:
+        """(m, 9 q), so that a weighed sum reads it in one go."""
+        q, m = self.energy.shape[:2]
+        return np.ascontiguousarray(self.energy.transpose(1, 0, 2, 3)).reshape(m, 9 * q)
+
     def weighed(self, weight: np.ndarray) -> np.ndarray:
         """(q, 3, 3) 1/m, the sum of the elements' energies times weight (m,)."""
-        q, m = self.energy.shape[:2]
-        return (weight.astype(np.float32) @ self.energy.reshape(q, m, 9)).reshape(q, 3, 3)
+        return (weight.astype(np.float32) @ self._by_element).reshape(-1, 3, 3)
 
 
-def energy_fields(places: Places, solver: Solver | None = None) -> EnergyFields:
-    """Energies of all places; solved for once. solver: of the uniform object, where there is one already; it
-    serves if its elements are the model's own."""
-    return places.stage("fields", lambda: _energies(places, solver))
+def energy_fields(places: Places) -> EnergyFields:
+    """Energies of all places; solved for once."""
+    return places.stage("fields", lambda: _energies(places))
 
 
-def _energies(places: Places, solver: Solver | None) -> EnergyFields:
+def _energies(places: Places) -> EnergyFields:
     model = places.model
+    # what the places were solved by serves here too, where their elements are the model's own
+    solver: Solver | None = places.stages.pop(UNIFORM, None)
     if solver is None or len(solver.mesh.tetrahedra) != len(model.mesh.tetrahedra):
         solver = Solver(model.mesh.quadratic(), model.material.poisson_ratio)
     mesh = solver.mesh

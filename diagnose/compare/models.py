@@ -16,11 +16,10 @@ from functools import partial
 
 import numpy as np
 
-from mechanics.far_field import energy_fields
 from mechanics.model import Model
 from mechanics.press_making import of_paths
 from mechanics.press_sites import sites_of
-from mechanics.pressed_places import Places
+from mechanics.pressed_places import UNIFORM, Places
 from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
 from mechanics.sites import TouchSites, touch_sites, touch_solver
@@ -105,7 +104,7 @@ def prepare(
     one, none = np.ones(len(table)), np.zeros(len(table))
     places, own = places_at(model, table, solved), {}
     if field != "homogeneous":
-        energy_fields(places, solver)
+        places.stages[UNIFORM] = solver
         own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
     return Prepared(
         presses,
