@@ -7,19 +7,23 @@ one array. Another Poisson's ratio is a new factorisation, done once at a few va
 
 from __future__ import annotations
 
+import hashlib
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from scipy.spatial import cKDTree
 
 from mechanics.elasticity import element_stiffness
 from mechanics.patch import PatchSampler, half_space_compliance
-from mechanics.pressed_places import Places
+from mechanics.pressed_places import UNIFORM, Places
 from mechanics.sites import PATCH_WIDTH_IN_EDGES, typical_edge
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 
-_CHUNK = 600
+_CHUNK, _BATCH = 600, 24
+_KNOWN = 16
+"""Far fields that are remembered: a fit moves first touches many times between two changes of the object."""
 
 
 @dataclass(frozen=True)
@@ -39,6 +43,21 @@ class EnergyFields:
     solver: Solver
     solution: np.ndarray
 
+    @cached_property
+    def whole(self) -> np.ndarray:
+        """(q, 3, 3) 1/m, the sum of all elements."""
+        return self.energy.sum(axis=1, dtype=float)
+
+    @cached_property
+    def _by_element(self) -> np.ndarray:
+        """(m, 9 q), so that a weighed sum reads it in one go."""
+        q, m = self.energy.shape[:2]
+        return np.ascontiguousarray(self.energy.transpose(1, 0, 2, 3)).reshape(m, 9 * q)
+
+    def weighed(self, weight: np.ndarray) -> np.ndarray:
+        """(q, 3, 3) 1/m, the sum of the elements' energies times weight (m,)."""
+        return (weight.astype(np.float32) @ self._by_element).reshape(-1, 3, 3)
+
 
 def energy_fields(places: Places) -> EnergyFields:
     """Energies of all places; solved for once."""
@@ -47,11 +66,18 @@ def energy_fields(places: Places) -> EnergyFields:
 
 def _energies(places: Places) -> EnergyFields:
     model = places.model
-    mesh = model.mesh.quadratic()
-    solver = Solver(mesh, model.material.poisson_ratio)
+    # what the places were solved by serves here too, where their elements are the model's own
+    solver: Solver | None = places.stages.pop(UNIFORM, None)
+    if solver is None or len(solver.mesh.tetrahedra) != len(model.mesh.tetrahedra):
+        solver = Solver(model.mesh.quadratic(), model.material.poisson_ratio)
+    mesh = solver.mesh
     sampler = _sampler(mesh)
-    u = solver.solve(_unit_loads(places, mesh, sampler))
     m, q = len(mesh.tetrahedra), len(places.first)
+    u = np.zeros((len(mesh.points), 3, 3 * q))
+    flat = u.reshape(-1, 3 * q)
+    for some in _batches(q):
+        right = _unit_loads(places, mesh, sampler, some).reshape(len(flat), -1)[solver.free]
+        flat[solver.free, 3 * some.start : 3 * some.stop] = solver.solve_free(right)
     energy = np.empty((q, m, 3, 3), dtype=np.float32)
     for a in range(0, m, _CHUNK):
         nodes = mesh.tetrahedra[a : a + _CHUNK]
@@ -72,9 +98,13 @@ def _energies(places: Places) -> EnergyFields:
 def far_with_weights(places: Places, softness: np.ndarray) -> np.ndarray:
     """(p, 3, 3) far field with each element's share of the compliance multiplied by softness (m,) (1:
     unchanged)."""
-    energy = energy_fields(places).energy
-    change = np.einsum("qmij,m->qij", energy, (softness - 1).astype(np.float32), optimize=True)
-    return places.far + change[places.place]
+    known: dict[bytes, np.ndarray] = places.stage("far with weights", dict)
+    key = hashlib.blake2b(softness.tobytes(), digest_size=16).digest()
+    if key not in known:
+        if len(known) >= _KNOWN:
+            del known[next(iter(known))]
+        known[key] = places.far + energy_fields(places).weighed(softness - 1)[places.place]
+    return known[key].copy()
 
 
 def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30, 0.40, 0.46)) -> np.ndarray:
@@ -83,9 +113,9 @@ def far_at_poisson(places: Places, nu: float, ratios: tuple[float, ...] = (0.30,
     def solve() -> dict[str, np.ndarray]:
         stated = places.model.material.poisson_ratio
         known = sorted({*ratios, stated})
-        mesh = places.model.mesh.quadratic()
-        own = energy_fields(places).solution
-        fars = np.array([_far(places, mesh, r, own if r == stated else None) for r in known])
+        mesh, fields = places.model.mesh.quadratic(), energy_fields(places)
+        own = (fields.whole - fields.half_space)[places.place]
+        fars = np.array([own if r == stated else _far(places, mesh, r) for r in known])
         return {"ratios": np.array(known), "far": fars - fars[known.index(stated)]}
 
     table = places.stage("poisson", lambda: places.stored("poisson", solve))
@@ -96,28 +126,29 @@ def _sampler(mesh: TetMesh) -> PatchSampler:
     return PatchSampler(mesh, PATCH_WIDTH_IN_EDGES * typical_edge(mesh))
 
 
-def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler) -> np.ndarray:
-    """(n, 3, 3 q) nodal forces of unit loads along the local axes of q places."""
-    forces = np.zeros((len(mesh.points), 3, 3 * len(places.first)))
-    for k, press in enumerate(places.first):
+def _batches(count: int) -> list[slice]:
+    return [slice(a, min(a + _BATCH, count)) for a in range(0, count, _BATCH)]
+
+
+def _unit_loads(places: Places, mesh: TetMesh, sampler: PatchSampler, some: slice) -> np.ndarray:
+    """(n, 3, 3 k) nodal forces of unit loads along the local axes of k of the places that are solved for."""
+    chosen = places.first[some]
+    forces = np.zeros((len(mesh.points), 3, 3 * len(chosen)))
+    for k, press in enumerate(chosen):
         nodes, weights = sampler.weights(places.point[press])
         for axis in range(3):
             forces[nodes, :, 3 * k + axis] = weights[:, None] * places.frame[press][axis]
     return forces
 
 
-def _far(places: Places, mesh: TetMesh, nu: float, solution: np.ndarray | None = None) -> np.ndarray:
-    """(p, 3, 3) local far field at a Poisson's ratio; solution: known displacements for the unit loads."""
-    sampler = _sampler(mesh)
-    u = Solver(mesh, nu).solve(_unit_loads(places, mesh, sampler)) if solution is None else solution
+def _far(places: Places, mesh: TetMesh, nu: float) -> np.ndarray:
+    """(p, 3, 3) local far field at another Poisson's ratio: one factorisation."""
+    sampler, solver = _sampler(mesh), Solver(mesh, nu)
     far = np.empty((len(places.first), 3, 3))
-    half = half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m)
-    for k, press in enumerate(places.first):
-        nodes, weights = sampler.weights(places.point[press])
-        mean = np.einsum("n,nar->ar", weights, u[nodes][:, :, 3 * k : 3 * k + 3])
-        block = places.frame[press] @ mean
-        far[k] = (block + block.T) / 2 - half
-    return far[places.place]
+    for some in _batches(len(far)):
+        loads = _unit_loads(places, mesh, sampler, some).reshape(3 * len(mesh.points), -1, 3)
+        far[some] = solver.quadratic_forms(loads[solver.free])
+    return (far - half_space_compliance(np.array([1.0, 0.0, 0.0]), nu, sampler.width_m))[places.place]
 
 
 def _interpolate(x: np.ndarray, table: np.ndarray, value: float) -> np.ndarray:

@@ -49,5 +49,5 @@ def far_of(
     ratios (m,) and whose softness under each tip is (p,)."""
     # what the far field takes off is of the modulus under the tip: the half-space, and what the energies'
     # elements are too wide for, so that the same ratio everywhere is another modulus
-    taken = fields.energy.sum(axis=1)[places.place] - places.far
+    taken = fields.whole[places.place] - places.far
     return far_with_weights(places, 1 / ratio) + (1 - softness)[:, None, None] * taken, 1 / softness

@@ -15,7 +15,9 @@ from mechanics.patch import PatchSampler
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.store import content_key, load_or_build
 
-VERSION = 2
+VERSION = 3
+UNIFORM = "uniform solver"
+"""Stage: the factorisation that the places were solved by, of the object of one modulus."""
 GRAIN_M = 0.0008
 """Presses that lie closer, with nearly one normal, share a solution."""
 
@@ -79,16 +81,20 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
     point, normal: (p, 3), frame: (p, 3, 3).
     """
     first, place = _shared(point, normal)
+    stages: dict[str, Any] = {}
 
     def solve() -> dict[str, np.ndarray]:
         ratio = model.element_ratio if np.ptp(model.element_ratio) > 0 else None
         mesh, nu = model.mesh.quadratic(), model.material.poisson_ratio
-        sites = touch_sites(mesh, point[first], normal[first], nu, solver=touch_solver(mesh, nu, ratio))
+        solver = touch_solver(mesh, nu, ratio)
+        if ratio is None:
+            stages[UNIFORM] = solver
+        sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver)
         return {"far": sites.far, "curvature": sites.curvature}
 
     sites = _stored("sites", model, point, normal, solve)
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
-    return Places(model, point, normal, frame, np.ascontiguousarray(far), sites["curvature"][place])
+    return Places(model, point, normal, frame, np.ascontiguousarray(far), sites["curvature"][place], stages)
 
 
 def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

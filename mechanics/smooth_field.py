@@ -11,7 +11,7 @@ Source: Rasmussen and Williams, Gaussian Processes for Machine Learning, chapter
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from scipy.linalg import cho_factor, cho_solve
@@ -42,7 +42,9 @@ class SmoothField:
 
     def at(self, points: np.ndarray) -> np.ndarray:
         """(k,) log ratio at points (k, 3) m: kriged, and 0 (the object's own modulus) far from all places."""
-        return kriging(points, self.places, self.length_m) @ self.log_ratio
+        own = correlation(self.places, self.places, self.length_m) + _JITTER * np.eye(len(self.places))
+        weights = cho_solve(cho_factor(own), self.log_ratio)
+        return correlation(points, self.places, self.length_m) @ weights
 
 
 @dataclass(frozen=True)
@@ -52,6 +54,24 @@ class Shares:
 
     nodes: np.ndarray
     weight: np.ndarray
+
+
+@dataclass(frozen=True)
+class Views:
+    """How p presses see the values of a field at places (c, 3) m, for each of l lengths that are tried.
+
+    drawn: (l, p, c), kriged to the nodes and summed by the presses' shares. own: (l, c, c) correlation of the
+    places. What presses felt is not in it: fits to some of them share it.
+    """
+
+    places: np.ndarray
+    lengths_m: np.ndarray
+    drawn: np.ndarray
+    own: np.ndarray
+
+    def of(self, presses: np.ndarray) -> Views:
+        """Of some of the presses, by number."""
+        return replace(self, drawn=self.drawn[:, presses])
 
 
 @dataclass(frozen=True)
@@ -132,27 +152,30 @@ def spacing(points: np.ndarray) -> float:
     return float(np.median(apart.min(axis=1)))
 
 
-def estimate(
-    log_modulus: np.ndarray,
-    error: np.ndarray,
-    site: np.ndarray,
-    shares: Shares,
-    places: np.ndarray,
-    lengths_m: np.ndarray,
-) -> Estimate:
+def views_of(shares: Shares, places: np.ndarray, lengths_m: np.ndarray) -> Views:
+    """What presses of these shares see of places (c, 3) m."""
+    apart, own = cdist(shares.nodes, places), []
+    drawn = np.empty((len(lengths_m), len(shares.weight), len(places)))
+    for k, length in enumerate(lengths_m):
+        own.append(correlation(places, places, length))
+        # the presses' sums before the kriging, as presses are fewer than nodes
+        summed = shares.weight @ matern_5_2(apart, length)
+        drawn[k] = cho_solve(cho_factor(own[k] + _JITTER * np.eye(len(places))), summed.T).T
+    return Views(places, np.asarray(lengths_m, dtype=float), drawn, np.array(own))
+
+
+def estimate(log_modulus: np.ndarray, error: np.ndarray, site: np.ndarray, views: Views) -> Estimate:
     """The likeliest field of presses whose own moduli are known.
 
     log_modulus: (p,) of each press, as if the object were of one modulus. error: (p,) standard error.
-    site: (p,) number of its place; presses of one site share that place's own scatter. places: (c, 3) m.
-    lengths_m: that are tried.
+    site: (p,) number of its place; presses of one site share that place's own scatter. views: of the presses.
     """
-    y, cover, design = _by_site(log_modulus, error, site, shares.weight)
-    flat = np.zeros((len(y), len(y)))
+    y, cover, mean = _by_site(log_modulus, error, site)
+    places, flat = views.places, np.zeros((len(y), len(y)))
     nothing = _searched(y, cover, flat, (np.log(0.05),))
     best = None
-    for length in lengths_m:
-        drawn = design @ kriging(shares.nodes, places, length)
-        own = correlation(places, places, length)
+    for length, seen, own in zip(views.lengths_m, views.drawn, views.own, strict=True):
+        drawn = mean @ seen
         kernel = drawn @ own @ drawn.T
         found = _searched(y, cover, kernel, (np.log(0.2), np.log(0.05)))
         if best is None or found[0] > best[0]:
@@ -162,7 +185,7 @@ def estimate(
     whole = cover + scatter**2 * np.eye(len(y)) + log_sd**2 * kernel
     level, inverse, rest = _levelled(y, whole)
     shared = log_sd**2 * own @ drawn.T
-    mean = shared @ rest
+    likeliest = shared @ rest
     # of ln E, whose level is unknown as well
     precise = np.linalg.inv(whole)
     unlevelled = 1 - shared @ precise.sum(axis=1)
@@ -177,22 +200,20 @@ def estimate(
         plain_rest / _left_out_weight(plain),
         float(level),
         float(1 / np.sqrt(precise.sum())),
-        SmoothField(places, mean, float(length)),
+        SmoothField(places, likeliest, float(length)),
         covariance,
-        float(np.std(drawn @ mean)),
+        float(np.std(drawn @ likeliest)),
     )
 
 
-def _by_site(
-    y: np.ndarray, error: np.ndarray, site: np.ndarray, weight: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(value (s,), covariance (s, s), weights (s, k)) of the sites' means by precision."""
+def _by_site(y: np.ndarray, error: np.ndarray, site: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """(value (s,), covariance (s, s), weights (s, p) of the presses) of the sites' means by precision."""
     names, number = np.unique(site, return_inverse=True)
     precision = 1 / error**2
     total = np.bincount(number, weights=precision)
     mean = np.zeros((len(names), len(y)))
     mean[number, np.arange(len(y))] = precision / total[number]
-    return mean @ y, np.diag(1 / total), mean @ weight
+    return mean @ y, np.diag(1 / total), mean
 
 
 def lengths_of(touched: np.ndarray, nodes: np.ndarray) -> np.ndarray:

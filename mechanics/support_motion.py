@@ -3,7 +3,8 @@
 The bonded solution of each place presses on its base with reactions r; the base, condensed on itself, resists
 motion with S. On springs of stiffness k (a unit area) the place gives way by r^T (S + k M)^-1 r more. Where a
 part of the base is loose it may slip, and lift but not sink: a small contact problem a place, solved for
-pressing. The base moves linearly between its corner nodes, which keeps S to some hundred rows.
+pressing. The base moves linearly between its corner nodes, or between MOST_CORNERS of them that are spread
+over it, which keeps S to some hundred rows.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 from scipy.linalg import cho_factor, cho_solve, solve
+from scipy.spatial import Delaunay
 
 from mechanics.elasticity import stiffness, triangle_mass
 from mechanics.far_field import energy_fields
@@ -24,7 +26,10 @@ from mechanics.tetmesh import EDGES, TetMesh
 
 ANGLES = 8
 FREE_FRACTIONS = (0.25, 0.5, 0.75)
-_BATCH = 128
+MOST_CORNERS = 250
+"""Of which the base's motion is drawn linearly: on a slab of 150 mm each 9 mm, as far apart as hardly matters
+under one that is thicker than that."""
+_BATCH, _KNOWN = 128, 16
 
 
 @dataclass(frozen=True)
@@ -53,6 +58,9 @@ def _condensed(places: Places) -> dict[str, np.ndarray]:
     mesh, free = solver.mesh, solver.free
     axes = local_frames(places.model.support.normal)[0]
     corners, interpolation = _corner_motion(mesh)
+    plane = (mesh.points[corners] - places.model.support.point) @ axes[1:].T
+    chosen, drawn = _few(plane)
+    interpolation = (interpolation @ drawn).tocsr()
     fixed = np.setdiff1d(np.arange(3 * len(mesh.points)), free)
     full = stiffness(mesh, solver.poisson_ratio)
     lift = sp.kron(interpolation, axes.T, format="csr")[fixed]  # support axes to the device's
@@ -65,9 +73,9 @@ def _condensed(places: Places) -> dict[str, np.ndarray]:
     loads = fields.solution.reshape(3 * len(mesh.points), -1)[free]
     reaction = (coupling.T @ loads).reshape(len(own), -1, 3).transpose(1, 0, 2)
     return {
-        "plane": (mesh.points[corners] - places.model.support.point) @ axes[1:].T,
+        "plane": plane[chosen],
         "stiffness": own - 0.5 * (compliance + compliance.T),
-        "mass": _mass(mesh, corners),
+        "mass": drawn.T @ (drawn.T @ _mass(mesh, corners)).T,
         "reaction": np.ascontiguousarray(reaction),
     }
 
@@ -96,6 +104,27 @@ def _corner_motion(mesh: TetMesh) -> tuple[np.ndarray, sp.csr_matrix]:
     return corners, matrix.tocsr()
 
 
+def _few(plane: np.ndarray) -> tuple[np.ndarray, sp.csr_matrix]:
+    """(chosen (r,), drawn (b, r)): at most MOST_CORNERS of points (b, 2), each farthest from those before,
+    and by which weights their motion gives that of all: linear in triangles, and beyond them."""
+    count = len(plane)
+    if count <= MOST_CORNERS:
+        return np.arange(count), sp.identity(count, format="csr")
+    chosen = [int(np.argmax(np.linalg.norm(plane - plane.mean(axis=0), axis=1)))]
+    away = np.linalg.norm(plane - plane[chosen[0]], axis=1)
+    while len(chosen) < MOST_CORNERS:
+        chosen.append(int(np.argmax(away)))
+        away = np.minimum(away, np.linalg.norm(plane - plane[chosen[-1]], axis=1))
+    mesh = Delaunay(plane[chosen])
+    # (b, t, 3) weights of the corners of every triangle: a point belongs where none is negative, or least so
+    two = np.einsum("tij,btj->bti", mesh.transform[:, :2], plane[:, None] - mesh.transform[:, 2])
+    weights = np.concatenate([two, 1 - two.sum(axis=2, keepdims=True)], axis=2)
+    inside = np.nan_to_num(weights.min(axis=2), nan=-np.inf).argmax(axis=1)
+    rows = np.repeat(np.arange(count), 3)
+    entries = (weights[np.arange(count), inside].ravel(), (rows, mesh.simplices[inside].ravel()))
+    return np.array(chosen), sp.csr_matrix(entries, shape=(count, len(chosen)))
+
+
 def _mass(mesh: TetMesh, corners: np.ndarray) -> np.ndarray:
     triangles = base_triangles(mesh)[:, :3]
     column = np.full(len(mesh.points), -1)
@@ -108,6 +137,15 @@ def _mass(mesh: TetMesh, corners: np.ndarray) -> np.ndarray:
 
 def far_on_springs(places: Places, normal: float, tangential: float) -> np.ndarray:
     """(p, 3, 3) far field on springs of these stiffnesses a unit of area over the modulus, 1/m."""
+    known: dict[tuple[float, float], np.ndarray] = places.stage("on springs", dict)
+    if (normal, tangential) not in known:
+        if len(known) >= _KNOWN:
+            del known[next(iter(known))]
+        known[normal, tangential] = _on_springs(places, normal, tangential)
+    return known[normal, tangential].copy()
+
+
+def _on_springs(places: Places, normal: float, tangential: float) -> np.ndarray:
     motion = support_motion(places)
     springs = np.diag([normal, tangential, tangential])
     factor = cho_factor(motion.stiffness + np.kron(motion.mass, springs), overwrite_a=True)

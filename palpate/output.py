@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import json
 import math
+import shutil
 import sys
+import threading
 from pathlib import Path
 from typing import Any, Self
 
 from mechanics.files import JSON, atomic_file
+from mechanics.progress import Remaining
 
 
 class Output:
@@ -57,33 +61,74 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-def progress_bar(label: str) -> Bar:
-    """A `mechanics.progress.Progress` that draws a bar on stderr when that is a terminal; call `.close()`."""
-    return Bar(label)
+EVERY_S = 10.0
+"""Between lines of progress where standard error is no terminal."""
+_REDRAWN_S, _SHORT_S = 1.0, 5.0
+
+
+def progress_bar(label: str, *, left: bool = True) -> Bar:
+    """A `mechanics.progress.Progress` on standard error; call `.close()`, or use it as a context manager.
+
+    left: False where the stage's own words say what is left.
+    """
+    return Bar(label, left)
 
 
 class Bar:
-    """See `progress_bar`; also a context manager, which closes it."""
+    """The one display of every wait: a bar with the stage and what is left of it on a terminal; elsewhere a
+    line every ten seconds, and none for what takes less. It goes on while a stage tells of nothing."""
 
-    def __init__(self, label: str) -> None:
+    def __init__(self, label: str, left: bool = True) -> None:
         from tqdm import tqdm
 
+        self._stream = sys.stderr
+        terminal = self._stream.isatty()
         self._bar = tqdm(
             total=100.0,
             desc=label,
-            disable=not sys.stderr.isatty(),
-            bar_format="{desc:<34.34} {bar:24} {percentage:3.0f}% {elapsed}",
+            file=self._stream,
+            disable=not terminal,
+            bar_format="{percentage:3.0f}% {bar:16} {elapsed} {desc}",
             leave=True,
         )
-        self._label = label
+        self._terminal, self._label, self._stage, self._share = terminal, label, "", 0.0
+        self._says_left, self._left, self._closed = left, Remaining(), threading.Event()
+        self._left.tell(0.0)
+        self._every = _REDRAWN_S if terminal else EVERY_S
+        self._thread = threading.Thread(target=self._go_on, name="progress", daemon=True)
+        self._thread.start()
 
     def __call__(self, stage: str, fraction: float) -> None:
-        self._bar.set_description_str(f"{self._label}: {stage}", refresh=False)
-        self._bar.n = 100.0 * min(max(fraction, 0.0), 1.0)
+        self._stage, self._share = stage, min(max(fraction, 0.0), 1.0)
+        self._left.tell(self._share)
+        if self._terminal:
+            self._draw()
+
+    def _words(self, *more: str) -> str:
+        """Label and stage, more, and what is left."""
+        late = self._says_left and self._left.elapsed_s > _SHORT_S
+        about = ": ".join(word for word in (self._label, self._stage) if word)
+        return ", ".join(word for word in (about, *more, self._left.words() if late else "") if word)
+
+    def _draw(self) -> None:
+        width = max(20, shutil.get_terminal_size().columns - 30)
+        self._bar.set_description_str(self._words()[:width], refresh=False)
+        self._bar.n = 100.0 * self._share
         self._bar.refresh()
+
+    def _go_on(self) -> None:
+        while not self._closed.wait(self._every):
+            if self._terminal:
+                self._draw()
+                continue
+            told = self._words(f"{100 * self._share:.0f} %", f"after {self._left.elapsed_s:.0f} s")
+            with contextlib.suppress(OSError, ValueError):  # nobody reads standard error any more
+                print(told, file=self._stream, flush=True)
 
     def close(self) -> None:
         """Finish the bar's line."""
+        self._closed.set()
+        self._thread.join()
         self._bar.close()
 
     def __enter__(self) -> Self:

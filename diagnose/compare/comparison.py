@@ -19,7 +19,7 @@ from mechanics.errors import ContactError
 from mechanics.model import Model
 from mechanics.options import option
 from mechanics.presses import Presses
-from mechanics.progress import Progress, silent
+from mechanics.progress import Progress, part, silent
 from mechanics.recording import Recording
 from mechanics.result import Result
 from mechanics.smooth_field import SmoothField
@@ -122,8 +122,8 @@ def compare(
     sites than two."""
     options = options or CompareOptions()
     if model is None:
-        made = reconstruct_fully(recording, ReconstructOptions(seed=seed), lambda s, f: progress(s, 0.6 * f))
-        model = made.model
+        made = reconstruct_fully(recording, ReconstructOptions(seed=seed), part(progress, 0.0, 0.4))
+        model, progress = made.model, part(progress, 0.4, 1.0)
     found = compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
     return replace(found, recording=recording)
 
@@ -138,17 +138,15 @@ def compare_presses(
 ) -> Comparison:
     """`compare` on a table of presses that touch the model. Raises ContactError for fewer sites than two."""
     options = options or CompareOptions()
-    prepared = prepare(
-        table, model, options.site_m, lambda s, f: progress(s, 0.6 + 0.2 * f), field=options.field
-    )
+    prepared = prepare(table, model, options.site_m, part(progress, 0.0, 0.3), field=options.field)
     presses = prepared.presses
 
     def predict(train: np.ndarray, test: np.ndarray) -> tuple[dict[str, np.ndarray], Fem]:
         return predicted(prepared, train, test, options.interpolation, options.first_touch)
 
     fold = _folds(presses.site, options.folds, seed)
-    forces, fitted = _by_fold(presses, fold, predict, progress)
-    held_out = tuple(_by_region(presses, model, predict, progress))
+    forces, fitted = _by_fold(presses, fold, predict, part(progress, 0.3, 0.7))
+    held_out = tuple(_by_region(presses, model, predict, part(progress, 0.7, 1.0)))
     error = {m: forces[m] - presses.force for m in MODELS}
     each = {
         m: np.array([rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))]) for m in MODELS
@@ -188,7 +186,7 @@ def _by_fold(
     fitted = []
     folds = int(fold.max()) + 1
     for k in range(folds):
-        progress("folds", 0.8 + 0.1 * k / folds)
+        progress(f"fold {k + 1} of {folds}", k / folds)
         held = np.flatnonzero(fold == k)
         found, fem = predict(np.flatnonzero(fold != k), held)
         fitted.append(fem)
@@ -200,8 +198,9 @@ def _by_fold(
 def _by_region(presses: Presses, model: Model, predict: Predict, progress: Progress) -> list[RegionResult]:
     """Each region held out as a whole."""
     made = []
-    for region in regions(model, presses.point, presses.normal):
-        progress(region.name, 0.95)
+    whole = regions(model, presses.point, presses.normal)
+    for k, region in enumerate(whole):
+        progress(f"{region.name} held out", k / len(whole))
         held = np.flatnonzero(region.members)
         forces, _ = predict(np.flatnonzero(~region.members), held)
         measured = presses.force[presses.rows(held)]

@@ -19,10 +19,10 @@ import numpy as np
 from mechanics.model import Model
 from mechanics.press_making import of_paths
 from mechanics.press_sites import sites_of
-from mechanics.pressed_places import Places
+from mechanics.pressed_places import UNIFORM, Places
 from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, silent
-from mechanics.sites import TouchSites, touch_sites
+from mechanics.sites import TouchSites, touch_sites, touch_solver
 from mechanics.smooth_field import SmoothField
 from mechanics.touch import forces_at
 from reconstruct.steps.s6_one_d.one_d import columns, fit_robust, low_passed
@@ -83,8 +83,9 @@ def prepare(
     model = of_one_modulus(model)
     if site_m is not None:
         table = replace(table, site=sites_of(table.point, table.normal, site_m))
+    solver = touch_solver(model.mesh, model.material.poisson_ratio)
     solved = touch_sites(
-        model.mesh, table.point, table.normal, model.material.poisson_ratio, progress=progress
+        model.mesh, table.point, table.normal, model.material.poisson_ratio, solver=solver, progress=progress
     )
     smooth = low_passed(table)
     presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
@@ -103,6 +104,7 @@ def prepare(
     one, none = np.ones(len(table)), np.zeros(len(table))
     places, own = places_at(model, table, solved), {}
     if field != "homogeneous":
+        places.stages[UNIFORM] = solver
         own = {law: press_moduli(table, solved, places, law, table.noise.raw_n) for law in LAWS}
     return Prepared(
         presses,

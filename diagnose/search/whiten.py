@@ -12,8 +12,10 @@ against what an error of shape could do. Woodbury keeps it to small matrices.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+import scipy.sparse as sp
 from scipy.linalg import cho_factor, solve_triangular
 
 from diagnose.forward.prediction import Forward
@@ -22,6 +24,7 @@ from diagnose.options import NuisanceOptions
 from mechanics.effects.settings import Settings
 from mechanics.presses import Presses
 
+_FEW_COLUMNS = 3
 _MODES = 2
 """Of a Brownian bridge, that hold 76 % of its variance; the rest counts as noise."""
 
@@ -86,6 +89,11 @@ class Whitener:
     def gram(self, x: np.ndarray) -> np.ndarray:
         """(g, k, k) whitened inner products of the columns of x (n, 3, k) in each group."""
         k = x.shape[2]
+        if self._at_once(k):
+            part = (x[self._rows] / self.louder[self._rows][:, None, None]).reshape(-1, k)
+            side = self._halved @ part
+            products = _inner(part, self._starts) - _inner(side, self._sides) / self.variance
+            return products / self.variance
         out = np.empty((self.groups, k, k))
         for i, block in enumerate(self.blocks):
             part = (x[block.rows] / self.louder[block.rows][:, None, None]).reshape(-1, k)
@@ -96,11 +104,38 @@ class Whitener:
     def raw_gram(self, x: np.ndarray) -> np.ndarray:
         """(g, k, k) plain inner products, N^2 where x is in N: for gaps."""
         k = x.shape[2]
+        if self._at_once(k):
+            return _inner(x[self._rows].reshape(-1, k), self._starts)
         return np.array([x[b.rows].reshape(-1, k).T @ x[b.rows].reshape(-1, k) for b in self.blocks])
+
+    def _at_once(self, columns: int) -> bool:
+        """Whether all groups are done in one step: many small ones, each with rows."""
+        return columns <= _FEW_COLUMNS and all(len(b.rows) for b in self.blocks)
+
+    @cached_property
+    def _rows(self) -> np.ndarray:
+        return np.concatenate([b.rows for b in self.blocks])
+
+    @cached_property
+    def _starts(self) -> np.ndarray:
+        return 3 * np.cumsum([0, *(len(b.rows) for b in self.blocks[:-1])])
+
+    @cached_property
+    def _sides(self) -> np.ndarray:
+        return np.cumsum([0, *(len(b.halved) for b in self.blocks[:-1])])
+
+    @cached_property
+    def _halved(self) -> sp.csr_matrix:
+        return sp.block_diag([b.halved for b in self.blocks], format="csr")
 
     def counts(self) -> np.ndarray:
         """(g,) thinned contact samples of each group."""
         return np.array([len(b.rows) for b in self.blocks])
+
+
+def _inner(x: np.ndarray, starts: np.ndarray) -> np.ndarray:
+    """(g, k, k) inner products of the columns of x (r, k) over the rows from each start to the next."""
+    return np.add.reduceat(x[:, :, None] * x[:, None, :], starts, axis=0)
 
 
 def nuisance_columns(

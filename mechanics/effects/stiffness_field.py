@@ -30,6 +30,7 @@ from mechanics.smooth_field import (
     kriging,
     lengths_of,
     places_of,
+    views_of,
 )
 
 MODES = 10
@@ -42,7 +43,7 @@ _BASIS = "stiffness_field"
 @dataclass(frozen=True)
 class Basis:
     """places: (c, 3) m. patterns: (MODES, c) of ln E there, those that presses tell of first, 0 for those
-    that are not there. elements: (m, c) by which the places' values give the elements'."""
+    that are not there. elements: (m, MODES) of ln E of the elements, by pattern."""
 
     prior: Prior
     places: np.ndarray
@@ -68,7 +69,7 @@ def _made(places: Places, prior: Prior, answer: np.ndarray, weight: np.ndarray) 
     strongest = np.linalg.svd(seen, full_matrices=False)[2][:MODES]
     patterns = np.zeros((MODES, len(at)))
     patterns[: len(strongest)] = strongest @ root.T
-    return Basis(prior, at, patterns, elements)
+    return Basis(prior, at, patterns, elements @ patterns.T)
 
 
 def _places(places: Places) -> np.ndarray:
@@ -79,7 +80,7 @@ def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     places, basis = scene.places, _basis(scene)
     if not values.any():
         return
-    ratio = np.exp(basis.elements @ (values @ basis.patterns))
+    ratio = np.exp(basis.elements @ values)
     softness = places.under_tip @ (1 / ratio[places.model.mesh.touchable_elements])
     far, dent_ratio = far_of(places, energy_fields(places), ratio, softness)
     settings.far = settings.far - places.far + far
@@ -93,9 +94,8 @@ def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
     shares, at = shares_in_elements(places, answer), _places(places)
     level = np.log(np.clip(1 + misfit.level, 0.2, 5.0))
     touched = places.point[places.first]
-    found = estimate(
-        level, 1 / np.sqrt(misfit.weight), places.place, shares, at, lengths_of(touched, shares.nodes)
-    )
+    views = views_of(shares, at, lengths_of(touched, shares.nodes))
+    found = estimate(level, 1 / np.sqrt(misfit.weight), places.place, views)
     basis = places.stages[_BASIS] = _made(places, found.prior, answer, misfit.weight)
     start = np.linalg.lstsq(basis.patterns.T, found.field.log_ratio, rcond=1e-6)[0]
     return [np.clip(start, *EFFECT.bounds)]

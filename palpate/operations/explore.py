@@ -180,14 +180,17 @@ def _on_phantom(
     explorer = _explorer(asked, goals, reach, robot.instrument, thing.poisson_ratio)
     robot.made = sum(s.kind == "press" for s in explorer.segments)
     steps: list[dict] = []
-    while True:
-        suggestion = explorer.suggest()
-        call.out.say(_line(suggestion, explorer.state))
-        if suggestion.kind == "stop":
-            break
-        state = explorer.add(robot.carry_out(suggestion))
-        explorer.save(asked.output)
-        steps.append({"suggest": suggestion.table(), "state": state.table()})
+    with call.progress("explore") as tell:
+        while True:
+            made = explorer.state.made
+            tell(f"touch {made + 1} of at most {goals.most}", min(made / goals.most, 1.0))
+            suggestion = explorer.suggest()
+            call.out.say(_line(suggestion, explorer.state))
+            if suggestion.kind == "stop":
+                break
+            state = explorer.add(robot.carry_out(suggestion))
+            explorer.save(asked.output)
+            steps.append({"suggest": suggestion.table(), "state": state.table()})
     call.out.say(f"written to {asked.output}: palpate reconstruct {asked.output} -o MODEL makes the model")
     figures = {"steps": steps, **explorer.state.table()}
     if robot.last is not None:

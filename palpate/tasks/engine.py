@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-import shutil
-import sys
+import contextlib
 from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any
 
 from mechanics.errors import OptionError
-from mechanics.progress import Progress
+from mechanics.progress import Progress, silent
+from palpate.output import progress_bar
 from palpate.tasks.driver import Outcome, Status, run
 from palpate.tasks.graph import Graph
 
@@ -47,25 +47,14 @@ def run_with_bar(
     progress: bool | Progress = True,
     outcomes: dict[str, Outcome] | None = None,
 ) -> dict[str, Outcome]:
-    """`driver.run` on the executor that is wanted; progress: a bar where standard error is a terminal, or a
-    function of words and the share that is done."""
-    from tqdm import tqdm
-
-    with (
-        executor(workers, scheduler, memory_bytes) as chosen,
-        tqdm(
-            total=100.0,
-            disable=progress is not True or not sys.stderr.isatty(),
-            bar_format="{percentage:3.0f}% {bar:20} {elapsed} {desc}",
-        ) as bar,
-    ):
+    """`driver.run` on the executor that is wanted; progress: shown on standard error, or a function of words
+    and the share that is done."""
+    with executor(workers, scheduler, memory_bytes) as chosen, contextlib.ExitStack() as shown:
+        told = progress if callable(progress) else silent
+        if progress is True:
+            told = shown.enter_context(progress_bar("", left=False))  # the words say it
 
         def tell(status: Status) -> None:
-            words, share = status.words(), status.fraction
-            if callable(progress):
-                progress(words, share)
-            bar.set_description_str(words[: max(10, shutil.get_terminal_size().columns - 36)], refresh=False)
-            bar.n = 100.0 * share
-            bar.refresh()
+            told(status.words(), status.fraction)
 
         return run(graph, chosen, root, force=force, tell=tell, outcomes=outcomes)

@@ -5,7 +5,16 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from mechanics.smooth_field import Shares, SmoothField, correlation, estimate, kriging, lengths_of, places_of
+from mechanics.smooth_field import (
+    Shares,
+    SmoothField,
+    correlation,
+    estimate,
+    kriging,
+    lengths_of,
+    places_of,
+    views_of,
+)
 
 NOISE = 0.03
 
@@ -29,7 +38,7 @@ def _found(seed: int, sd: float):
     told = np.log(20e3) + truth + rng.normal(0, NOISE, len(points))
     error = np.full(len(points), NOISE)
     site = np.arange(len(points))
-    return estimate(told, error, site, shares, points, lengths_of(points, points)), truth
+    return estimate(told, error, site, views_of(shares, points, lengths_of(points, points))), truth
 
 
 def test_kriging_gives_back_what_it_was_given_and_nothing_far_away():
@@ -72,7 +81,7 @@ def test_a_share_in_the_depth_is_told_by_presses_that_reach_there():
     truth = np.where(np.arange(2 * len(top)) < len(top), 0.3, -0.3)
     told = shares.weight @ truth
     error, site = np.full(len(top), 0.01), np.arange(len(top))
-    found = estimate(told, error, site, shares, shares.nodes, np.array([0.02]))
+    found = estimate(told, error, site, views_of(shares, shares.nodes, np.array([0.02])))
     log = found.field.log_ratio
     assert log[: len(top)].mean() - log[len(top) :].mean() > 0.25
     assert found.sd[: len(top)].mean() < found.sd[len(top) :].mean()

@@ -10,6 +10,7 @@ that were left out.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -17,19 +18,21 @@ from mechanics.effects import stiffness_field
 from mechanics.field_response import shares_of, tips_of
 from mechanics.model import Model
 from mechanics.options import option
-from mechanics.patch import half_space_compliance
 from mechanics.pressed_places import Places
 from mechanics.presses import Presses
-from mechanics.sites import LoadPatch, TouchSites, touch_sites, touch_solver
+from mechanics.sites import TouchSites
 from mechanics.smooth_field import (
     Estimate,
     Shares,
     SmoothField,
+    Views,
     correlation,
     estimate,
     lengths_of,
     places_of,
+    views_of,
 )
+from mechanics.solved_fields import far_in_field
 from mechanics.touch import forces_at
 from reconstruct.steps.s7_modulus.press_fit import LawFit, far_sensitivity, fit_law, press_data
 
@@ -71,6 +74,14 @@ class PressModuli:
     sites: TouchSites
     noise_n: float
 
+    @cached_property
+    def views(self) -> Views:
+        """What the presses see of a field's places: those of all presses, whichever a field is fitted to."""
+        rows = np.flatnonzero(self.usable)
+        touched = tips_of(self.places)[rows[np.unique(self.site[rows], return_index=True)[1]]]
+        elements = self.shares.nodes[: self.shares.weight.shape[1] - len(self.site)]
+        return views_of(self.shares, places_of(touched, elements), lengths_of(touched, elements))
+
     @property
     def usable(self) -> np.ndarray:
         return self.fit.telling
@@ -110,27 +121,21 @@ def fit_field(own: PressModuli, seen: np.ndarray) -> Estimate | None:
     Shares of the compliance are first order in the field: where it is asked for, the presses are fitted anew
     beside it.
     """
-    found = _likeliest(own, seen)
+    found = _likeliest(own, own.fit, seen)
     for _ in range(REFITS):
         if found is None or not asked_for(found):
             break
-        found = _likeliest(replace(own, fit=own.beside(found.field)), seen)
+        found = _likeliest(own, own.beside(found.field), seen)
     return found
 
 
-def _likeliest(own: PressModuli, seen: np.ndarray) -> Estimate | None:
-    seen = seen[own.usable[seen]]
-    sites, first = np.unique(own.site[seen], return_index=True)
-    if len(sites) < LEAST_SITES:
+def _likeliest(own: PressModuli, fit: LawFit, seen: np.ndarray) -> Estimate | None:
+    seen = seen[fit.telling[seen]]
+    if len(np.unique(own.site[seen])) < LEAST_SITES:
         return None
-    touched = tips_of(own.places)[seen[first]]
-    nodes = own.shares.nodes
-    elements = nodes[: own.shares.weight.shape[1] - len(own.site)]
-    shares = Shares(nodes, own.shares.weight[seen])
     return estimate(
-        np.log(own.fit.modulus_pa[seen]), own.fit.relative_error[seen], own.site[seen], shares,
-        places_of(touched, elements), lengths_of(touched, elements),
-    )  # fmt: skip
+        np.log(fit.modulus_pa[seen]), fit.relative_error[seen], own.site[seen], own.views.of(seen)
+    )
 
 
 def asked_for(found: Estimate | None) -> bool:
@@ -174,26 +179,20 @@ class FieldSites:
 
 
 def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> FieldSites:
-    """The sites as they are with a field, solved with it in the elements; None: of one modulus."""
+    """The sites as they are with a field, solved with it in the elements or beside one that was
+    (mechanics.solved_fields); None: of one modulus."""
     if field is None:
         return FieldSites(sites, np.ones(len(sites)))
-    mesh, nu = places.model.mesh.quadratic(), sites.poisson_ratio
-    ratio = np.exp(field.at(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)))
-    points, normals = places.point[places.first], places.normal[places.first]
+    mesh = places.model.mesh
+    log_ratio = field.at(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1))
     # of what is nearer than the load's width the modulus under the tip tells, not a sharper load
-    solver, blunt = touch_solver(mesh, nu, ratio), LoadPatch(tip_radius_m=_BLUNT_M)
-    solved = touch_sites(mesh, points, normals, nu, solver=solver, curvature=0.0, patch=blunt)
-    half = np.array([half_space_compliance(n, nu, solved.patch_width_m) for n in solved.normals])
+    solved, half, width = far_in_field(places, log_ratio)
     under = np.exp(field.at(tips_of(places)))
     # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
     scale = under[:, None, None]
-    far = scale * solved.far[places.place] + (scale - 1) * half[places.place]
-    width = solved.patch_width_m
+    far = scale * solved[places.place] + (scale - 1) * half[places.place]
+    nu = sites.poisson_ratio
     return FieldSites(TouchSites(sites.points, sites.normals, sites.curvature, far, width, nu), under)
-
-
-_BLUNT_M = 1.0
-"""A tip that is wider than every load."""
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ import pytest
 from benchmarks._tissue import tissue
 from diagnose.compare.comparison import CompareOptions, compare_presses
 from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
+from mechanics import solved_fields
 from mechanics.press_making import PathErrors, of_paths
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 
@@ -55,6 +56,31 @@ def test_a_first_touch_that_is_sure_stays():
     np.testing.assert_array_equal(
         as_touched(_spring(presses), presses, "moved"), as_touched(_spring(presses), presses, "read")
     )
+
+
+def test_folds_share_factorisations_and_predict_what_each_alone_would(monkeypatch):
+    """To half a percent of the force; each fold's field is then solved by itself."""
+    slab = tissue(1, raster=5)
+    solved, solve = [], solved_fields.solve_field
+
+    def counted(*given):
+        solved.append(given)
+        return solve(*given)
+
+    monkeypatch.setattr(solved_fields, "solve_field", counted)
+    found = {}
+    for apart in (solved_fields.APART, -1.0):
+        monkeypatch.setattr(solved_fields, "APART", apart)
+        result = compare_presses(slab.presses, slab.model, CompareOptions(folds=4))
+        assert all(field is not None for field in result.fields)
+        found[apart] = result, len(solved)
+        solved.clear()
+    (shared, few), (alone, many) = found.values()
+    assert few < 0.5 * many
+    off = shared.predicted["fem"] - alone.predicted["fem"]
+    assert np.sqrt((off**2).mean()) < 0.005 * np.sqrt((shared.presses.force**2).mean())
+    assert np.abs(off).max() > 0  # they are not the same computation
+    assert shared.rmse_n["fem"] == pytest.approx(alone.rmse_n["fem"], rel=0.02)
 
 
 @pytest.mark.slow
