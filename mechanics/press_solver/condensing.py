@@ -88,24 +88,34 @@ def partial_factor(upper: sp.csr_matrix, kept: np.ndarray) -> pardiso.PartialFac
     return pardiso.PartialFactor(upper, kept) if pardiso.available() else SuperLuFactor(upper, kept)
 
 
-def onto(schur: np.ndarray, load: np.ndarray, few: np.ndarray) -> tuple[np.ndarray, np.ndarray, object]:
-    """(stiffness, load) of the unknowns `few` when the others of a dense system carry nothing more, and what
-    `spread` needs to find those."""
-    others = np.setdiff1d(np.arange(len(schur)), few)
-    if not len(others):
-        return schur, load, None
-    factor = la.cho_factor(schur[np.ix_(others, others)], lower=True, check_finite=False)
-    across = schur[np.ix_(few, others)]
-    solved = la.cho_solve(factor, np.column_stack([across.T, load[others]]), check_finite=False)
-    small = schur[np.ix_(few, few)] - across @ solved[:, :-1]
-    return small, load[few] - across @ solved[:, -1], (few, others, solved)
+class Condensed:
+    """A dense system (k, k) condensed onto its unknowns `few`, ascending, when the others carry nothing more.
 
+    stiffness: (f, f).
+    """
 
-def spread(change: np.ndarray, kept: object, size: int) -> np.ndarray:
-    """(size,) all unknowns of a dense system from those that `onto` kept."""
-    if kept is None:
-        return change
-    few, others, solved = kept  # type: ignore[misc]
-    whole = np.empty(size)
-    whole[few], whole[others] = change, solved[:, -1] - solved[:, :-1] @ change
-    return whole
+    def __init__(self, dense: np.ndarray, few: np.ndarray) -> None:
+        self._few, self._others = few, np.setdiff1d(np.arange(len(dense)), few)
+        self.stiffness = dense[np.ix_(few, few)]
+        if len(self._others):
+            self._across = dense[np.ix_(self._others, few)]
+            self._factor = la.cho_factor(
+                dense[np.ix_(self._others, self._others)], lower=True, check_finite=False
+            )
+            self._solved = la.cho_solve(self._factor, self._across, check_finite=False)
+            self.stiffness = self.stiffness - self._across.T @ self._solved
+
+    def pull(self, load: np.ndarray) -> np.ndarray:
+        """(f,) what a load (k,) is on the few."""
+        if not len(self._others):
+            return load
+        return load[self._few] - self._solved.T @ load[self._others]
+
+    def spread(self, few: np.ndarray, load: np.ndarray) -> np.ndarray:
+        """(k,) all unknowns from the few, under that load."""
+        if not len(self._others):
+            return few
+        whole = np.empty(len(load))
+        own = la.cho_solve(self._factor, load[self._others], check_finite=False)
+        whole[self._few], whole[self._others] = few, own - self._solved @ few
+        return whole

@@ -160,7 +160,8 @@ def _evaluate(
                 mx, my, mz = x / far, y / far, z / far
             deep = radius - (mx * x + my * y + mz * z)
             overlap[k] = deep
-            if not deep > 0.0:
+            # a sticking point may pull: who settles the contact lets go of it once the rest is at peace
+            if not deep > 0.0 and not sticks:
                 continue
             for i in range(3):
                 slid[k, i] = anchor[k, i]

@@ -29,9 +29,10 @@ class PressOptions:
     law: str = "neo-hookean"
     stiffening: float = 0.0
     friction: float | None = None
-    finest: float = 0.35
-    growth: float = 0.4
+    finest: float = 0.5
+    growth: float = 0.8
     zone: float = 3.5
+    reach: float = 1.25
     step: float = 0.1
     penalty: float = 3000.0
     tolerance: float = 2e-4
@@ -123,7 +124,7 @@ class PressSolver:
         near = far(middle) < options.zone * deepest
         if options.law == "linear":
             near[:] = False
-        reach = far(mesh.points[mesh.faces[:, :3]].mean(axis=1)) < 1.6 * deepest + 0.1 * tip
+        reach = far(mesh.points[mesh.faces[:, :3]].mean(axis=1)) < options.reach * deepest + 0.1 * tip
         facing = np.einsum("fi,i->f", _across(mesh), normal) > 0.0
         faces = mesh.faces[reach & facing]
         if near.any():

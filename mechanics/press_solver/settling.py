@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.press_solver.condensing import onto, spread
+from mechanics.press_solver.condensing import Condensed
 from mechanics.press_solver.contact import Grip, SphereContact, Traction
 
 _PASSES, _ITERATIONS = 8, 60
@@ -42,6 +42,7 @@ class Settling:
         self._of_face = unknowns[contact.faces].reshape(-1, 18)
         self._per_face = len(contact.weights[0])
         self.refused = np.zeros(contact.weights.size, dtype=bool)
+        self._known: tuple[np.ndarray, np.ndarray, Condensed] | None = None
 
     def displaced(self, u: np.ndarray) -> np.ndarray:
         """(n, 3) m, displacement of the faces' nodes from that of the kept unknowns (k,)."""
@@ -84,22 +85,30 @@ class Settling:
         trial.relative = before.relative
         few = np.unique(self._of_face[chosen])
         few = few[few >= 0]
-        small, pull, rest = onto(schur, load, few)
+        small = self._onto(schur, few)
+        pull = small.pull(load)
         local = np.full(len(u) + 1, -1)
         local[few] = np.arange(len(few))
         unknowns = local[self._of_face[chosen]]
         x = np.zeros(len(few))
         for _ in range(_PASSES):
-            solved = self._newton(x, small, pull, chosen, few, unknowns, u, centre, trial)
+            solved = self._newton(x, small.stiffness, pull, chosen, few, unknowns, u, centre, trial)
             if solved is None:
                 return None
             x, traction, relative = solved
             if self.contact.friction == 0.0 or not self._arrived(own, traction, relative, before, trial):
                 break
-        result.change = spread(x, rest, len(u))
+        result.change = small.spread(x, load)
         result.load[few], result.force = traction.forces, traction.force
         result.pressing[own] = traction.overlap > 0
         return result
+
+    def _onto(self, schur: np.ndarray, few: np.ndarray) -> Condensed:
+        """The last one where it is of the same tangent and unknowns."""
+        known = self._known
+        if known is None or known[0] is not schur or not np.array_equal(known[1], few):
+            self._known = known = schur, few, Condensed(schur, few)
+        return known[2]
 
     def _newton(
         self, x: np.ndarray, small: np.ndarray, pull: np.ndarray, chosen: np.ndarray, few: np.ndarray,
@@ -128,11 +137,11 @@ class Settling:
     ) -> bool:
         """Anchor the points that began to press in this step where they met the sphere; whether any moved.
 
-        A point that presses while it is free but would pull if it were held slides until the step ends.
+        A held point that pulls is let go; it slides until the step ends, should it press again.
         """
         new = ~before.anchored[own]
         pressing = traction.overlap > 0
-        pulls = new & trial.anchored[own] & ~pressing
+        pulls = trial.anchored[own] & ~pressing
         self.refused[own[pulls]] = True
         trial.anchored[own[pulls]] = False
         come = np.flatnonzero(new & pressing & ~self.refused[own])
