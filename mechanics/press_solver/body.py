@@ -25,9 +25,10 @@ class Body:
         ratio: np.ndarray,
         near: np.ndarray,
         kept_nodes: np.ndarray,
+        coupled: bool = False,
     ) -> None:
         def solid(cells: np.ndarray, law: float) -> Solid:
-            return Solid(mesh.points, mesh.cells[cells], poisson_ratio, law, ratio[cells])
+            return Solid(mesh.points, mesh.cells[cells], poisson_ratio, law, ratio[cells], coupled)
 
         self._count = len(mesh.points)
         free = ~mesh.fixed

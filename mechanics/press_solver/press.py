@@ -28,6 +28,7 @@ class PressOptions:
 
     law: str = "neo-hookean"
     stiffening: float = 0.0
+    coupled: bool = False
     friction: float | None = None
     finest: float = 0.5
     growth: float = 0.8
@@ -130,7 +131,7 @@ class PressSolver:
         if near.any():
             near |= np.isin(mesh.cells, faces).any(axis=1)
         nodes = np.unique(faces)
-        body = Body(mesh, self.poisson_ratio, options.stiffening, self._ratio[mesh.parent], near, nodes)
+        body = Body(mesh, self.poisson_ratio, options.stiffening, self._ratio[mesh.parent], near, nodes, options.coupled)
         local = np.full(len(mesh.points), -1)
         local[nodes] = np.arange(len(nodes))
         contact = SphereContact(

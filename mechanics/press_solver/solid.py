@@ -1,10 +1,14 @@
 """A nearly incompressible solid at finite strain: quadratic tetrahedra with mean dilatation.
 
-Total Lagrangian, in F = 1 + du/dX and the first Piola-Kirchhoff stress. Energy W(I1bar) + K U(theta): the
-isochoric part is the family of mechanics.effects.strain_stiffening, 2 dW/dI1bar = mu h(I1bar - 3); theta is
-an element's mean volume ratio (Nagtegaal, Parks & Rice 1974; Simo, Taylor & Pister 1985) and U = (theta^2 - 1)
-/ 4 - ln(theta) / 2. Its tangent at rest is the small-strain solid. Lengths m, stresses in units of the global
-Young's modulus.
+Total Lagrangian, in F = 1 + du/dX and the first Piola-Kirchhoff stress. Theta is an element's mean volume
+ratio (Nagtegaal, Parks & Rice 1974; Simo, Taylor & Pister 1985), h the family of
+mechanics.effects.strain_stiffening. Two energies, alike where nothing changes its volume:
+
+    split      W(I1bar) + K (theta^2 / 4 - ln(theta) / 2), 2 dW/dI1bar = mu h(I1bar - 3)
+    coupled    W(I1) - mu ln J + lambda ln(theta)^2 / 2, 2 dW/dI1 = mu h(I1 - 3), as in mechanics/dent_*.csv
+
+The tangent of both at rest is the small-strain solid. Lengths m, stresses in units of the global Young's
+modulus.
 """
 
 from __future__ import annotations
@@ -36,7 +40,7 @@ class Response:
 class Solid:
     """Elements of a body: points (n, 3) m, cells (m, 10), their modulus over the global one (m,), or None.
 
-    stiffening: r of the family, 0 neo-Hookean.
+    stiffening: r of the family, 0 neo-Hookean. coupled: which of the two energies.
     """
 
     def __init__(
@@ -46,9 +50,10 @@ class Solid:
         poisson_ratio: float,
         stiffening: float = 0.0,
         ratio: np.ndarray | None = None,
+        coupled: bool = False,
     ) -> None:
         self.cells = np.ascontiguousarray(cells)
-        self.stiffening = float(stiffening)
+        self.stiffening, self.coupled = float(stiffening), coupled
         slopes = np.array([shape_derivatives(2, at) for at in GAUSS])
         slopes = slopes[..., 1:] - slopes[..., :1]
         jacobian = np.einsum("qax,eay->eqxy", slopes, points[cells])
@@ -58,7 +63,7 @@ class Solid:
         )
         lam, mu = lame_parameters(1.0, poisson_ratio)
         ratio = np.ones(len(cells)) if ratio is None else np.asarray(ratio, dtype=float)
-        self.shear, self.bulk = mu * ratio, (lam + 2 * mu / 3) * ratio
+        self.shear, self.bulk = mu * ratio, (lam if coupled else lam + 2 * mu / 3) * ratio
 
     def __len__(self) -> int:
         return len(self.cells)
@@ -79,7 +84,7 @@ class Solid:
         given = np.empty(0) if pressure is None else pressure
         energy = _respond(
             self.cells, displacement, self.gradients, self.weights, self.shear, self.bulk, self.stiffening,
-            given, tangent, np.empty((4, 3, 3)), np.empty((10, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, 3)),
+            self.coupled, given, tangent, np.empty((4, 3, 3)), np.empty((10, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, 3)),
             forces, stiffness, own, slope, growth,
         )  # fmt: skip
         if not np.isfinite(energy):
@@ -89,7 +94,7 @@ class Solid:
 
 @kernel
 def _respond(
-    cells, u, gradients, weights, shear, bulk, ratio, given, tangent, f, h, moduli, half,
+    cells, u, gradients, weights, shear, bulk, ratio, coupled, given, tangent, f, h, moduli, half,
     forces, stiffness, pressure, slope, growth,
 ):  # fmt: skip
     """Energy; nan where an element is turned inside out. f, h, moduli, half: room to work in."""
@@ -111,9 +116,15 @@ def _respond(
             volume += weights[e, q]
             deformed += weights[e, q] * det
         theta = deformed / volume
-        pressure[e] = bulk[e] * 0.5 * (theta - 1 / theta)
-        slope[e] = bulk[e] * 0.5 * (1 + 1 / (theta * theta)) / volume
-        total += volume * bulk[e] * 0.5 * (0.5 * (theta * theta - 1) - np.log(theta))
+        log = np.log(theta)
+        if coupled:
+            pressure[e] = bulk[e] * log / theta
+            slope[e] = bulk[e] * (1 - log) / (theta * theta) / volume
+            total += volume * bulk[e] * 0.5 * log * log
+        else:
+            pressure[e] = bulk[e] * 0.5 * (theta - 1 / theta)
+            slope[e] = bulk[e] * 0.5 * (1 + 1 / (theta * theta)) / volume
+            total += volume * bulk[e] * 0.5 * (0.5 * (theta * theta - 1) - log)
         believed = given[e] if given.shape[0] else pressure[e]
         for r in range(30):
             forces[e, r] = 0.0
@@ -129,7 +140,7 @@ def _respond(
             for i in range(3):
                 for j in range(3):
                     first += f[q, i, j] * f[q, i, j]
-            scale = det ** (-2.0 / 3.0)
+            scale = 1.0 if coupled else det ** (-2.0 / 3.0)
             excess = scale * first - 3.0
             if ratio > 0.0:
                 hard = np.exp(2 * ratio * excess)
@@ -144,17 +155,21 @@ def _respond(
                 hard, harder, energy = 1.0, 0.0, excess
             mu = shear[e]
             total += w * 0.5 * mu * energy
-            # d[i, j] = half the derivative of I1bar, kept in h[3:6]
+            # half the derivative of I1 or I1bar, kept in h[3:6]
             for i in range(3):
                 for j in range(3):
-                    h[3 + i, j] = scale * (f[q, i, j] - first / 3 * h[i, j])
+                    h[3 + i, j] = scale * (f[q, i, j] - (0.0 if coupled else first / 3 * h[i, j]))
+            around = 0.0  # what the shear modulus adds to the pressure
+            if coupled:
+                total -= w * mu * np.log(det)
+                around = -mu / det
             for a in range(10):
                 for i in range(3):
                     push, grow = 0.0, 0.0
                     for j in range(3):
                         push += h[3 + i, j] * g[a, j]
                         grow += h[i, j] * g[a, j]
-                    forces[e, 3 * a + i] += w * mu * hard * push
+                    forces[e, 3 * a + i] += w * (mu * hard * push + around * det * grow)
                     growth[e, 3 * a + i] += w * det * grow
             if tangent:
                 p = believed * det
@@ -163,9 +178,12 @@ def _respond(
                     for j in range(3):
                         for k in range(3):
                             for l in range(3):
-                                value = (c * first / 3 - p) * h[i, l] * h[k, j]
-                                value += (c * 2 / 9 * first + p) * h[i, j] * h[k, l]
-                                value -= c * 2 / 3 * (h[i, j] * f[q, k, l] + f[q, i, j] * h[k, l])
+                                value = p * (h[i, j] * h[k, l] - h[i, l] * h[k, j])
+                                if coupled:
+                                    value += mu * h[i, l] * h[k, j]
+                                else:
+                                    value += c * first * (h[i, l] * h[k, j] / 3 + h[i, j] * h[k, l] * 2 / 9)
+                                    value -= c * 2 / 3 * (h[i, j] * f[q, k, l] + f[q, i, j] * h[k, l])
                                 value += 2 * mu * harder * h[3 + i, j] * h[3 + k, l]
                                 if i == k and j == l:
                                     value += c
