@@ -33,8 +33,8 @@ class PressOptions:
     finest: float = 0.5
     growth: float = 0.8
     zone: float = 3.5
-    reach: float = 1.25
-    step: float = 0.1
+    reach: float = 1.1
+    step: float = 0.2
     penalty: float = 3000.0
     tolerance: float = 2e-4
 
@@ -92,15 +92,24 @@ class PressSolver:
         count, scale = len(centres), self.young_modulus_pa
         force, radius, energy = np.full((count, 3), np.nan), np.full(count, np.nan), np.full(count, np.nan)
         for k, centre in enumerate(centres):
-            before = path.state.centre
-            steps = max(1, int(np.ceil(np.linalg.norm(centre - before) / (self.options.step * self.tip_radius_m))))
-            ways = [before + share * (centre - before) for share in np.arange(1, steps + 1) / steps]
-            if not all(path.advance(way) for way in ways):
+            if not self._driven(path, start, centre):
                 break
             state = path.state
             force[k], energy[k] = scale * state.force, scale * state.energy
             radius[k] = self._contact_radius(settling, path, normal)
         return PressSolution(force, radius, energy, np.isfinite(energy))
+
+    def _driven(self, path: Path, start: np.ndarray, centre: np.ndarray) -> bool:
+        """Drive the sphere straight to `centre` in steps that grow with what it has travelled; whether it got
+        there. Where a point meets the sphere is found to first order in the step."""
+        least, most = 0.3 * self.options.step * self.tip_radius_m, self.options.step * self.tip_radius_m
+        while (left := float(np.linalg.norm(centre - path.state.centre))) > 1e-12:
+            gone = float(np.linalg.norm(path.state.centre - start))
+            step = min(max(0.4 * gone, least), most)
+            share = 1 / np.ceil(left / step - 1e-6)
+            if not path.advance(path.state.centre + share * (centre - path.state.centre)):
+                return False
+        return True
 
     def _prepared(
         self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, centres: np.ndarray, start: np.ndarray

@@ -10,7 +10,7 @@ import numpy as np
 from mechanics.press_solver.condensing import Condensed
 from mechanics.press_solver.contact import Grip, SphereContact, Traction
 
-_PASSES, _ITERATIONS = 8, 60
+_PASSES, _ITERATIONS = 3, 60
 _SETTLED = 1e-9
 """Of the residual over the contact's forces."""
 _REACH = 0.12
@@ -150,7 +150,7 @@ class Settling:
         shift = np.linalg.norm(met - trial.anchor[points], axis=1) * trial.anchored[points]
         fresh = ~trial.anchored[points]
         trial.anchored[points], trial.anchor[points] = True, met
-        far = 1e-5 * self.contact.radius
+        far = 1e-4 * self.contact.radius
         return bool(pulls.any() or fresh.any() or (shift > far).any())
 
     def kept_grip(self, u: np.ndarray, centre: np.ndarray, found: Settled) -> Grip:
