@@ -153,3 +153,96 @@ class Pardiso:
     def __del__(self) -> None:
         if not sys.is_finalizing() and getattr(self, "_handle", None) is not None:
             self.free()
+
+
+class PartialFactor:
+    """Symmetric matrices of one pattern, factorised with k unknowns kept last: Schur complement and halves.
+
+    upper: (n, n) upper triangle with its diagonal, CSR, sorted. kept: (k,) indices, ascending. The
+    fill-reducing ordering is found once, here; `refresh` serves every later matrix of the pattern.
+    """
+
+    def __init__(self, upper: sp.csr_matrix, kept: np.ndarray) -> None:
+        self.size, self._kept = upper.shape[0], np.asarray(kept)
+        self._rows = upper.indptr.astype(np.int32)
+        self._columns = upper.indices.astype(np.int32)
+        self._solvers: dict[int, _Phases] = {}
+        self._now: _Phases | None = None
+
+    def refresh(self, values: np.ndarray) -> np.ndarray:
+        """Factorise the matrix of these values (nnz,); the Schur complement (k, k) on the kept unknowns.
+
+        Cholesky where the matrix is positive definite, LDL' where it is not.
+        """
+        try:
+            return self._refresh(values, _DEFINITE)
+        except ArithmeticError:
+            return self._refresh(values, _INDEFINITE)
+
+    def _refresh(self, values: np.ndarray, kind: int) -> np.ndarray:
+        if kind not in self._solvers:
+            self._solvers[kind] = _Phases(kind, self._rows, self._columns, self._kept)
+        self._now = self._solvers[kind]
+        return self._now.factorise(values)
+
+    def forward(self, right: np.ndarray) -> np.ndarray:
+        """(n,) what `backward` needs of b (n,); its kept entries are b_k - A_ki A_ii^-1 b_i."""
+        assert self._now is not None, "refresh comes first"
+        return self._now.solve(331, right)
+
+    def backward(self, half: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """x (n,) whose kept entries are `kept` (k,), from the result of `forward`."""
+        assert self._now is not None, "refresh comes first"
+        if self._now.kind == _INDEFINITE:
+            half = self._now.solve(332, half)
+        half = half.copy()
+        half[self._kept] = kept
+        return self._now.solve(333, half)
+
+
+class _Phases:
+    """One handle of the library for one kind of matrix; it keeps its ordering and the last factor."""
+
+    def __init__(self, kind: int, rows: np.ndarray, columns: np.ndarray, kept: np.ndarray) -> None:
+        self.kind, self._rows, self._columns = kind, rows, columns
+        self.size, self._count = len(rows) - 1, len(kept)
+        self._handle, self._iparm = np.zeros(64, dtype=np.int64), np.zeros(64, dtype=np.int32)
+        # values of our own, nested dissection, perturbed pivots, Schur complement with factors, zero-based
+        for place, value in ((0, 1), (1, 2), (9, 13 if kind == _DEFINITE else 8), (34, 1), (35, 2)):
+            self._iparm[place] = value
+        self._perm = np.zeros(self.size, dtype=np.int32)
+        self._perm[kept] = 1
+        self._values = np.ones(len(columns))
+        self._call(11, np.zeros(1), np.zeros(1))
+
+    def factorise(self, values: np.ndarray) -> np.ndarray:
+        self._values = np.ascontiguousarray(values, dtype=np.float64)
+        schur = np.zeros((self._count, self._count))
+        self._call(22, np.zeros(self.size), schur)
+        return 0.5 * (schur + schur.T)
+
+    def solve(self, phase: int, right: np.ndarray) -> np.ndarray:
+        right, solution = np.ascontiguousarray(right, dtype=np.float64), np.zeros(self.size)
+        self._call(phase, right, solution)
+        return solution
+
+    def _call(self, phase: int, right: np.ndarray, solution: np.ndarray) -> None:
+        def integer(value: int) -> object:
+            return ctypes.byref(ctypes.c_int32(value))
+
+        def pointer(array: np.ndarray) -> ctypes.c_void_p:
+            return ctypes.c_void_p(array.ctypes.data)
+
+        error = ctypes.c_int32(0)
+        _mkl().pardiso(
+            pointer(self._handle), integer(1), integer(1), integer(self.kind), integer(phase),
+            integer(self.size), pointer(self._values), pointer(self._rows), pointer(self._columns),
+            pointer(self._perm), integer(1), pointer(self._iparm), integer(0), pointer(right),
+            pointer(solution), ctypes.byref(error),
+        )  # fmt: skip
+        if error.value:
+            raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")
+
+    def __del__(self) -> None:
+        if not sys.is_finalizing() and self._handle.any():
+            self._call(-1, np.zeros(1), np.zeros(1))

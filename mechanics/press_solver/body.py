@@ -1,0 +1,126 @@
+"""A body in two zones: near a tip at finite strain, the rest linear and condensed onto what joins them."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from mechanics.press_solver.condensing import Assembly, partial_factor
+from mechanics.press_solver.graded_mesh import GradedMesh
+from mechanics.press_solver.solid import Response, Solid
+
+
+class Body:
+    """A graded mesh with a material, condensed as far as it can be.
+
+    near: (m,) bool, the cells that are solved at finite strain; none of them: the small-strain solid.
+    kept_nodes: (c,) nodes that a tip may press, ascending; where cells are near, of these.
+    Displacements are those of the free unknowns (size,); `kept` tells which of these a tip may press.
+    """
+
+    def __init__(
+        self,
+        mesh: GradedMesh,
+        poisson_ratio: float,
+        stiffening: float,
+        ratio: np.ndarray,
+        near: np.ndarray,
+        kept_nodes: np.ndarray,
+        coupled: bool = False,
+    ) -> None:
+        def solid(cells: np.ndarray, law: float) -> Solid:
+            return Solid(mesh.points, mesh.cells[cells], poisson_ratio, law, ratio[cells], coupled)
+
+        self._count = len(mesh.points)
+        free = ~mesh.fixed
+        mine = np.unique(mesh.cells[near]) if near.any() else kept_nodes
+        self.number = _numbered(mine[free[mine]], self._count)
+        self.size = int(self.number.max()) + 1
+        self._free = np.flatnonzero(self.number >= 0)
+        kept = self.number.reshape(-1, 3)[kept_nodes].ravel()
+        self.kept = kept[kept >= 0]
+        self._near = solid(np.flatnonzero(near), stiffening)
+        far = np.flatnonzero(~near)
+        shared = np.zeros(0, dtype=np.int64)
+        block = np.zeros((0, 0))
+        if len(far):
+            rest = np.unique(mesh.cells[far])
+            joint = np.intersect1d(rest, mine) if near.any() else kept_nodes
+            joint = joint[free[joint]]
+            shared = self.number.reshape(-1, 3)[joint].ravel()
+            block = self._condensed(mesh, solid(far, 0.0), rest[free[rest]], joint)
+        self._shared, self._block = shared, block
+        if len(self._near):
+            self._assembly = Assembly(self._near.cells, self.number, shared)
+            self._assembly.add_block(block)
+            self._factor = partial_factor(self._assembly.pattern, self.kept)
+        self._schur: np.ndarray | None = None if len(self._near) else block
+
+    def _condensed(self, mesh: GradedMesh, rest: Solid, nodes: np.ndarray, joint: np.ndarray) -> np.ndarray:
+        number = _numbered(nodes, self._count)
+        assembly = Assembly(rest.cells, number)
+        response = rest.respond(np.zeros_like(mesh.points), tangent=True)
+        assert response is not None
+        factor = partial_factor(assembly.pattern, number.reshape(-1, 3)[joint].ravel())
+        return factor.refresh(assembly.values(response.stiffness))
+
+    @property
+    def linear(self) -> bool:
+        """Whether every cell is at small strain: its stiffness never changes."""
+        return not len(self._near)
+
+    def whole(self, u: np.ndarray) -> np.ndarray:
+        """(n, 3) m of all nodes of the mesh from the unknowns (size,); zero elsewhere."""
+        all_of_it = np.zeros(3 * self._count)
+        all_of_it[self._free] = u
+        return all_of_it.reshape(-1, 3)
+
+    def resist(self, u: np.ndarray) -> tuple[np.ndarray, float, Response | None] | None:
+        """(resisting forces (size,), stored energy, the elements' answer), in units of Young's modulus; None
+        where an element is turned inside out."""
+        far = self._block @ u[self._shared]
+        forces, energy = np.zeros(self.size), 0.5 * float(u[self._shared] @ far)
+        forces[self._shared] = far
+        if self.linear:
+            return forces, energy, None
+        response = self._near.respond(self.whole(u))
+        if response is None:
+            return None
+        return forces + self._assembly.gathered(response.forces), energy + response.energy, response
+
+    def foretold_pressure(self, response: Response | None, step: np.ndarray) -> np.ndarray | None:
+        """(m,) what Newton's method makes of the elements' pressures in a step (size,) of the unknowns."""
+        if response is None:
+            return None
+        local = self.whole(step)[self._near.cells].reshape(-1, 30)
+        return response.pressure + response.slope * np.einsum("er,er->e", response.growth, local)
+
+    def linearise(self, u: np.ndarray, pressure: np.ndarray | None) -> bool:
+        """Take the tangent at u, with these pressures in it; whether it could be taken."""
+        if self.linear:
+            return True
+        response = self._near.respond(self.whole(u), tangent=True, pressure=pressure)
+        if response is None:
+            return False
+        self._schur = self._factor.refresh(self._assembly.values(response.stiffness))
+        return True
+
+    @property
+    def schur(self) -> np.ndarray:
+        """(k, k) stiffness of the kept unknowns, of the last tangent."""
+        assert self._schur is not None, "linearise comes first"
+        return self._schur
+
+    def forward(self, right: np.ndarray) -> np.ndarray:
+        """See pardiso.PartialFactor."""
+        return right if self.linear else self._factor.forward(right)
+
+    def backward(self, half: np.ndarray, kept: np.ndarray) -> np.ndarray:
+        """See pardiso.PartialFactor."""
+        return kept if self.linear else self._factor.backward(half, kept)
+
+
+def _numbered(nodes: np.ndarray, count: int) -> np.ndarray:
+    """(3 count,) numbers of the unknowns of `nodes`, in their order; -1 elsewhere."""
+    number = np.full((count, 3), -1)
+    number[nodes] = np.arange(3 * len(nodes)).reshape(-1, 3)
+    return number.ravel()
