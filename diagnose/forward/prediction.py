@@ -8,6 +8,7 @@ elastic object -> what follows the path (softening, memory, adhesion) -> what th
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -34,6 +35,8 @@ class Forward:
 
     touches: Presses
     places: Places
+    modulus_fitted: ClassVar[bool] = True
+    """Whether a fit moves the modulus; else it is what `ideal` says."""
 
     def __post_init__(self) -> None:
         self._kept: dict[int, np.ndarray] = {}

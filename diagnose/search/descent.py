@@ -94,7 +94,8 @@ class Descent:
         """(n, 3, k) of the prediction, by forward differences."""
         base = self.forward.touches.local_force - residual
         columns = np.empty((*residual.shape, len(values)))
-        for i in range(len(values)):
+        columns[:, :, 0] = 0.0
+        for i in range(0 if self.forward.modulus_fitted else 1, len(values)):
             moved = values.copy()
             h = self.step[i] if values[i] + self.step[i] <= self.high[i] else -self.step[i]
             moved[i] += h
