@@ -35,8 +35,8 @@ class Forward:
 
     touches: Presses
     places: Places
-    modulus_fitted: ClassVar[bool] = True
-    """Whether a fit moves the modulus; else it is what `ideal` says."""
+    measured: ClassVar[bool] = True
+    """Whether a sensor read the forces; a simulator's modulus and surface are known: no fit moves them."""
 
     def __post_init__(self) -> None:
         self._kept: dict[int, np.ndarray] = {}

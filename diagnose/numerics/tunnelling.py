@@ -13,7 +13,7 @@ INSIDE = 0.5
 
 
 def _see(signal: Signal) -> Seen:
-    left, through = signal.left.copy(), 0
+    left, through, never = signal.left.copy(), 0, 0
     usual = np.median([np.linalg.norm(signal.force[part], axis=1).max(initial=0.0) for part in signal.parts])
     for part in signal.parts:
         size, depth, t = np.linalg.norm(signal.force[part], axis=1), signal.depth[part], signal.t[part]
@@ -22,15 +22,21 @@ def _see(signal: Signal) -> Seen:
         silent = (size < LEAST_SHARE * min(size.max(), usual)) & (depth > INSIDE * depth.max()) & (depth > 0)
         if not size.max() > 0:
             silent = (depth > INSIDE * depth.max()) & (depth > 0) & bool(usual > 0)
-        lasting = [(a, b) for a, b in runs(silent) if t[b - 1] - t[a] > LONGEST_S]
+        # a force that comes late comes all the same, and a tip between nodes is felt at its deepest
+        felt = np.flatnonzero(size > LEAST_SHARE * usual)
+        over, deepest = int(felt[-1]) if len(felt) else -1, int(np.argmax(depth))
+        lasting = [
+            (a, b) for a, b in runs(silent) if t[b - 1] - t[a] > LONGEST_S and over < a and deepest < b
+        ]
         if lasting:
             through += 1
+            never += over < 0
             # from where it fell through until it has come out again
             left[part.start + lasting[0][0] : part.stop] = True
     if not through:
         return Seen(signal, {})
     mended = Signal(signal.t, signal.force, signal.depth, signal.parts, left)
-    return Seen(mended, {"share": through / len(signal.parts)})
+    return Seen(mended, {"share": through / len(signal.parts), "never_felt": never / len(signal.parts)})
 
 
 EFFECT = NumericalEffect(

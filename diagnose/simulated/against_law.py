@@ -7,6 +7,7 @@ modulus is stated, not fitted; its noise is not a sensor's but what our own law 
 from __future__ import annotations
 
 import dataclasses
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -17,6 +18,7 @@ from diagnose.numerics.registry import numericals
 from diagnose.options import AttributionOptions, NuisanceOptions
 from diagnose.search.attribution import Attribution, attribute
 from diagnose.search.descent import Descent
+from diagnose.search.detectable import SEEN
 from diagnose.search.evidence import Search
 from diagnose.search.fit import Fit, settings_of
 from diagnose.search.intervals import parameter_intervals
@@ -30,7 +32,7 @@ from mechanics.progress import Progress, silent
 LEAST_SHARE = 0.02
 """Of the typical force, below which a numerical effect is not named: our own law is no better everywhere."""
 OWN_ERRORS = NuisanceOptions(
-    onset_m=0.15e-3, site_stiffness=0.03, press_stiffness=0.005, law=0.03, floor_share=0.015, floor_n=1e-3
+    onset_m=0.1e-3, site_stiffness=0.03, press_stiffness=0.005, law=0.03, floor_share=0.015, floor_n=1e-3
 )
 """One standard deviation of what our law misses on the surface that a simulator was given too."""
 COMMON_ERROR = 0.05
@@ -39,12 +41,13 @@ COMMON_ERROR = 0.05
 
 @dataclass(frozen=True)
 class Numerics:
-    """named: strongest first. candidates: not told apart from them. keys: of every effect that was looked at,
-    by name; intervals: at 95 %. probability, gain, confidence_set_p by name. force: by name the (n, 3) N that
-    it adds to the law's force, of a fit that has not seen the place; "all": of those named together. law:
-    (n, 3) N, our law at the stated parameters; with_numerics: with what was named; local frames. strain:
-    finite strain, where the simulator has it. onset: (p,) m, by how much earlier it meets each press's
-    surface. remainder: something is left that nothing here explains. reasons: in words."""
+    """named: strongest first. candidates: not told apart from them.
+
+    By name: keys of every effect that was looked at; intervals at 95 %; probability, gain, confidence_set_p;
+    detectable_n, N rms from which these presses show it at all; force, the (n, 3) N that it adds to the law's
+    force, of a fit that has not seen the place ("all": of those named together). law: (n, 3) N, our law at
+    the stated parameters; with_numerics: with what was named; local frames. strain: finite strain, where the
+    simulator has it. remainder: something is left that nothing here explains. reasons: in words."""
 
     named: tuple[str, ...]
     candidates: tuple[str, ...]
@@ -55,10 +58,10 @@ class Numerics:
     law: np.ndarray
     with_numerics: np.ndarray
     strain: tuple[Effect, ...]
-    onset: np.ndarray
     remainder: bool
     reasons: tuple[str, ...]
     gain: dict[str, float] = field(default_factory=dict)
+    detectable_n: dict[str, float] = field(default_factory=dict)
     confidence_set_p: dict[str, float] = field(default_factory=dict)
     found: Attribution | None = None
 
@@ -88,7 +91,7 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
     counts = search.whitener.counts()
     kept = never_worse(names, plain, after, counts, search.whitener.explained)
     best = _with(search, found, kept.names)
-    law, together, onset = _held_out(search, best.found)
+    law, together = _held_out(search, best.found)
     force = {"all": together - law}
     keys, intervals, probability, gain = {}, {}, {}, {}
     rng = np.random.default_rng(0)
@@ -98,7 +101,7 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
             force[name] = force["all"]
         else:
             # an effect alone, on the law: what mending it alone would take away
-            alone, with_it, _ = _held_out(search, score.candidate.found, folds=name in kept.names)
+            alone, with_it = _held_out(search, score.candidate.found, folds=name in kept.names)
             force[name] = with_it - alone
         keys[name] = score.effect.report(fitted.of(name), forward, fitted.modulus)
         intervals[name] = parameter_intervals(fitted, name, forward, search.dof, rng)
@@ -118,12 +121,34 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
             f"the simulator's force is {1e3 * missed:.0f} mN from our law even with what is named: something "
             "else is in its numerics, or it was given other parameters than those stated"
         )
+    limits = {n: max(x, LEAST_SHARE * typical) for n, x in _limits(search, found, tried).items()}
     forward.touches = t
     rivals = tuple(r for r in found.rivals if r not in kept.names)
     return Numerics(
         kept.names, rivals if kept.names else (), keys, intervals, probability, force, law, together,
-        law_of(best.found), onset, remainder, tuple(reasons), gain, found.confidence_set_p, found,
+        law_of(best.found), remainder, tuple(reasons), gain, limits,
+        found.confidence_set_p, found,
     )  # fmt: skip
+
+
+def _limits(search: Search, found: Attribution, tried: Sequence[Effect]) -> dict[str, float]:
+    """{name: N rms over contact samples} of the smallest change by an effect that shows beside what our own
+    law may miss, of the form of its starts that shows best."""
+    forward, base = search.forward, found.base.found
+    before = np.nan_to_num(forward.predict(settings_of(forward, base.effects, base.values, base.onset)))
+    limits = {}
+    for effect in tried:
+        shown = []
+        for start in effect.starts():
+            moved = np.where(start == effect.ideal, start + [10 * p.step for p in effect.parameters], start)
+            settings = settings_of(forward, base.effects, base.values, base.onset)
+            effect.act(settings, moved, forward)
+            change = np.nan_to_num(forward.predict(settings)) - before
+            size = np.sqrt((change[forward.touches.counted] ** 2).sum(axis=1).mean())
+            seen = np.sqrt(search.whitener.gram(change[:, :, None]).sum())
+            shown.append(float(size * SEEN / max(seen, 1e-12)))
+        limits[effect.name] = min(shown)
+    return limits
 
 
 def _within_common_error(found: Attribution) -> tuple[str, ...]:
@@ -166,23 +191,21 @@ def _without(search: Search, found: Fit, fold: np.ndarray) -> Fit:
     )
 
 
-def _held_out(search: Search, found: Fit, *, folds: bool = True) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """((n, 3) N our law alone, (n, 3) N with the effects of a fit, (p,) m first touches): at each place of a
-    fit that has not seen it; folds: else of the one fit."""
+def _held_out(search: Search, found: Fit, *, folds: bool = True) -> tuple[np.ndarray, np.ndarray]:
+    """((n, 3) N our law alone, (n, 3) N with the effects of a fit): at each place of a fit that has not seen
+    it; folds: else of the one fit."""
     forward = search.forward
     t = forward.touches
     law, together = np.zeros_like(t.local_force), np.zeros_like(t.local_force)
-    onset = np.zeros(len(t))
     base = law_of(found)
     for fold in neighbours(t) if folds else [np.arange(t.sites)]:
         again = _without(search, found, fold) if folds else found
         with_it = forward.predict(settings_of(forward, again.effects, again.values, again.likeliest))
-        plainly = settings_of(forward, base, again.values[:1], again.likeliest)
-        own = np.isin(t.site, fold)
-        rows = own[t.press]
-        together[rows], onset[own] = np.nan_to_num(with_it)[rows], again.likeliest[own]
+        plainly = settings_of(forward, base, again.values[:1])
+        rows = np.isin(t.site, fold)[t.press]
+        together[rows] = np.nan_to_num(with_it)[rows]
         law[rows] = np.nan_to_num(forward.predict(plainly))[rows]
-    return law, together, onset
+    return law, together
 
 
 def seen_in_samples(signal: Signal) -> tuple[Signal, dict[str, tuple[NumericalEffect, dict[str, float]]]]:

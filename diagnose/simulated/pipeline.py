@@ -148,18 +148,15 @@ def _numerics(sides: _Sides, rules: AttributionOptions, progress: Progress) -> N
 def _with_fallen(sides: _Sides, found: Numerics, held: np.ndarray) -> Numerics:
     """The same over all presses: those that the tip fell through have our law's force with what was named."""
     forward, t = sides.forward, sides.forward.touches
-    onset = np.zeros(len(t))
-    onset[held] = found.onset
     rows = t.rows(np.flatnonzero(held))
-    whole = dataclasses.replace(found, onset=onset)
-    law = law_at(forward, forward.stated, whole)
+    law = law_at(forward, forward.stated, found)
     together = law.copy()
     together[rows] = found.with_numerics
     force = {}
     for name, own in found.force.items():
         force[name] = np.zeros_like(law)
         force[name][rows] = own
-    return dataclasses.replace(whole, law=law, with_numerics=together, force=force)
+    return dataclasses.replace(found, law=law, with_numerics=together, force=force)
 
 
 def _with_seen(sides: _Sides, found: Numerics) -> Numerics:
@@ -178,9 +175,13 @@ def _with_seen(sides: _Sides, found: Numerics) -> Numerics:
     strength = {n: float((found.force[n][t.counted] ** 2).sum()) for n in found.named}
     strength |= {n: float((parts[n][t.counted] ** 2).sum()) for n in named}
     order = tuple(sorted(strength, key=lambda n: -strength[n]))
+    # a tip that is never felt at a place may go between nodes there
+    between = "tunnelling" in named and sides.seen["tunnelling"]["never_felt"] > 0
+    rivals = ("contact_nodes",) if between and "contact_nodes" not in order else ()
     return dataclasses.replace(
         found,
         named=order,
+        candidates=(*found.candidates, *(r for r in rivals if r not in found.candidates)),
         keys={**found.keys, **sides.seen},
         probability={**found.probability, **{n: 1.0 if n in named else 0.0 for n in sides.seen}},
         force={**found.force, **{n: parts[n] for n in sides.seen}, "all": all_of},
@@ -336,6 +337,7 @@ def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
             numerics.keys[name], gain=numerics.gain.get(name, 0.0),
             intervals=numerics.intervals.get(name, {}),
             confidence_set_p=numerics.confidence_set_p.get(name, float("nan")),
+            detectable_n=numerics.detectable_n.get(name, float("nan")),
         )
         for name in NAMES if name in numerics.keys and name in numerics.force
     ]  # fmt: skip

@@ -95,7 +95,7 @@ class StatedForward(Forward):
     """The forward model of a simulation: its ideal is what the simulator was given, whatever a fit would take
     for the modulus, so that what differs from it is the simulator's own."""
 
-    modulus_fitted: ClassVar[bool] = False
+    measured: ClassVar[bool] = False
     stated: Stated = field(default_factory=lambda: Stated(1.0, 0.49, STICKS, 1.0))
 
     def ideal(self, modulus: float) -> Settings:
