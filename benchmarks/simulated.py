@@ -23,7 +23,7 @@ import numpy as np
 from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
-from diagnose.options import DiagnoseOptions
+from diagnose.options import AttributionOptions, DiagnoseOptions
 from diagnose.pipeline import diagnose
 from diagnose.simulated.forces import Forces, ForcesOptions
 from diagnose.simulated.pipeline import Asked, diagnose_simulated
@@ -156,8 +156,9 @@ def _judged(
     sealed = digest({"flaws": [[f.name, x] for f, x in planted]}, salt)
     asked = Asked(Forces(block.t, force, "planted"), _stated(given), ForcesOptions(clock_offset_s=0.0))
     verdict = diagnose_simulated(
-        world.recording, world.model, asked, DiagnoseOptions(bootstrap=100), reality=world.diagnosis
-    )
+        world.recording, world.model, asked, DiagnoseOptions(bootstrap=100), reality=world.diagnosis,
+        attribution=AttributionOptions(most=2),
+    )  # fmt: skip
     left = rms(measured - rest[counted])
     return _Case(number, tuple(planted), sizes, left, sealed, salt, verdict, world.late)
 
