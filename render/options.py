@@ -33,6 +33,12 @@ class RenderOptions:
         "rbf", "of 1D parameters over the surface", choices=("rbf", "nearest"), flag="--interpolation"
     )
 
+    simulator_settings: str = option(
+        "documented",
+        "of another simulator: as its own documentation says, or as good as it gets",
+        choices=("documented", "best"),
+    )
+
     def __post_init__(self) -> None:
         if self.friction is not None and (math.isnan(self.friction) or self.friction < 0):
             raise OptionError(f"friction is {self.friction}; it must be 0 or greater (inf sticks)")

@@ -22,16 +22,29 @@ _RENDERERS = {
 }
 
 
+_SIMULATORS = {
+    "scikit-fem": "render.simulators.scikit_fem",
+    "mujoco": "render.simulators.mujoco",
+}
+"""Other simulators, which need packages of their own and take their time."""
+
+
 def names() -> tuple[str, ...]:
-    """The names that `create` takes."""
+    """The names of our own renderers."""
     return tuple(_RENDERERS)
+
+
+def simulator_names() -> tuple[str, ...]:
+    """The names of the other simulators that `create` takes."""
+    return tuple(_SIMULATORS)
 
 
 def create(
     name: str, model: Model, options: RenderOptions | None = None, progress: Progress = silent
 ) -> Renderer:
     """The renderer of that name for a model; raises OptionError for a name that is not there."""
-    if name not in _RENDERERS:
-        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(_RENDERERS)}")
-    module = importlib.import_module(_RENDERERS[name])
+    known = {**_RENDERERS, **_SIMULATORS}
+    if name not in known:
+        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(known)}")
+    module = importlib.import_module(known[name])
     return module.create(name, model, options or RenderOptions(), progress)

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -35,6 +36,8 @@ class Forward:
 
     touches: Presses
     places: Places
+    measured: ClassVar[bool] = True
+    """Whether a sensor read the forces; a simulator's modulus and surface are known: no fit moves them."""
 
     def __post_init__(self) -> None:
         self._kept: dict[int, np.ndarray] = {}

@@ -94,7 +94,8 @@ class Descent:
         """(n, 3, k) of the prediction, by forward differences."""
         base = self.forward.touches.local_force - residual
         columns = np.empty((*residual.shape, len(values)))
-        for i in range(len(values)):
+        columns[:, :, 0] = 0.0
+        for i in range(0 if self.forward.measured else 1, len(values)):
             moved = values.copy()
             h = self.step[i] if values[i] + self.step[i] <= self.high[i] else -self.step[i]
             moved[i] += h
@@ -235,7 +236,11 @@ class Descent:
         residual = np.where(np.isfinite(residual), residual, self.forward.touches.local_force)
         jacobian = self.jacobian(values, residual, onset)
         shown = np.concatenate([self.effective(residual, onset)[:, :, None], jacobian], axis=2)
-        likeliest, residual = self.likeliest_touches(values, residual, onset)
+        if self.forward.measured or any(e.hints.own_touches for e in self.effects):
+            likeliest, residual = self.likeliest_touches(values, residual, onset)
+        else:
+            likeliest = np.zeros_like(onset)
+            residual = np.nan_to_num(self.residual(values, likeliest))
         plain = np.concatenate([residual[:, :, None], jacobian], axis=2)
         return Fit(
             self.effects, values, loss, residual, jacobian, self.whitener.gram(shown),

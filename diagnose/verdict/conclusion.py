@@ -63,6 +63,7 @@ def conclude(findings: Findings, lap: Callable[[str], None]) -> Diagnosis:
         free_air=findings.free,
         residual_before=residual_before,
         residual_after=found.final.residual,
+        findings=findings,
     )  # fmt: skip
     lap("verdict")
     return result

@@ -145,6 +145,7 @@ class Diagnosis(Result):
     held_out_n: dict[str, tuple[float, float]] = field(default_factory=dict)
     recording: Recording | None = None
     model: Model | None = None
+    findings: Any = None  # diagnose.verdict.answer.Findings: all that the verdict rests on
 
     def improved(self) -> Model:
         """The model with the object's, contact's and boundary's effects that were named; the instrument's are

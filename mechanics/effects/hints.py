@@ -40,7 +40,8 @@ class SearchHints:
     slack: factor on the lack of fit that its law may leave. systematic: (k,) standard deviations of its
     values that no noise tells, from known cases; systematic_share: the same in shares of the values;
     common_factor: standard deviation of a factor on all values that the modulus takes up. signed: values
-    whose sign is sure once named.
+    whose sign is sure once named. own_touches: it meets each place at a depth of its own, so first touches
+    are fitted beside it though the surface is known.
     """
 
     candidates: Callable[[], list[np.ndarray]] | None = None
@@ -60,3 +61,4 @@ class SearchHints:
     systematic_share: tuple[float, ...] = ()
     common_factor: float = 0.0
     signed: tuple[int, ...] = ()
+    own_touches: bool = False

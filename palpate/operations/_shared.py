@@ -11,7 +11,7 @@ from mechanics.errors import OptionError
 from mechanics.surface_files import UNITS, is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand
 from palpate.operations._flags import natural
-from render.registry import names
+from render.registry import names, simulator_names
 
 if TYPE_CHECKING:
     import mechanics.model
@@ -79,8 +79,8 @@ def poisson_operand(words: str, default: float | None = None, **more: Any) -> An
 
 
 def renderer_operand() -> Any:
-    """--renderer NAME."""
-    return operand("fem", "what answers", choices=names())
+    """--renderer NAME, ours or another simulator."""
+    return operand("fem", "what answers", choices=(*names(), *simulator_names()))
 
 
 @dataclass(frozen=True)

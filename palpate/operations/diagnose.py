@@ -4,14 +4,18 @@ the gap shrinks.
 REC is a recording's .csv, .csv.gz or .toml. Without --model the recording is reconstructed first. The answer
 may be one effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown".
 Forces in N (rms of the 3-vector over contact samples of held-out places), lengths in m, moduli in Pa.
+With --simulated FORCES.csv (t,fx,fy,fz: s, and N on the tool, along the recorded path) it is the gap of that
+simulator, in three parts: its numerics, the parameters that it was given, and what every ideal elastic
+simulation lacks.
 """
 
 from __future__ import annotations
 
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.simulated.forces import ForcesOptions
 from mechanics.errors import OptionError
 from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import (
@@ -30,6 +34,7 @@ from palpate.operations.reconstruct import reconstruct
 from palpate.output import Output
 
 if TYPE_CHECKING:
+    from diagnose.simulated.result import SimulatedGap
     from diagnose.verdict.result import Diagnosis
     from palpate.operations._shared import ModelLike, RecordingLike
 
@@ -43,6 +48,19 @@ class DiagnoseOperands:
         "of this recording or of another of the same object; without it the recording is reconstructed"
     )
     _: KW_ONLY
+    simulated: Any = operand(
+        None,
+        "forces of another simulator along the recorded path: t,fx,fy,fz (in Python also (t, force) arrays)",
+        metavar="FORCES.csv",
+        reads=True,
+    )
+    stated: Any = operand(
+        None,
+        "what that simulator was given (repeatable): young_modulus_pa, poisson_ratio, friction, "
+        "tip_radius_m; default: the model's",
+        metavar="KEY=VALUE",
+        count="repeat",
+    )
     apply: str | None = operand(
         None,
         "write the improved model (object, contact, boundary effects)",
@@ -61,14 +79,15 @@ class DiagnoseOperands:
     seed: int = seed_operand()
 
 
-def _answer(result: Diagnosis, asked: DiagnoseOperands, out: Output) -> int:
+def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
     out.say(*result.lines())
+    own: Diagnosis = getattr(result, "reality", result)
     if asked.apply:
-        better = result.improved().save(asked.apply)
-        kept = [name for name in result.effects if name in better.effects]
+        better = own.improved().save(asked.apply)
+        kept = [name for name in own.effects if name in better.effects]
         out.say(f"improved model ({', '.join(kept) or 'modulus only'}): {asked.apply}")
     if asked.corrected:
-        result.corrected().save(asked.corrected)
+        own.corrected().save(asked.corrected)
         out.say(f"corrected recording: {asked.corrected}")
     if asked.report:
         out.say(f"report: {result.report(asked.report)}")
@@ -77,16 +96,26 @@ def _answer(result: Diagnosis, asked: DiagnoseOperands, out: Output) -> int:
 
 
 @operation(
-    DiagnoseOperands, MeshFileOptions, DiagnoseOptions, AttributionOptions, NuisanceOptions, answer=_answer
+    DiagnoseOperands,
+    MeshFileOptions,
+    DiagnoseOptions,
+    AttributionOptions,
+    NuisanceOptions,
+    ForcesOptions,
+    answer=_answer,
 )
-def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis:
+def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     """The sim-to-real gap: where simulated and measured force differ, which effect was left out, how far the
     gap shrinks with it on places that were not fitted; N rms.
 
-    fast: fewer effects, one in an answer. Raises DiagnosisError where the data cannot carry it.
+    fast: fewer effects, one in an answer. With simulated the answer is a SimulatedGap: that simulator's
+    numerics, the parameters that it was given, and what every ideal simulation lacks. Raises DiagnosisError
+    where the data cannot carry it.
     """
     from diagnose.pipeline import diagnose as diagnosed
     from reconstruct.placing import presses_on
+
+    forces = _forces(asked)
 
     if asked.corrected and not str(asked.corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{asked.corrected}' must end in .csv or .csv.gz")
@@ -100,11 +129,36 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis:
         else:
             plain = load(source, progress=tell)
             made, begun = plain.replaced(presses=presses_on(measured, plain)), 0.0
-        return diagnosed(
-            measured,
-            made,
-            options,
-            lambda s, x: tell(s, begun + (1 - begun) * x),
-            nuisance=call.of(NuisanceOptions),
-            attribution=call.of(AttributionOptions, **most),
-        )
+        rules: dict[str, Any] = {
+            "nuisance": call.of(NuisanceOptions),
+            "attribution": call.of(AttributionOptions, **most),
+        }
+
+        def rest(stage: str, share: float) -> None:
+            tell(stage, begun + (1 - begun) * share)
+
+        if forces is None:
+            return diagnosed(measured, made, options, rest, **rules)
+        from diagnose.simulated.pipeline import Asked, diagnose_simulated
+        from diagnose.simulated.stated import stated_of
+
+        simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
+        return diagnose_simulated(measured, made, simulation, options, rest, **rules)
+
+
+def _forces(asked: DiagnoseOperands) -> Any:
+    """The simulated forces, looked at before the work; None where there are none."""
+    if asked.simulated is None:
+        if asked.stated:
+            raise OptionError("--stated says what a simulator was given: name its forces by --simulated")
+        return None
+    from diagnose.simulated.forces import read_forces, sorted_forces
+
+    if isinstance(asked.simulated, tuple | list):
+        import numpy as np
+
+        t, force = (np.asarray(each, dtype=float) for each in asked.simulated)
+        if t.ndim != 1 or force.shape != (len(t), 3):
+            raise OptionError(f"simulated needs t (n,) and force (n, 3); got {t.shape} and {force.shape}")
+        return sorted_forces(t, force, "simulated")
+    return read_forces(asked.simulated)

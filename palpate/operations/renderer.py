@@ -13,7 +13,7 @@ from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import with_friction
 from palpate.operations.load import load
 from render.options import RenderOptions
-from render.registry import create, names
+from render.registry import create, names, simulator_names
 from render.support import SupportOptions
 
 if TYPE_CHECKING:
@@ -56,8 +56,9 @@ def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], Tou
             words = "a renderer that is there keeps its options; give them to pp.renderer"
             raise OptionError(f"{', '.join(given)}: {words}")
         return lambda tell: scene_of(model, support)
-    if name not in names():
-        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(names())}")
+    allowed = (*names(), *simulator_names())
+    if name not in allowed:
+        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(allowed)}")
     chosen = _with_scene(model, call.of(RenderOptions))
 
     def make(tell: Progress) -> TouchScene:

@@ -1,0 +1,53 @@
+"""What a numerical effect is: an effect (mechanics.effects.base) with advice on how to mend it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from mechanics.effects.base import Effect
+from mechanics.presses import Presses
+
+DOMAIN = "numerics"
+LEAST_SHARE = 0.1
+"""Of a press's greatest force, below which a sample says nothing of whether contact was kept."""
+
+
+@dataclass(frozen=True)
+class Signal:
+    """A simulated force sample by sample: t (n,) s, force (n, 3) N on the tool, depth (n,) m of the tip below
+    the surface; parts: the samples of each press. left (n,) bool: samples that say nothing of the law."""
+
+    t: np.ndarray
+    force: np.ndarray
+    depth: np.ndarray
+    parts: tuple[slice, ...]
+    left: np.ndarray
+
+
+@dataclass(frozen=True)
+class Seen:
+    """What the samples themselves show: the signal without it, and the effect's keys; {} where it is not
+    there."""
+
+    signal: Signal
+    keys: dict[str, float]
+
+
+@dataclass(frozen=True)
+class NumericalEffect(Effect):
+    """A flaw of a simulator. advice: what mends it, in words that fit any simulator.
+
+    see(signal): of what shows in the samples themselves and needs no law; it is taken off before any law is
+    fitted. None: it is searched for, as physical effects are.
+    """
+
+    advice: str = ""
+    see: Callable[[Signal], Seen] | None = None
+
+
+def signal_of(presses: Presses, force: np.ndarray) -> Signal:
+    """The signal of a table of presses (mechanics.presses) with a simulated force (n, 3) N at its rows."""
+    return Signal(presses.t, force, presses.travel[:, 0], tuple(presses.parts), np.zeros(len(force), bool))

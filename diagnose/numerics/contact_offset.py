@@ -1,0 +1,28 @@
+"""Contact offset: the surface is met before or after it is there (margins, skins, radii of particles)."""
+
+import numpy as np
+
+from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.effects.base import Parameter, Scope
+from mechanics.effects.hints import SearchHints
+from mechanics.effects.settings import Scene, Settings
+from mechanics.schema import Key
+
+
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+    settings.onset = settings.onset + values[0]
+
+
+EFFECT = NumericalEffect(
+    name="contact_offset",
+    domain=DOMAIN,
+    scope=Scope.PRESS,
+    words="the surface stands off (a margin, a skin, a particle's radius), or is met late",
+    plain_words="the simulated surface is met before, or after, it is there",
+    parameters=(Parameter("offset_m", "m", -2e-3, 2e-3, 0.0, (2e-4, -2e-4, 8e-4, -8e-4), 2e-5),),
+    keys={"offset_m": Key(low=-0.1, high=0.1, unit="m", required=True)},
+    report=lambda values, scene, modulus_pa: {"offset_m": float(values[0])},
+    change=_change,
+    advice="set contact margin, rest offset or the particles' radius to 0, or move the tip back by it",
+    hints=SearchHints(hides_strain=True),
+)

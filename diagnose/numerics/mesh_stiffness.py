@@ -1,0 +1,59 @@
+"""Mesh stiffness: elements that are too coarse, or lock near Poisson's ratio 0.5, resist too much.
+
+A factor on the force of a place, whatever depth and rate; more where the object is stiff (thin, near its
+base) than where it is soft: ln ratio is a straight line in the logarithm of the place's own compliance.
+"""
+
+from typing import Any
+
+import numpy as np
+
+from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.effects.base import Parameter, Scope
+from mechanics.effects.hints import SearchHints
+from mechanics.effects.settings import Scene, Settings
+from mechanics.schema import Key
+
+
+def _stiffer(scene: Scene) -> np.ndarray:
+    """(p,) how stiff a place is against the others: mean 0, standard deviation 1."""
+    # what a place gives beside its dent, and the dent of a quarter of the tip's radius
+    soft = np.log(np.maximum(scene.places.far[:, 0, 0] + 1 / scene.tip_radius, 1e-3))
+    spread = soft.std()
+    return (soft.mean() - soft) / spread if spread > 1e-6 else np.zeros(len(soft))
+
+
+def _ratio(values: np.ndarray, scene: Scene) -> np.ndarray:
+    return np.exp(values[0] + values[1] * _stiffer(scene))
+
+
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+    settings.stiffness = settings.stiffness * _ratio(values, scene)
+
+
+def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:
+    ratio = _ratio(values, scene)
+    return {
+        "ratio": float(np.exp(values[0])),
+        "ratio_softest_place": float(ratio[np.argmin(_stiffer(scene))]),
+        "ratio_stiffest_place": float(ratio[np.argmax(_stiffer(scene))]),
+    }
+
+
+EFFECT = NumericalEffect(
+    name="mesh_stiffness",
+    domain=DOMAIN,
+    scope=Scope.EVERYWHERE,
+    words="the mesh is too stiff (coarse or locking elements), whatever depth and rate",
+    plain_words="the simulated object itself is too stiff or too soft, as coarse or locking meshes are",
+    parameters=(
+        Parameter("log_ratio", "1", -2.5, 2.5, 0.0, (0.2, -0.2), 0.01),
+        Parameter("log_ratio_a_spread", "1", -0.6, 0.6, 0.0, (0.0, 0.0), 0.01, 0.1),
+    ),
+    keys={"ratio": Key(low=1e-3, high=1e3, required=True)},
+    report=_report,
+    change=_change,
+    advice="refine the mesh, use quadratic elements, or lower Poisson's ratio by steps (0.49, 0.47, 0.45) "
+    "until the force no longer changes; check that the modulus is the one stated",
+    hints=SearchHints(),
+)

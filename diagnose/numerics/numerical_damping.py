@@ -1,0 +1,49 @@
+"""Numerical damping: force that goes with the tip's speed while it touches, and that no parameter states."""
+
+import numpy as np
+
+from diagnose.forward.prediction import Forward
+from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.effects.base import Parameter, Scope
+from mechanics.effects.settings import WEIGHED, Scene, Settings
+from mechanics.schema import Key
+
+
+def _velocity(scene: Forward) -> np.ndarray:
+    """(n, 3) m/s of the tip, device frame."""
+    t = scene.touches
+    out = np.zeros_like(t.position)
+    for part in t.parts:
+        if part.stop - part.start > 2:
+            out[part] = np.gradient(t.position[part], t.t[part], axis=0)
+    return out
+
+
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+    assert isinstance(scene, Forward), "numerical effects act on the presses of a diagnosis"
+    velocity = _velocity(scene)
+    normal = scene.places.frame[scene.press, 0]
+
+    def damped(force: np.ndarray) -> np.ndarray:
+        out = force - values[0] * velocity
+        # the surface lets go rather than pull
+        pull = np.minimum(np.einsum("ni,ni->n", out, normal), 0.0)
+        touching = np.einsum("ni,ni->n", force, normal) > 0
+        return np.where(touching[:, None], out - pull[:, None] * normal, force)
+
+    settings.read(WEIGHED, damped)
+
+
+EFFECT = NumericalEffect(
+    name="numerical_damping",
+    domain=DOMAIN,
+    scope=Scope.TIME,
+    words="force that grows with the tip's speed, which no parameter states",
+    plain_words="the simulated object resists fast presses more than slow ones",
+    parameters=(Parameter("damping_n_s_per_m", "N s/m", 0.0, 200.0, 0.0, (0.5, 3.0), 0.05),),
+    keys={"damping_n_s_per_m": Key(low=0.0, high=1e6, unit="N s/m", required=True)},
+    report=lambda values, scene, modulus_pa: {"damping_n_s_per_m": float(values[0])},
+    change=_change,
+    advice="lower the damping of contact and material, or take smaller time steps (implicit integrators damp "
+    "by themselves)",
+)

@@ -1,0 +1,28 @@
+"""Time step: the force answers where the tip was, some steps ago."""
+
+import numpy as np
+
+from diagnose.numerics.base import DOMAIN, NumericalEffect
+from mechanics.effects.base import Parameter, Scope
+from mechanics.effects.settings import LATE, Scene, Settings
+from mechanics.samples import delayed
+from mechanics.schema import Key
+
+
+def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
+    parts = [slice(a, b) for a, b in zip(scene.start[:-1], scene.start[1:], strict=True)]
+    settings.read(LATE, lambda force: delayed(parts, scene.t, force, values[0]))
+
+
+EFFECT = NumericalEffect(
+    name="time_step",
+    domain=DOMAIN,
+    scope=Scope.TIME,
+    words="the force comes late, by the simulator's steps",
+    plain_words="the simulated force answers where the tip was a moment ago",
+    parameters=(Parameter("delay_s", "s", 0.0, 0.2, 0.0, (0.01, 0.04), 0.001),),
+    keys={"delay_s": Key(low=0.0, high=10.0, unit="s", required=True)},
+    report=lambda values, scene, modulus_pa: {"delay_s": float(values[0])},
+    change=_change,
+    advice="take smaller time steps, more iterations a step, or log each force with the position of its step",
+)

@@ -1,0 +1,190 @@
+"""The gap of another simulator: the answers of a diagnosis, and the three parts that the gap is made of."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from diagnose.simulated.stated import Stated
+from diagnose.verdict.result import Diagnosis, EffectEntry
+from diagnose.verdict.where import Where
+from mechanics.presses import Presses
+from mechanics.result import Result
+
+PARTS = ("numerics", "parameters", "reality")
+"""In the order in which they are taken off."""
+
+
+@dataclass(frozen=True)
+class Simulator:
+    """Whose forces they are. version: "" where it is not known."""
+
+    name: str
+    version: str
+    stated: Stated
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys; `given`: which of `stated` were said, the others are the model's."""
+        return {
+            "name": self.name,
+            "version": self.version,
+            "stated": self.stated.as_json(),
+            "given": sorted(self.stated.given),
+        }
+
+
+@dataclass(frozen=True)
+class Part:
+    """gap_n: N rms that it adds to the gap. share: of the mean square of the gap (below 0: it hides
+    others). names: of the effects in it, strongest first."""
+
+    gap_n: float
+    share: float
+    names: tuple[str, ...] = ()
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, and the names."""
+        return {"gap_n": self.gap_n, "share": self.share, "effects": list(self.names)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SimulatedGap(Result):
+    """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
+    over contact samples, the parts at places that their fits have not seen.
+
+    parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
+    sensor's noise and touch_share what the object's own first touches take. reality: today's diagnosis of our
+    ideal model. gaps: (n, 3) N, local frames of `touches`, as the parts are taken off, "simulated" first.
+    notes: what was told of the forces. `plot`: the parts. `report`: the page.
+    """
+
+    simulator: Simulator
+    noise_n: float
+    gap_before_n: float
+    gap_after_n: float
+    gap_closed: float | None
+    gap_closed_ci95: tuple[float, float] | None
+    kind: str
+    effects: tuple[str, ...]
+    candidates: tuple[str, ...]
+    parts: Mapping[str, Part]
+    unexplained: float
+    unexplained_n: float
+    noise_share: float
+    touch_share: float
+    where: Where
+    entries: tuple[EffectEntry, ...]
+    young_modulus_pa: float
+    advice: tuple[str, ...]
+    notes: tuple[str, ...]
+    reasons: tuple[str, ...]
+    reality: Diagnosis
+    touches: Presses
+    gaps: Mapping[str, np.ndarray] = field(default_factory=dict)
+    simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
+    gap_after_measured_n: float | None = None
+
+    @property
+    def summary(self) -> str:
+        """The answer in one sentence."""
+        first = max(PARTS, key=lambda name: self.parts[name].share)
+        if not self.effects:
+            return (
+                "nothing is named: neither numerics nor parameters nor what an ideal simulation lacks stands "
+                "out of this gap"
+            )
+        words = {
+            "numerics": "most of the gap is numerics",
+            "parameters": "most of the gap is parameters",
+            "reality": "most of the gap is what every ideal elastic simulation lacks",
+        }[first]
+        if self.unexplained > self.parts[first].share:
+            words = "most of the gap is not explained"
+        named = ", ".join(n.replace("_", " ") for n in self.effects)
+        rest = ", ".join(n.replace("_", " ") for n in self.candidates)
+        return f"{words}; named: {named}" + (f" (not ruled out: {rest})" if rest else "")
+
+    def lines(self) -> list[str]:
+        """The three parts, a line each, with units."""
+        given = self.simulator.stated
+        said = ", ".join(
+            f"{name} {_value(value)}{'' if name in given.given else ' (of the model)'}"
+            for name, value in given.as_json().items()
+        )
+        version = f" {self.simulator.version}" if self.simulator.version else ""
+        lines = [
+            f"simulator: {self.simulator.name}{version}; stated: {said}",
+            *(f"  note: {note}" for note in self.notes),
+            f"verdict: {self.summary}",
+            f"gap: {self.gap_before_n:.4f} N from simulated to measured force (noise {self.noise_n:.4f} N)",
+        ]
+        for name in PARTS:
+            part = self.parts[name]
+            lines.append(
+                f"  {name}: {part.gap_n:.4f} N, {part.share:.0%} of the gap's square{self._of(part)}"
+            )
+        lines.append(
+            f"  unexplained: {self.unexplained_n:.4f} N, {self.unexplained:.0%} "
+            f"(noise {self.noise_share:.0%}, first touches {self.touch_share:.0%})"
+        )
+        lines.append(
+            f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N once all of it is mended, "
+            "on places not fitted"
+        )
+        if self.gap_after_measured_n is not None:
+            lines.append(f"measured with the mended settings: {self.gap_after_measured_n:.4f} N")
+        lines += [f"  {reason}" for reason in self.reasons]
+        lines += [f"advice: {each}" for each in self.advice]
+        return lines
+
+    def _of(self, part: Part) -> str:
+        if not part.names:
+            return ""
+        words = {e.name: e for e in self.entries}
+        said = [
+            n.replace("_", " ") + (f" {words[n].parameters}" if n in words and words[n].parameters else "")
+            for n in part.names
+        ]
+        return ": " + "; ".join(said)
+
+    def as_json(self) -> dict[str, Any]:
+        """The contract's keys, and some more."""
+        closed = self.gap_closed_ci95
+        return {
+            "noise_n": self.noise_n,
+            "gap_before_n": self.gap_before_n,
+            "gap_after_n": self.gap_after_n,
+            "gap_closed": self.gap_closed,
+            "gap_closed_ci95": None if closed is None else list(closed),
+            "verdict": {
+                "kind": self.kind,
+                "effects": list(self.effects),
+                "candidates": list(self.candidates),
+            },
+            "where": {
+                "axes": [{"axis": a.axis, "share": a.share, "p": a.p} for a in self.where.axes],
+                "worst": [{"x": x, "y": y, "z": z, "rmse_n": r} for x, y, z, r in self.where.worst],
+                "bins": self.where.bins,
+            },
+            "effects": [e.as_json() for e in self.entries],
+            "young_modulus_pa": self.young_modulus_pa,
+            "next_touch": None if self.reality.next_touch is None else self.reality.next_touch.as_json(),
+            "simulator": self.simulator.as_json(),
+            "parts": {name: self.parts[name].as_json() for name in ("reality", "parameters", "numerics")},
+            "unexplained": self.unexplained,
+            "unexplained_n": self.unexplained_n,
+            "unexplained_of": {"noise": self.noise_share, "first_touches": self.touch_share},
+            "advice": list(self.advice),
+            "notes": list(self.notes),
+            "reasons": list(self.reasons),
+            "gap_after_measured_n": self.gap_after_measured_n,
+            "ideal": self.reality.as_json(),
+        }
+
+
+def _value(value: float | None) -> str:
+    return "sticks" if value is None or not math.isfinite(value) else f"{value:g}"

@@ -1,0 +1,112 @@
+"""What a simulator was given, and our law at that: the reference that its numerics are held against."""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from typing import Any, ClassVar
+
+from diagnose.forward.prediction import Forward
+from mechanics.effects.settings import STICKS, Settings
+from mechanics.errors import OptionError
+from mechanics.far_field import far_at_poisson
+from mechanics.model import Model
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
+from mechanics.schema import Key
+
+_FRICTION = Key(low=0.0, high=100.0, unknown=True)
+KEYS: dict[str, Key] = {
+    "young_modulus_pa": YOUNG_MODULUS,
+    "poisson_ratio": POISSON_RATIO,
+    "friction": _FRICTION,
+    "tip_radius_m": TIP_RADIUS,
+}
+ALIASES = {
+    "modulus": "young_modulus_pa",
+    "young_modulus": "young_modulus_pa",
+    "young": "young_modulus_pa",
+    "e": "young_modulus_pa",
+    "nu": "poisson_ratio",
+    "poisson": "poisson_ratio",
+    "mu": "friction",
+    "tip_radius": "tip_radius_m",
+}
+
+
+@dataclass(frozen=True)
+class Stated:
+    """young_modulus_pa, poisson_ratio, friction (inf: the tip sticks), tip_radius_m of a simulation. given:
+    the names of those that were said; the others are the model's."""
+
+    young_modulus_pa: float
+    poisson_ratio: float
+    friction: float
+    tip_radius_m: float
+    given: frozenset[str] = frozenset()
+
+    def but(self, name: str, value: float) -> Stated:
+        """The same with one value changed."""
+        other: dict[str, Any] = {name: value}
+        return dataclasses.replace(self, **other)
+
+    def as_json(self) -> dict[str, float | None]:
+        """By name; null for the friction of a tip that sticks."""
+        values = {name: getattr(self, name) for name in KEYS}
+        return {name: value if math.isfinite(value) else None for name, value in values.items()}
+
+
+def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> Stated:
+    """KEY=VALUE words, or a mapping, over the model's values. Raises OptionError for what is not known."""
+    pairs = said.items() if isinstance(said, Mapping) else (_pair(word) for word in said or ())
+    values: dict[str, Any] = {}
+    for key, value in pairs:
+        name = ALIASES.get(key.strip().lower(), key.strip().lower())
+        if name not in KEYS:
+            raise OptionError(f"--stated {key}: not known; allowed are {', '.join(KEYS)}")
+        if name in values:
+            raise OptionError(f"--stated says {name} twice: say it once")
+        try:
+            values[name] = float(value)
+        except (TypeError, ValueError) as error:
+            raise OptionError(f"--stated {key}={value}: it must be a number") from error
+        if math.isnan(values[name]) or not KEYS[name].takes(values[name]):
+            raise OptionError(f"--stated {key}={value}: it must be {KEYS[name].words}")
+    slip = model.effects.get("friction_slip", {})
+    usual = Stated(
+        model.material.young_modulus_pa,
+        model.material.poisson_ratio,
+        float(slip.get("mu", STICKS)),
+        model.tool.tip_radius_m,
+    )
+    return dataclasses.replace(usual, **values, given=frozenset(values))
+
+
+def _pair(word: str) -> tuple[str, str]:
+    key, equals, value = word.partition("=")
+    if not equals or not value.strip():
+        raise OptionError(f"--stated '{word}' must be KEY=VALUE, as modulus=30000")
+    return key, value.strip()
+
+
+@dataclass
+class StatedForward(Forward):
+    """The forward model of a simulation: its ideal is what the simulator was given, whatever a fit would take
+    for the modulus, so that what differs from it is the simulator's own."""
+
+    measured: ClassVar[bool] = False
+    stated: Stated = field(default_factory=lambda: Stated(1.0, 0.49, STICKS, 1.0))
+
+    def ideal(self, modulus: float) -> Settings:
+        """Settings of the ideal model at the stated parameters; `modulus` does not count."""
+        given = self.stated
+        settings = super().ideal(given.young_modulus_pa)
+        if given.poisson_ratio != settings.nu:
+            settings.nu = given.poisson_ratio
+            settings.far = far_at_poisson(self.places, given.poisson_ratio)
+        settings.touch.friction = given.friction
+        settings.touch.tip_ratio = given.tip_radius_m / self.tip_radius
+        # a larger tip on the same path meets the surface earlier
+        settings.onset = settings.onset + (given.tip_radius_m - self.tip_radius)
+        return settings

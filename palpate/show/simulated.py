@@ -1,0 +1,241 @@
+"""Another simulator's gap: the parts as bars, the object coloured by the gap, and the page."""
+
+from __future__ import annotations
+
+import copy
+import dataclasses
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from diagnose.numerics.registry import NAMES, numerical
+from diagnose.simulated.result import PARTS, SimulatedGap
+from diagnose.verdict.result import Diagnosis, EffectEntry
+from mechanics.effects.registry import effect
+from palpate.show.diagnosis import place as place_gap
+from palpate.show.diagnosis.figures import curves_picture, first_picture, presses_picture
+from palpate.show.diagnosis.figures import view as view_of_gap
+from palpate.show.diagnosis.parameters import number, plain_key
+from palpate.show.diagnosis.words import AXIS_WORDS, force_words, percent, share_words, spoken
+from palpate.show.page import Page
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pyvista import Plotter
+
+    from palpate.show.view3d import View
+
+COLOURS = {
+    "numerics": "#1d3557", "parameters": "#2a9d8f", "reality": "#e76f51", "unexplained": "#c9c9c9",
+}  # fmt: skip
+MEANING = {
+    "numerics": "what the simulator adds of its own",
+    "parameters": "what it was given wrongly",
+    "reality": "what every ideal elastic simulation lacks",
+}
+STATED = {
+    "stated_modulus": "the Young's modulus that it was given",
+    "stated_poisson_ratio": "the Poisson's ratio that it was given",
+    "stated_friction": "the friction that it was given",
+    "stated_tip_radius": "the radius of the tip that it was given",
+}
+WORDS = {
+    "share": "share",
+    "never_felt": "of it never felt at all",
+    "ratio": "stiffness of the mesh, times what it should be",
+    "ratio_softest_place": "at the softest place, times",
+    "ratio_stiffest_place": "at the stiffest place, times",
+    "effective_radius_m": "no contact is smaller than a patch of radius",
+    "late_m": "and met late by",
+    "stiffness_n_per_m": "stiffness of the contact",
+    "damping_n_s_per_m": "damping",
+    "delay_s": "late by",
+    "offset_m": "the surface stands off by",
+    "velocity_m_per_s": "it wanders by, x y z",
+    "stated": "given",
+    "measured": "measured",
+}
+
+
+def as_diagnosis(result: SimulatedGap) -> Diagnosis:
+    """The same in the form of a diagnosis of our own model, for its pictures: measured against this
+    simulator's force, and with all that is named mended."""
+    forward = copy.copy(result.reality.forward)
+    assert forward is not None, "only what `diagnose` returned holds its touches"
+    measured = result.gaps["simulated"] + result.simulated
+    touches = result.touches
+    frame = touches.frame[touches.press]
+    forward.touches = dataclasses.replace(touches, force=np.einsum("nij,ni->nj", frame, measured))
+    return dataclasses.replace(
+        result.reality,
+        forward=forward,
+        attribution=None,
+        residual_before=result.gaps["simulated"],
+        residual_after=result.gaps["reality"],
+        where=result.where,
+        kind=result.kind,
+        effects=result.effects,
+        candidates=result.candidates,
+        entries=result.entries,
+    )
+
+
+def draw(result: SimulatedGap, ax: Axes) -> None:
+    """The gap's square, cut into its parts."""
+    left, rows = 0.0, [*PARTS, "unexplained"]
+    for name in rows:
+        share = result.unexplained if name == "unexplained" else result.parts[name].share
+        width = max(share, 0.0)
+        ax.barh([0], [width], left=left, color=COLOURS[name], label=f"{name} {percent(share)}", height=0.6)
+        left += width
+    ax.set(yticks=[], xlim=(0, max(left, 1.0)), xlabel="share of the mean square of the gap")
+    ax.set_title(f"{result.simulator.name}: a gap of {force_words(result.gap_before_n)}", fontsize=11)
+    ax.legend(ncols=4, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.35), fontsize=9)
+    ax.spines[["top", "right", "left"]].set_visible(False)
+
+
+def view(result: SimulatedGap) -> View:
+    """The object by its gap; each press as measured, simulated, and with all that is named mended."""
+    return view_of_gap(as_diagnosis(result))
+
+
+def place(result: SimulatedGap, plotter: Plotter) -> None:
+    """The object coloured by the gap."""
+    place_gap(as_diagnosis(result), plotter)
+
+
+def meaning(name: str) -> str:
+    """What a flaw, a parameter or an effect is, in plain words."""
+    if name in STATED:
+        return STATED[name]
+    known: Any = numerical(name) if name in NAMES else effect(name)
+    return known.plain_words or known.words
+
+
+def keys_in_words(entry: EffectEntry) -> str:
+    """An entry's numbers with units that a hand knows."""
+    said = []
+    for key, value in entry.parameters.items():
+        words, factor, unit = plain_key(key)
+        shown = "none: it sticks" if value is None else number(value, factor)
+        said.append(f"{WORDS.get(key, words)} {shown} {unit}".strip())
+    return ", ".join(said)
+
+
+def _lead(result: SimulatedGap) -> str:
+    if not result.effects:
+        return "Nothing stands out: this simulation is as near to the measured forces as they can tell."
+    strongest = result.effects[0]
+    return f"It is off by {force_words(result.gap_before_n)}. Above all: {meaning(strongest)}." + (
+        f" Not ruled out: {spoken(result.candidates, 'or')}." if result.candidates else ""
+    )
+
+
+def _cards(result: SimulatedGap) -> list[tuple[str, str, str]]:
+    known = {e.name: e for e in result.entries}
+    cards = []
+    for name in PARTS:
+        part = result.parts[name]
+        said = []
+        for each in part.names:
+            numbers = keys_in_words(known[each]) if each in known else ""
+            said.append(meaning(each) + (f" ({numbers})" if numbers else ""))
+        text = "; ".join(said) or "nothing is named here"
+        cards.append(
+            (
+                f"{name.capitalize()}: {MEANING[name]}",
+                f"{force_words(part.gap_n)}, {percent(part.share)}",
+                text[0].upper() + text[1:] + ".",
+            )
+        )
+    return cards
+
+
+def report(result: SimulatedGap, path: Path | str) -> Path:
+    """Write one self-contained HTML page; returns its path."""
+    from matplotlib.figure import Figure
+
+    shown = as_diagnosis(result)
+    assert result.reality.model is not None and result.reality.recording is not None
+    page = Page(f"{result.simulator.name} against measured touch: {result.reality.recording.name}")
+    page.lead(_lead(result))
+    page.cards(_cards(result))
+    for each in result.advice:
+        page.next_step(f"What to do: {each}.")
+    for note in result.notes:
+        page.paragraph(f"Note: {note}.")
+    figure = Figure(figsize=(9, 1.7), layout="constrained")
+    draw(result, figure.subplots())
+    page.figure(
+        figure,
+        "Taken off one after another, at places that no fit has seen: numerics, parameters, then what every "
+        f"ideal simulation lacks. Of what is left {percent(result.noise_share)} is the sensor's noise and "
+        f"{percent(result.touch_share)} where exactly the object was first met.",
+    )
+    page.view(
+        view_of_gap(shown),
+        first_picture(result.reality.model, shown),
+        "Left: how far this simulator is from the measured force around each place. Right: one press, "
+        "measured, simulated, and (dashed) with all that is named mended.",
+    )
+    _stated(page, result)
+    _tried(page, result)
+    page.heading("What the difference depends on")
+    page.table(
+        ["the difference depends on", "share of it", "probability that this is chance"],
+        [[AXIS_WORDS[a.axis], percent(a.share), f"{a.p:.2g}"] for a in result.where.axes],
+    )
+    page.figure(curves_picture(shown), "Mean difference at each depth, and at each speed of the tip.")
+    page.figure(presses_picture(shown), "The presses that differ most, after the first picture's.")
+    for reason in result.reasons:
+        page.paragraph(reason[0].upper() + reason[1:] + ".")
+    return page.write(path)
+
+
+def _stated(page: Page, result: SimulatedGap) -> None:
+    page.heading("What the simulator was given")
+    given = result.simulator.stated
+    wrong = {e.name: e for e in result.entries if e.domain == "parameters"}
+    field = {
+        "young_modulus_pa": "stated_modulus",
+        "poisson_ratio": "stated_poisson_ratio",
+        "friction": "stated_friction",
+        "tip_radius_m": "stated_tip_radius",
+    }
+    rows = []
+    for key, value in given.as_json().items():
+        words, factor, unit = plain_key(key)
+        entry = wrong.get(field[key])
+        measured = "" if entry is None else entry.parameters["measured"]
+        shown = [
+            ("it sticks" if v is None else v if v == "" else number(v, factor)) for v in (value, measured)
+        ]
+        said = "stated" if key in given.given else "not stated: the model's"
+        rows.append([words, shown[0], said, shown[1] or "agrees", unit])
+    page.table(["parameter", "given", "by whom", "the recording says", "unit"], rows)
+
+
+def _tried(page: Page, result: SimulatedGap) -> None:
+    page.heading("What was tried")
+    page.paragraph(
+        "Each flaw of a simulator was held against the difference between its force and our own law's at the "
+        "parameters that it was given, where no sensor's noise stands in the way, and judged at places that "
+        "the fit had not seen. The difference left is that to the measured force once this alone is mended."
+    )
+    page.table(
+        ["effect", "kind", "what it means", "how likely", "difference left [mN]", "taken away", "values"],
+        [
+            [
+                e.name.replace("_", " "),
+                e.domain,
+                meaning(e.name),
+                percent(e.probability),
+                f"{e.gap_after_n * 1e3:.0f}",
+                share_words(e.gap_closed),
+                keys_in_words(e) if e.probability > 0.01 else "",
+            ]
+            for e in result.entries
+            if e.domain in ("numerics", "parameters") or e.name in result.effects
+        ],
+    )

@@ -1,0 +1,155 @@
+"""What an adapter of another simulator is, and the renderer that drives one.
+
+An adapter makes a `World` whenever the tip comes near to the object: the body at rest, the tip in the air.
+The world is stepped along the path until the tip is away again. So what a press leaves behind (creep, drift)
+does not reach the next, and free air costs nothing.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol, Self
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from mechanics.errors import OptionError
+from mechanics.model import Model
+from mechanics.refine import refined_around
+from mechanics.tetmesh import TetMesh
+from render.base import Renderer, check_radii
+from render.options import RenderOptions
+from render.snapping import touched_surface
+
+NEAR_M, AWAY_M = 1.5e-3, 2.5e-3
+"""Of the tip's surface from the object: where a world begins, and where it ends."""
+DOCUMENTED, BEST = "documented", "best"
+
+
+class World(Protocol):
+    """One touch in a simulator."""
+
+    def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
+        """(3,) N on the tool once the tip's centre, (3,) m, is there, dt_s after the last step."""
+
+
+class Adapter(ABC):
+    """One simulator. units: what it computes in. cannot: what it cannot say, a line each. advice: by
+    numerical effect, in its own words. extra: the package's extra that installs it."""
+
+    name: str
+    units: str
+    cannot: tuple[str, ...]
+    advice: dict[str, str]
+    extra: str
+
+    def __init__(self, model: Model, settings: str, friction: float) -> None:
+        self.model, self.settings, self.friction = model, settings, friction
+        self.mesh = model.mesh.linear()
+
+    @property
+    @abstractmethod
+    def version(self) -> str:
+        """Of the simulator that is installed."""
+
+    @property
+    @abstractmethod
+    def stated(self) -> dict[str, float]:
+        """What it is given: young_modulus_pa, poisson_ratio, friction, tip_radius_m."""
+
+    @abstractmethod
+    def begin(self, tip: np.ndarray, radius_m: float) -> World:
+        """A body at rest, and a tip of that radius with its centre at `tip` (3,) m, near the surface."""
+
+    def mesh_around(self, tip: np.ndarray, radius_m: float, edge_m: float, reach_m: float) -> TetMesh:
+        """The model's linear mesh with edges of at most about `edge_m` within `reach_m` of the place that is
+        nearest to the tip."""
+        touchable = self.mesh.points[np.unique(self.mesh.touchable_surface)]
+        centre = touchable[np.argmin(np.linalg.norm(touchable - tip, axis=1))]
+        foot = tip + (centre - tip) * min(1.0, radius_m / max(np.linalg.norm(centre - tip), 1e-9))
+        fine = self.mesh
+        for share in (2.0, 1.5, 1.0, 1.0):
+            fine, _ = refined_around(fine, foot, share * reach_m, edge_m)
+        return fine
+
+
+class SimulatedState(NamedTuple):
+    """As render.base.State, and world: the World that is under way, in a list of one a tip."""
+
+    forces: np.ndarray
+    touching: np.ndarray
+    points: np.ndarray
+    normals: np.ndarray
+    depths: np.ndarray
+    stiffness: np.ndarray
+    radii_m: np.ndarray
+    dt_s: np.ndarray
+    world: list[World | None]
+
+
+class SimulatorRenderer(Renderer):
+    """Another simulator as a renderer: it takes its own time, and no servo should wait for it."""
+
+    def __init__(self, name: str, model: Model, adapter: type[Adapter], options: RenderOptions) -> None:
+        self.name, self.model, self.options = name, model, options
+        self.contact = touched_surface(model, options)
+        slip = model.effects.get("friction_slip", {})
+        usual = float(slip.get("mu", 1.0))
+        friction = usual if options.friction is None else options.friction
+        self.adapter = adapter(model, options.simulator_settings, friction)
+        self._tree = cKDTree(self.contact.arrays.vertices)
+
+    def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> SimulatedState:
+        radii = check_radii(radii_m, self.model)
+        m = len(radii)
+        return SimulatedState(
+            np.zeros((m, 3)), np.zeros(m, dtype=np.int64), np.zeros((m, 3)), np.zeros((m, 3)), np.zeros(m),
+            np.zeros(m), radii.copy(), np.array([dt_s]), [None] * m,
+        )  # fmt: skip
+
+    def step(self, state: SimulatedState, tips: np.ndarray) -> tuple[SimulatedState, np.ndarray]:
+        near = self._tree.query(np.asarray(tips, dtype=float))[0] - state.radii_m
+        for i, tip in enumerate(np.asarray(tips, dtype=float)):
+            world = state.world[i]
+            if world is None and near[i] < NEAR_M:
+                world = state.world[i] = self.adapter.begin(tip, float(state.radii_m[i]))
+            elif world is not None and near[i] > AWAY_M:
+                world = state.world[i] = None
+            state.forces[i] = 0.0 if world is None else world.step(float(state.dt_s[0]), tip)
+            state.touching[i] = int(state.forces[i].any())
+        return state, state.forces
+
+    def follow(self, state: SimulatedState, path: np.ndarray, steps_s: np.ndarray) -> np.ndarray:
+        forces = np.zeros(np.shape(path))
+        for k, (tips, step_s) in enumerate(zip(path, steps_s, strict=True)):
+            state.dt_s[0] = step_s
+            self.step(state, tips)
+            forces[k] = state.forces
+        return forces
+
+    def with_modulus(self, young_modulus_pa: float) -> Renderer:
+        return type(self)(
+            self.name, self.model.with_modulus(young_modulus_pa), type(self.adapter), self.options
+        )
+
+    def with_friction(self, friction: float) -> Self:
+        raise OptionError(f"{self.name} takes its friction when it is made: --friction {friction:g}")
+
+    def with_series_compliance(self, compliance_m_per_n: float) -> Self:
+        raise OptionError(f"{self.name} has no virtual coupling: it is no renderer for the 1 kHz loop")
+
+
+def missing(adapter: type[Adapter], error: ImportError) -> OptionError:
+    """What is said where a simulator is not installed."""
+    return OptionError(
+        f"'{adapter.name}' needs {error.name}, which is not installed: pip install 'palpate[{adapter.extra}]'"
+    )
+
+
+def made(adapter: type[Adapter], model: Model, options: RenderOptions) -> Any:
+    """The renderer of an adapter; raises OptionError where the simulator is not installed."""
+    try:
+        return SimulatorRenderer(adapter.name, model, adapter, options)
+    except ImportError as error:
+        raise missing(adapter, error) from error

@@ -1,0 +1,235 @@
+"""scikit-fem: small-strain elasticity, statics, and a sphere on nodes by a penalty, with Coulomb's friction.
+
+documented: its examples' linear tetrahedra (`ElementTetP1`) on the model's own mesh. best: quadratic ones
+(`ElementTetP2`) with edges of 0.45 of the tip's radius under it.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from scipy.sparse import csc_matrix
+from scipy.sparse.linalg import splu
+
+from mechanics import pardiso
+from mechanics.progress import Progress, silent
+from mechanics.tetmesh import TetMesh
+from render.simulators.base import BEST, Adapter, World, made
+
+if TYPE_CHECKING:
+    from mechanics.model import Model
+    from render.base import Renderer
+    from render.options import RenderOptions
+
+PENALTY = {"documented": 10.0, BEST: 30.0}
+"""A node's contact spring over the stiffness of the object under one node: no part of scikit-fem."""
+NEAR_RADII = 1.05
+"""Of the tip: nodes so near to its centre may touch, as what it presses moves away from it."""
+MOVED_M = 2e-5
+"""The tip's travel after which the contact is solved anew; between, the force is held."""
+ITERATIONS, SHARES = 30, (1.0, 0.5, 0.2, 0.05)
+"""Of Newton's method, and the shares of a step that are tried."""
+
+
+class ScikitFem(Adapter):
+    """The adapter. One mesh is factorised for all touches; of `best` one a touch."""
+
+    name, extra, units = "scikit-fem", "scikit-fem", "SI: m, N, Pa"
+    cannot = (
+        "small strain only",
+        "no contact of its own: a sphere on nodes by a penalty is written here",
+        "one modulus",
+    )
+    advice = {
+        "contact_nodes": "refine under the tip (`mesh.refined(elements)`) to a third of its radius, and take "
+        "`ElementTetP2`: --simulator-settings best",
+        "mesh_stiffness": "take `ElementTetP2` instead of `ElementTetP1`: --simulator-settings best",
+        "contact_stiffness": "raise the penalty of the contact",
+        "contact_offset": "let the nodes on the surface lie on it: refine where it is curved",
+    }
+
+    def __init__(self, model: Model, settings: str, friction: float) -> None:
+        import skfem  # noqa: F401
+
+        super().__init__(model, settings, friction)
+        self._whole = None if settings == BEST else _Solved(self.mesh, model, order=1)
+
+    @property
+    def version(self) -> str:
+        return importlib.metadata.version("scikit-fem")
+
+    @property
+    def stated(self) -> dict[str, float]:
+        material = self.model.material
+        return {
+            "young_modulus_pa": material.young_modulus_pa,
+            "poisson_ratio": material.poisson_ratio,
+            "friction": self.friction,
+            "tip_radius_m": self.model.tool.tip_radius_m,
+        }
+
+    def begin(self, tip: np.ndarray, radius_m: float) -> World:
+        solved = self._whole
+        if solved is None:
+            fine = self.mesh_around(tip, radius_m, 0.45 * radius_m, 1.1 * radius_m)
+            solved = _Solved(fine, self.model, order=2)
+        return _Touch(solved, radius_m, self.friction, PENALTY.get(self.settings, 10.0))
+
+
+class _Solved:
+    """A mesh with its stiffness factorised. points: (n, 3) m of the nodes that may touch."""
+
+    def __init__(self, mesh: TetMesh, model: Model, order: int) -> None:
+        import skfem
+        from skfem.models.elasticity import lame_parameters, linear_elasticity
+
+        material = model.material
+        linear = skfem.MeshTet(mesh.points.T, mesh.tetrahedra.T)
+        element = skfem.ElementTetP1() if order == 1 else skfem.ElementTetP2()
+        basis = skfem.Basis(linear, skfem.ElementVector(element))
+        lame = lame_parameters(material.young_modulus_pa, material.poisson_ratio)
+        stiffness = csc_matrix(linear_elasticity(*lame).assemble(basis))
+        base = mesh.points[mesh.fixed]
+        height = model.support.height(basis.doflocs.T)
+        # what lies on the base is held: its own nodes, and the middles of its edges
+        held = height < model.support.height(base).max() + 1e-9
+        free = np.flatnonzero(~held)
+        self._factor, self._free, self._size = _factorised(stiffness[free][:, free]), free, stiffness.shape[0]
+        where = basis.doflocs
+        surface = basis.get_dofs(linear.boundary_facets()).flatten()
+        # the components of a node share its place
+        order_of = np.lexsort(np.round(where[:, surface], 9))
+        nodes = surface[order_of].reshape(-1, 3)
+        nodes = nodes[~held[nodes[:, 0]]]
+        self.nodes, self.points = np.sort(nodes, axis=1), where[:, nodes[:, 0]].T
+        self._columns: dict[int, np.ndarray] = {}
+
+    def compliance(self, chosen: np.ndarray) -> np.ndarray:
+        """(3 c, 3 c) m/N of chosen surface nodes (c,), components x, y, z a node."""
+        new = [int(k) for k in chosen if int(k) not in self._columns]
+        if new:
+            dofs = self.nodes[new].ravel()
+            loads = np.zeros((self._size, len(dofs)))
+            loads[dofs, np.arange(len(dofs))] = 1.0
+            solved = self._factor.solve(loads[self._free])
+            moved = np.zeros((self._size, len(dofs)))
+            moved[self._free] = solved
+            on_surface = moved[self.nodes.ravel()]
+            for i, k in enumerate(new):
+                self._columns[k] = on_surface[:, 3 * i : 3 * i + 3]
+        rows = (3 * chosen[:, None] + np.arange(3)).ravel()
+        return np.concatenate([self._columns[int(k)][rows] for k in chosen], axis=1)
+
+
+def _factorised(matrix: Any) -> Any:
+    """Whatever solves it, by `solve`."""
+    if pardiso.available():
+        return pardiso.Pardiso(matrix)
+    return splu(csc_matrix(matrix), permc_spec="MMD_AT_PLUS_A", options={"SymmetricMode": True})
+
+
+class _Touch:
+    """A sphere on nodes: springs along the sphere's normal, and across it until they slip."""
+
+    def __init__(self, solved: _Solved, radius_m: float, friction: float, penalty: float) -> None:
+        self.solved, self.radius_m, self.friction = solved, radius_m, friction
+        self.penalty = penalty
+        self._at: np.ndarray | None = None
+        self._force = np.zeros(3)
+        self._chosen = np.zeros(0, dtype=int)
+        self._stuck: dict[int, np.ndarray] = {}
+        self._u = np.zeros((0, 3))
+
+    def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
+        if self._at is None or np.linalg.norm(tip - self._at) > MOVED_M:
+            self._at, self._force = tip.copy(), self._solve(tip)
+        return self._force
+
+    def _solve(self, tip: np.ndarray) -> np.ndarray:
+        points = self.solved.points
+        near = np.flatnonzero(np.linalg.norm(points - tip, axis=1) < NEAR_RADII * self.radius_m)
+        if not len(near):
+            self._stuck, self._chosen = {}, near
+            return np.zeros(3)
+        if not np.array_equal(near, self._chosen):
+            old = dict(zip(self._chosen.tolist(), self._u, strict=True))
+            self._chosen, self._matrix = near, self.solved.compliance(near)
+            self._u = np.array([old.get(int(k), np.zeros(3)) for k in near])
+        own = np.median(np.diag(self._matrix).reshape(-1, 3).mean(axis=1))
+        spring = self.penalty / own
+        force, u = self._balanced(tip, near, spring)
+        self._u = u
+        on = np.linalg.norm(force, axis=1) > 0
+        relative = points[near] + u - tip
+        kept = {}
+        for k in np.flatnonzero(on):
+            first = self._stuck.get(int(near[k]), relative[k])
+            n = relative[k] / np.linalg.norm(relative[k])
+            push = float(force[k] @ n)
+            slid = relative[k] - first
+            slid = slid - (slid @ n) * n
+            length, most = float(np.linalg.norm(slid)), self.friction * push / spring
+            # an anchor that slips follows until its spring is on the cone
+            kept[int(near[k])] = relative[k] - slid * most / length if length > most and length > 0 else first
+        self._stuck = kept
+        return -force.sum(axis=0)
+
+    def _balanced(self, tip: np.ndarray, near: np.ndarray, spring: float) -> tuple[np.ndarray, np.ndarray]:
+        """((c, 3) N on the nodes, (c, 3) m): where springs and object balance, by Newton's steps."""
+        points, u = self.solved.points[near], self._u.copy()
+        size = len(near)
+        force = np.zeros((size, 3))
+        for _ in range(ITERATIONS):
+            force, slope = self._springs(points + u - tip, near, spring)
+            residual = u.ravel() - self._matrix @ force.ravel()
+            if np.abs(residual).max() < 1e-8:
+                break
+            jacobian = np.eye(3 * size)
+            for k in np.flatnonzero(force.any(axis=1)):
+                block = slice(3 * k, 3 * k + 3)
+                jacobian[:, block] -= self._matrix[:, block] @ slope[k]
+            step = np.clip(np.linalg.solve(jacobian, residual), -1e-3, 1e-3).reshape(size, 3)
+            u = min(
+                (u - share * step for share in SHARES), key=lambda v: self._miss(points, v, tip, near, spring)
+            )
+        return force, u
+
+    def _miss(
+        self, points: np.ndarray, u: np.ndarray, tip: np.ndarray, near: np.ndarray, spring: float
+    ) -> float:
+        """m, how far displacements are from balance."""
+        force, _ = self._springs(points + u - tip, near, spring)
+        return float(np.abs(u.ravel() - self._matrix @ force.ravel()).max())
+
+    def _springs(
+        self, relative: np.ndarray, near: np.ndarray, spring: float
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """((c, 3) N on nodes at `relative` to the tip's centre, (c, 3, 3) N/m their slopes)."""
+        distance = np.maximum(np.linalg.norm(relative, axis=1), 1e-9)
+        n = relative / distance[:, None]
+        deep = self.radius_m - distance
+        force, slope = np.zeros_like(relative), np.zeros((len(relative), 3, 3))
+        for k in np.flatnonzero(deep > 0):
+            across = np.eye(3) - np.outer(n[k], n[k])
+            force[k] = spring * deep[k] * n[k]
+            slope[k] = -spring * np.outer(n[k], n[k]) + spring * deep[k] / distance[k] * across
+            first = self._stuck.get(int(near[k]))
+            if first is None:
+                continue
+            pull = -spring * across @ (relative[k] - first)
+            most = self.friction * spring * deep[k]
+            size = float(np.linalg.norm(pull))
+            if math.isfinite(most) and size > most:
+                force[k] += pull * most / size
+            else:
+                force[k] += pull
+                slope[k] -= spring * across
+        return force, slope
+
+
+def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
+    """The renderer; raises OptionError where scikit-fem is not installed."""
+    return made(ScikitFem, model, options)
