@@ -8,14 +8,13 @@ surface; what it solved is kept by content. Everything that a robot's owner may 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from types import SimpleNamespace
 
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from mechanics.recording import Recording
 from scenes.laboratory.curves import Curve, PathJob, Solving, curves
-from scenes.laboratory.effects import effect
+from scenes.laboratory.effects import Bench, effect
 from scenes.laboratory.specimen import Fineness, Specimen
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom, column, rectangle, stacked
@@ -78,8 +77,10 @@ def robot_tissue(seed: int, *, places: int | None = None, solving: Solving | Non
     across = max(2, round(count / along))
     phantom = _phantom(rng, np.array([along - 1, across - 1]) * spacing + 2 * _WALL_M, height)
     strength = rng.uniform(0.6, 1.4)
-    keys = effect("stiffness_field").parameters(strength, SimpleNamespace(phantom=phantom, rng=rng))
-    specimen = effect("stiffness_field").in_solid(Specimen(tip_radius=1e3 * tip), keys)
+    varies = effect("stiffness_field")
+    keys = varies.parameters(strength, Bench(phantom, phantom.young_modulus_pa, tip, (), rng))
+    assert varies.in_solid is not None
+    specimen = varies.in_solid(Specimen(tip_radius=1e3 * tip), keys)
     points, normals = _touched(phantom, rng, along, across, spacing)
     deepest = 1e3 * min(0.3 * height, 1.2 * tip)
     travel = -deepest * np.linspace(0, 1, _STATES)[:, None] ** 1.3 * [0.0, 0.0, 1.0]

@@ -192,7 +192,7 @@ def _indentation(
         modulus = made.young_modulus_pa / bench.similarity.modulus
         interval = modulus_interval(bench, made)
     assert made.attribution is not None
-    ideal, at_bound = made.attribution.ideal.found.modulus / bench.similarity.modulus, _at_bound(made)
+    ideal, at_bound = made.attribution.ideal.found.modulus / bench.similarity.modulus, made.at_bound
     if made.effects:
         notes.append(f"without {_listed(made.effects)} the modulus would be {ideal:.4g} Pa")
     told = {e.name for e in effects()} - set(made.left_out)
@@ -246,19 +246,6 @@ def _named_parameters(bench: Bench, made: Diagnosis) -> dict[str, dict[str, Any]
         for e in fit.effects
         if e.name in made.effects
     }
-
-
-def _at_bound(made: Diagnosis) -> tuple[str, ...]:
-    """Parameters of the effects named that stand where the search ends: 'effect: parameter'."""
-    assert made.attribution is not None
-    fit, found = made.attribution.final.found, []
-    for e in fit.effects:
-        for p, value in zip(e.parameters, fit.of(e.name), strict=True):
-            near = 1e-3 * (p.high - p.low)
-            absent = abs(value - p.ideal) <= near
-            if e.name in made.effects and not absent and (value <= p.low + near or value >= p.high - near):
-                found.append(f"{e.name.replace('_', ' ')}: {p.name}")
-    return tuple(found)
 
 
 def _listed(names: Sequence[str]) -> str:

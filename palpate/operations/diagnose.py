@@ -62,6 +62,8 @@ class DiagnoseOperands:
 
 
 def _answer(result: Diagnosis, asked: DiagnoseOperands, out: Output) -> int:
+    from diagnose.apply import unsure
+
     out.say(*result.lines())
     if asked.apply:
         better = result.improved().save(asked.apply)
@@ -69,6 +71,8 @@ def _answer(result: Diagnosis, asked: DiagnoseOperands, out: Output) -> int:
         out.say(f"improved model ({', '.join(kept) or 'modulus only'}): {asked.apply}")
     if asked.corrected:
         result.corrected().save(asked.corrected)
+        for name in unsure(result):
+            out.say(f"{name.replace('_', ' ')}: smaller than twice its own error, not taken off")
         out.say(f"corrected recording: {asked.corrected}")
     if asked.report:
         out.say(f"report: {result.report(asked.report)}")
