@@ -98,14 +98,31 @@ def with_effects(model: Model, named: Mapping[str, Mapping[str, Any]]) -> Model:
     return model
 
 
+def unsure(diagnosis: Verdict) -> tuple[str, ...]:
+    """Asserted effects of the instrument that are smaller than twice their own error: the 95 % interval of
+    each of their parameters holds what a right instrument has (0, or 1 on a matrix's diagonal)."""
+    found = []
+    for entry in diagnosis.entries:
+        if entry.name in diagnosis.effects and effect(entry.name).correct is not None and entry.intervals:
+            held = [
+                (low <= right) & (right <= high)
+                for low, high in (np.asarray(each, float) for each in entry.intervals.values())
+                for right in (np.eye(3) if low.shape == (3, 3) else np.zeros(low.shape),)
+            ]
+            found += [entry.name] if all(each.all() for each in held) else []
+    return tuple(found)
+
+
 def corrected(recording: Recording, diagnosis: Verdict) -> Recording:
     """The recording with asserted instrument effects taken off, what the instrument does last first.
 
-    Those that cannot be taken off stay. Times keep their samples.
+    Those that cannot be taken off, and those that are smaller than twice their error (`unsure`), stay. Times
+    keep their samples.
     """
     parameters = {e.name: e.parameters for e in diagnosis.entries}
     asserted = sorted((effect(name) for name in diagnosis.effects), key=lambda e: -e.read_as)
+    kept = unsure(diagnosis)
     for each in asserted:
-        if each.correct is not None:
+        if each.correct is not None and each.name not in kept:
             recording = each.correct(recording, parameters.get(each.name, {}))
     return dataclasses.replace(recording, truth=None)

@@ -36,6 +36,7 @@ from reconstruct.steps.s7_modulus.modulus_field import (
     press_moduli,
     with_field,
 )
+from reconstruct.steps.s7_modulus.press_fit import touched_by_law
 from render.one_d import Law, spread_law
 
 RIVALS = ("kelvin-voigt", "hunt-crossley")
@@ -79,7 +80,8 @@ def prepare(
     field: str = "auto",
 ) -> Prepared:
     """Contact samples and what each model needs; the touch sites are solved here. site_m: None keeps the
-    table's sites. field: as in CompareOptions."""
+    table's sites. field: as in CompareOptions. First touches that were not recorded are found by the touch
+    law, for every model alike."""
     model = of_one_modulus(model)
     if site_m is not None:
         table = replace(table, site=sites_of(table.point, table.normal, site_m))
@@ -87,6 +89,7 @@ def prepare(
     solved = touch_sites(
         model.mesh, table.point, table.normal, model.material.poisson_ratio, solver=solver, progress=progress
     )
+    table = touched_by_law(table, solved, LAWS, LAW_ERROR, table.noise.raw_n)
     smooth = low_passed(table)
     presses = replace(smooth, force=table.net.force).window(MARGIN_S, MARGIN_S)
     unit = {

@@ -46,12 +46,14 @@ UP = np.array([0.0, 0.0, 1.0])
 @dataclass(frozen=True)
 class Curve:
     """One cycle of a machine: t (n,) s increasing, travel (n,) m into the sample from any zero, force (n,) N
-    that pushes the tip out, from any level. name: of its file."""
+    that pushes the tip out, from any level. name: of its file. level_n: what it reads in free air; None: what
+    the first rows read."""
 
     t: np.ndarray
     travel: np.ndarray
     force: np.ndarray
     name: str = ""
+    level_n: float | None = None
 
 
 @dataclass(frozen=True)
@@ -181,7 +183,7 @@ def _levelled(curve: Curve, pace: float) -> Curve:
     t, travel, force = (
         v[: count * block].reshape(count, block).mean(axis=1) for v in (curve.t, curve.travel, curve.force)
     )
-    return Curve(pace * (t - t[0]), travel, force, curve.name)
+    return Curve(pace * (t - t[0]), travel, force, curve.name, curve.level_n)
 
 
 def _way_in(curve: Curve) -> tuple[np.ndarray, np.ndarray, float] | None:
@@ -189,12 +191,20 @@ def _way_in(curve: Curve) -> tuple[np.ndarray, np.ndarray, float] | None:
     contact."""
     peak = int(np.argmax(curve.force))
     early = slice(0, max(3, int(_BASELINE * peak)))
-    force = curve.force - np.median(curve.force[early])
-    noise = max(white_noise_std(curve.force[:, None]), spread_about_zero(force[early]) / np.sqrt(2))
+    force = curve.force - _level(curve, peak)
+    noise = white_noise_std(curve.force[:, None])
+    if curve.level_n is None:
+        noise = max(noise, spread_about_zero(force[early]) / np.sqrt(2))
     noise = max(noise, _LEAST_NOISE * float(force.max()))
     if peak < 4 or not force[peak] > _CONTACT * noise:
         return None
     return curve.travel[: peak + 1], force[: peak + 1], noise
+
+
+def _level(curve: Curve, peak: int) -> float:
+    """N, what the curve reads in free air."""
+    early = curve.force[: max(3, int(_BASELINE * peak))]
+    return float(np.median(early)) if curve.level_n is None else curve.level_n
 
 
 def _modulus(each: Loading, onset: float, law: Any, poisson_ratio: float) -> float:
@@ -213,7 +223,7 @@ def _side_by_side(
         t = np.arange(0.0, curve.t[-1], 1 / rate)
         travel, force = (np.interp(t, curve.t, v) for v in (curve.travel, curve.force))
         peak = int(np.argmax(force))
-        level = np.median(force[: max(3, int(_BASELINE * peak))])
+        level = _level(Curve(t, travel, force, level_n=curve.level_n), peak)
         times.append(clock + t)
         heights.append(HAND_TIP_M + at - length * travel)
         forces.append(scale * (force - level))

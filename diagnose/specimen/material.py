@@ -11,12 +11,13 @@ import numpy as np
 from scipy.stats import t as student
 
 from diagnose.forward.touches import touches_of
-from diagnose.specimen.approach import Approach, approach_of
-from diagnose.specimen.bench import Bench, bench_of
+from diagnose.specimen.approach import APPROACH_LAWS, Approach, approach_of
+from diagnose.specimen.bench import Bench, Curve, bench_of
 from diagnose.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
 from diagnose.specimen.result import Material, Tests
 from diagnose.specimen.rivals import held_out_rivals
-from diagnose.specimen.yielding import Machine, Way, machine_of, way_of
+from diagnose.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
+from diagnose.specimen.zero import bias, late_contact
 from diagnose.verdict.result import Diagnosis
 from mechanics.effects.finite_strain import EFFECT as FINITE
 from mechanics.effects.registry import effects
@@ -66,10 +67,24 @@ def material_of(
     if tests.kind == "relaxation":
         return _relaxation(tests, names)
     assert tests.tip_radius_m is not None
-    bench = bench_of(
-        tests.curves, tests.tip_radius_m, layer_m=layer_m, poisson_ratio=poisson_ratio, specimens=specimens
-    )
-    return _indentation(tests, bench, names, fast, seed, progress)
+
+    def bench(curves: Sequence[Curve]) -> Bench:
+        assert tests.tip_radius_m is not None
+        return bench_of(
+            curves, tests.tip_radius_m, layer_m=layer_m, poisson_ratio=poisson_ratio, specimens=specimens
+        )
+
+    curves, words = late_contact(tests.curves, poisson_ratio, tests.tip_radius_m)
+    found = bench(curves)
+    if words is not None:
+        else_pa = float(np.median(approach_of(bench(tests.curves)).modulus_pa))
+        notes = (*tests.notes, f"{words}; the modulus would be {else_pa:.4g} Pa then")
+        tests = replace(tests, curves=tuple(curves), notes=notes)
+    elif (read := bias(curves, found)) is not None:
+        words = f"the force reads {read[0]:.3g} N in free air, which is taken off"
+        notes = (*tests.notes, f"{words}: the modulus would be {read[1]:.4g} Pa if it were not")
+        tests = replace(tests, notes=notes)
+    return _indentation(tests, found, names, fast, seed, progress)
 
 
 def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
@@ -80,7 +95,8 @@ def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
     ready = [c.upto(MOST_STRAIN) for c in curves]
     fitted = fit_law(ready, law)
     own = np.array([fit_law([c], law).young_modulus_pa for c in ready])
-    spread = 1.96 * own.std(ddof=1) / np.sqrt(len(own)) if len(own) > 1 else np.nan
+    few = student.ppf(0.975, len(own) - 1) if len(own) > 1 else np.nan
+    spread = few * own.std(ddof=1) / np.sqrt(len(own)) if len(own) > 1 else np.nan
     error["constant"] = float(np.median([c.stress.std() / np.sqrt((c.stress**2).mean()) for c in ready]))
     c = fitted.coefficients
     parameters = {"law": law.name, "strain_zero": fitted.zero}
@@ -168,8 +184,8 @@ def _indentation(
         modulus = made.young_modulus_pa / bench.similarity.modulus
         interval = modulus_interval(bench, made)
     assert made.attribution is not None
+    ideal, at_bound = made.attribution.ideal.found.modulus / bench.similarity.modulus, made.at_bound
     if made.effects:
-        ideal = made.attribution.ideal.found.modulus / bench.similarity.modulus
         notes.append(f"without {_listed(made.effects)} the modulus would be {ideal:.4g} Pa")
     told = {e.name for e in effects()} - set(made.left_out)
     return Material(
@@ -186,7 +202,8 @@ def _indentation(
         closed=made.gap_closed,
         closed_ci95=made.gap_closed_ci95,
         parameters=_named_parameters(bench, made),
-        at_bound=_at_bound(made),
+        at_bound=at_bound,
+        bound_carries=bool(at_bound) and not interval[0] <= ideal <= interval[1],
         notes=(*notes, *made.reasons),
         unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - told)),
         diagnosis=made,
@@ -223,28 +240,21 @@ def _named_parameters(bench: Bench, made: Diagnosis) -> dict[str, dict[str, Any]
     }
 
 
-def _at_bound(made: Diagnosis) -> tuple[str, ...]:
-    """Parameters of the effects named that stand where the search ends: 'effect: parameter'."""
-    assert made.attribution is not None
-    fit, found = made.attribution.final.found, []
-    for e in fit.effects:
-        for p, value in zip(e.parameters, fit.of(e.name), strict=True):
-            near = 1e-3 * (p.high - p.low)
-            absent = abs(value - p.ideal) <= near
-            if e.name in made.effects and not absent and (value <= p.low + near or value >= p.high - near):
-                found.append(f"{e.name.replace('_', ' ')}: {p.name}")
-    return tuple(found)
-
-
 def _listed(names: Sequence[str]) -> str:
     return " and ".join(n.replace("_", " ") for n in names)
 
 
-def _mean_interval(own: np.ndarray) -> tuple[float, float]:
-    if len(own) < 2:
-        return float("nan"), float("nan")
-    half = student.ppf(0.975, len(own) - 1) * own.std(ddof=1) / np.sqrt(len(own))
-    return float(own.mean() - half), float(own.mean() + half)
+_ALIKE = 1.1
+"""The interval of a few curves covers laws that miss at most so many times what the best misses."""
+
+
+def _both(modulus_pa: float, own: np.ndarray, interval: tuple[float, float]) -> tuple[float, float]:
+    """Pa, 95 %: by what curves differ in ln E, own (c,) Pa, beside the fit's own interval."""
+    between = 0.0
+    if len(own) > 1:
+        between = student.ppf(0.975, len(own) - 1) * np.log(own).std(ddof=1) / np.sqrt(len(own))
+    low, high = (float(np.hypot(np.log(end / modulus_pa), between)) for end in interval)
+    return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
 
 
 def _ways(tests: Tests, bench: Bench) -> list[Way]:
@@ -273,9 +283,11 @@ def _few(
     if slopes:
         notes.append(f"free air slopes by {np.median(slopes):.3g} N/m of travel, which is taken off")
     machine: Machine | None = None
+    nu = bench.model.material.poisson_ratio
     if len(ways) > 1 or np.isfinite(approach.hysteresis):
-        nu = bench.model.material.poisson_ratio
         machine = machine_of(ways, nu, tests.tip_radius_m, float(np.median(own)))
+    limit = _ALIKE * approach.error[approach.law]
+    likely = [approach.law, *(n for n in APPROACH_LAWS if n != approach.law and approach.error[n] <= limit)]
     onset = {"onset_m": bench.onset_m[bench.used].tolist()}
     common = Material(
         kind="indentation",
@@ -283,7 +295,9 @@ def _few(
         curves=len(own),
         held_out="blocks of each way in",
         young_modulus_pa=float(own.mean()),
-        young_modulus_ci95_pa=_mean_interval(own),
+        young_modulus_ci95_pa=_both(
+            float(own.mean()), own, rigid_interval(ways, nu, tests.tip_radius_m, float(own.mean()), likely)
+        ),
         law=approach.law,
         error=approach.error,
         verdict=f"{approach.law} follows the way in best; {gone}",
@@ -298,7 +312,9 @@ def _few(
     return replace(
         common,
         young_modulus_pa=machine.modulus_pa,
-        young_modulus_ci95_pa=machine.modulus_ci95_pa,
+        young_modulus_ci95_pa=_both(
+            machine.modulus_pa, own_moduli(ways, nu, tests.tip_radius_m, machine), machine.modulus_ci95_pa
+        ),
         law=machine.law,
         error={**approach.error, "on a rigid machine": machine.rigid_error, "verdict": machine.error},
         verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "

@@ -47,7 +47,8 @@ class Material(Result):
     rms (of N, Pa): 1D models are the floor, 'regression' has no physics and is the ceiling. closed: share of
     the gap beyond the noise that the verdict closes on held-out curves, with its interval. effects: what was
     named. parameters: by law or effect, SI. unknown: what such a test cannot tell. seen: (x, measured,
-    predicted, axes' words). at_bound: parameters at the end of the search. odds: of the least sure of
+    predicted, axes' words). at_bound: parameters at the end of the search; bound_carries: the
+    modulus goes with them, as without them it lies outside its interval. odds: of the least sure of
     what was understood of the files. `plot`: measured and predicted. `show`: nothing, it has no place in
     space.
     """
@@ -70,6 +71,7 @@ class Material(Result):
     seen: tuple[np.ndarray, np.ndarray, np.ndarray, str, str] | None = None
     diagnosis: Diagnosis | None = None
     at_bound: tuple[str, ...] = ()
+    bound_carries: bool = False
     odds: float = float("inf")
 
     @property
@@ -79,8 +81,14 @@ class Material(Result):
 
     @property
     def predicts(self) -> bool:
-        """Whether held-out data are predicted better than by a constant."""
-        return not self.missed > self.error.get("constant", float("inf"))
+        """Whether held-out data are predicted better than by a constant, by a modulus that no end of a search
+        decides."""
+        return not (self.bound_carries or self.beyond_constant)
+
+    @property
+    def beyond_constant(self) -> bool:
+        """Whether a constant predicts held-out data better."""
+        return self.missed > self.error.get("constant", float("inf"))
 
     @property
     def beaten_by(self) -> str | None:

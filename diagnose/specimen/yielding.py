@@ -38,7 +38,18 @@ class Way:
 
     travel: np.ndarray
     push: np.ndarray
-    slope_n_per_m: float
+    slope_n_per_m: float = 0.0
+
+    @classmethod
+    def thinned(cls, u: np.ndarray, net: np.ndarray, slope_n_per_m: float = 0.0) -> Way:
+        """Of the rows (n,) m, (n,) N over free air that end at the peak."""
+        top = float(net[-1])
+        edges = np.linspace(_LOWEST * top, top, _POINTS + 1)
+        step = np.clip(np.searchsorted(edges, net) - 1, -1, _POINTS - 1)
+        kept = np.unique(step[step >= 0])
+        mean = [(float(u[step == k].mean()), float(net[step == k].mean())) for k in kept]
+        thin_u, thin_f = (np.array(v) for v in zip(*mean, strict=True))
+        return cls(thin_u, thin_f, slope_n_per_m)
 
 
 @dataclass(frozen=True)
@@ -73,14 +84,8 @@ def way_of(travel: np.ndarray, force: np.ndarray, onset: float) -> Way:
         else:
             slope = 0.0
     net = f - level - slope * (u - onset)
-    top = float(net[-1])
-    edges = np.linspace(_LOWEST * top, top, _POINTS + 1)
-    step = np.clip(np.searchsorted(edges, net) - 1, -1, _POINTS - 1)
-    step = np.where(u > onset - 0.1 * (u[-1] - onset), step, -1)
-    kept = np.unique(step[step >= 0])
-    mean = [(float(u[step == k].mean()), float(net[step == k].mean())) for k in kept]
-    thin_u, thin_f = (np.array(v) for v in zip(*mean, strict=True))
-    return Way(thin_u, thin_f, float(slope))
+    near = u > onset - 0.1 * (u[-1] - onset)
+    return Way.thinned(u[near], net[near], float(slope))
 
 
 class _Fit:
@@ -133,6 +138,59 @@ class _Fit:
         _, c, left = self.solved(ways, kept, found, yields)
         return found, c, left
 
+    def left_out(
+        self, ways: Sequence[Way], guess: float, yields: bool
+    ) -> tuple[tuple[float, float], list[tuple[float, float]], float]:
+        """((log E, c) of all rows, those without each block of force, rms N of the blocks left out)."""
+        blocks = [
+            np.minimum(np.arange(len(w.push)) * _BLOCKS // max(len(w.push), 1), _BLOCKS - 1) for w in ways
+        ]
+        log_e, c, _ = self.fitted(ways, [np.ones(len(w.push)) for w in ways], guess, yields)
+        missed, again = 0.0, []
+        for k in range(_BLOCKS):
+            kept = [(b != k).astype(float) for b in blocks]
+            own, own_c, left = self.fitted(ways, kept, log_e, yields)
+            again.append((own, own_c))
+            missed += sum(float((r[b == k] ** 2).sum()) for r, b in zip(left, blocks, strict=True))
+        return (log_e, c), again, float(np.sqrt(missed / sum(map(len, blocks))))
+
+
+def left_out_error(ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float) -> float:
+    """rms of the blocks of force that the best law misses, on a rigid machine or one that yields, over the
+    rms of the force. modulus_pa: a first guess."""
+    deepest, guess = max(float(w.travel[-1] - w.travel[0]) for w in ways), float(np.log(modulus_pa))
+    fits = (_Fit(name, poisson_ratio, radius_m, deepest) for name in LAWS)
+    return min(fit.left_out(ways, guess, yields)[2] for fit in fits for yields in (False, True)) / _rms(ways)
+
+
+def own_moduli(ways: Sequence[Way], poisson_ratio: float, radius_m: float, machine: Machine) -> np.ndarray:
+    """(w,) Pa of each way by itself, by the machine's law and stiffness."""
+    deepest = max(float(w.travel[-1] - w.travel[0]) for w in ways)
+    fit, start = _Fit(machine.law, poisson_ratio, radius_m, deepest), float(np.log(machine.modulus_pa))
+    found = []
+    for way in ways:
+        less = Way(way.travel - way.push / machine.stiffness_n_per_m, way.push)
+        found.append(fit.fitted([less], [np.ones(len(way.push))], start, False)[0])
+    return np.exp(np.array(found))
+
+
+def rigid_interval(
+    ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float, laws: Sequence[str]
+) -> tuple[float, float]:
+    """Pa, 95 %, about modulus_pa, of a fit of all ways on a rigid machine: what it changes by without each
+    block of force, over `laws`, the first of which modulus_pa is by."""
+    deepest, guess = max(float(w.travel[-1] - w.travel[0]) for w in ways), float(np.log(modulus_pa))
+    low, high, middle = 0.0, 0.0, 0.0
+    for k, law in enumerate(laws):
+        (log_e, _), apart, _ = _Fit(law, poisson_ratio, radius_m, deepest).left_out(ways, guess, False)
+        middle, half = (middle if k else log_e), _TIMES * float(_jackknifed(apart)[0])
+        low, high = min(low, log_e - half - middle), max(high, log_e + half - middle)
+    return modulus_pa * float(np.exp(low)), modulus_pa * float(np.exp(high))
+
+
+def _rms(ways: Sequence[Way]) -> float:
+    return float(np.sqrt(np.mean(np.concatenate([w.push for w in ways]) ** 2)))
+
 
 def machine_of(
     ways: Sequence[Way], poisson_ratio: float, radius_m: float, modulus_pa: float
@@ -142,31 +200,22 @@ def machine_of(
     Needs two ways in or more; None where a rigid machine does as well.
     """
     deepest = max(float(w.travel[-1] - w.travel[0]) for w in ways)
-    rms = float(np.sqrt(np.mean(np.concatenate([w.push for w in ways]) ** 2)))
-    everything = [np.ones(len(w.push)) for w in ways]
-    blocks = [np.minimum(np.arange(len(w.push)) * _BLOCKS // max(len(w.push), 1), _BLOCKS - 1) for w in ways]
+    rms = _rms(ways)
     guess = float(np.log(modulus_pa))
     errors: dict[tuple[str, bool], float] = {}
-    whole: dict[tuple[str, bool], tuple[float, float, list[np.ndarray]]] = {}
+    whole: dict[tuple[str, bool], tuple[float, float]] = {}
     apart: dict[tuple[str, bool], list[tuple[float, float]]] = {}
     for name in LAWS:
         fit = _Fit(name, poisson_ratio, radius_m, deepest)
         for yields in (False, True):
-            whole[name, yields] = fit.fitted(ways, everything, guess, yields)
-            missed, again = 0.0, []
-            for k in range(_BLOCKS):
-                kept = [(b != k).astype(float) for b in blocks]
-                log_e, c, left = fit.fitted(ways, kept, whole[name, yields][0], yields)
-                again.append((log_e, c))
-                missed += sum(float((r[b == k] ** 2).sum()) for r, b in zip(left, blocks, strict=True))
-            apart[name, yields] = again
-            errors[name, yields] = float(np.sqrt(missed / sum(map(len, blocks)))) / rms
+            whole[name, yields], apart[name, yields], missed = fit.left_out(ways, guess, yields)
+            errors[name, yields] = missed / rms
     rigid = min(LAWS, key=lambda name: errors[name, False])
     law = min(LAWS, key=lambda name: errors[name, True])
     if errors[law, True] > _BETTER * errors[LAWS[0], True]:
         law = LAWS[0]
     spread = _jackknifed(apart[law, True])
-    log_e, c, _ = whole[law, True]
+    log_e, c = whole[law, True]
     push = max(float(w.push.max()) for w in ways)
     matters = c * push > _MATTERS * deepest
     if not matters or errors[law, True] > _GAIN * errors[rigid, False] or c < _SURE * spread[1]:
@@ -174,7 +223,7 @@ def machine_of(
     likely = [name for name in LAWS if errors[name, True] <= _ALIKE * errors[law, True]]
     ends = np.array(
         [
-            np.array(whole[name, True][:2]) + sign * _TIMES * _jackknifed(apart[name, True])
+            np.array(whole[name, True]) + sign * _TIMES * _jackknifed(apart[name, True])
             for name in {law, *likely}
             for sign in (-1, 1)
         ]

@@ -172,7 +172,12 @@ class Diagnosis(Result):
         """The three answers, a line each, with units."""
         near = self.where.leading
         lines = [
-            f"verdict: {self.summary}",
+            "; ".join(
+                [
+                    "verdict: " + self.summary,
+                    *(f"{each} stands at the end of its range" for each in self.at_bound),
+                ]
+            ),
             f"where: gap {self.gap_before_n:.4f} N (noise {self.noise_n:.4f} N); it follows {near.axis} most "
             f"(share {near.share:.0%}, p = {near.p:.2g})",
             *(f"which: {e.name} {_said(e)}" for e in self.entries if e.name in self.effects),
@@ -183,6 +188,11 @@ class Diagnosis(Result):
                 f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N on places not fitted, "
                 f"{self.gap_closed:.0%} closed (95 % interval {low:.0%} to {high:.0%})"
             )
+        if self.constant_n is not None:
+            lines.append(
+                f"floor: the sensor noise {self.noise_n:.4f} N; ceiling: a constant push "
+                f"{self.constant_n:.4f} N"
+            )
         lines += [f"  {reason}" for reason in self.reasons]
         if self.next_touch is not None and self.unsettled:
             lines.append(f"next touch: {self.next_touch.why}")
@@ -190,6 +200,33 @@ class Diagnosis(Result):
             names = ", ".join(n.replace("_", " ") for n in self.left_out)
             lines.append(f"not tried (these presses cannot show it, or --fast leaves it out): {names}")
         return lines
+
+    @property
+    def constant_n(self) -> float | None:
+        """rms error, N, of the ceiling: at every place a constant push along the normal, the mean of the
+        other places'; None where the touches are not at hand."""
+        if self.forward is None or self.forward.touches.sites < 2:
+            return None
+        t = self.forward.touches
+        force, site = t.local_force[t.counted], t.site[t.press[t.counted]]
+        total, count = np.bincount(site, weights=force[:, 0]), np.bincount(site)
+        others = (total.sum() - total) / np.maximum(len(site) - count, 1)
+        missed = force - others[site, None] * [1.0, 0.0, 0.0]
+        return float(np.sqrt(max((missed**2).sum(axis=1).mean() + t.thinned_away, 0.0)))
+
+    @property
+    def at_bound(self) -> tuple[str, ...]:
+        """Parameters of the effects named that stand where the search ends: 'effect: parameter'."""
+        if self.attribution is None:
+            return ()
+        fit, found = self.attribution.final.found, []
+        for e in fit.effects:
+            for p, value in zip(e.parameters, fit.of(e.name), strict=True):
+                near = 1e-3 * (p.high - p.low)
+                absent = abs(value - p.ideal) <= near
+                if e.name in self.effects and not absent and not p.low + near < value < p.high - near:
+                    found.append(f"{e.name.replace('_', ' ')}: {p.name}")
+        return tuple(found)
 
     @property
     def unsettled(self) -> bool:
@@ -219,6 +256,8 @@ class Diagnosis(Result):
             "next_touch": None if self.next_touch is None else self.next_touch.as_json(),
             "errors_n": dict(self.errors_n),
             "held_out": {k: {"gap_before_n": a, "gap_after_n": b} for k, (a, b) in self.held_out_n.items()},
+            "constant_rmse_n": self.constant_n,
+            "at_bound": list(self.at_bound),
             "reasons": list(self.reasons),
             "confusable": [{"pair": [a, b], "cosine": c} for a, b, c in self.confusable],
             "seconds": dict(self.seconds),

@@ -67,6 +67,7 @@ def reconstruct(**planned: Any) -> dict[str, Any]:
         "presses": len(result.model.presses),
         "young_modulus_pa": result.young_modulus_pa,
         "young_modulus_ci95_pa": result.young_modulus_ci95_pa,
+        "doubt": result.doubt,
     }
 
 

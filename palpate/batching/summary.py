@@ -21,9 +21,9 @@ _Z95 = 1.959964
 
 @dataclass(frozen=True)
 class Row:
-    """A recording in summary.csv. status: done, failed or waiting; reason: in a line, why it failed. verdict:
-    the diagnosis' kind; effects: those asserted, ';' between. Moduli Pa, gaps N rms; seconds: of all steps,
-    whenever they were done."""
+    """A recording in summary.csv. status: done, failed or waiting; reason: in a line, why it failed or is not
+    to be believed. verdict: the diagnosis' kind; effects: those asserted, ';' between. Moduli Pa, gaps N rms;
+    seconds: of all steps, whenever they were done."""
 
     recording: str
     status: str
@@ -57,6 +57,11 @@ class Entry:
     def object(self) -> str | None:
         name = self.values.get("reconstruct", {}).get("object")
         return None if name is None else str(name)
+
+    @property
+    def doubt(self) -> str:
+        """Why its model is not to be believed; '' where nothing speaks against it."""
+        return str(self.values.get("reconstruct", {}).get("doubt", ""))
 
 
 @dataclass(frozen=True)
@@ -107,6 +112,11 @@ class Batch(Result):
         return [row for row in self.rows if row.status == "failed"]
 
     @property
+    def doubtful(self) -> list[Row]:
+        """Those whose model is not to be believed; `reason` says why."""
+        return [entry.row for entry in self.entries if entry.doubt]
+
+    @property
     def table(self) -> dict[str, list[Any]]:
         """The columns of summary.csv by name; None where nothing is known."""
         return {name: [getattr(row, name) for row in self.rows] for name in COLUMNS}
@@ -127,13 +137,16 @@ def entry_of(name: str, outcomes: Mapping[str, Outcome], bad: str | None, steps:
     values: dict[str, Mapping[str, Any]] = {step: record.value for step, record in records.items()}
     failed = [o for o in outcomes.values() if o.state == "failed"]
     status = "failed" if failed else ("done" if len(records) == len(steps) else "waiting")
-    low, high = values.get("reconstruct", {}).get("young_modulus_ci95_pa") or (None, None)
+    made = values.get("reconstruct", {})
+    low, high = made.get("young_modulus_ci95_pa") or (None, None)
+    reasons = [f"{o.task.stage}: {o.reason}" for o in failed]
+    reasons += [f"not to be believed: {made['doubt']}"] if made.get("doubt") else []
     verdict = values.get("diagnose", {})
     row = Row(
         recording=name,
         status=status,
-        reason="; ".join(f"{o.task.stage}: {o.reason}" for o in failed),
-        young_modulus_pa=values.get("reconstruct", {}).get("young_modulus_pa"),
+        reason="; ".join(reasons),
+        young_modulus_pa=made.get("young_modulus_pa"),
         young_modulus_lo_pa=low,
         young_modulus_hi_pa=high,
         verdict=verdict.get("kind"),

@@ -17,6 +17,16 @@ def npz(path: Path) -> list[Table]:
         return _by_length(path.name, {name: held[name] for name in held.files})
 
 
+def npy(path: Path) -> list[Table]:
+    """A NumPy array: the fields of a structured one by name, the columns of a plain one by number ('#1')."""
+    held = np.load(path, allow_pickle=False)
+    if held.dtype.names:
+        return _by_length(path.name, {name: held[name] for name in held.dtype.names})
+    (table,) = _by_length(path.name, {"": held}) or [Table(path.name, {})]
+    columns = list(table.columns.values())
+    return [Table(path.name, {f"#{k + 1}": values for k, values in enumerate(columns)})]
+
+
 def matlab(path: Path) -> list[Table]:
     """Variables and the fields of structures; version 7.3 is HDF5."""
     import scipy.io

@@ -30,10 +30,13 @@ from palpate.importing.meaning import (
     press_scores,
     settled_clock,
 )
+from palpate.importing.sheets import SHEET_SUFFIXES, lines_of
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import SI, without_unit
 
 LEAST_ROWS = 8
+_HEAD = 40
+"""Rows of a sheet in which the probe's radius may be said."""
 _INTO = ("depth", "indentation", "indent", "compression", "travel", "penetration")
 _OUT = ("height", "gap", "toolgap")
 _NAMED, _USUAL = float(np.log(6.0)), float(np.log(2.0))
@@ -106,7 +109,11 @@ def read_curves(paths: Sequence[Path], said: SaidOfCurves, tip_radius_m: float) 
 
 def stated_radius(path: Path) -> float | None:
     """m, of the probe, where the text before the numbers says it."""
-    found = _RADIUS.search(path.read_bytes()[:4000].decode("latin-1").replace("Âµ", "µ"))
+    if path.suffix.lower() in SHEET_SUFFIXES:
+        text = "\n".join(line for lines in lines_of(path).values() for line in lines[:_HEAD])
+    else:
+        text = path.read_bytes()[:4000].decode("latin-1").replace("Âµ", "µ")
+    found = _RADIUS.search(text)
     if found is None:
         return None
     unit = (found[2] or found[4] or "m").lower().replace("µ", "u")

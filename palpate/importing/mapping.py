@@ -19,6 +19,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from os.path import commonprefix
 from pathlib import Path
 from typing import Any
 
@@ -263,20 +264,27 @@ def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:
         wanted |= {role} | {end + b for b in ("pos", "position") for end in role if kind == "position"}
     matches = []
     for table in tables:
-        named = [name for name in table.columns if _key(name) in wanted or _ends(name, role, wanted)]
+        inside = _shared_prefix(table)
+        own_name = {name: _key(name[inside:]) for name in table.columns}
+        named = [name for name, own in own_name.items() if own in wanted or _ends(name, role, wanted)]
         # X (N) is a force, whatever X is else
-        named += [name for name in table.columns if role[0] == "f" and _key(name) == role[1]]
-        own = [name for name in dict.fromkeys(named) if _may_be(name, role)]
+        named += [name for name, own in own_name.items() if role[0] == "f" and own == role[1]]
+        own = [name for name in dict.fromkeys(named) if _may_be(name, role, own_name[name])]
         matches += [(table, name) for name in own[:1] if len(own) == 1 or role == "t"]
     if role == "t":
         return matches[0] if len(matches) >= 1 else None
     return matches[0] if len(matches) == 1 else None
 
 
-def _may_be(name: str, role: str) -> bool:
+def _shared_prefix(table: Table) -> int:
+    """Length of the structure's name that all columns begin with: data.x, data.y."""
+    return commonprefix(list(table.columns)).rfind(".") + 1 if len(table.columns) > 1 else 0
+
+
+def _may_be(name: str, role: str, own: str) -> bool:
     """Whether the unit in a column's name is of the role's kind, or tells no kind."""
     kinds = [kind for kind in SI if unit_in(name, kind) is not None]
-    if role[0] == "f" and _key(name) == role[1]:
+    if role[0] == "f" and own == role[1]:
         return "force" in kinds
     return not kinds or KIND.get(role) in kinds
 

@@ -18,12 +18,15 @@ from diagnose.specimen.result import Tests
 from mechanics.errors import OptionError, RecordingError
 from palpate.importing.curves import LEAST_ROWS, SaidOfCurves, numbers_in, read_curves, stated_radius
 from palpate.importing.meaning import MOST_ODDS, Unclear
+from palpate.importing.sheets import SHEET_SUFFIXES
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables
 from reconstruct.external.indentation import read_chiaro
 from reconstruct.external.uniaxial import of_compression, read_tension
 
 KINDS = ("indentation", "compression", "tension", "relaxation")
 _LOOK = 4000
+_SAYING = (*TEXT_SUFFIXES, *SHEET_SUFFIXES)
+"""Files with words beside the numbers."""
 _BEYOND = 1e15
 _TIPS_M = (1e-9, 0.1)
 _MODULUS = ("relaxationmodulus", "modulus", "g", "e")
@@ -108,7 +111,7 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
         stated.append(data.stated_modulus_pa)
     others = [p for p, own in zip(paths, chiaro, strict=True) if not own]
     if tip_radius_m is None:
-        radii = {stated_radius(p) for p in others if p.suffix.lower() in TEXT_SUFFIXES} - {None}
+        radii = {stated_radius(p) for p in others if p.suffix.lower() in _SAYING} - {None}
         tip_radius_m = radii.pop() if len(radii) == 1 else None
         if tip_radius_m is not None:
             notes.append(f"tip radius {1e3 * tip_radius_m:.4g} mm, as the file says")

@@ -32,7 +32,9 @@ _HOME = "palpate.importing"
 TEXT_SUFFIXES = (".csv", ".tsv", ".txt", ".dat", ".asc")
 _READERS: dict[str, tuple[str, str]] = {
     **dict.fromkeys((*TEXT_SUFFIXES, ".gz"), (f"{_HOME}.text", "")),
+    **dict.fromkeys((".xlsx", ".xlsm", ".xls", ".xlsb", ".ods"), (f"{_HOME}.sheets", "python-calamine")),
     ".npz": (f"{_HOME}.arrays:npz", ""),
+    ".npy": (f"{_HOME}.arrays:npy", ""),
     ".mat": (f"{_HOME}.arrays:matlab", "h5py"),
     **dict.fromkeys((".h5", ".hdf5", ".hdf"), (f"{_HOME}.arrays:hdf5", "h5py")),
     ".parquet": (f"{_HOME}.arrays:parquet", "pyarrow"),

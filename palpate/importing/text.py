@@ -6,6 +6,7 @@ from __future__ import annotations
 import csv
 import gzip
 import re
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -27,10 +28,23 @@ _FORTRAN = re.compile(r"[-+]?\d*\.?\d*[dD][-+]?\d+")
 def read(path: Path) -> list[Table]:
     """The one table of a text file: the longest run of rows of numbers, named by the line before it."""
     raw = gzip.decompress(path.read_bytes()) if path.suffix == ".gz" else path.read_bytes()
-    lines = _decoded(raw).splitlines()
+    made = table_of(_decoded(raw).splitlines(), path.name)
+    if made is None:
+        raise RecordingError(f"'{path}' holds no rows of two numbers or more: is it a table?")
+    return [made]
+
+
+def table_of(
+    lines: list[str],
+    name: str,
+    separators: Sequence[str | None] = _SEPARATORS,
+    commas: Sequence[bool] = (False, True),
+) -> Table | None:
+    """The table in the lines of a text, by whichever separator and decimal sign (comma: True) it has most
+    numbers; None where it has no two numbers in a row."""
     best: tuple[int, int, str | None, bool] = (0, 0, None, False)
-    for separator in _SEPARATORS:
-        for comma in (False, True):
+    for separator in separators:
+        for comma in commas:
             if comma and separator == ",":
                 continue
             start, cells = _run(lines, separator, comma)
@@ -38,7 +52,7 @@ def read(path: Path) -> list[Table]:
                 best = cells, start, separator, comma
     cells, start, separator, comma = best
     if not cells:
-        raise RecordingError(f"'{path}' holds no rows of two numbers or more: is it a table?")
+        return None
     width = len(_split(lines[start], separator))
     rows = []
     for line in lines[start:]:
@@ -49,7 +63,7 @@ def read(path: Path) -> list[Table]:
         rows.append([_number(part, comma) for part in parts])
     values = np.array(rows)
     names = _names(lines, start, separator, width)
-    return [Table(path.name, dict(zip(names, values.T, strict=True)))]
+    return Table(name, dict(zip(names, values.T, strict=True)))
 
 
 def _decoded(raw: bytes) -> str:

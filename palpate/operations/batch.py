@@ -59,7 +59,7 @@ class BatchOperands:
 
 
 def _answer(result: Batch, asked: BatchOperands, out: Output) -> int:
-    """2 where not one recording came through."""
+    """2 where not one recording came through, 1 where a model is not to be believed."""
     out.say(*result.lines())
     out.json(result.as_json())
     if result.failed:
@@ -67,7 +67,9 @@ def _answer(result: Batch, asked: BatchOperands, out: Output) -> int:
             f"{len(result.failed)} of {len(result)} recordings failed: see {result.folder / 'summary.csv'}"
         )
         print(f"palpate batch: {words}", file=sys.stderr)
-    return 2 if len(result.failed) == len(result) else 0
+    if len(result.failed) == len(result):
+        return 2
+    return 1 if result.doubtful else 0
 
 
 @operation(BatchOperands, answer=_answer)

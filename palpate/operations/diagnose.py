@@ -80,6 +80,8 @@ class DiagnoseOperands:
 
 
 def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
+    from diagnose.apply import unsure
+
     out.say(*result.lines())
     own: Diagnosis = getattr(result, "reality", result)
     if asked.apply:
@@ -88,6 +90,8 @@ def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
         out.say(f"improved model ({', '.join(kept) or 'modulus only'}): {asked.apply}")
     if asked.corrected:
         own.corrected().save(asked.corrected)
+        for name in unsure(own):
+            out.say(f"{name.replace('_', ' ')}: smaller than twice its own error, not taken off")
         out.say(f"corrected recording: {asked.corrected}")
     if asked.report:
         out.say(f"report: {result.report(asked.report)}")

@@ -1,4 +1,4 @@
-"""Other programs' files become a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS bags, MCAP.
+"""Other programs' files become a recording: text, spreadsheets, NumPy, MATLAB, HDF5, Parquet, ROS, MCAP.
 
 Columns are guessed from their names, and said by --column ROLE=NAME where that fails (roles: t, x, y, z,
 fx, fy, fz, qw, qx, qy, qz; '#3' is the third column, '-NAME' its negative, '=0' a constant in SI,
@@ -137,8 +137,8 @@ def _on_command_line(asked: ImportOperands) -> None:
 
 @operation(ImportOperands, answer=_answer, before=_on_command_line, progress=False)
 def import_table(asked: ImportOperands, call: Call) -> Imported:
-    """What other programs' files hold, as a recording: CSV, TSV, text, NumPy, MATLAB, HDF5, Parquet, ROS
-    bag, MCAP.
+    """What other programs' files hold, as a recording: CSV, TSV, text, spreadsheets, NumPy, MATLAB, HDF5,
+    Parquet, ROS bag, MCAP.
 
     The recording is in m, s and N, forces on the tool. Raises RecordingError where something needed is
     missing.

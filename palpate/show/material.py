@@ -36,14 +36,15 @@ def lines(result: Material) -> list[str]:
 def _first(result: Material) -> str:
     """The verdict, after what makes it worth less."""
     doubts = []
-    if not result.predicts:
+    if result.beyond_constant:
         doubts.append(
             f"NO ANSWER: held-out errors of {result.missed:.0%} exceed the "
             f"{result.error['constant']:.0%} of a constant"
         )
     elif result.beaten_by is not None:
         doubts.append(f"{result.beaten_by} predicts held-out data better")
-    doubts += [f"{each} stands at the end of its range" for each in result.at_bound]
+    carried = ", which carries the modulus: NO ANSWER" if result.bound_carries else ""
+    doubts += [f"{each} stands at the end of its range{carried}" for each in result.at_bound]
     return "; ".join([*doubts, result.verdict])
 
 
@@ -84,6 +85,7 @@ def as_json(result: Material) -> dict[str, Any]:
         "unknown": list(result.unknown),
         "predicts": result.predicts,
         "at_bound": list(result.at_bound),
+        "bound_carries_modulus": result.bound_carries,
     }
 
 

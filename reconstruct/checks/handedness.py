@@ -63,6 +63,9 @@ def handedness(data: Samples) -> Iterator[Finding]:
     worst = int(np.flatnonzero(good)[np.argmax(off)])
     stretch = data.touches.start[worst], data.touches.end[worst] - 1
     name, words, todo = _described(best)
+    if best == "-x -y -z":
+        stated = dict(data.recording.description.get("recording") or {}).get("force_on", "tool")
+        todo = _other_side("tool" if stated == "object" else "object")
     at = [float(data.recording.t[int(i)]) for i in stretch]
     yield Finding(
         name,
@@ -124,6 +127,13 @@ def _maps() -> dict[str, np.ndarray]:
 _MAPS = _maps()
 
 
+def _other_side(whose: str) -> str:
+    return (
+        f"it is that on the {whose}: say --force-on {whose} to palpate import or open, or "
+        f'force_on = "{whose}" under [recording]'
+    )
+
+
 def _described(best: str) -> tuple[str, str, str]:
     """Name, words and remedy of a map."""
     if best == "abs":
@@ -136,7 +146,7 @@ def _described(best: str) -> tuple[str, str, str]:
         return (
             "force sign",
             "the force pulls where it should push",
-            'swap [recording] force_on between "tool" and "object"',
+            _other_side("object"),
         )
     parts = best.split()
     words = "fx, fy, fz behave like " + ", ".join(p if p[0] == "-" else "+" + p for p in parts)

@@ -1,5 +1,5 @@
 """Files as people export them: machines' curves and robots' logs, with units, signs, axes, separators,
-decimal signs, headers and clocks varied at random, and what they hold in truth."""
+decimal signs, headers, clocks and kinds of file varied at random, and what they hold in truth."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from mechanics.dent import dent_law
+from tests.support.containers import WRITERS, Content
 
 _LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "µm": 1e-6}
 _FORCES = {"N": 1.0, "mN": 1e-3, "gf": 9.80665e-3}
@@ -30,12 +31,27 @@ class Export:
     position: np.ndarray | None = None
     force_on_tool: np.ndarray | None = None
     traits: Mapping[str, Any] = field(default_factory=dict)
+    columns: Mapping[str, str] = field(default_factory=dict)
+    """Said beside a file whose columns have no names."""
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
-def export(folder: Path, seed: int) -> Export:
-    """One file of that seed in a folder: two of three are a machine's."""
+CONTAINERS = {
+    "curves": ("text", "text", "xlsx", "ods", "npz", "npy", "mat"),
+    "recording": ("text", "xlsx", "ods", "npz", "npy", "mat", "bag", "mcap"),
+}
+"""Kinds of file that are drawn from, by what they hold."""
+
+
+def export(folder: Path, seed: int, *, mixed: bool = False) -> Export:
+    """One file of that seed in a folder: two of three are a machine's. mixed: of any kind, not text alone."""
     rng = np.random.default_rng([31, seed])
-    return machine_export(folder, seed, rng) if seed % 3 else robot_export(folder, seed, rng)
+    kind = "curves" if seed % 3 else "recording"
+    container = "text"
+    if mixed:
+        container = str(np.random.default_rng([32, seed]).choice(CONTAINERS[kind]))
+    make = machine_export if kind == "curves" else robot_export
+    return make(folder, seed, rng, container)
 
 
 def machine_press(
@@ -62,7 +78,7 @@ def machine_press(
     return t, travel, force
 
 
-def machine_export(folder: Path, seed: int, rng: np.random.Generator) -> Export:
+def machine_export(folder: Path, seed: int, rng: np.random.Generator, container: str = "text") -> Export:
     """A bench machine's file: one press, or blocks with clocks of their own."""
     radius = float(rng.choice([1e-3, 2e-3, 3e-3, 5e-3, 10e-3]))
     modulus = float(np.exp(rng.uniform(np.log(3e3), np.log(3e6))))
@@ -105,13 +121,19 @@ def machine_export(folder: Path, seed: int, rng: np.random.Generator) -> Export:
     remarks = [f"Operator: A. Nother {seed}", "Sample: gel"]
     if in_file:
         remarks.append(f"Probe radius: {1e3 * radius:g} mm")
-    style = _write(path, rng, head, [units["t"], units["z"], units["f"]] if said else None, table, remarks)
+    written = Content(head, [units["t"], units["z"], units["f"]] if said else None, table, remarks)
+    made = _as(container, path, rng, written, ("t", "depth" if counts > 0 else "height", "load"))
+    # words beside the numbers are in texts and sheets alone
+    in_file = in_file and container in ("text", "xlsx", "ods")
     traits = {"travel": int(counts), "load": int(sign), "units": units if said else "unsaid", "air": air,
-              "hold": hold, "blocks": blocks, "restarts": restarts, "name": name, **style}  # fmt: skip
-    return Export(path, "curves", None if in_file else radius, young_modulus_pa=modulus, traits=traits)
+              "hold": hold, "blocks": blocks, "restarts": restarts, "name": name, **made.style}  # fmt: skip
+    return Export(
+        made.path, "curves", None if in_file else radius, young_modulus_pa=modulus, traits=traits,
+        columns=made.columns, units=made.units,
+    )  # fmt: skip
 
 
-def robot_export(folder: Path, seed: int, rng: np.random.Generator) -> Export:
+def robot_export(folder: Path, seed: int, rng: np.random.Generator, container: str = "text") -> Export:
     """A robot's log: presses on a dome, force of the tool or on the object, a frame turned by quarters."""
     rate, radius = float(rng.choice([100.0, 250.0])), float(rng.choice([3e-3, 4e-3, 5e-3]))
     stiffness = float(rng.uniform(200, 1500))
@@ -141,9 +163,47 @@ def robot_export(folder: Path, seed: int, rng: np.random.Generator) -> Export:
     stem = [["x", "y", "z"], ["pos_x", "pos_y", "pos_z"], ["tcp_x", "tcp_y", "tcp_z"]][rng.integers(3)]
     head = [str(rng.choice(["t", "time", "timestamp"])), *stem, "fx", "fy", "fz"]
     of_each = [units["t"], *[units["z"]] * 3, *[units["f"]] * 3]
-    style = _write(path, rng, head, of_each if said else None, table, [])
-    traits = {"force_on": "object" if on_object else "tool", "units": units if said else "unsaid", **style}
-    return Export(path, "recording", radius, position=place, force_on_tool=force, traits=traits)
+    if container in ("bag", "mcap"):  # by their standard in m, N, s
+        table = np.column_stack([t, place, -force if on_object else force])
+    written = Content(head, of_each if said else None, table, [])
+    made = _as(container, path, rng, written, ("t", "x", "y", "z", "fx", "fy", "fz"))
+    whose = "object" if on_object else "tool"
+    traits = {"force_on": whose, "units": units if said else "unsaid", **made.style}
+    return Export(
+        made.path, "recording", radius, position=place, force_on_tool=force, traits=traits,
+        columns=made.columns, units=made.units,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class _Written:
+    path: Path
+    style: dict[str, Any]
+    columns: Mapping[str, str] = field(default_factory=dict)
+    units: Mapping[str, str] = field(default_factory=dict)
+
+
+_KINDS = {"t": "time", "f": "force", "l": "force"}
+
+
+def _as(
+    container: str, path: Path, rng: np.random.Generator, content: Content, roles: Sequence[str]
+) -> _Written:
+    """The file in that container. A plain NumPy array has no names: its owner says columns and units."""
+    if container == "text":
+        style = _write(path, rng, content.head, content.units, content.table, content.remarks)
+        return _Written(path, style)
+    plain = container == "npy" and bool(rng.random() < 0.5)
+    path = path.with_suffix("" if container == "bag" else f".{container}")
+    WRITERS[container](path, content, int(rng.integers(3)), plain)
+    style = {"container": container, "plain": plain}
+    if not plain:
+        return _Written(path, style)
+    columns = {role: f"#{k + 1}" for k, role in enumerate(roles)}
+    units = {} if content.units is None else {
+        _KINDS.get(role[0], "position"): unit for role, unit in zip(roles, content.units, strict=True)
+    }  # fmt: skip
+    return _Written(path, style, columns, units)
 
 
 def _write(

@@ -1,0 +1,101 @@
+"""Where a machine's zero of force lies: what it reads in free air (a bias), or that contact began before the
+first row (a late contact).
+
+A curve whose first rows already push is read in two ways: its zero is wrong by what the first rows read, or
+the zero is right and the tip was in the sample already. Either is fitted to the way in by every law of the
+dent, and its blocks of force are left out in turn; the late contact is named where it misses far less.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Sequence
+
+import numpy as np
+
+from diagnose.specimen.bench import Bench, Curve
+from diagnose.specimen.yielding import Way, left_out_error
+from mechanics.dent import dent_law
+from reconstruct.steps.s1_filter.low_pass import white_noise_std
+
+_PUSHES, _OFF = 0.03, 0.01
+"""Share of the peak that first rows push by where a contact may be late; that a bias must have to be said."""
+_GAIN, _SURE = 0.75, 4.0
+"""A late contact must miss at most this share of what a wrong zero misses; a bias so many standard errors."""
+_EARLY = 0.1
+_AIR = 0.03
+
+
+def late_contact(
+    curves: Sequence[Curve], poisson_ratio: float, radius_m: float
+) -> tuple[list[Curve], str | None]:
+    """The curves, whose zero is the file's own where contact began before the first row, and words for that;
+    the curves as they are, and None, where free air was recorded or the zero may as well be wrong."""
+    first = [_first(c) for c in curves]
+    pushing = [
+        level > max(_PUSHES * float(c.force.max()), _SURE * error)
+        for c, (level, error) in zip(curves, first, strict=True)
+    ]
+    if not curves or np.mean(pushing) < 0.5:
+        return list(curves), None
+    raw = [_way(c, 0.0) for c in curves]
+    levelled = [_way(c, level) for c, (level, _) in zip(curves, first, strict=True)]
+    modulus = _hertz(curves[0], radius_m)
+    late, wrong = (left_out_error(ways, poisson_ratio, radius_m, modulus) for ways in (raw, levelled))
+    if late > _GAIN * wrong:
+        return list(curves), None
+    words = (
+        f"contact began before the first row, which pushes by {np.median([x for x, _ in first]):.3g} N: held "
+        f"out, the force errs by {100 * late:.2g} % so and by {100 * wrong:.2g} % if that were the zero"
+    )
+    return [dataclasses.replace(c, level_n=0.0) for c in curves], words
+
+
+def bias(curves: Sequence[Curve], bench: Bench) -> tuple[float, float] | None:
+    """(N, Pa): what the machine reads in free air, median of the curves, and the modulus if it were not
+    taken off; None where it is not surely above a hundredth of the peak."""
+    levels, top, moduli = [], [], []
+    law, nu = dent_law("sphere"), bench.model.material.poisson_ratio
+    radius = bench.recording.tip_radius_m / bench.similarity.length
+    for curve, onset in zip(curves, bench.onset_m, strict=True):
+        if not np.isfinite(onset):
+            continue
+        peak = int(np.argmax(curve.force))
+        u, force = curve.travel[: peak + 1] - onset, curve.force[: peak + 1]
+        air = u < -_AIR * u[-1]
+        if air.sum() < 3:
+            continue
+        levels.append(float(np.median(force[air])))
+        top.append(float(force[-1]))
+        shape = np.asarray(law.force(np.maximum(u, 0.0), 1.0, nu, radius))
+        moduli.append(float(shape @ force / max(shape @ shape, 1e-300)))
+    if not levels:
+        return None
+    level = float(np.median(levels))
+    error = float(np.std(levels)) / np.sqrt(len(levels)) + 1e-12
+    noise = float(np.median([white_noise_std(c.force[:, None]) for c in curves]))
+    if abs(level) < max(_OFF * float(np.median(top)), _SURE * max(error, noise / np.sqrt(3))):
+        return None
+    return level, float(np.median(moduli))
+
+
+def _first(curve: Curve) -> tuple[float, float]:
+    """(N, its error): what the first rows of the way in read, where they stand still; the first of them where
+    the force rises from the beginning."""
+    peak = int(np.argmax(curve.force))
+    early = curve.force[: max(3, int(_EARLY * peak))]
+    noise = white_noise_std(curve.force[:, None])
+    still = abs(float(early[-1] - early[0])) < _SURE * noise
+    return (float(np.median(early)), noise) if still else (float(early[:3].mean()), noise)
+
+
+def _way(curve: Curve, level: float) -> Way:
+    peak = int(np.argmax(curve.force))
+    return Way.thinned(curve.travel[: peak + 1], curve.force[: peak + 1] - level)
+
+
+def _hertz(curve: Curve, radius_m: float) -> float:
+    """Pa, a first guess from the whole of the way in."""
+    peak = int(np.argmax(curve.force))
+    deep = max(float(np.ptp(curve.travel[: peak + 1])), 1e-12)
+    return float(np.ptp(curve.force)) / (16 / 9 * np.sqrt(radius_m) * deep**1.5)

@@ -1,0 +1,73 @@
+"""The instrument's zero is among the candidates: a bias and a late contact are said, each with the modulus
+with and without; intervals of few curves hold what curves differ in."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from diagnose.specimen.bench import Curve
+from diagnose.specimen.material import material_of
+from diagnose.specimen.result import Tests
+from diagnose.specimen.zero import late_contact
+from mechanics.dent import dent_law
+from palpate.show.material import lines
+
+RADIUS, MODULUS = 0.005, 3e4
+
+
+def curve(seed: int, *, begins: float, zero: float = 0.0, modulus: float = MODULUS) -> Curve:
+    """In and out of a sphere; begins: travel of the first row over the deepest; zero: N that free air
+    reads."""
+    rng = np.random.default_rng(seed)
+    deepest = RADIUS * rng.uniform(0.25, 0.35)
+    way = deepest * np.linspace(begins, 1, 500)
+    travel = np.concatenate([way, way[::-1]])
+    force = np.asarray(dent_law("sphere").force(np.maximum(travel, 0), modulus, 0.49, RADIUS))
+    read = force + zero + 0.003 * force.max() * rng.standard_normal(len(force))
+    return Curve(np.arange(len(travel)) / 100, travel + 0.01, read, f"curve {seed}")
+
+
+def material(curves):
+    tests = Tests("indentation", curves=tuple(curves), tip_radius_m=RADIUS)
+    return material_of(tests, [c.name for c in curves], fast=True)
+
+
+@pytest.mark.parametrize("count", [1, 3])
+def test_a_late_contact_is_said_and_the_modulus_is_right(count):
+    made = material([curve(k, begins=0.25) for k in range(count)])
+    said = "\n".join(lines(made))
+    assert "contact began before the first row" in said and "the modulus would be" in said
+    assert made.young_modulus_pa == pytest.approx(MODULUS, rel=0.06)
+    low, high = made.young_modulus_ci95_pa
+    assert low <= made.young_modulus_pa <= high
+
+
+@pytest.mark.parametrize("begins", [-0.2, 0.0])
+def test_a_wrong_zero_is_no_late_contact(begins):
+    given = [curve(k, begins=begins, zero=0.2) for k in range(3)]
+    assert late_contact(given, 0.49, RADIUS) == (given, None)
+    assert material(given).young_modulus_pa == pytest.approx(MODULUS, rel=0.06)
+
+
+def test_a_bias_is_said_with_the_modulus_that_it_would_make():
+    made = material([curve(k, begins=-0.2, zero=0.2) for k in range(3)])
+    said = "\n".join(lines(made))
+    assert "the force reads 0.2 N in free air" in said and "if it were not" in said
+    assert made.young_modulus_pa == pytest.approx(MODULUS, rel=0.06)
+    assert "free air" not in "\n".join(lines(material([curve(k, begins=-0.2) for k in range(3)])))
+
+
+def test_an_interval_of_few_curves_holds_what_they_differ_in_beside_the_fits_own_error():
+    alike = material([curve(k, begins=-0.2) for k in range(3)])
+    apart = material([curve(k, begins=-0.2, modulus=MODULUS * (1 + 0.2 * k)) for k in range(3)])
+    one = material([curve(0, begins=-0.2)])
+
+    def width(made) -> float:
+        low, high = made.young_modulus_ci95_pa
+        assert low <= made.young_modulus_pa <= high
+        return float(np.log(high / low))
+
+    assert 0 < width(one) < 0.3
+    assert width(apart) > 3 * width(alike)
+    assert width(apart) > 2 * 4.3 * 0.15 / np.sqrt(3)
