@@ -1,4 +1,5 @@
-"""What stands in a page of a model: geometry, tables, modes of the far field, measured presses; and what is said."""
+"""What stands in a page of a model: geometry, tables, modes of the far field, measured presses; and
+what its scripts are told."""
 
 from __future__ import annotations
 
@@ -14,7 +15,7 @@ from mechanics.presses import Presses
 from mechanics.progress import Progress, silent
 from mechanics.surface_compliance import SurfaceCompliance
 from palpate.exporting.page.band import force_band
-from palpate.exporting.page.packed import Block, Modes, modes_of
+from palpate.exporting.page.packed import Block, modes_of
 from palpate.exporting.page.tables import depths_of, greatest_depth, responses, straight_forces
 from render.base import Renderer
 from render.fem import FemRenderer
@@ -102,7 +103,8 @@ def about(renderer: FemRenderer, depths_m: np.ndarray) -> dict[str, Any]:
 
 def spacemouse_reports() -> list[dict[str, Any]]:
     """How a SpaceMouse's input reports are read, found out by asking the codec: for each report id and least
-    length in bytes (without the id) what each value is: at (first byte), of (translation or rotation), axis, sign.
+    length in bytes (without the id) what each value is: at (first byte), of (translation or rotation), axis,
+    sign.
     """
     found = []
     for report, length in ((1, 12), (1, 6), (2, 6)):
@@ -114,14 +116,17 @@ def spacemouse_reports() -> list[dict[str, Any]]:
             told = spacemouse.decode(bytes(data), spacemouse.Deflection())
             for of, values in (("translation", told.translation), ("rotation", told.rotation)):
                 fields += [
-                    {"at": at, "of": of, "axis": axis, "sign": value} for axis, value in enumerate(values) if value
+                    {"at": at, "of": of, "axis": axis, "sign": value}
+                    for axis, value in enumerate(values)
+                    if value
                 ]
         found.append({"report": report, "bytes": length, "fields": fields})
     return found
 
 
 def _far(block: Block, renderer: FemRenderer) -> None:
-    """Modes by which a force moves the mesh's corners, U U^T / E, and how each vertex hangs on three of them."""
+    """Modes by which a force moves the mesh's corners, U U^T / E, and how each vertex hangs on three of
+    them."""
     compliance, contact = renderer.compliance, renderer.contact
     number = np.full(len(renderer.model.mesh.points), len(compliance.nodes))
     number[compliance.nodes] = np.arange(len(compliance.nodes))
@@ -132,8 +137,8 @@ def _far(block: Block, renderer: FemRenderer) -> None:
 
 
 def shown_modes(compliance: SurfaceCompliance) -> np.ndarray:
-    """(t, 3, r) 1/m^0.5: unit modulus, the displacement of corner i for a force on corner j is modes[i] @ modes[j].T,
-    nearly."""
+    """(t, 3, r) 1/m^0.5, unit modulus: the displacement of corner i for a force on corner j is nearly
+    modes[i] @ modes[j].T."""
     t = len(compliance.nodes)
     if len(compliance.factor):
         wide = compliance.factor.reshape(3 * t, -1).astype(float)
@@ -149,8 +154,8 @@ def shown_modes(compliance: SurfaceCompliance) -> np.ndarray:
 
 
 def _measured(block: Block, presses: Presses) -> dict[str, Any]:
-    """The measured presses: where they met the surface and, where samples are kept, force along the normal over
-    depth, on the way in and out."""
+    """The measured presses: where they met the surface and, where samples are kept, force along the normal
+    over depth, on the way in and out."""
     block.floats("press_points", presses.point)
     block.floats("press_normals", presses.normal)
     starts, depths, forces = [0], [], []
@@ -171,10 +176,9 @@ def _measured(block: Block, presses: Presses) -> dict[str, Any]:
 def _thinned(depth_m: np.ndarray, force_n: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Means over runs of rows, CURVE_POINTS at most."""
     parts: Sequence[np.ndarray] = [
-        rows for rows in np.array_split(np.arange(len(depth_m)), min(CURVE_POINTS, max(len(depth_m), 1))) if len(rows)
+        rows
+        for rows in np.array_split(np.arange(len(depth_m)), min(CURVE_POINTS, max(len(depth_m), 1)))
+        if len(rows)
     ]
     means = [np.array([values[rows].mean() for rows in parts]) for values in (depth_m, force_n)]
     return means[0], means[1]
-
-
-__all__ = ["Modes", "about", "contents", "one_d_renderer", "shown_modes", "spacemouse_reports"]

@@ -1,11 +1,11 @@
 """What a page interpolates: presses that the renderer's own step made at every place of the surface.
 
-At each vertex the tip goes straight in along the surface's normal, and four times aslant, as in `palpate press`
-(10 mm/s, sticking). From these follow, at depths that are dense near first touch,
+At each vertex the tip goes straight in along the surface's normal, and four times aslant, as in `palpate
+press` (10 mm/s, sticking). From these follow, at depths that are dense near first touch,
     force      F0(d)           of the straight press, along the normal and sideways
-    sideways   M(d) = dF/ds    change of the force on the tool with a sideways move s of the tip at that depth
-and the page follows a path by F0(d) + sum of M ds, on Coulomb's cone. `Responses.channels` says how the numbers
-are turned so that they may be interpolated between vertices.
+    sideways   M(d) = dF/ds    change of the force on the tool with a sideways move s of the tip there
+and the page follows a path by F0(d) + sum of M ds, on Coulomb's cone. `Responses.channels` says how the
+numbers are turned so that they may be interpolated between vertices.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ _AIR_M = 2e-3
 
 @dataclass(frozen=True)
 class Responses:
-    """depths_m: (k,) greater than 0. channels: (v, k, CHANNELS), N/m; each vanishes at depth 0 with the root of
-    the depth or faster: normal force over depth; sideways force over depth (3, device frame); mean sideways
-    stiffness; what it differs by in each direction (6: xx, yy, zz, xy, xz, yz); change of the normal force with
-    a sideways move (3).
+    """depths_m: (k,) greater than 0. channels: (v, k, CHANNELS), N/m; each vanishes at depth 0 with the root
+    of the depth or faster: normal force over depth; sideways force over depth (3, device frame); mean
+    sideways stiffness; what it differs by in each direction (6: xx, yy, zz, xy, xz, yz); change of the normal
+    force with a sideways move (3).
     """
 
     depths_m: np.ndarray
@@ -40,12 +40,12 @@ class Responses:
 
 
 def greatest_depth(renderer: Renderer) -> float:
-    """How deep a page presses, m: a tenth deeper than anyone did, at least 1.6 tip radii, and at most half the
-    object's height."""
+    """How deep a page presses, m: a tenth deeper than anyone did, at least two tip radii, to which the law of
+    the dent is tabulated, and at most 0.6 of the object's height."""
     model = renderer.model
     touched = float(np.nanmax(model.presses.depth_m)) if len(model.presses) else 0.0
     height = float(model.support.height(model.mesh.points).max())
-    return float(min(max(1.1 * touched, 1.6 * model.tool.tip_radius_m), 0.5 * height))
+    return float(min(max(1.1 * touched, 2.0 * model.tool.tip_radius_m), 0.6 * height))
 
 
 def depths_of(deepest_m: float) -> np.ndarray:
@@ -54,17 +54,19 @@ def depths_of(deepest_m: float) -> np.ndarray:
 
 
 def responses(renderer: Renderer, depths_m: np.ndarray) -> Responses:
-    """The finite-element renderer's table at every vertex of its surface; vertices that cannot be pressed have
+    """The finite-element renderer's table at every vertex of its surface; those that cannot be pressed have
     that of the nearest one that can."""
     sticky, arrays = renderer.with_friction(np.inf), renderer.contact.arrays
     vertices = _pressable(renderer)
     frames = local_frames(arrays.normals[vertices])
     n, u, v = frames[:, 0], frames[:, 1], frames[:, 2]
     straight = pressed(sticky, vertices, np.zeros_like(n), depths_m)
+    # a tip that is its radius aside of what holds it may be taken to have left the object
+    slope = min(_SLOPE, 0.9 * renderer.model.tool.tip_radius_m / float(depths_m[-1]))
     per_m = []
     for axis in (u, v):
-        both = [pressed(sticky, vertices, sign * _SLOPE * axis, depths_m) for sign in (1.0, -1.0)]
-        gained = (both[0] - both[1]) / (2 * _SLOPE)
+        both = [pressed(sticky, vertices, sign * slope * axis, depths_m) for sign in (1.0, -1.0)]
+        gained = (both[0] - both[1]) / (2 * slope)
         per_m.append(_slopes(depths_m, gained))
     table = _channels(depths_m, straight, per_m, frames)
     return Responses(depths_m, _everywhere(table, vertices, arrays.vertices))
@@ -91,7 +93,9 @@ def pressed(renderer: Renderer, vertices: np.ndarray, slope: np.ndarray, depths_
         np.concatenate([[0.0], depths_m]),
     )
     way = np.concatenate([[-_AIR_M, -1e-4], fine])
-    aside = np.maximum(way, 0.0)[:, None] * slope[:, None]  # only once it touches: at the vertex, whatever is beside
+    aside = (
+        np.maximum(way, 0.0)[:, None] * slope[:, None]
+    )  # only once it touches: at the vertex, whatever is beside
     centre = points[:, None] + (radius - way[:, None]) * normals[:, None] + aside
     gone = np.full((len(points), 1, 3), np.nan)  # a reading that is none: what was touched is let go
     path = np.concatenate([gone, centre], axis=1)
@@ -129,7 +133,9 @@ def _slopes(depths_m: np.ndarray, force: np.ndarray) -> np.ndarray:
     return by_root / (2 * root[1:, None])
 
 
-def _channels(depths_m: np.ndarray, straight: np.ndarray, per_m: list[np.ndarray], frames: np.ndarray) -> np.ndarray:
+def _channels(
+    depths_m: np.ndarray, straight: np.ndarray, per_m: list[np.ndarray], frames: np.ndarray
+) -> np.ndarray:
     n, axes = frames[:, 0], (frames[:, 1], frames[:, 2])
     p, k = straight.shape[:2]
     out = np.zeros((p, k, CHANNELS))
