@@ -79,5 +79,6 @@ def write(
     chosen = partial(writer, **more.get(to, {}))
     with atomic_file(path, kind) as temporary:
         notes = chosen(temporary, subject)
-    lost = [f"not in the file: {', '.join(subject.left_out)}"] if subject.left_out else []
+    felt = to == "page"  # its tables are of the renderer, which renders them
+    lost = [f"not in the file: {', '.join(subject.left_out)}"] if subject.left_out and not felt else []
     return (*notes, *lost)
