@@ -4,8 +4,9 @@
 // in which one pressed, other tips, and the support beside the object.
 
 const CHANNELS = 14;
-const WALKS = 10;
-const STEEPNESS = 1 / 1.3;
+const STEPS = 80; // of a straight press
+const WALKS = 10; // of the place that holds a tip, in one step
+const STEEPNESS = 1 / 1.3; // about: forces go as the depth to the power of 1.3
 
 class Tables {
   constructor(read, about) {
@@ -100,7 +101,7 @@ class Touch {
     this.tip = tip;
     this.slipping = false;
     const { depth, offset } = this.from(tip);
-    if (depth <= 0) return this.release();
+    if (depth <= 0) return this.depth > 0 || depth < -1e-5 ? this.release() : undefined; // or not yet in
     this.shift(depth, offset);
     return this.balance();
   }
@@ -146,7 +147,9 @@ class Touch {
         const along = times(sideways, 1 / pull);
         if (walk < WALKS && push > 0) {
           const stiff = Math.max(dot(along, stiffness(now, along)), 1e-3);
-          this.place = this.surface.walk(this.place, times(along, -0.9 * (pull - most) / stiff));
+          // never farther than it is stretched, however soft the first touch is
+          const far = Math.min(0.9 * (pull - most) / stiff, size(this.offset) + 0.2 * this.depth);
+          this.place = this.surface.walk(this.place, times(along, -far));
           this.settle();
           const { depth, offset } = this.from(this.tip);
           if (depth <= 0) return this.release();
@@ -200,7 +203,9 @@ class Presser {
     if (steep < Math.cos(80 * Math.PI / 180)) throw new RangeError("the press misses the object or grazes it");
     const touch = new Touch(this.surface, this.tables, radius, this.about.friction);
     touch.hold(found.place);
-    for (let i = 1; i <= 40 && touch.touching; i++) touch.step(plus(found.centre, into, depth * (i / 40) ** 2 / steep));
+    for (let i = 1; i <= STEPS && touch.touching; i++) {
+      touch.step(plus(found.centre, into, depth * (i / STEPS) ** 2 / steep));
+    }
     return { touch, found, force_n: touch.force, error_n: touch.touching ? bandOf(this.tables, touch) : 0 };
   }
 }
