@@ -66,13 +66,13 @@ class Touch {
     this.slipping = false;
   }
 
-  // Holds a tip at a place of the surface, with its centre straight above by the tip's radius.
-  hold(place) {
+  // Holds a tip at a place of the surface, with its centre straight above by the tip's radius, or nearly so.
+  hold(place, tip = null) {
     this.place = place;
     this.settle();
-    this.tip = plus(this.point, this.normal, this.radius);
+    this.tip = tip || plus(this.point, this.normal, this.radius);
     this.depth = 0;
-    this.offset = [0, 0, 0];
+    this.offset = this.from(this.tip).offset;
     this.stuck = [0, 0, 0]; // sideways force of sideways moves
     this.lifted = 0; // normal force of sideways moves
     this.force = [0, 0, 0];
@@ -149,12 +149,16 @@ class Touch {
           const stiff = Math.max(dot(along, stiffness(now, along)), 1e-3);
           // never farther than it is stretched, however soft the first touch is
           const far = Math.min(0.9 * (pull - most) / stiff, size(this.offset) + 0.2 * this.depth);
-          this.place = this.surface.walk(this.place, times(along, -far));
+          const before = this.place;
+          this.place = this.surface.walk(before, times(along, -far));
           this.settle();
           const { depth, offset } = this.from(this.tip);
-          if (depth <= 0) return this.release();
-          this.shift(depth, offset);
-          continue;
+          if (depth > 0) {
+            this.shift(depth, offset);
+            continue;
+          }
+          this.place = before; // it would walk out from under the tip
+          this.settle();
         }
         sideways = times(along, most);
         this.stuck = plus(sideways, own, -1);
@@ -202,7 +206,7 @@ class Presser {
     const steep = found ? -dot(found.normal, into) : 0;
     if (steep < Math.cos(80 * Math.PI / 180)) throw new RangeError("the press misses the object or grazes it");
     const touch = new Touch(this.surface, this.tables, radius, this.about.friction);
-    touch.hold(found.place);
+    touch.hold(found.place, found.centre);
     for (let i = 1; i <= STEPS && touch.touching; i++) {
       touch.step(plus(found.centre, into, depth * (i / STEPS) ** 2 / steep));
     }
