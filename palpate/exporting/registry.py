@@ -5,17 +5,28 @@ from __future__ import annotations
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from mechanics.errors import OptionError
 from mechanics.files import Kind, atomic_file
 from mechanics.model import Model
+from mechanics.progress import Progress, silent
 from mechanics.surface_files import UNITS
 from palpate.exporting import abaqus, gmsh, mujoco, sofa, stl
 from palpate.exporting.subject import Subject, subject_of
 
 Writer = Callable[[Path, Subject], tuple[str, ...]]
+
+
+def _page(path: Path, subject: Subject, **more: Any) -> tuple[str, ...]:
+    """`palpate.exporting.page.document.write`, whose libraries the help of the command need not load."""
+    from palpate.exporting.page import document
+
+    return document.write(path, subject, **more)
+
+
 FORMATS: dict[str, tuple[str, Writer, Kind]] = {
     "mujoco": (".xml", mujoco.write, Kind("a scene of palpate export", (b"<!-- Palpate model",))),
     "sofa": (".scn", sofa.write, Kind("a scene of palpate export", (b"<?xml",), holds=b"<!-- Palpate model")),
@@ -24,6 +35,11 @@ FORMATS: dict[str, tuple[str, Writer, Kind]] = {
         ".msh",
         gmsh.write,
         Kind("a mesh of palpate export", (b"$MeshFormat",), holds=b"young_modulus_pa"),
+    ),
+    "page": (
+        ".html",
+        _page,
+        Kind("a page of palpate export", (b"<!doctype html>",), holds=b"Made by palpate"),
     ),
     "stl": (".stl", stl.write, Kind("an STL of palpate export", (stl.HEADER,))),
 }
@@ -39,11 +55,12 @@ def write(
     at: np.ndarray | None = None,
     depth_m: float | None = None,
     unit: str = "m",
+    progress: Progress = silent,
 ) -> tuple[str, ...]:
     """Write a model for another program; what its format cannot say, one line each.
 
-    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. Raises OptionError
-    for a program or suffix that does not fit.
+    at, depth_m: of the press in the scene (see `subject_of`). unit: of an STL's lengths. progress: of a page,
+    whose tables take some seconds. Raises OptionError for a program or suffix that does not fit.
     """
     if to not in FORMATS:
         raise OptionError(f"--to is '{to}'; allowed are {', '.join(FORMATS)}")
@@ -57,8 +74,11 @@ def write(
     if depth_m is not None and not depth_m > 0:
         raise OptionError(f"--depth is {depth_m} m; it must be greater than 0")
     subject = subject_of(model, at, depth_m)
-    chosen = partial(stl.write, unit=unit) if to == "stl" else writer
+    asked = at is not None or depth_m is not None
+    more: dict[str, dict[str, Any]] = {"stl": {"unit": unit}, "page": {"opens": asked, "progress": progress}}
+    chosen = partial(writer, **more.get(to, {}))
     with atomic_file(path, kind) as temporary:
         notes = chosen(temporary, subject)
-    lost = [f"not in the file: {', '.join(subject.left_out)}"] if subject.left_out else []
+    felt = to == "page"  # its tables are of the renderer, which renders them
+    lost = [f"not in the file: {', '.join(subject.left_out)}"] if subject.left_out and not felt else []
     return (*notes, *lost)

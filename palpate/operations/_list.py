@@ -32,7 +32,7 @@ OPERATIONS = {
         "import_table read_table",
         "palpate.operations.import_",
     ),
-    "export": Entry("a MODEL for MuJoCo, SOFA, Abaqus, Gmsh, or as STL", "export"),
+    "export": Entry("a MODEL as a page to be pressed, for MuJoCo, SOFA, Abaqus, Gmsh, or STL", "export"),
     "material": Entry("the material of a specimen from a machine's curves", "material"),
     "replay": Entry("a recorded tip path through a renderer, headless", "replay"),
     "press": Entry("one scripted press on a model, headless", "press"),

@@ -1,8 +1,9 @@
-"""A MODEL for other programs: a minimal scene that runs there, or its mesh.
+"""A MODEL for other programs: a minimal scene that runs there, its mesh, or a page that can be pressed.
 
 mujoco (.xml): a flex on its base and the tip as a mocap sphere. sofa (.scn): tetrahedra, base, a sphere's
 force. abaqus (.inp): hybrid tetrahedra, base, a rigid sphere that is pressed in. gmsh (.msh): mesh, groups,
-moduli. stl: the boundary. Metres, newtons, pascals, the model's frame (an STL's lengths as --unit says).
+moduli. stl: the boundary. page (.html): one file that any browser opens, offline, in which the object can be
+pressed. Metres, newtons, pascals, the model's frame (an STL's lengths as --unit says).
 """
 
 from __future__ import annotations
@@ -50,7 +51,7 @@ def _answer(notes: tuple[str, ...], asked: ExportOperands, out: Output) -> int:
 
 @operation(ExportOperands, answer=_answer)
 def export(asked: ExportOperands, call: Call) -> tuple[str, ...]:
-    """Write a model for another program: a minimal scene that runs there, or its mesh.
+    """Write a model for another program: a minimal scene that runs there, its mesh, or a page to be pressed.
 
     Returns what the format cannot say, one line each. But for an STL's lengths all is in SI units, m, and the
     model's frame. Raises OptionError for an unknown format or a place that misses the object, FileError where
@@ -62,4 +63,7 @@ def export(asked: ExportOperands, call: Call) -> tuple[str, ...]:
 
     plain = load(asked.model, progress=call.wanted)
     at = None if asked.at is None else np.asarray(asked.at)
-    return write(plain, asked.to, asked.path, at=at, depth_m=asked.depth_m, unit=asked.unit)
+    with call.progress("export") as tell:
+        return write(
+            plain, asked.to, asked.path, at=at, depth_m=asked.depth_m, unit=asked.unit, progress=tell
+        )

@@ -17,7 +17,7 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._run import answer
 from palpate.operations._shared import MODEL, recording_operand, report_operand, save_operand, seed_operand
 from palpate.operations.read_recording import read_recording
-from palpate.output import Output
+from palpate.output import Output, progress_bar
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.pipeline import ReconstructOptions
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
@@ -68,10 +68,13 @@ class ReconstructOperands:
 
 
 def _answer(result: Reconstruction, asked: ReconstructOperands, out: Output) -> int:
+    from mechanics.compliance import load_or_condense
     from mechanics.model_files import read_model
 
     if asked.report:
         beside = {Path(name).name: read_model(name) for name in asked.beside}
+        with progress_bar("report") as tell:
+            load_or_condense(result.model, tell)  # the report's object can be pressed
         out.say(f"report: {result.report(asked.report, beside)}")
     unreported = dataclasses.replace(asked, report=None)
     answer(result, unreported, out, lines=[f"written to {asked.save}"], figures={"model": asked.save})

@@ -121,7 +121,10 @@ def report(result: Changes, path: Path | str) -> Path:
     figure = new_figure(8, 3.4)
     draw(result, figure.subplots())
     page.view(
-        view(result), figure, "Moduli with 95 % intervals, or the ratio at every place that both pressed."
+        view(result),
+        figure,
+        "Moduli with 95 % intervals, or the ratio at every place that both pressed.",
+        result.before.model,
     )
     rows = []
     for side in (result.before, result.after):

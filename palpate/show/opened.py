@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from mechanics.model import Model
 from palpate.importing.opened import Opened
 from palpate.show.page import Page, subplots
 
@@ -63,5 +64,6 @@ def report(result: Opened, path: Path | str) -> Path:
     if view is None:
         page.figure(figure, "The result")
     else:
-        page.view(view, figure, "The result")
+        held = result.result if isinstance(result.result, Model) else getattr(result.result, "model", None)
+        page.view(view, figure, "The result", held)
     return page.write(path)

@@ -18,6 +18,7 @@ from mechanics.files import PNG, Kind, atomic_file, reading
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+    from mechanics.model import Model
     from palpate.show.view3d import View
 
 PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
@@ -77,10 +78,15 @@ class Page:
         """A picture: a matplotlib figure, a PNG's path, or an (h, w, 3) uint8 image."""
         self._parts.append(_figure(picture, caption))
 
-    def view(self, view: View, picture: Any, caption: str) -> None:
-        """The object to be turned; without scripts the picture with its caption."""
+    def view(self, view: View, picture: Any, caption: str, model: Model | None = None) -> None:
+        """The object to be turned, and of a model a button to press it; without scripts the picture with its
+        caption."""
         self._parts.append(view.html(_figure(picture, caption)))
         self._live = True
+        if model is not None:
+            from palpate.exporting.page.button import button
+
+            self._parts.append(button(model))
 
     def html(self) -> str:
         """The whole page."""

@@ -27,6 +27,7 @@ def report(result: Comparison, path: Path | str) -> Path:
         view(result),
         still(result),
         "Left: FEM's error at each press, held out of every fit. Right: the press that it predicts worst.",
+        result.model,
     )
     page.paragraph(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "

@@ -89,6 +89,7 @@ def report(result: DemoResult, path: Path | str) -> Path:
         view(result),
         saved["object"],
         "Left: contact points and fixed base. Right: how uncertain the shape is.",
+        result.model,
     )
     page.paragraph(
         f"Surface: {result.reconstruction.surface.method}; {result.reconstruction.surface.reason}."

@@ -42,7 +42,7 @@ def report(result: Diagnosis, path: Path | str) -> Path:
     page.lead(verdict(result))
     page.cards(answers(result, typical))
     page.next_step(_what_next(result, model, recording.path or "REC"))
-    page.view(view(result), first_picture(model, result), _caption(result))
+    page.view(view(result), first_picture(model, result), _caption(result), model)
     page.figure(gains_picture(result), _gains_caption(result))
     _next_touch(page, result)
     _modulus_after(page, model, result)

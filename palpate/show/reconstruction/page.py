@@ -56,6 +56,7 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     page.view(
         view(result), figures["object"],
         "Left: first touches and fixed base. Right: the modulus of single presses, and where.",
+        result.model,
     )  # fmt: skip
     _how(page, result)
     page.heading("Exploration and geometry")

@@ -1,0 +1,212 @@
+"""A page that can be pressed against `palpate press`: the same presses in a browser and by the renderer.
+
+Of every object the presses are drawn over its surface (seeded): half with the model's own friction, half
+with one on which a tip slides; half straight in, half aslant by up to 60 degrees; from 0.5 mm to as deep as
+the page goes. Left out are presses that miss or graze the object, and those in which the tip meets the
+support, which a page has not. Beside them: every measured place along its stated normal, the file's size, and
+frames a second with everything drawn anew, on a desktop and a phone-sized view. Needs chromium (or
+google-chrome) on the PATH.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks.evidence import Figure, rates
+from benchmarks.timing import table
+from mechanics.errors import OptionError
+from mechanics.frames import local_frames
+from palpate.exporting.page.document import page_of
+from palpate.exporting.page.tables import greatest_depth
+from palpate.operations.load import load
+from palpate.output import progress_bar
+from render.fem import FemRenderer
+from render.options import RenderOptions
+from render.press import Stroke, press
+from render.scene import in_the_air
+from tests.palpate.show.browser import Tab, a_tab, browser_found
+
+OBJECTS = ("silicone-1", "silicone-2", "silicone-3", "nodule", "bean")
+SHARE, AT_LEAST_N = 0.02, 0.005
+STEEPEST_DEG, SHALLOWEST_M, SPEED_M_PER_S = 60.0, 5e-4, 0.01
+VIEWS = {"desktop, 1280 x 800": (1280, 800), "phone, 390 x 844": (390, 844)}
+_SECONDS = 4.0
+_AT_ONCE = 25
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which objects, how many presses."""
+    parser.add_argument(
+        "objects",
+        nargs="*",
+        default=OBJECTS,
+        metavar="MODEL",
+        help="folders or scenes (default: five scenes)",
+    )
+    parser.add_argument("--presses", type=int, default=500, help="drawn presses an object (default: 500)")
+    parser.add_argument("--friction", type=float, default=0.2, help="of the half that slides (default: 0.2)")
+    parser.add_argument("--seed", type=int, default=0, help="of the drawn presses (default: 0)")
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One press: at (3,) m, way (3,), depth m; force (3,) N by the renderer; kind: straight, stick, slide or
+    measured."""
+
+    at: np.ndarray
+    way: np.ndarray
+    depth_m: float
+    force: np.ndarray
+    kind: str
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Measure; print a table; return the figures."""
+    if browser_found() is None:
+        raise OptionError("palpate bench page needs chromium or google-chrome on the PATH")
+    found: dict[str, Any] = {}
+    progress = progress_bar("pages")
+    with tempfile.TemporaryDirectory() as folder, a_tab(Path(folder) / "profile") as tab:
+        for k, name in enumerate(arguments.objects):
+            found[Path(name).name] = _measured(name, arguments, tab, Path(folder))
+            progress("pages", (k + 1) / len(arguments.objects))
+    progress.close()
+    rows = []
+    for name, of in found.items():
+        for kind, misses in of["misses"].items():
+            if len(misses):
+                relative = 100 * np.array(of["relative"][kind])
+                share = 100 * np.mean(np.array(misses) <= 1)
+                numbers = (np.median(relative), np.quantile(relative, 0.95), relative.max())
+                rows.append([name, kind, str(len(misses)), *(f"{v:.2f}" for v in numbers), f"{share:.1f}"])
+    print(table(["object", "presses", "count", "median %", "95 % %", "most %", "within %"], rows))
+    for name, of in found.items():
+        frames = "; ".join(f"{view} {rate:.0f}" for view, rate in of["frames"].items())
+        print(f"{name}: {of['bytes'] / 1e6:.2f} MB; frames a second: {frames}")
+    return {"objects": found, "figures": _figures(found)}
+
+
+def _measured(name: str, arguments: argparse.Namespace, tab: Tab, folder: Path) -> dict[str, Any]:
+    own = FemRenderer(load(name))
+    slippery = FemRenderer(own.model, RenderOptions(friction=arguments.friction))
+    rng = np.random.default_rng(arguments.seed)
+    misses: dict[str, list[float]] = {"straight": [], "stick": [], "slide": [], "measured": []}
+    relative: dict[str, list[float]] = {kind: [] for kind in misses}
+    of: dict[str, Any] = {"misses": misses, "relative": relative, "frames": {}}
+    half = arguments.presses // 2
+    for renderer, count in ((slippery, arguments.presses - half), (own, half)):
+        page = folder / "touch.html"
+        page.write_text(page_of(renderer), encoding="utf-8")
+        of["bytes"] = page.stat().st_size
+        tab.open(page, *VIEWS["desktop, 1280 x 800"])
+        tab.wait("window.palpate !== undefined")
+        asked = drawn(renderer, count, rng)
+        answers = [np.array(force) for force in _answers(tab, asked)]
+        if renderer is own:
+            places = measured_places(own)
+            asked += places
+            answers += [np.array(force) for force in _answers(tab, places, straight=True)]
+        for each, force in zip(asked, answers, strict=True):
+            off, size = float(np.linalg.norm(force - each.force)), float(np.linalg.norm(each.force))
+            misses[each.kind].append(off / (SHARE * size + AT_LEAST_N))
+            relative[each.kind].append(off / size)
+    for view, (width, height) in VIEWS.items():
+        tab.open(page, width, height)
+        tab.wait("window.palpate !== undefined")
+        tab.evaluate(
+            "palpate.page.pressAt([...palpate.page.surface.at(palpate.page.topPlace()).point], 0.003)"
+        )
+        tab.evaluate(f"palpate.frames({_SECONDS / 2})")  # the picture finds the sharpness that it can hold
+        of["frames"][view] = tab.evaluate(f"palpate.frames({_SECONDS})")
+    return of
+
+
+def drawn(renderer: FemRenderer, count: int, rng: np.random.Generator) -> list[Asked]:
+    """Presses drawn over the touchable surface by area, with the renderer's answers."""
+    arrays, model = renderer.contact.arrays, renderer.model
+    triangles = arrays.triangles[arrays.free > 0]
+    p = arrays.vertices[triangles]
+    area = np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
+    radius, deepest, friction = (
+        model.tool.tip_radius_m,
+        greatest_depth(renderer),
+        renderer.parameters.friction[0],
+    )
+    found: list[Asked] = []
+    while len(found) < count:
+        weights, corners = (
+            rng.dirichlet(np.ones(3)),
+            triangles[rng.choice(len(triangles), p=area / area.sum())],
+        )
+        normal = weights @ arrays.normals[corners]
+        frame = local_frames(normal[None] / np.linalg.norm(normal))[0]
+        straight = len(found) % 2 == 0
+        tilt = 0.0 if straight else np.radians(rng.uniform(0.0, STEEPEST_DEG))
+        turn = rng.uniform(0.0, 2 * np.pi)
+        way = np.array([-np.cos(tilt), np.sin(tilt) * np.cos(turn), np.sin(tilt) * np.sin(turn)]) @ frame
+        at, depth = weights @ arrays.vertices[corners], float(rng.uniform(SHALLOWEST_M, deepest))
+        try:
+            curve = press(in_the_air(renderer), at, way, Stroke(depth, SPEED_M_PER_S))
+        except OptionError:
+            continue
+        if model.support.height(curve.position[: curve.deepest + 1]).min() < radius:
+            continue
+        force, out = curve.force_at(depth), np.asarray(curve.normal)
+        push = float(force @ out)
+        sideways = float(np.linalg.norm(force - push * out))
+        slides = sideways > 0.995 * friction * push
+        found.append(Asked(at, way, depth, force, "slide" if slides else "straight" if straight else "stick"))
+    return found
+
+
+def measured_places(renderer: FemRenderer) -> list[Asked]:
+    """Straight presses at the places of the model's own presses, along their stated normals."""
+    presses, deepest = renderer.model.presses, greatest_depth(renderer)
+    found = []
+    for at, normal, depth_m in zip(presses.point, presses.normal, presses.depth_m, strict=True):
+        depth = min(float(depth_m), deepest)
+        try:
+            curve = press(in_the_air(renderer), at, -normal, Stroke(depth, SPEED_M_PER_S))
+        except OptionError:
+            continue
+        found.append(Asked(at, -normal, depth, curve.force_at(depth), "measured"))
+    return found
+
+
+def _answers(tab: Tab, asked: list[Asked], straight: bool = False) -> list[list[float]]:
+    """The page's forces, N; straight: without telling it the direction."""
+    found: list[list[float]] = []
+    for start in range(0, len(asked), _AT_ONCE):
+        some = [
+            [each.at.tolist(), each.depth_m, None if straight else each.way.tolist()]
+            for each in asked[start : start + _AT_ONCE]
+        ]
+        found += tab.evaluate(f"{json.dumps(some)}.map((each) => palpate.press(...each).force_n)")
+    return found
+
+
+def _figures(found: dict[str, Any]) -> list[Figure]:
+    figures = []
+    for name, of in found.items():
+        drawn_ones = [m for kind in ("straight", "stick", "slide") for m in of["misses"][kind]]
+        within = int(np.sum(np.array(drawn_ones) <= 1))
+        what = f"{name}: drawn presses within 2 % + 5 mN of palpate press"
+        figures += [each.at_least(99.0) for each in rates({what: (within, len(drawn_ones))})]
+        for kind, relative in of["relative"].items():
+            if relative:
+                values = 100 * np.array(relative)
+                spread = (float(values.min()), float(values.max()))
+                what = f"{name}, {kind}: median difference of {len(values)} forces"
+                figures.append(Figure(what, float(np.median(values)), spread, "%"))
+        figures.append(Figure(f"{name}: size of the file", of["bytes"] / 1e6, None, "MB").at_most(3.0))
+        for view, rate in of["frames"].items():
+            what = f"{name}: frames a second drawn in software, {view}"
+            figures.append(Figure(what, rate, None, "1/s").at_least(30.0))
+    return figures
