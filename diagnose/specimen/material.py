@@ -171,7 +171,7 @@ def _indentation(
     if made.effects:
         ideal = made.attribution.ideal.found.modulus / bench.similarity.modulus
         notes.append(f"without {_listed(made.effects)} the modulus would be {ideal:.4g} Pa")
-    told = {e.name for e in effects()} - set(made.left_out)
+    tested = {e.name for e in effects()} - set(made.left_out)
     return Material(
         kind="indentation",
         files=names,
@@ -188,7 +188,7 @@ def _indentation(
         parameters=_named_parameters(bench, made),
         at_bound=_at_bound(made),
         notes=(*notes, *made.reasons),
-        unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - told)),
+        unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - tested)),
         diagnosis=made,
         odds=tests.odds,
     )
