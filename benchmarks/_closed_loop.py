@@ -119,6 +119,20 @@ class Timing:
 
 
 @njit(cache=True, nogil=True)
+def enabled_pose():
+    """(IN_WIDTH,) what a device gives that is connected, calibrated, enabled and not turned, at the origin."""
+    pose = np.zeros(IN_WIDTH)
+    pose[IN_CONNECTED] = 1.0
+    pose[IN_CALIBRATED] = 1.0
+    pose[IN_ENABLED] = 1.0
+    pose[IN_QUATERNION] = 1.0
+    pose[IN_FORCE_MAP] = 1.0
+    pose[IN_FORCE_MAP + 4] = 1.0
+    pose[IN_FORCE_MAP + 8] = 1.0
+    return pose
+
+
+@njit(cache=True, nogil=True)
 def _run(
     kernel,
     model,
@@ -140,14 +154,7 @@ def _run(
     """out: (n, 11) position, command, rendered, work, the most of it until the next pose. transition: (2, 3)
     over a substep. read, lag: Timing's."""
     position, velocity = start.copy(), throw.copy()
-    pose = np.zeros(IN_WIDTH)
-    pose[IN_CONNECTED] = 1.0
-    pose[IN_CALIBRATED] = 1.0
-    pose[IN_ENABLED] = 1.0
-    pose[IN_QUATERNION] = 1.0
-    pose[IN_FORCE_MAP] = 1.0
-    pose[IN_FORCE_MAP + 4] = 1.0
-    pose[IN_FORCE_MAP + 8] = 1.0
+    pose = enabled_pose()
     line = np.zeros((delay_steps + 1, 3))
     work, until = 0.0, 0
     substep_ns = parameters.period_ns // SUBSTEPS

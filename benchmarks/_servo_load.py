@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numba import njit, types
 
+from benchmarks._closed_loop import enabled_pose
 from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.simulated import SPEC
@@ -31,16 +32,10 @@ from palpate.servo.layout import (
 from palpate.servo.loop import Program, make_program, one_tick
 from palpate.servo.realtime import real_time_thread
 from palpate.servo.tick import (
-    IN_CALIBRATED,
-    IN_CONNECTED,
-    IN_ENABLED,
-    IN_FORCE_MAP,
     IN_POSITION,
-    IN_QUATERNION,
     IN_SEQUENCE,
     IN_TIME,
     IN_TIP,
-    IN_WIDTH,
     TickArrays,
     TickParameters,
     account,
@@ -112,14 +107,7 @@ def _timed(
     kernel, model, state, support, arrays, parameters, path, ticks, start, wait, cpu_bins, cpu_extremes
 ):
     """The servo's loop, its poses taken from `path`; wait: sleep to each deadline, else free-running."""
-    pose = np.zeros(IN_WIDTH)
-    pose[IN_CONNECTED] = 1.0
-    pose[IN_CALIBRATED] = 1.0
-    pose[IN_ENABLED] = 1.0
-    pose[IN_QUATERNION] = 1.0
-    pose[IN_FORCE_MAP] = 1.0
-    pose[IN_FORCE_MAP + 4] = 1.0
-    pose[IN_FORCE_MAP + 8] = 1.0
+    pose = enabled_pose()
     for tick in range(ticks):
         for i in range(3):
             pose[IN_POSITION + i] = path[(start + tick) % path.shape[0], i]

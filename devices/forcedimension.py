@@ -127,13 +127,13 @@ class ForceDimensionWire:
         if "dhdGetMaxForce" not in self._newer:
             words.append("the library is too old to tell its force limit")
         else:
-            told = float(self._library.dhdGetMaxForce(number))
+            limit_n = float(self._library.dhdGetMaxForce(number))
             # negative: no limit is set
-            if told == 0.0:
+            if limit_n == 0.0:
                 raise DeviceError("the library cuts all forces to 0: lift its limit (dhdSetMaxForce)")
-            if 0.0 < told < most:
-                most = told
-                words.append(f"the library cuts forces at {told:g} N")
+            if 0.0 < limit_n < most:
+                most = limit_n
+                words.append(f"the library cuts forces at {limit_n:g} N")
         if "dhdSetGravityCompensation" not in self._newer:
             words.append("the library is too old for gravity compensation to be set")
         elif self._library.dhdSetGravityCompensation(1, number) < 0:

@@ -108,11 +108,11 @@ class HaplyWire:
                 )
             self.device_id = first.device_id
             self._key = codec.spelling(inventory)
-            told = codec.config(inventory, self.device_id)
-            self._ask(codec.introduction(self.device_id, PROFILE, told, self.options.preset))
-            if told is not None:
-                told = codec.config(self._ask(codec.full_state(self.device_id)), self.device_id) or told
-            self._settle(told)
+            shown = codec.config(inventory, self.device_id)
+            self._ask(codec.introduction(self.device_id, PROFILE, shown, self.options.preset))
+            if shown is not None:
+                shown = codec.config(self._ask(codec.full_state(self.device_id)), self.device_id) or shown
+            self._settle(shown)
         except (OSError, TimeoutError, client_errors()) as error:
             self.disconnect()
             raise DeviceError(
@@ -129,7 +129,7 @@ class HaplyWire:
         self._socket.send(message)
         return self._socket.recv(timeout=OPEN_S)
 
-    def _settle(self, told: codec.HaplyConfig | None) -> None:
+    def _settle(self, shown: codec.HaplyConfig | None) -> None:
         """What acts between a command and the hand, into the specification; refuses what cannot be undone."""
         base = self.options.uri.replace("ws", "http", 1).rstrip("/")
         version = codec.version(_get(f"{base}/version"))
@@ -145,18 +145,18 @@ class HaplyWire:
             words.append(f"its force scale of {scale:g} is undone; at most {_most(scale):g} N can act")
         self._scale = 1.0 if scale is None else scale
         damping = 0.0
-        if told is None:
+        if shown is None:
             words.append("it does not tell its filters and its mount")
         else:
-            _refuse_mirrored_or_scaled(told)
-            words += _declared(told)
-            damping = told.damping_n_s_per_m or 0.0
+            _refuse_mirrored_or_scaled(shown)
+            words += _declared(shown)
+            damping = shown.damping_n_s_per_m or 0.0
         self.spec = replace(
             SPEC,
             max_force_n=_most(self._scale),
             max_damping_n_s_per_m=max(0.0, SPEC.max_damping_n_s_per_m - damping),
             conditions=tuple(words),
-            simulated=told is not None and told.simulated,
+            simulated=shown is not None and shown.simulated,
         )
 
     def _enter(self, client: Any, uri: str) -> Any:
@@ -236,35 +236,35 @@ def _most(scale: float) -> float:
     return SPEC.max_force_n * min(1.0, scale)
 
 
-def _refuse_mirrored_or_scaled(told: codec.HaplyConfig) -> None:
-    if told.basis not in (None, codec.BASIS):
+def _refuse_mirrored_or_scaled(shown: codec.HaplyConfig) -> None:
+    if shown.basis not in (None, codec.BASIS):
         raise DeviceError(
-            f"the Inverse service keeps its basis at {told.basis}: set it to {codec.BASIS} "
+            f"the Inverse service keeps its basis at {shown.basis}: set it to {codec.BASIS} "
             "(X right, Y forward, Z up)"
         )
-    if not all(abs(s - 1.0) < 1e-6 for s in told.mount_scale):
+    if not all(abs(s - 1.0) < 1e-6 for s in shown.mount_scale):
         raise DeviceError(
-            f"the Inverse service's mount scales lengths by {told.mount_scale}, so that work is not force "
+            f"the Inverse service's mount scales lengths by {shown.mount_scale}, so that work is not force "
             "times way: set the mount's scale to 1, or choose --haply-preset arm_front_centered"
         )
 
 
-def _declared(told: codec.HaplyConfig) -> list[str]:
+def _declared(shown: codec.HaplyConfig) -> list[str]:
     """In plain words, what stays between a command and the hand."""
     words = []
-    if told.preset is not None:
-        words.append(f"mount preset {told.preset}")
-    if told.mount_turn_rad > 1e-3:
-        words.append(f"the mount is turned by {math.degrees(told.mount_turn_rad):.0f} degrees")
-    if told.damping_n_s_per_m:
-        words.append(f"its damping filter of {told.damping_n_s_per_m:g} N s/m acts on the hand as well")
-    if told.force_gate is not None:
+    if shown.preset is not None:
+        words.append(f"mount preset {shown.preset}")
+    if shown.mount_turn_rad > 1e-3:
+        words.append(f"the mount is turned by {math.degrees(shown.mount_turn_rad):.0f} degrees")
+    if shown.damping_n_s_per_m:
+        words.append(f"its damping filter of {shown.damping_n_s_per_m:g} N s/m acts on the hand as well")
+    if shown.force_gate is not None:
         words.append(
-            f"its force gate (gain {told.force_gate:g}) may weaken forces that oscillate: left on, it guards"
+            f"its force gate (gain {shown.force_gate:g}) may weaken forces that oscillate: left on, it guards"
         )
-    if told.gravity_compensation is not None and told.gravity_compensation != 1.0:
-        words.append(f"it carries {told.gravity_compensation:g} of the arm's weight")
-    if told.simulated:
+    if shown.gravity_compensation is not None and shown.gravity_compensation != 1.0:
+        words.append(f"it carries {shown.gravity_compensation:g} of the arm's weight")
+    if shown.simulated:
         words.append("a simulated device: no hand feels it")
     return words
 

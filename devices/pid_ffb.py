@@ -119,7 +119,7 @@ class PidWire:
             port.write(layout.magnitude(block, 0.0))
         self._started_s = float("-inf")
         self._running = False
-        self._told_s = float("-inf")
+        self._reading_s = float("-inf")
         self._reading: Reading | None = None
         self._fault = ""
         self._velocity.reset()
@@ -141,10 +141,10 @@ class PidWire:
                 fresh = True
                 self._position = self.options.stroke_m * np.array([axes.x or 0.0, -(axes.y or 0.0), 0.0])
                 self._buttons = axes.buttons
-        if not fresh and (self._told_s == float("-inf") or now - self._told_s < QUIET_S):
+        if not fresh and (self._reading_s == float("-inf") or now - self._reading_s < QUIET_S):
             return None
         # a stick that is held still may report nothing: silence of an attached device is its last place
-        self._told_s = now
+        self._reading_s = now
         velocity = self._velocity.update(now, self._position)
         return Reading(self._position, velocity, buttons=self._buttons, fault=self._fault)
 

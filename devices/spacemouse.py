@@ -60,7 +60,7 @@ class SpacemouseWire:
         entry = entries[0]
         self._port = HidPort(entry["path"].decode(), entry["vendor_id"], module=self._hid)
         self._deflection = codec.Deflection()
-        self._report_s = self._told_s = self._clock()
+        self._report_s = self._reading_s = self._clock()
         self._set_led(True)
 
     def _set_led(self, on: bool) -> None:
@@ -77,14 +77,14 @@ class SpacemouseWire:
             self._deflection = codec.decode(report, self._deflection)
         if reports:
             self._report_s = now
-        elif now - self._told_s < QUIET_S:
+        elif now - self._reading_s < QUIET_S:
             return None
         elif now - self._report_s > RELEASED_S and not self._deflection.at_rest:
             # the report that said 'released' was lost: a tip must not creep on for ever
             self._deflection = codec.Deflection(
                 buttons=self._deflection.buttons, battery_percent=self._deflection.battery_percent
             )
-        self._told_s = now
+        self._reading_s = now
         return Reading(
             velocity_m_per_s=self.options.full_speed_m_per_s * np.array(self._deflection.translation),
             buttons=self._deflection.buttons,

@@ -109,10 +109,10 @@ def _is_simulated(table: Mapping[str, Any]) -> bool:
 def number(text: str | bytes) -> float | None:
     """The number of an answer about one setting: bare, or under `data` and `value`; None where it is none."""
     try:
-        told = json.loads(text)
+        answer = json.loads(text)
         for key in ("data", "value"):
-            told = told.get(key, told) if isinstance(told, Mapping) else told
-        numbers = _numbers({"": told})
+            answer = answer.get(key, answer) if isinstance(answer, Mapping) else answer
+        numbers = _numbers({"": answer})
     except (ValueError, OverflowError, RecursionError):
         return None
     return numbers[0] if len(numbers) == 1 else None
@@ -121,9 +121,9 @@ def number(text: str | bytes) -> float | None:
 def version(text: str | bytes) -> str:
     """Of the service, from the answer to GET /version; '' where it does not tell."""
     try:
-        told = json.loads(text)
-        told = told.get("data") or told
-        return str(told.get("git_tag") or told.get("project_version") or "")
+        answer = json.loads(text)
+        answer = answer.get("data") or answer
+        return str(answer.get("git_tag") or answer.get("project_version") or "")
     except (ValueError, AttributeError, RecursionError):
         return ""
 
@@ -229,20 +229,20 @@ def _command(device_id: str, commands: dict[str, Any]) -> str:
     return json.dumps({"inverse3": [{"device_id": device_id, "commands": commands}]}, separators=(",", ":"))
 
 
-def introduction(device_id: str, profile: str, told: HaplyConfig | None = None, preset: str = "") -> str:
+def introduction(device_id: str, profile: str, shown: HaplyConfig | None = None, preset: str = "") -> str:
     """The first message: names this program's profile, asks for its frame and filters, probes.
 
-    Only what the inventory showed (`told`) is asked for, in this session alone: the basis X right, Y forward,
+    Only what the inventory has `shown` is asked for, in this session alone: the basis X right, Y forward,
     Z up; the mount by `preset`, or, for '', as it is; no damping by the service.
     """
     session: dict[str, Any] = {"profile": {"name": profile}}
     device: dict[str, Any] = {}
-    if told is not None:
-        if told.basis is not None:
+    if shown is not None:
+        if shown.basis is not None:
             session["basis"] = {"permutation": BASIS}
-        if told.preset is not None and preset:
+        if shown.preset is not None and preset:
             device["preset"] = {"preset": preset}
-        if told.damping_n_s_per_m:
+        if shown.damping_n_s_per_m:
             device["damping"] = {"scalar": 0.0}
     about: dict[str, Any] = {"device_id": device_id, "commands": {"probe_position": {}}}
     if device:

@@ -187,7 +187,7 @@ def _indentation(
     ideal, at_bound = made.attribution.ideal.found.modulus / bench.similarity.modulus, made.at_bound
     if made.effects:
         notes.append(f"without {_listed(made.effects)} the modulus would be {ideal:.4g} Pa")
-    told = {e.name for e in effects()} - set(made.left_out)
+    tested = {e.name for e in effects()} - set(made.left_out)
     return Material(
         kind="indentation",
         files=names,
@@ -205,7 +205,7 @@ def _indentation(
         at_bound=at_bound,
         bound_carries=bool(at_bound) and not interval[0] <= ideal <= interval[1],
         notes=(*notes, *made.reasons),
-        unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - told)),
+        unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - tested)),
         diagnosis=made,
         odds=tests.odds,
     )

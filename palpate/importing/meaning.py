@@ -24,7 +24,7 @@ _EXPONENTS = (1.0, 1.5, 2.0)
 _ROWS_TOLD, _MODEL_ERROR = 8.0, 0.02
 """A curve tells as much as so many independent rows, and a law misses so much of its variance."""
 _PULL, _OUTSIDE, _WORK, _DRIFT = 8.0, 2.0, 3.0, 0.02
-_CLOCK_TOLD, _SENSE_TOLD, _TWICE_TOLD = 10.0, 14.0, 60.0
+_CLOCK_SHARE, _SENSE_SHARE, _TWICE_SHARE = 10.0, 14.0, 60.0
 
 
 class Unclear(RecordingError):
@@ -135,7 +135,7 @@ def force_sense(position: np.ndarray, force: np.ndarray) -> Reading:
     grown = np.diff(size)[both]
     both_sizes = float(np.linalg.norm(pressed) * np.linalg.norm(grown))
     rises = float(pressed @ grown) / both_sizes if both_sizes > 0 else 0.0
-    return best({(1,): _SENSE_TOLD / 2 * rises, (-1,): -_SENSE_TOLD / 2 * rises})
+    return best({(1,): _SENSE_SHARE / 2 * rises, (-1,): -_SENSE_SHARE / 2 * rises})
 
 
 def clock_starts(t: np.ndarray) -> np.ndarray:
@@ -152,12 +152,12 @@ def clock_of(t: np.ndarray, values: np.ndarray) -> Reading:
     in_time, as_written = (
         float(np.abs(np.diff(scaled[order], axis=0)).sum()) for order in (np.argsort(t, kind="stable"), ...)
     )
-    told = _CLOCK_TOLD * float(np.log(max(as_written, 1e-12) / max(in_time, 1e-12)))
-    if abs(told) < 1e-3:  # rows that are merely reversed
-        told = np.log(MOST_ODDS)
+    log_odds = _CLOCK_SHARE * float(np.log(max(as_written, 1e-12) / max(in_time, 1e-12)))
+    if abs(log_odds) < 1e-3:  # rows that are merely reversed
+        log_odds = np.log(MOST_ODDS)
     # one clock does not show a time twice
-    told -= _TWICE_TOLD * (1 - len(np.unique(t)) / len(t))
-    return best({(1,): told / 2, (-1,): -told / 2})
+    log_odds -= _TWICE_SHARE * (1 - len(np.unique(t)) / len(t))
+    return best({(1,): log_odds / 2, (-1,): -log_odds / 2})
 
 
 def settled_clock(where: str, t: np.ndarray, stated: str | None, reading: Reading) -> Reading:

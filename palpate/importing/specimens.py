@@ -46,18 +46,18 @@ def read_tests(
     if not files:
         raise OptionError("no file was given: name at least one")
     paths = [Path(f) for f in files]
-    told = [kind if kind != "auto" else kind_of(p) for p in paths]
-    if len(set(told)) > 1:
-        other = next(i for i, k in enumerate(told) if k != told[0])
+    test_of = [kind if kind != "auto" else kind_of(p) for p in paths]
+    if len(set(test_of)) > 1:
+        other = next(i for i, k in enumerate(test_of) if k != test_of[0])
         raise RecordingError(
-            f"'{paths[0]}' is a test in {told[0]} and '{paths[other]}' one in {told[other]}: give "
+            f"'{paths[0]}' is a test in {test_of[0]} and '{paths[other]}' one in {test_of[other]}: give "
             "files of one kind"
         )
-    if told[0] == "compression":
+    if test_of[0] == "compression":
         return Tests("compression", tests=tuple(of_compression(p, _specimen(p)) for p in paths))
-    if told[0] == "tension":
+    if test_of[0] == "tension":
         return Tests("tension", tests=tuple(map(read_tension, paths)))
-    if told[0] == "relaxation":
+    if test_of[0] == "relaxation":
         return Tests("relaxation", holds=tuple(_hold(p) for p in paths))
     return _indentations(paths, tip_radius_m, said or SaidOfCurves())
 

@@ -56,8 +56,8 @@ def serve(
 
     kept: called after every segment that was taken in, so that nothing felt is lost.
     """
-    told = answer(explorer)
-    say(json.dumps(told))
+    reply = answer(explorer)
+    say(json.dumps(reply))
     for line in lines:
         if not line.strip():
             continue
@@ -70,7 +70,7 @@ def serve(
             say(json.dumps({"error": str(error)}))
             continue
         kept(explorer)
-        told = answer(explorer)
-        say(json.dumps(told))
-        if told["suggest"]["kind"] == "stop":
+        reply = answer(explorer)
+        say(json.dumps(reply))
+        if reply["suggest"]["kind"] == "stop":
             return

@@ -72,10 +72,10 @@ class Specimen:
     def key(self) -> str:
         """A content key."""
         # what came later is left out where it is not there: solved curves of before keep their keys
-        told = {name: value for name, value in asdict(self).items() if name != "field" or value is not None}
+        stated = {name: value for name, value in asdict(self).items() if name != "field" or value is not None}
         if self.stiffening:
-            told["stiffening"] = ("exponential or power law", self.stiffening)
-        text = json.dumps([VERSION, told], sort_keys=True, default=str)
+            stated["stiffening"] = ("exponential or power law", self.stiffening)
+        text = json.dumps([VERSION, stated], sort_keys=True, default=str)
         return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 

@@ -94,8 +94,8 @@ class PressModuli:
         found = fit_law(
             self.data, there.sites, radius, fit.law, fit.depth_m, LAW_ERROR, self.noise_n, start=fit
         )
-        told = self.shares.weight @ field.at(self.shares.nodes)
-        return replace(found, modulus_pa=found.modulus_pa / there.ratio * np.exp(told))
+        log_factor = self.shares.weight @ field.at(self.shares.nodes)
+        return replace(found, modulus_pa=found.modulus_pa / there.ratio * np.exp(log_factor))
 
 
 def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
