@@ -96,7 +96,7 @@ class TrueShape:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""
         points = np.einsum("kb,kbx->kx", _bernstein(weights), self._control[triangle])
         normals = np.einsum("kc,kcx->kx", weights, self.corner_normals[triangle])
-        return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
     def foot(self, points: np.ndarray, facing: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape nearest to points (k, 3), unit normals (k, 3) there.
