@@ -158,7 +158,7 @@ def report(
             if chosen.any() and len(force) > 1:
                 part = spread[chosen]
                 spreads.append(part)
-                rows.append([f"{shape.name}, {kind}", int(chosen.sum()), len(force)])
+                rows.append([f"{shape.name}, {kind}", str(chosen.sum()), str(len(force))])
                 rows[-1] += [
                     f"{np.percentile(part[:, d], 95):.2f} / {part[:, d].max():.2f}" for d in range(3)
                 ]
