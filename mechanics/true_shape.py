@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mechanics.nearest import closest, neighbours, triangle_areas
+from mechanics.nearest import closest, neighbours
 from mechanics.store import content_key
 
 CREASE_DEGREES = 35.0
@@ -80,23 +80,11 @@ class TrueShape:
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
         return self.on(triangle[row], weights)[0]
 
-    def sharpest_bend(self, limit: float) -> float:
-        """1/m: the greatest curvature of the faces up to `limit`, but for the sharpest 2 % of their area."""
-        tensors = _bends(self.vertices[self.triangles], self.corner_normals)
-        bend = np.abs(np.linalg.eigvalsh(tensors)).max(axis=1)
-        area = triangle_areas(self.vertices, self.triangles)
-        kept = (bend < limit) & (area > 0)
-        if not kept.any():
-            return 0.0
-        order = np.argsort(bend[kept])
-        share = np.cumsum(area[kept][order]) / area[kept].sum()
-        return float(bend[kept][order][np.searchsorted(share, 0.98)])
-
     def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""
         points = np.einsum("kb,kbx->kx", _bernstein(weights), self._control[triangle])
         normals = np.einsum("kc,kcx->kx", weights, self.corner_normals[triangle])
-        return points, normals / np.linalg.norm(normals, axis=1, keepdims=True)
+        return points, normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
 
     def foot(self, points: np.ndarray, facing: np.ndarray | None = None) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape nearest to points (k, 3), unit normals (k, 3) there.
