@@ -45,7 +45,8 @@ def softness(ratio: float) -> float:
 
 def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float) -> np.ndarray:
     """(m,) share of each element in the ball, with a soft edge of the elements' size."""
-    distance = np.linalg.norm(centroid - centre, axis=1)
+    away = centroid - centre
+    distance = np.sqrt(np.einsum("mi,mi->m", away, away))
     return 1 / (1 + np.exp(np.clip((distance - radius) / (0.35 * blur), -40, 40)))
 
 
