@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
+from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import BALL, Ball
 from mechanics.model import Model
 from mechanics.moduli import inclusion_ratio
@@ -53,12 +53,8 @@ def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float)
 def first_order(values: np.ndarray, places: Places) -> np.ndarray:
     """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
     fields = energy_fields(places)
-    share = inside(fields.centroid, values[:3], values[3], _blur(fields))
+    share = inside(fields.centroid, values[:3], values[3], fields.blur)
     return far_with_weights(places, 1 + share * (softness(np.exp(values[4])) - 1)) - places.far
-
-
-def _blur(fields: EnergyFields) -> float:
-    return float(np.cbrt(np.median(fields.volume))) * 1.5
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -97,7 +93,7 @@ def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
     fields = energy_fields(places)
     compliance = fields.energy[:, :, 0, 0]
     centres = _centres(fields.centroid, places.point)
-    blur = _blur(fields)
+    blur = fields.blur
     weight, level = misfit.weight, misfit.level
     found = []
     for radius in RADII_M:
