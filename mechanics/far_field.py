@@ -22,6 +22,7 @@ from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 
 _CHUNK, _BATCH = 600, 24
+_SIX = np.triu_indices(3)
 _KNOWN = 16
 """Far fields that are remembered: a fit moves first touches many times between two changes of the object."""
 
@@ -49,14 +50,25 @@ class EnergyFields:
         return self.energy.sum(axis=1, dtype=float)
 
     @cached_property
+    def blur(self) -> float:
+        """m, one and a half edges of the middle element: what is finer is not drawn in the elements."""
+        return float(np.cbrt(np.median(self.volume))) * 1.5
+
+    @cached_property
     def _by_element(self) -> np.ndarray:
-        """(m, 9 q), so that a weighed sum reads it in one go."""
+        """(m, 6 q) of the tensors' six numbers, so that a weighed sum reads no more, and in one go."""
         q, m = self.energy.shape[:2]
-        return np.ascontiguousarray(self.energy.transpose(1, 0, 2, 3)).reshape(m, 9 * q)
+        six = np.empty((m, q, 6), dtype=np.float32)
+        for k, (i, j) in enumerate(zip(*_SIX, strict=True)):
+            six[:, :, k] = self.energy[:, :, i, j].T
+        return six.reshape(m, 6 * q)
 
     def weighed(self, weight: np.ndarray) -> np.ndarray:
         """(q, 3, 3) 1/m, the sum of the elements' energies times weight (m,)."""
-        return (weight.astype(np.float32) @ self._by_element).reshape(-1, 3, 3)
+        six = (weight.astype(np.float32) @ self._by_element).reshape(-1, 6)
+        tensor = np.empty((len(six), 3, 3), dtype=np.float32)
+        tensor[:, _SIX[0], _SIX[1]] = tensor[:, _SIX[1], _SIX[0]] = six
+        return tensor
 
 
 def energy_fields(places: Places) -> EnergyFields:

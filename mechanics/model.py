@@ -18,7 +18,7 @@ from mechanics.material import (
     finite,
     positive,
 )
-from mechanics.moduli import gradient_ratio, skin_ratio, with_balls, within_limits
+from mechanics.moduli import gradient_ratio, height_share, skin_ratio, with_balls, within_limits
 from mechanics.press_making import no_presses
 from mechanics.presses import Presses
 from mechanics.quantities import USUAL_TIP_RADIUS_M
@@ -126,9 +126,8 @@ class Model(Result):
         if material.field is not None:
             ratio = ratio * material.field
         if material.gradient is not None:
-            ratio = ratio * gradient_ratio(
-                self.mesh, material.gradient, self.support.point, self.support.normal
-            )
+            height = height_share(self.mesh, self.support.point, self.support.normal)
+            ratio = ratio * gradient_ratio(material.gradient, height)
         return ratio
 
     def fitted_to(self, presses: Presses) -> bool:

@@ -66,13 +66,16 @@ def with_balls(mesh: TetMesh, matrix_ratio: np.ndarray | None, balls: Iterable[B
     return within_limits(balls_ratio(mesh, balls) * (1.0 if matrix_ratio is None else matrix_ratio))
 
 
-def gradient_ratio(
-    mesh: TetMesh, gradient: Gradient, support_point: np.ndarray, support_normal: np.ndarray
-) -> np.ndarray:
-    """(m,) at the tetrahedra's centres. support_normal: (3,) unit, into the object."""
+def height_share(mesh: TetMesh, support_point: np.ndarray, support_normal: np.ndarray) -> np.ndarray:
+    """(m,) height of the tetrahedra's centres over the support, as a share of the object's. support_normal:
+    (3,) unit, into the object."""
     highest = ((mesh.points - support_point) @ support_normal).max()
     centroid = mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)
-    height = ((centroid - support_point) @ support_normal) / highest
+    return ((centroid - support_point) @ support_normal) / highest
+
+
+def gradient_ratio(gradient: Gradient, height: np.ndarray) -> np.ndarray:
+    """(m,) at the tetrahedra's centres, of which `height_share` is (m,)."""
     return gradient.ratio_base + (gradient.ratio_top - gradient.ratio_base) * height
 
 

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.far_field import EnergyFields, energy_fields, far_with_weights
+from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import BALL, Ball
 from mechanics.model import Model
 from mechanics.moduli import inclusion_ratio
@@ -45,19 +45,16 @@ def softness(ratio: float) -> float:
 
 def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float) -> np.ndarray:
     """(m,) share of each element in the ball, with a soft edge of the elements' size."""
-    distance = np.linalg.norm(centroid - centre, axis=1)
+    away = centroid - centre
+    distance = np.sqrt(np.einsum("mi,mi->m", away, away))
     return 1 / (1 + np.exp(np.clip((distance - radius) / (0.35 * blur), -40, 40)))
 
 
 def first_order(values: np.ndarray, places: Places) -> np.ndarray:
     """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
     fields = energy_fields(places)
-    share = inside(fields.centroid, values[:3], values[3], _blur(fields))
+    share = inside(fields.centroid, values[:3], values[3], fields.blur)
     return far_with_weights(places, 1 + share * (softness(np.exp(values[4])) - 1)) - places.far
-
-
-def _blur(fields: EnergyFields) -> float:
-    return float(np.cbrt(np.median(fields.volume))) * 1.5
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
@@ -96,7 +93,7 @@ def _seek(scene: Scene, misfit: Misfit) -> list[np.ndarray]:
     fields = energy_fields(places)
     compliance = fields.energy[:, :, 0, 0]
     centres = _centres(fields.centroid, places.point)
-    blur = _blur(fields)
+    blur = fields.blur
     weight, level = misfit.weight, misfit.level
     found = []
     for radius in RADII_M:

@@ -10,7 +10,7 @@ from mechanics.effects.settings import Scene, Settings
 from mechanics.far_field import energy_fields, far_with_weights
 from mechanics.material import GRADIENT, Gradient
 from mechanics.model import Model
-from mechanics.moduli import gradient_ratio
+from mechanics.moduli import gradient_ratio, height_share
 
 
 def gradient(log_ratio: float) -> Gradient:
@@ -21,7 +21,10 @@ def gradient(log_ratio: float) -> Gradient:
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:
     places, model = scene.places, scene.places.model
-    ratio = gradient_ratio(model.mesh, gradient(values[0]), model.support.point, model.support.normal)
+    height = places.stage(
+        "height share", lambda: height_share(model.mesh, model.support.point, model.support.normal)
+    )
+    ratio = gradient_ratio(gradient(values[0]), height)
     settings.far = settings.far - places.far + far_with_weights(places, 1 / ratio)
     # the half-space that is taken off is of the modulus under the tip
     softness = places.under_tip @ (1 / ratio[model.mesh.touchable_elements])

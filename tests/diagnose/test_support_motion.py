@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from diagnose.forward.prediction import build_forward
 from diagnose.forward.touches import touches_of
+from mechanics import support_motion as support
 from mechanics.far_field import energy_fields
 from mechanics.frames import tangents
 from mechanics.patch import PatchSampler
 from mechanics.refine import typical_edge
 from mechanics.solver import Solver
 from mechanics.support import BaseHold
-from mechanics.support_motion import far_on_springs, far_partly_bonded, loosened, support_motion
+from mechanics.support_motion import far_on_springs, far_partly_bonded, few_corners, loosened, support_motion
 
 
 @pytest.fixture(scope="module")
@@ -48,6 +51,30 @@ def test_springs(places, normal, tangential):
     # the base moves linearly between nodes 10 mm apart here, quadratically in the factorised solution
     np.testing.assert_allclose(got[:, 0, 0], expected[place][:, 0, 0], rtol=0.1)
     np.testing.assert_allclose(got, expected[place], atol=0.2 * np.abs(expected).max())
+
+
+def test_points_of_a_plane_follow_some_of_them():
+    """Rigid motion, which is linear, comes out exactly, within the chosen ones and beyond."""
+    random = np.random.default_rng(0)
+    angle, radius = random.uniform(0, 2 * np.pi, 900), 0.05 * np.sqrt(random.uniform(size=900))
+    plane = np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])
+    chosen, drawn = few_corners(plane)
+    assert len(chosen) == support.MOST_CORNERS and drawn.shape == (900, len(chosen))
+    np.testing.assert_allclose(drawn.sum(axis=1), 1.0)
+    np.testing.assert_allclose(drawn @ plane[chosen], plane, atol=1e-12)
+    np.testing.assert_allclose(drawn[chosen].toarray(), np.eye(len(chosen)), atol=1e-9)
+    # no point is thrown far by the others
+    assert np.abs(drawn).max() < 3
+
+
+def test_a_base_of_many_corners_gives_as_much_when_some_of_them_move_it(places, monkeypatch):
+    whole = far_on_springs(places, 25.0, 25.0) - places.far
+    corners = len(support_motion(places).plane)
+    monkeypatch.setattr(support, "MOST_CORNERS", corners // 2)
+    few = replace(places, stages={})
+    got = far_on_springs(few, 25.0, 25.0) - places.far
+    assert len(support_motion(few).plane) == corners // 2
+    np.testing.assert_allclose(got[:, 0, 0], whole[:, 0, 0], rtol=0.1)
 
 
 def test_partly_loose(places):
