@@ -167,7 +167,7 @@ class _Touch:
         points = self.solved.points
         near = np.flatnonzero(np.linalg.norm(points - tip, axis=1) < NEAR_RADII * self.radius_m)
         if not len(near):
-            self._stuck, self._chosen = {}, near
+            self._stuck, self._chosen, self._u = {}, near, np.zeros((0, 3))
             return np.zeros(3)
         if not np.array_equal(near, self._chosen):
             old = dict(zip(self._chosen.tolist(), self._u, strict=True))
