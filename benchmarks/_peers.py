@@ -22,12 +22,12 @@ from mechanics.model import Model, Support, Tool
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
+from render.simulators.mujoco import POISSON_LIMIT as FLEX_POISSON
+from render.simulators.mujoco import flex_xml
 
 NEAR_M = 0.009
 """Around a place: where a tip may touch, for a solver that is told of nodes."""
 SETTLE_S, TIMESTEP_S = 0.1, 0.001
-FLEX_POISSON = 0.45
-"""At 0.49 its linear tetrahedra lock, and its solver of the elastic forces does not converge."""
 NEWTON_TIMESTEP_S, NEWTON_SWEEPS, NEWTON_STEPS = 0.005, 20, 40
 """Steps at each depth, half of them moving; three times as many change the force by 1 %."""
 NEWTON_CONTACT, NEWTON_SKIN_M = 1e5, 1e-4
@@ -41,35 +41,6 @@ DEPTHS_M = (0.001, 0.002, 0.003)
 def hertz_n(depth_m: float) -> float:
     """Hertz' force of the tip in a half space, N."""
     return 4.0 / 3.0 * YOUNG_PA / (1 - POISSON**2) * np.sqrt(TIP_RADIUS_M) * depth_m**1.5
-
-
-def flex_xml(
-    mesh: TetMesh,
-    timestep_s: float,
-    *,
-    young_pa: float = YOUNG_PA,
-    poisson: float = POISSON,
-    radius_m: float = TIP_RADIUS_M,
-) -> str:
-    """An object as a flex with a mocap sphere above its top."""
-    points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
-    elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
-    pins = " ".join(str(node) for node in np.flatnonzero(mesh.fixed))
-    mass = 1000.0 * float(mesh.volumes.sum())
-    top = mesh.points.max(axis=0)
-    middle = 0.5 * (top + mesh.points.min(axis=0))
-    return f"""<mujoco>
-<option timestep="{timestep_s}" gravity="0 0 0" integrator="discrete" solver="CG"/>
-<size memory="1G"/>
-<worldbody>
-<body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + radius_m + 0.001}">
-<geom name="tip" type="sphere" size="{radius_m}" condim="3" friction="0.5"/></body>
-<flexcomp name="block" type="direct" dim="3" mass="{mass}" radius="1e-4"
- point="{points}" element="{elements}">
-<contact condim="3" selfcollide="none" friction="0.5"/>
-<elasticity young="{young_pa}" poisson="{poisson}" damping="0.01"/>
-<pin id="{pins}"/>
-</flexcomp></worldbody></mujoco>"""
 
 
 class Peer(ABC):

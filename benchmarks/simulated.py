@@ -16,6 +16,7 @@ import json
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +31,7 @@ from diagnose.simulated.pipeline import Asked, diagnose_simulated
 from diagnose.simulated.result import SimulatedGap
 from diagnose.simulated.stated import KEYS, Stated
 from diagnose.verdict.result import Diagnosis
+from mechanics.errors import OptionError
 from mechanics.model import Model
 from mechanics.recording import Recording
 from palpate.output import progress_bar
@@ -46,6 +48,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--pairs", type=int, default=12, help="cases with two")
     parser.add_argument("--controls", type=int, default=12, help="cases with none")
     parser.add_argument("--seed", type=int, default=0, help="of all that is drawn")
+    parser.add_argument(
+        "--judged", nargs="+", type=Path, help="count what these files of --json hold, instead of judging"
+    )
 
 
 @dataclass(frozen=True)
@@ -91,6 +96,10 @@ class _Case:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Plant, seal, judge, open; print what was found."""
+    if arguments.judged:
+        rows = [row for path in arguments.judged for row in json.loads(path.read_text())["cases"]]
+        _check_seals(rows)
+        return _said(rows)
     block = Block()
     worlds = [_world(block, late) for late in (False, False, True)]
     drawn = np.random.default_rng(arguments.seed)
@@ -102,12 +111,22 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             tell("cases", number / len(plan))
             world = worlds[number % 3]
             cases.append(_judged(block, world, planted, 1000 * arguments.seed + number, number))
-    _print(cases)
-    figures = _figures(cases)
-    print(
-        table(["figure", "value", "target"], [[f.what, f"{f.value:.3g} {f.unit}", f.target] for f in figures])
-    )
-    return {"figures": figures, "cases": [_row(case) for case in cases]}
+    return _said([_row(case) for case in cases])
+
+
+def _said(rows: list[dict[str, Any]]) -> dict[str, Any]:
+    """Print every case and the counts; the figures with the cases."""
+    _print(rows)
+    figures = _figures(rows)
+    said = [[f.what, f"{f.value:.3g} {f.unit}", f.target] for f in figures]
+    print(table(["figure", "value", "target"], said))
+    return {"figures": figures, "cases": rows}
+
+
+def _check_seals(rows: Sequence[dict[str, Any]]) -> None:
+    broken = [k for k, row in enumerate(rows) if digest(row["truth"], row["salt"]) != row["sealed"]]
+    if broken:
+        raise OptionError(f"cases {broken} are not what was sealed: judge them again")
 
 
 def _world(block: Block, late: bool) -> _Reality:
@@ -167,16 +186,74 @@ def _stated(given: Given) -> Stated:
     return Stated(given.modulus_pa, given.poisson, given.friction, given.radius_m, frozenset(KEYS))
 
 
-def _print(cases: Sequence[_Case]) -> None:
-    rows = []
-    for case in cases:
-        said = " ".join(f"{f.name}={x:.3g}" for f, x in case.planted) or "none"
-        rows.append(
-            [case.number, said, f"{case.visible:.1f}", " ".join(case.named) or "none",
-             " ".join(case.verdict.candidates), f"{case.verdict.gap_before_n:.3f}",
-             f"{_predicted(case) or float('nan'):.3f}", f"{case.left_n:.3f}"]
+def _print(rows: Sequence[dict[str, Any]]) -> None:
+    lines = []
+    for number, row in enumerate(rows):
+        said = " ".join(f"{name}={x:.3g}" for name, x in row["truth"]["flaws"]) or "none"
+        left = row["said_left_n"]
+        lines.append(
+            [number, said, f"{row['times_visible']:.1f}", " ".join(row["named"]) or "none",
+             " ".join(row["candidates"]), f"{row['gap_n']:.3f}", "-" if left is None else f"{left:.3f}",
+             f"{row['left_n']:.3f}"]
         )  # fmt: skip
-    print(table(["case", "planted", "times visible", "named", "or", "gap [N]", "said left", "left"], rows))
+    print(table(["case", "planted", "times visible", "named", "or", "gap [N]", "said left", "left"], lines))
+
+
+def _truth(row: dict[str, Any]) -> list[str]:
+    """Names of what was planted, the largest first."""
+    return sorted(row["sizes_n"], key=lambda n: -row["sizes_n"][n])
+
+
+def _strictly(row: dict[str, Any]) -> bool:
+    """Whether the largest flaw is named first."""
+    return row["named"][:1] == _truth(row)[:1]
+
+
+def _first(row: dict[str, Any]) -> bool:
+    """The same, or it is a candidate beside what is named."""
+    return _strictly(row) or (bool(row["named"]) and _truth(row)[0] in row["candidates"])
+
+
+def _all_of(row: dict[str, Any]) -> bool:
+    """Whether everything planted is named or a candidate."""
+    return set(_truth(row)) <= {*row["named"], *row["candidates"]}
+
+
+def _figures(rows: Sequence[dict[str, Any]]) -> list[Figure]:
+    single = [r for r in rows if len(r["sizes_n"]) == 1]
+    far = [r for r in single if r["times_visible"] >= FAR]
+    pairs = [r for r in rows if len(r["sizes_n"]) == 2]
+    controls = [r for r in rows if not r["sizes_n"]]
+    counted = {
+        f"first place, one flaw of {FAR:g} times what can be seen": (sum(map(_first, far)), len(far)),
+        "first place strictly, the same": (sum(map(_strictly, far)), len(far)),
+        "in names or candidates, the same": (sum(map(_all_of, far)), len(far)),
+        "only that flaw named, the same": (sum(r["named"] == _truth(r) for r in far), len(far)),
+        "first place, one flaw of any size": (sum(map(_first, single)), len(single)),
+        "dominant of pairs": (sum(map(_first, pairs)), len(pairs)),
+        "both of pairs in names or candidates": (sum(map(_all_of, pairs)), len(pairs)),
+        "false alarms on controls": (sum(bool(r["named"]) for r in controls), len(controls)),
+        "parts and the rest add up to 1": (sum(r["adds_up"] for r in rows), len(rows)),
+    }
+    targets = {"first place, one flaw of 4": 85.0, "dominant of pairs": 90.0, "parts and": 100.0}
+    figures = []
+    for figure in rates(counted):
+        least = next((t for name, t in targets.items() if figure.what.startswith(name)), None)
+        if figure.what.startswith("false alarms"):
+            figure = figure.at_most(2.0)
+        figures.append(figure if least is None else figure.at_least(least))
+    off = []
+    for r in rows:
+        measured = r["gap_n"] ** 2 - r["left_n"] ** 2
+        # where mending it changes nothing to speak of there is no shrinkage to predict
+        if r["said_left_n"] is not None and measured > 0.1 * r["gap_n"] ** 2:
+            off.append(abs((r["gap_n"] ** 2 - r["said_left_n"] ** 2) / measured - 1))
+    if off:
+        low, high = np.quantile(off, [0.25, 0.75])
+        what = f"shrinkage predicted against measured, median of {len(off)} (quartiles)"
+        spread = (100 * float(low), 100 * float(high))
+        figures.append(Figure(what, 100 * float(np.median(off)), spread, "%").at_most(15.0))
+    return figures
 
 
 def _predicted(case: _Case) -> float | None:
@@ -185,63 +262,14 @@ def _predicted(case: _Case) -> float | None:
     return known.get(case.truth[0]) if case.truth and case.truth[0] in case.named else None
 
 
-def _first(case: _Case) -> bool:
-    """Whether the largest flaw stands first, or as a candidate of what does."""
-    return case.named[:1] == case.truth[:1] or (bool(case.named) and case.truth[0] in case.verdict.candidates)
-
-
-def _figures(cases: Sequence[_Case]) -> list[Figure]:
-    single = [c for c in cases if len(c.planted) == 1]
-    far = [c for c in single if c.visible >= FAR]
-    pairs = [c for c in cases if len(c.planted) == 2]
-    controls = [c for c in cases if not c.planted]
-    counted = {
-        f"first place, one flaw of {FAR:g} times what can be seen": (sum(map(_first, far)), len(far)),
-        "first place strictly, the same": (sum(c.named[:1] == c.truth[:1] for c in far), len(far)),
-        "in names or candidates, the same": (
-            sum(c.truth[0] in (*c.named, *c.verdict.candidates) for c in far), len(far),
-        ),
-        "first place, one flaw of any size": (sum(map(_first, single)), len(single)),
-        "only the flaw named, one flaw of that size": (sum(c.named == c.truth for c in far), len(far)),
-        "dominant of pairs": (sum(map(_first, pairs)), len(pairs)),
-        "both of pairs": (
-            sum(set(c.truth) <= {*c.named, *c.verdict.candidates} for c in pairs), len(pairs),
-        ),
-        "false alarms on controls": (sum(bool(c.named) for c in controls), len(controls)),
-        "parts and the rest add up to 1": (sum(map(_adds_up, cases)), len(cases)),
-    }  # fmt: skip
-    targets = {"first place, one flaw of 4": 85.0, "dominant of pairs": 90.0, "parts and": 100.0}
-    figures = []
-    for figure in rates(counted):
-        least = next((t for name, t in targets.items() if figure.what.startswith(name)), None)
-        if figure.what.startswith("false alarms"):
-            figure = figure.at_most(2.0)
-        figures.append(figure if least is None else figure.at_least(least))
-    off = [
-        abs((c.verdict.gap_before_n**2 - p**2) / (c.verdict.gap_before_n**2 - c.left_n**2) - 1)
-        for c in cases if (p := _predicted(c)) is not None and c.left_n < 0.95 * c.verdict.gap_before_n
-    ]  # fmt: skip
-    if off:
-        low, high = np.quantile(off, [0.25, 0.75])
-        figures.append(
-            Figure(
-                f"shrinkage predicted against measured, median of {len(off)} (quartiles)",
-                100 * float(np.median(off)), (100 * float(low), 100 * float(high)), "%",
-            ).at_most(15.0)
-        )  # fmt: skip
-    return figures
-
-
-def _adds_up(case: _Case) -> bool:
-    parts = case.verdict.parts
-    return abs(sum(p.share for p in parts.values()) + case.verdict.unexplained - 1) < 1e-9
-
-
 def _row(case: _Case) -> dict[str, Any]:
-    truth = {"flaws": [[f.name, x] for f, x in case.planted]}
+    verdict = case.verdict
+    whole = sum(part.share for part in verdict.parts.values()) + verdict.unexplained
     return {
-        "truth": truth, "salt": case.salt, "sealed": case.sealed, "late_sensor": case.late,
-        "sizes_n": case.sizes, "times_visible": case.visible, "left_n": case.left_n,
-        "verdict": json.loads(json.dumps(case.verdict.as_json()["verdict"])),
-        "named": case.named, "said_left_n": _predicted(case), "gap_n": case.verdict.gap_before_n,
+        "truth": {"flaws": [[f.name, x] for f, x in case.planted]}, "salt": case.salt, "sealed": case.sealed,
+        "late_sensor": case.late, "sizes_n": case.sizes, "times_visible": case.visible,
+        "left_n": case.left_n, "kind": verdict.kind, "named": case.named,
+        "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
+        "shares": {name: part.share for name, part in verdict.parts.items()},
+        "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n, "adds_up": abs(whole - 1) < 1e-9,
     }  # fmt: skip

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from diagnose.explore.segments import Instrument as Instrument
     from diagnose.explore.segments import Segment as Segment
     from diagnose.specimen.result import Material as Material
+    from diagnose.simulated.result import SimulatedGap as SimulatedGap
     from diagnose.verdict.result import Diagnosis as Diagnosis
     from mechanics.calibration import Calibration as Calibration
     from mechanics.errors import CacheError as CacheError
@@ -90,6 +91,7 @@ _OTHERS = {
     "render.press": "Curve",
     "diagnose.compare.comparison": "Comparison",
     "diagnose.verdict.result": "Diagnosis",
+    "diagnose.simulated.result": "SimulatedGap",
     "scenes.laboratory.simulate": "Simulation",
     "palpate.batching.summary": "Batch",
     "render.base": "Renderer",

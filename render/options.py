@@ -38,6 +38,9 @@ class RenderOptions:
         "of another simulator: as its own documentation says, or as good as it gets",
         choices=("documented", "best"),
     )
+    simulator_set: str = option(
+        "", "numbers of another simulator's settings to change: KEY=VALUE, comma separated"
+    )
 
     def __post_init__(self) -> None:
         if self.friction is not None and (math.isnan(self.friction) or self.friction < 0):

@@ -11,7 +11,7 @@ simulation lacks.
 
 from __future__ import annotations
 
-from dataclasses import KW_ONLY, dataclass
+from dataclasses import KW_ONLY, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
@@ -32,10 +32,14 @@ from palpate.operations.load import load
 from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.output import Output
+from render.registry import simulator_names
 
 if TYPE_CHECKING:
     from diagnose.simulated.result import SimulatedGap
     from diagnose.verdict.result import Diagnosis
+    from mechanics.model import Model
+    from mechanics.progress import Progress
+    from mechanics.recording import Recording
     from palpate.operations._shared import ModelLike, RecordingLike
 
 
@@ -53,6 +57,24 @@ class DiagnoseOperands:
         "forces of another simulator along the recorded path: t,fx,fy,fz (in Python also (t, force) arrays)",
         metavar="FORCES.csv",
         reads=True,
+    )
+    renderer: str | None = operand(
+        None,
+        "a simulator that is run along the recorded path, instead of --simulated",
+        choices=simulator_names(),
+    )
+    simulator_settings: str = operand(
+        "documented",
+        "of --renderer: as its own documentation says, or as good as it gets",
+        choices=("documented", "best"),
+    )
+    simulator_set: str = operand(
+        "", "numbers of these settings to change: KEY=VALUE, comma separated", metavar="KEY=VALUE,..."
+    )
+    mended: str | None = operand(
+        None,
+        "run --renderer once more with these numbers, and measure the gap that is left",
+        metavar="KEY=VALUE,...",
     )
     stated: Any = operand(
         None,
@@ -141,17 +163,54 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         def rest(stage: str, share: float) -> None:
             tell(stage, begun + (1 - begun) * share)
 
-        if forces is None:
+        if asked.renderer is None and forces is None:
             return diagnosed(measured, made, options, rest, **rules)
         from diagnose.simulated.pipeline import Asked, diagnose_simulated
         from diagnose.simulated.stated import stated_of
 
-        simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
-        return diagnose_simulated(measured, made, simulation, options, rest, **rules)
+        if forces is not None:
+            simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
+            return diagnose_simulated(measured, made, simulation, options, rest, **rules)
+        simulation = _simulation(asked, measured, made, asked.simulator_set, tell)
+        found = diagnose_simulated(measured, made, simulation, options, rest, **rules)
+        if asked.mended is None:
+            return found
+        again = _simulation(asked, measured, made, asked.mended, tell)
+        left = diagnose_simulated(measured, made, again, options, rest, reality=found.reality, **rules)
+        return replace(found, gap_after_measured_n=left.gap_before_n)
+
+
+def _simulation(
+    asked: DiagnoseOperands, measured: Recording, model: Model, numbers: str, tell: Progress
+) -> Any:
+    """A simulator that is run along the recorded path; and what it says of itself."""
+    from diagnose.simulated.forces import Forces, ForcesOptions
+    from diagnose.simulated.pipeline import Asked
+    from diagnose.simulated.stated import stated_of
+    from render.options import RenderOptions
+    from render.registry import create
+    from render.replay import replay_recording
+
+    assert asked.renderer is not None
+    settings = RenderOptions(simulator_settings=asked.simulator_settings, simulator_set=numbers)
+    made: Any = create(asked.renderer, model, settings, tell)
+    force = replay_recording(made, measured, tell)
+    said = f"settings {asked.simulator_settings}" + (f", {numbers}" if numbers else "")
+    notes = (
+        f"run here along the recorded path: {said}",
+        *(f"it cannot say: {x}" for x in made.adapter.cannot),
+    )
+    forces = Forces(measured.t, force, asked.renderer, notes)
+    stated = stated_of(made.adapter.stated, model)
+    return Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), made.adapter.version, made.adapter.advice)
 
 
 def _forces(asked: DiagnoseOperands) -> Any:
     """The simulated forces, looked at before the work; None where there are none."""
+    if asked.simulated is not None and asked.renderer is not None:
+        raise OptionError("--simulated and --renderer both name a simulator: name one")
+    if asked.mended is not None and asked.renderer is None:
+        raise OptionError("--mended runs a simulator once more: name it by --renderer")
     if asked.simulated is None:
         if asked.stated:
             raise OptionError("--stated says what a simulator was given: name its forces by --simulated")

@@ -7,6 +7,7 @@ does not reach the next, and free air costs nothing.
 
 from __future__ import annotations
 
+import dataclasses
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Self
@@ -44,8 +45,12 @@ class Adapter(ABC):
     advice: dict[str, str]
     extra: str
 
-    def __init__(self, model: Model, settings: str, friction: float) -> None:
-        self.model, self.settings, self.friction = model, settings, friction
+    settings: dict[str, Any]
+    """Of each of its two settings the frozen dataclass of numbers that `--simulator-set` changes."""
+
+    def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
+        self.model, self.friction = model, friction
+        self.own = changed(self.settings[options.simulator_settings], options.simulator_set)
         self.mesh = model.mesh.linear()
 
     @property
@@ -67,11 +72,29 @@ class Adapter(ABC):
         nearest to the tip."""
         touchable = self.mesh.points[np.unique(self.mesh.touchable_surface)]
         centre = touchable[np.argmin(np.linalg.norm(touchable - tip, axis=1))]
-        foot = tip + (centre - tip) * min(1.0, radius_m / max(np.linalg.norm(centre - tip), 1e-9))
+        away = max(float(np.linalg.norm(centre - tip)), 1e-9)
+        foot = tip + (centre - tip) * min(1.0, radius_m / away)
         fine = self.mesh
         for share in (2.0, 1.5, 1.0, 1.0):
             fine, _ = refined_around(fine, foot, share * reach_m, edge_m)
         return fine
+
+
+def changed(settings: Any, text: str) -> Any:
+    """The settings with KEY=VALUE words over them; raises OptionError for what is not there or no number."""
+    known = {f.name for f in dataclasses.fields(settings)}
+    values = {}
+    for word in filter(None, (w.strip() for w in text.split(","))):
+        key, _, value = word.partition("=")
+        if key not in known:
+            raise OptionError(f"--simulator-set {word}: allowed are {', '.join(sorted(known))}")
+        try:
+            values[key] = float(value)
+        except ValueError as error:
+            raise OptionError(f"--simulator-set {word}: it must be KEY=NUMBER") from error
+        if not values[key] > 0:
+            raise OptionError(f"--simulator-set {word}: it must be greater than 0")
+    return dataclasses.replace(settings, **values)
 
 
 class SimulatedState(NamedTuple):
@@ -97,7 +120,7 @@ class SimulatorRenderer(Renderer):
         slip = model.effects.get("friction_slip", {})
         usual = float(slip.get("mu", 1.0))
         friction = usual if options.friction is None else options.friction
-        self.adapter = adapter(model, options.simulator_settings, friction)
+        self.adapter = adapter(model, options, friction)
         self._tree = cKDTree(self.contact.arrays.vertices)
 
     def start(self, radii_m: Sequence[float] | None = None, dt_s: float = 1e-3) -> SimulatedState:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import importlib.metadata
 import math
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -17,15 +18,26 @@ from scipy.sparse.linalg import splu
 from mechanics import pardiso
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, Adapter, World, made
+from render.simulators.base import BEST, DOCUMENTED, Adapter, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model
     from render.base import Renderer
     from render.options import RenderOptions
 
-PENALTY = {"documented": 10.0, BEST: 30.0}
-"""A node's contact spring over the stiffness of the object under one node: no part of scikit-fem."""
+
+@dataclass(frozen=True)
+class Settings:
+    """penalty: a node's contact spring over the stiffness of the object under one node, no part of
+    scikit-fem. order: 1 or 2, of the elements. edge_radii: edges under the tip, in its radii, inf as the
+    model has them."""
+
+    penalty: float
+    order: float = 1
+    edge_radii: float = math.inf
+
+
+SETTINGS = {DOCUMENTED: Settings(10.0), BEST: Settings(30.0, 2, 0.45)}
 NEAR_RADII = 1.05
 """Of the tip: nodes so near to its centre may touch, as what it presses moves away from it."""
 MOVED_M = 2e-5
@@ -51,11 +63,14 @@ class ScikitFem(Adapter):
         "contact_offset": "let the nodes on the surface lie on it: refine where it is curved",
     }
 
-    def __init__(self, model: Model, settings: str, friction: float) -> None:
+    settings = SETTINGS
+
+    def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
         import skfem  # noqa: F401
 
-        super().__init__(model, settings, friction)
-        self._whole = None if settings == BEST else _Solved(self.mesh, model, order=1)
+        super().__init__(model, options, friction)
+        graded = math.isfinite(self.own.edge_radii)
+        self._whole = None if graded else _Solved(self.mesh, model, round(self.own.order))
 
     @property
     def version(self) -> str:
@@ -74,9 +89,9 @@ class ScikitFem(Adapter):
     def begin(self, tip: np.ndarray, radius_m: float) -> World:
         solved = self._whole
         if solved is None:
-            fine = self.mesh_around(tip, radius_m, 0.45 * radius_m, 1.1 * radius_m)
-            solved = _Solved(fine, self.model, order=2)
-        return _Touch(solved, radius_m, self.friction, PENALTY.get(self.settings, 10.0))
+            fine = self.mesh_around(tip, radius_m, self.own.edge_radii * radius_m, 1.1 * radius_m)
+            solved = _Solved(fine, self.model, round(self.own.order))
+        return _Touch(solved, radius_m, self.friction, self.own.penalty)
 
 
 class _Solved:
@@ -152,7 +167,7 @@ class _Touch:
         points = self.solved.points
         near = np.flatnonzero(np.linalg.norm(points - tip, axis=1) < NEAR_RADII * self.radius_m)
         if not len(near):
-            self._stuck, self._chosen = {}, near
+            self._stuck, self._chosen, self._u = {}, near, np.zeros((0, 3))
             return np.zeros(3)
         if not np.array_equal(near, self._chosen):
             old = dict(zip(self._chosen.tolist(), self._u, strict=True))

@@ -40,7 +40,7 @@ def test_door_is_what_was_promised():
     assert set(FUNCTIONS) == set(promised.split())
     assert set(RESULTS) == set(
         "Recording Model Reconstruction ReplayResult Curve Comparison Diagnosis Simulation Batch "
-        "Checkup Imported Opened Material Calibration Changes".split()
+        "Checkup Imported Opened Material Calibration Changes SimulatedGap".split()
     )
     assert all(issubclass(getattr(pp, name), pp.PalpateError) for name in ERRORS)
     with pytest.raises(AttributeError, match="no attribute 'replay_recording'.*replay"):

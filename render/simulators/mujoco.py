@@ -1,0 +1,177 @@
+"""MuJoCo: a flex of linear tetrahedra, its base pinned, and the tip as a mocap sphere.
+
+documented: the contact that its documentation has by default (solref 0.02 1) on the model's own mesh. best:
+edges of half the tip's radius under it, a contact of solref 0.004 1, half the time step. Poisson's ratio is
+0.45 at most in both: nearer to 0.5 its linear tetrahedra lock.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechanics.progress import Progress, silent
+from mechanics.tetmesh import TetMesh
+from render.simulators.base import BEST, DOCUMENTED, Adapter, World, made
+
+if TYPE_CHECKING:
+    from mechanics.model import Model
+    from render.base import Renderer
+    from render.options import RenderOptions
+
+POISSON_LIMIT = 0.45
+"""Beyond it linear tetrahedra lock, and the solver of the elastic forces does not converge at 0.49."""
+DENSITY_KG_M3 = 1000.0
+
+
+@dataclass(frozen=True)
+class Settings:
+    """timestep_s; solref_s, damping_ratio: solref of the contact; damping_s: of the flex's elasticity;
+    edge_radii: edges under the tip, in its radii, inf as the model has them."""
+
+    timestep_s: float
+    solref_s: float
+    damping_ratio: float = 1.0
+    damping_s: float = 0.01
+    edge_radii: float = np.inf
+
+
+SETTINGS = {
+    DOCUMENTED: Settings(2e-3, 0.02),
+    BEST: Settings(1e-3, 0.004, edge_radii=0.5),
+}
+
+
+def flex_xml(
+    mesh: TetMesh,
+    timestep_s: float,
+    *,
+    young_pa: float,
+    poisson: float,
+    radius_m: float,
+    friction: float = 0.5,
+    solref: tuple[float, float] = (0.02, 1.0),
+    damping_s: float = 0.01,
+) -> str:
+    """An object as a flex with a mocap sphere above its top."""
+    points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
+    elements = " ".join(str(node) for node in mesh.tetrahedra.ravel())
+    pins = " ".join(str(node) for node in np.flatnonzero(mesh.fixed))
+    mass = DENSITY_KG_M3 * float(mesh.volumes.sum())
+    top = mesh.points.max(axis=0)
+    middle = 0.5 * (top + mesh.points.min(axis=0))
+    contact = f'solref="{solref[0]:g} {solref[1]:g}"'
+    return f"""<mujoco>
+<option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG"/>
+<size memory="1G"/>
+<worldbody>
+<body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + radius_m + 0.001}">
+<geom type="sphere" size="{radius_m}" condim="3" friction="{friction:g}" {contact}/></body>
+<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="1e-4"
+point="{points}" element="{elements}">
+<contact condim="3" selfcollide="none" friction="{friction:g}" {contact}/>
+<elasticity young="{young_pa}" poisson="{poisson}" damping="{damping_s:g}"/>
+<pin id="{pins}"/>
+</flexcomp></worldbody></mujoco>"""
+
+
+def force_on_tip(mujoco: Any, model: Any, data: Any) -> np.ndarray:
+    """(3,) N on the mocap sphere, from all contacts."""
+    total, wrench = np.zeros(3), np.zeros(6)
+    for c in range(data.ncon):
+        contact = data.contact[c]
+        mujoco.mj_contactForce(model, data, c, wrench)
+        # the frame's first axis points from the first geometry to the second, and so does its force
+        sign = -1.0 if contact.geom[0] >= 0 else 1.0
+        total += sign * (np.asarray(contact.frame).reshape(3, 3).T @ wrench[:3])
+    return total
+
+
+class MuJoCo(Adapter):
+    """The adapter."""
+
+    name, extra, units = "mujoco", "mujoco", "SI: m, kg, s, N, Pa"
+    settings = SETTINGS
+    cannot = (
+        "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
+        "one modulus a flex",
+        "a contact that gives: it is a constraint with a time constant (solref)",
+        "no tip that sticks for ever: friction is a number",
+    )
+    advice = {
+        "contact_stiffness": 'a harder contact, solref="0.004 1" on geom and flex (twice timestep or more): '
+        "--simulator-set solref_s=0.004,timestep_s=0.001",
+        "contact_nodes": "refine the flex to half the tip's radius under it: --simulator-settings best",
+        "contact_offset": 'margin="0", gap="0" and a small flex radius (1e-4)',
+        "mesh_stiffness": "refine the flex, and stay at poisson 0.45 or below",
+        "numerical_damping": 'lower elasticity damping, and solref damping ratio 1; timestep="0.001"',
+        "time_step": 'timestep="0.001" or less, more iterations',
+        "lost_contact": 'solref="0.004 1" and timestep="0.001"',
+    }
+
+    def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
+        import mujoco
+
+        super().__init__(model, options, friction if np.isfinite(friction) else 10.0)
+        self._mujoco: Any = mujoco
+        self._whole: tuple[float, Any] | None = None
+
+    @property
+    def version(self) -> str:
+        return str(self._mujoco.__version__)
+
+    @property
+    def stated(self) -> dict[str, float]:
+        material = self.model.material
+        return {
+            "young_modulus_pa": material.young_modulus_pa,
+            "poisson_ratio": min(material.poisson_ratio, POISSON_LIMIT),
+            "friction": self.friction,
+            "tip_radius_m": self.model.tool.tip_radius_m,
+        }
+
+    def _compiled(self, mesh: TetMesh, radius_m: float) -> Any:
+        given, own = self.stated, self.own
+        xml = flex_xml(
+            mesh, own.timestep_s, young_pa=given["young_modulus_pa"], poisson=given["poisson_ratio"],
+            radius_m=radius_m, friction=self.friction, solref=(own.solref_s, own.damping_ratio),
+            damping_s=own.damping_s,
+        )  # fmt: skip
+        return self._mujoco.MjModel.from_xml_string(xml)
+
+    def begin(self, tip: np.ndarray, radius_m: float) -> World:
+        edge = self.own.edge_radii
+        if np.isfinite(edge):
+            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
+            return _Touch(self._mujoco, self._compiled(fine, radius_m), tip)
+        if self._whole is None or self._whole[0] != radius_m:
+            self._whole = radius_m, self._compiled(self.mesh, radius_m)
+        return _Touch(self._mujoco, self._whole[1], tip)
+
+
+class _Touch:
+    """One touch: the sphere is led along, in steps of the simulator's own."""
+
+    def __init__(self, mujoco: Any, model: Any, tip: np.ndarray) -> None:
+        self._mujoco, self._model, self._data = mujoco, model, mujoco.MjData(model)
+        self._tip, self._left, self._force = np.array(tip), 0.0, np.zeros(3)
+
+    def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
+        own = float(self._model.opt.timestep)
+        self._left += dt_s
+        count = int(self._left / own + 1e-9)
+        self._left -= count * own
+        for k in range(count):
+            self._data.mocap_pos[0] = self._tip + (k + 1) / count * (tip - self._tip)
+            self._mujoco.mj_step(self._model, self._data)
+        if count:
+            self._tip = np.array(tip)
+            self._force = force_on_tip(self._mujoco, self._model, self._data)
+        return self._force
+
+
+def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
+    """The renderer; raises OptionError where MuJoCo is not installed."""
+    return made(MuJoCo, model, options)

@@ -1,0 +1,173 @@
+"""Another simulator's forces: what is unclear is refused, flaws are named, and the parts add up."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from diagnose.numerics.base import signal_of
+from diagnose.numerics.registry import NAMES, numericals
+from diagnose.options import DiagnoseOptions
+from diagnose.pipeline import diagnose
+from diagnose.simulated.against_law import seen_in_samples
+from diagnose.simulated.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
+from diagnose.simulated.pipeline import Asked, diagnose_simulated
+from diagnose.simulated.result import PARTS
+from diagnose.simulated.stated import StatedForward, stated_of
+from mechanics.effects.registry import NAMES as PHYSICAL
+from mechanics.errors import OptionError, RecordingError
+
+FAST = DiagnoseOptions(fast=True, bootstrap=50)
+OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
+
+
+@pytest.fixture(scope="module")
+def world(bench):
+    """(recording, model, its diagnosis, the law's own force without noise)."""
+    recording, model = bench.record(law="linear")
+    exact = {}
+    bench.record(lambda t, x, f: exact.update(force=f.copy()) or (x, f), law="linear")
+    return recording, model, diagnose(recording, model, FAST), exact["force"]
+
+
+def judged(world, force, **stated):
+    recording, model, reality, _ = world
+    asked = Asked(Forces(recording.t, force, "a simulator"), stated_of(stated, model), OWN_CLOCK)
+    return diagnose_simulated(recording, model, asked, FAST, reality=reality)
+
+
+def shares(result):
+    return sum(result.parts[name].share for name in PARTS) + result.unexplained
+
+
+def test_a_simulation_by_our_own_law_has_no_flaw(world):
+    result = judged(world, world[3])
+    assert result.effects == () and result.kind == "none"
+    assert shares(result) == pytest.approx(1.0)
+    assert result.gap_before_n < 1.3 * result.noise_n
+
+
+def test_a_stiffer_mesh_is_numerics_and_a_stated_modulus_a_parameter(world):
+    force, modulus = 1.5 * world[3], world[1].material.young_modulus_pa
+    mesh, given = judged(world, force), judged(world, force, modulus=1.5 * modulus)
+    assert mesh.effects[0] == "mesh_stiffness" and mesh.parts["numerics"].share > 0.9
+    assert "stated_modulus" in mesh.candidates  # nobody stated it
+    ratio = next(e for e in mesh.entries if e.name == "mesh_stiffness").parameters["ratio"]
+    assert ratio == pytest.approx(1.5, rel=0.1)
+    assert given.effects == ("stated_modulus",) and given.parts["parameters"].share > 0.9
+    assert given.gap_after_n < 0.3 * given.gap_before_n
+    for result in (mesh, given):
+        assert shares(result) == pytest.approx(1.0)
+
+
+def test_a_late_force_is_the_time_step(world):
+    t, force = world[0].t, world[3]
+    result = judged(world, np.column_stack([np.interp(t - 0.03, t, f) for f in force.T]))
+    assert result.effects[0] == "time_step"
+    delay = next(e for e in result.entries if e.name == "time_step").parameters["delay_s"]
+    assert delay == pytest.approx(0.03, abs=0.004)
+    assert any("time steps" in each for each in result.advice)
+
+
+def test_json_has_the_keys_of_the_contract(world):
+    figures = judged(world, 1.5 * world[3]).as_json()
+    assert set(figures["parts"]) == {"reality", "parameters", "numerics"}
+    assert all({"gap_n", "share"} <= set(part) for part in figures["parts"].values())
+    assert {"name", "version", "stated"} <= set(figures["simulator"])
+    assert figures["simulator"]["stated"]["friction"] is None  # it sticks
+    assert {"gap_before_n", "verdict", "where", "effects", "next_touch", "unexplained"} <= set(figures)
+    assert {e["domain"] for e in figures["effects"]} <= {
+        "object", "contact", "boundary", "instrument", "parameters", "numerics",
+    }  # fmt: skip
+
+
+def test_numerical_effects_have_names_of_their_own_and_do_nothing_at_their_ideal(world):
+    assert not set(NAMES) & set(PHYSICAL)
+    real = world[2].forward
+    forward = StatedForward(real.touches, real.places, stated_of({}, world[1]))
+    plain = forward.predict(forward.ideal(1.0))
+    for effect in numericals():
+        settings = forward.ideal(1.0)
+        effect.act(settings, effect.ideal, forward)
+        assert forward.predict(settings) == pytest.approx(plain, abs=1e-12), effect.name
+        assert effect.advice
+
+
+def test_flicker_and_falling_through_show_in_the_samples(world):
+    presses, force = world[1].presses, world[3]
+    at = np.column_stack([np.interp(presses.t, world[0].t, f) for f in force.T])
+    flickering = at.copy()
+    flickering[np.random.default_rng(0).random(len(at)) < 0.2] = 0.0
+    signal, seen = seen_in_samples(signal_of(presses, flickering))
+    assert seen["lost_contact"][1]["share"] == pytest.approx(0.2, abs=0.08)
+    assert np.abs(signal.force - at).max() < 0.2 * np.abs(at).max()
+    through = at.copy()
+    part = presses.parts[3]
+    deep = presses.travel[part, 0]
+    through[part][np.argmax(deep > 0.7 * deep.max()) :] = 0.0
+    _, seen = seen_in_samples(signal_of(presses, through))
+    assert seen["tunnelling"][1]["share"] == pytest.approx(1 / len(presses))
+    assert not seen_in_samples(signal_of(presses, at))[1]
+
+
+def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):
+    recording, model, _, force = world
+    presses, t = model.presses, recording.t
+    with pytest.raises(OptionError, match="--simulated-force-on object"):
+        aligned(Forces(t, -force, "x"), presses, ForcesOptions())
+    turned = aligned(Forces(t, -force, "x"), presses, ForcesOptions(simulated_force_on="object"))
+    assert turned.usable.all()
+    with pytest.raises(OptionError, match="state --clock-offset"):
+        aligned(Forces(t - 1000.0, force, "x"), presses, ForcesOptions(clock_offset_s=None))
+    with pytest.raises(OptionError, match="--clock-offset"):
+        aligned(Forces(t + 1.0, force, "x"), presses, ForcesOptions())
+    with pytest.raises(OptionError, match="zero wherever"):
+        aligned(Forces(t, 0 * force, "x"), presses, ForcesOptions())
+
+
+def test_missing_rows_and_another_rate_are_told(world):
+    recording, model, _, force = world
+    presses, t = model.presses, recording.t
+    kept = ~((t > presses.onset_s[2]) & (t < presses.onset_s[2] + 0.3))
+    some = aligned(Forces(t[kept][::4], force[kept][::4], "x"), presses, OWN_CLOCK)
+    assert not some.usable[2] and some.usable.sum() == len(presses) - 1
+    said = " ".join(some.notes)
+    assert "125 Hz" in said and "1 of 24 presses were left out" in said
+    bad = force.copy()
+    bad[5] = np.nan
+    assert "1 rows without a number" in sorted_forces(t, bad, "x").notes[0]
+
+
+def test_a_press_without_rows_is_left_out_of_the_answer(world):
+    recording, model, reality, force = world
+    t, onset = recording.t, model.presses.onset_s[2]
+    kept = ~((t > onset) & (t < onset + 0.3))
+    asked = Asked(Forces(t[kept], 1.5 * force[kept], "x"), stated_of({}, model), OWN_CLOCK)
+    result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    assert result.effects[0] == "mesh_stiffness" and shares(result) == pytest.approx(1.0)
+    assert len(result.touches) == len(reality.forward.touches) - 1
+
+
+def test_files_are_read_or_refused(tmp_path):
+    good = tmp_path / "good.csv"
+    good.write_text("t,fx,fy,fz,note\n0,0,0,1,a\n0.1,0,0,2,b\n")
+    assert read_forces(good).force[1, 2] == 2.0
+    bad = tmp_path / "bad.csv"
+    bad.write_text("time,fx,fy,fz\n0,0,0,1\n")
+    with pytest.raises(RecordingError, match="lacks the columns t"):
+        read_forces(bad)
+
+
+def test_what_was_stated_is_read_over_the_models_own(world):
+    model = world[1]
+    stated = stated_of(["modulus=30000", "nu=0.4"], model)
+    assert stated.young_modulus_pa == 30000 and stated.poisson_ratio == 0.4
+    assert stated.tip_radius_m == model.tool.tip_radius_m and stated.given == {
+        "young_modulus_pa", "poisson_ratio",
+    }  # fmt: skip
+    for wrong in (["colour=3"], ["nu=0.7"], ["nu"], ["nu=soft"], ["nu=0.4", "poisson=0.3"]):
+        with pytest.raises(OptionError, match="--stated"):
+            stated_of(wrong, model)
+    assert dataclasses.replace(stated, given=frozenset()).as_json()["friction"] is None

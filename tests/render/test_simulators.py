@@ -1,0 +1,64 @@
+"""Other simulators behind the renderer's interface press a block, each as far as its theory goes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from mechanics.box_mesh import box_mesh
+from mechanics.errors import OptionError
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
+from render.options import RenderOptions
+from render.press import Stroke, press
+from render.registry import create, names, simulator_names
+from render.scene import in_the_air
+
+E, NU, RADIUS = 30e3, 0.4, 0.006
+
+
+@pytest.fixture(scope="module")
+def model():
+    mesh = box_mesh((8, 8, 4), (0.048, 0.048, 0.024)).quadratic()
+    return Model(mesh, Material(E, NU), Support(np.zeros(3), np.array([0, 0, 1.0])), Tool(RADIUS), 0.006)
+
+
+def pressed(model, name, **options):
+    renderer = create(name, model, RenderOptions(**options))
+    stroke = Stroke(0.002, 0.02, hold_s=0.05, approach_m=1e-3, rate_hz=250.0)
+    return press(in_the_air(renderer), np.array([0.0, 0.0, 0.024]), np.array([0, 0, -1.0]), stroke)
+
+
+def test_they_are_named_apart_from_our_own():
+    assert {"scikit-fem", "mujoco"} <= set(simulator_names()) and not set(names()) & set(simulator_names())
+
+
+def test_scikit_fem_pushes_back_near_hertz_and_lets_go(model):
+    pytest.importorskip("skfem")
+    curve = pressed(model, "scikit-fem")
+    hertz = 4 / 3 * E / (1 - NU**2) * np.sqrt(RADIUS) * 0.002**1.5
+    assert 0.5 * hertz < curve.force_at(0.002)[2] < 2.5 * hertz
+    assert curve.force[0] == pytest.approx(0.0) and curve.force[-1] == pytest.approx(0.0, abs=1e-9)
+    assert curve.force_at(0.002)[2] > curve.force_at(0.001)[2]
+
+
+def test_a_softer_penalty_is_a_softer_contact(model):
+    pytest.importorskip("skfem")
+    soft = pressed(model, "scikit-fem", simulator_set="penalty=0.5")
+    assert soft.peak_force_n < 0.8 * pressed(model, "scikit-fem").peak_force_n
+
+
+def test_mujoco_pushes_back_and_a_harder_contact_more(model, tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs
+    plain = pressed(model, "mujoco")
+    hard = pressed(model, "mujoco", simulator_set="solref_s=0.004,timestep_s=0.001")
+    assert plain.force_at(0.002)[2] > 0 and hard.peak_force_n > 1.2 * plain.peak_force_n
+
+
+def test_a_setting_that_is_not_there_is_refused(model):
+    pytest.importorskip("skfem")
+    with pytest.raises(OptionError, match="allowed are edge_radii, order, penalty"):
+        create("scikit-fem", model, RenderOptions(simulator_set="colour=3"))
+    with pytest.raises(OptionError, match="takes its friction when it is made"):
+        create("scikit-fem", model).with_friction(0.3)
