@@ -30,6 +30,9 @@ _SIDEWAYS = 1.5
 _RISES = 0.5
 """... and slides where its force does not rise by this share of its peak in between."""
 _ROWS = 250
+_LEAST_PEAKS, _PLANE, _GOES_WITH = 6, 3.0, 0.9
+"""Peaks that tell a plane, and by how much they must be spread along it more than off it; how closely a
+slide's force must follow its depth (correlation) to be a press."""
 
 
 def free_air_seen(position: np.ndarray, force: np.ndarray, radius_m: float, noise_n: float) -> bool:
@@ -104,9 +107,11 @@ def _withdrawn(signals: Signals, start: int, peak: int, low: int, after: int) ->
     return bool(way > _FALLS * max(deep[peak] - min(deep[start], deep[low]), 1e-9))
 
 
-def loading(signals: Signals, piece: Piece) -> Loading | None:
-    """The loading of a piece; None where the force has no direction or hardly grows."""
-    normal = initial_normal(signals, piece.start, piece.peak)
+def loading(signals: Signals, piece: Piece, normal: np.ndarray | None = None) -> Loading | None:
+    """The loading of a piece, along its own force or a normal that is known; None where the force has no
+    direction or hardly grows."""
+    if normal is None:
+        normal = initial_normal(signals, piece.start, piece.peak)
     if normal is None or piece.peak - piece.start < 3:
         return None
     rows = slice(piece.start, piece.peak + 1)
@@ -125,6 +130,33 @@ def in_place(signals: Signals, piece: Piece) -> Piece | None:
     if signals.magnitude[start : piece.peak + 1].min() > (1 - _RISES) * signals.magnitude[piece.peak]:
         return None
     return dataclasses.replace(piece, start=start, end=end)
+
+
+def _plane_of_peaks(signals: Signals, pieces: Sequence[Piece]) -> np.ndarray | None:
+    """Outward normal of the plane that the tip is in at the peaks, by which a slide's way in is told whatever
+    its friction; None where the peaks lie on a line or are none."""
+    if len(pieces) < _LEAST_PEAKS:
+        return None
+    at = signals.position[[piece.peak for piece in pieces]]
+    _, spread, axes = np.linalg.svd(at - at.mean(axis=0), full_matrices=False)
+    if spread[1] < _PLANE * spread[2]:
+        return None
+    push = signals.force[[piece.peak for piece in pieces]].sum(axis=0)
+    return axes[2] if push @ axes[2] > 0 else -axes[2]
+
+
+def _sliding_in(signals: Signals, piece: Piece, up: np.ndarray) -> tuple[Piece | None, Loading | None]:
+    """A piece whose tip slides while it goes in: kept where its force rises with its depth along `up`."""
+    push = signals.force[piece.start : piece.peak + 1] @ up
+    deep = -signals.position[piece.start : piece.peak + 1] @ up
+    if len(push) < 4 or not push[-1] > 0 or push.min() > (1 - _RISES) * push[-1]:
+        return None, None
+    first = int(push.argmin())
+    push, deep = push[first:], deep[first:]
+    if len(push) < 4 or np.ptp(deep) == 0 or np.corrcoef(push, deep)[0, 1] < _GOES_WITH:
+        return None, None
+    begun = dataclasses.replace(piece, start=piece.start + first)
+    return begun, loading(signals, begun, up)
 
 
 def _goes_in(signals: Signals, piece: Piece, way: int) -> int:
@@ -147,9 +179,12 @@ def _goes_in(signals: Signals, piece: Piece, way: int) -> int:
 def found_cycles(signals: Signals, pieces: Sequence[Piece]) -> tuple[list[Touch], list[tuple[int, int, str]]]:
     """The cycles of one recording as presses, and the pieces that are none: (start, end, reason)."""
     kept, loadings, unused = [], [], []
+    up = _plane_of_peaks(signals, pieces)
     for piece in pieces:
         steady = in_place(signals, piece)
         each = None if steady is None else loading(signals, steady)
+        if steady is None and up is not None:
+            steady, each = _sliding_in(signals, piece, up)
         if steady is None or each is None:
             why = "slides into its peak" if steady is None else "shows no rise of force with depth"
             unused.append((piece.start, piece.end, why))
