@@ -311,7 +311,8 @@ class Camera {
     this.middle = times(plus(low, high), 0.5);
     this.size = 0.5 * size(plus(high, low, -1));
     this.floor = plus(this.middle, up, -dot(plus(this.middle, floor, -1), up));
-    const aside = unit(cross(up, Math.abs(up[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0]));
+    const least = up.map(Math.abs).indexOf(Math.min(...up.map(Math.abs)));
+    const aside = unit(cross(up, [0, 1, 2].map((axis) => (axis === least ? 1 : 0))));
     this.level = [aside, cross(up, aside)];
     this.reset();
   }
