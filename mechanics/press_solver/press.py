@@ -23,7 +23,7 @@ class PressOptions:
     'linear'. friction: Coulomb's coefficient; None sticks. finest: edges under the first contact, contact
     radii; growth: edges a distance from the place. zone: of finite strain, radii of the deepest contact;
     inf solves the whole body so. step: longest load step, tip radii. penalty: traction an overlap, of E over
-    the tip radius.
+    the first contact's radius.
     """
 
     law: str = "neo-hookean"
@@ -35,7 +35,7 @@ class PressOptions:
     zone: float = 3.5
     reach: float = 1.1
     step: float = 0.2
-    penalty: float = 3000.0
+    penalty: float = 1500.0
     tolerance: float = 2e-4
 
 
@@ -144,7 +144,7 @@ class PressSolver:
         local = np.full(len(mesh.points), -1)
         local[nodes] = np.arange(len(nodes))
         contact = SphereContact(
-            mesh.points[nodes], local[faces], tip, options.friction, options.penalty / tip
+            mesh.points[nodes], local[faces], tip, options.friction, options.penalty / first
         )
         number = body.number.reshape(-1, 3)[nodes]
         rank = np.full(body.size + 1, -1)
