@@ -62,11 +62,12 @@ def load_or_condense(
     error = (options or ComplianceOptions()).error_of(model.mesh)
     form = () if error is None else ("low-rank", error)
     key = content_key(
-        "surface compliance 5",
+        "surface compliance 6",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,
         model.mesh.touchable,
+        "" if model.mesh.shape is None else model.mesh.shape.key,
         material.poisson_ratio,
         model.ratio_without_balls,
         *held,

@@ -4,6 +4,7 @@ MODEL/model.toml       format, material, tool, mesh, frame, effects, provenance,
                        counts, an edited value changes the model
 MODEL/mesh.vtu         tetrahedra, device frame, metres; fixed, touchable, shape uncertainty; modulus_field
                        where the material has one; young_modulus_pa, for people who look: never read back
+MODEL/shape.vtp        the object's surface itself, where it is known (mechanics.true_shape)
 MODEL/presses.bin      the table of presses, samples and all (mechanics.presses)
 MODEL/palpations.csv   one row a palpation
 MODEL/surface.vtp      what a tip meets, written by the shell (render.felt_surface), keyed by content
@@ -39,6 +40,7 @@ from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from mechanics.schema import ANY, Key, Named, Schema, check_table
 from mechanics.tetmesh import TetMesh
 from mechanics.toml_text import dump_toml
+from mechanics.true_shape import TrueShape
 from mechanics.vtk_files import read_vtk, vtk_bytes
 
 FORMAT = 3
@@ -73,13 +75,23 @@ SCHEMA: Schema = {
     "end": {"whole": Key(bool, required=True)},
 }
 """What model.toml may hold; further tables inform and are left alone. Each effect says its own keys."""
+SHAPE = "shape.vtp"
 _NEEDED = ("material", "tool", "mesh", "frame")
 
 MODEL = FolderKind(
     "a MODEL folder",
     "model.toml",
     Kind("a model.toml", (b"format = ", b"[material]"), holds=b"[material]"),
-    ("model.toml", "mesh.vtu", "presses.bin", "palpations.csv", "surface.vtp", "*.cache", "compliance-*.bin"),
+    (
+        "model.toml",
+        "mesh.vtu",
+        "shape.vtp",
+        "presses.bin",
+        "palpations.csv",
+        "surface.vtp",
+        "*.cache",
+        "compliance-*.bin",
+    ),
 )
 """What `write_model` writes, and what is kept beside it later."""
 
@@ -126,6 +138,9 @@ def write_model(path: Path | str, model: Model) -> Path:
     with atomic_folder(path, MODEL) as folder:
         (folder / "model.toml").write_text(text, encoding="utf-8")
         (folder / "mesh.vtu").write_bytes(vtk_bytes(grid))
+        if mesh.shape is not None:
+            shell = pyvista.PolyData.from_regular_faces(mesh.shape.vertices, mesh.shape.triangles)
+            (folder / SHAPE).write_bytes(vtk_bytes(shell))
         write_csv(folder / "palpations.csv", model.presses)
         write_presses(folder / "presses.bin", model.presses)
     return path
@@ -178,7 +193,7 @@ def read_model(path: Path | str) -> Model:
     _checked(table, path / "model.toml")
     try:
         grid = read_vtk(path / "mesh.vtu", ModelError)
-        mesh = _mesh_of(grid)
+        mesh = dataclasses.replace(_mesh_of(grid), shape=_shape_of(path / SHAPE))
         if table["mesh"]["nodes"] != len(mesh.points):
             raise ModelError(
                 f"model.toml says {table['mesh']['nodes']} nodes, mesh.vtu holds {len(mesh.points)}: "
@@ -205,6 +220,16 @@ def read_model(path: Path | str) -> Model:
         raise ModelError(f"'{path}' lacks {error}: reconstruct it again") from error
     except (MeshError, TypeError, ValueError, AttributeError, IndexError, OverflowError) as error:
         raise ModelError(f"'{path}' is damaged: {error}") from error
+
+
+def _shape_of(path: Path) -> TrueShape | None:
+    """The shape beside the mesh; None where the model has none."""
+    if not path.is_file():
+        return None
+    shell = read_vtk(path, ModelError)
+    if not shell.n_cells:
+        raise ModelError(f"{SHAPE} holds no triangles")
+    return TrueShape(np.asarray(shell.points, dtype=float), shell.regular_faces)
 
 
 def _mesh_of(grid: Any) -> TetMesh:

@@ -11,6 +11,20 @@ def triangle_areas(points: np.ndarray, triangles: np.ndarray) -> np.ndarray:
     return np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
 
 
+def neighbours(triangles: np.ndarray) -> np.ndarray:
+    """(k, 3) the triangle across the edge from corner i to corner i+1; -1 where there is none."""
+    k = len(triangles)
+    start = triangles.ravel()
+    end = np.roll(triangles, -1, axis=1).ravel()
+    n = int(triangles.max()) + 1
+    forward, backward = start * np.int64(n) + end, end * np.int64(n) + start
+    order = np.argsort(forward, kind="stable")
+    place = np.searchsorted(forward[order], backward)
+    place = np.minimum(place, len(order) - 1)
+    found = order[place]
+    return np.where(forward[found] == backward, found // 3, -1).reshape(k, 3)
+
+
 def closest(
     vertices: np.ndarray, triangles: np.ndarray, points: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -109,6 +109,7 @@ def _stored(
     mesh = model.mesh
     key = content_key(
         name, VERSION, mesh.points, mesh.tetrahedra, mesh.fixed, model.element_ratio,
+        "" if mesh.shape is None else mesh.shape.key,
         model.material.poisson_ratio, point, normal,
     )  # fmt: skip
     return load_or_build(path, key, build)

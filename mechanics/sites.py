@@ -11,7 +11,7 @@ from mechanics.errors import MeshError
 from mechanics.frames import tangents
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
-from mechanics.near_field import sharpening
+from mechanics.near_field import contact_width, sharpening
 from mechanics.patch import PatchSampler, half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_TIP_RADIUS_M
@@ -21,6 +21,7 @@ from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
+PATCH_WIDTH_M, PATCH_SHARE = 0.004, 1 / 30
 SURFACE_EDGE_M = 0.006
 _BATCH = 16
 
@@ -97,8 +98,13 @@ def touch_solver(
 
 
 def patch_width(mesh: TetMesh) -> float:
-    """The width, m, of the narrowest patch that a quadratic mesh resolves: 0.8 edges of its surface."""
-    return PATCH_WIDTH_IN_EDGES * typical_edge(mesh)
+    """The width, m, of the patch of a touch on a quadratic mesh: the same for every mesh of an object.
+
+    PATCH_WIDTH_M, on a small object PATCH_SHARE of its diagonal; but at least the 0.8 edges of the surface
+    that the elements resolve.
+    """
+    diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
+    return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), min(PATCH_WIDTH_M, PATCH_SHARE * diagonal))
 
 
 def touch_sites(
@@ -140,7 +146,7 @@ def touch_sites(
     for i, normal in enumerate(normals):
         far[i] -= half_space_compliance(normal, poisson_ratio, width)
     if curvature is None:
-        curvature = mean_curvature(mesh, points, normals)
+        curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))
     return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio))
 
@@ -160,25 +166,40 @@ def patch_loads(mesh: TetMesh, patches: Sequence[tuple[np.ndarray, np.ndarray]])
     return forces
 
 
-def mean_curvature(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(k,) 1/m mean of the principal curvatures at surface points, convex positive.
+def mean_curvature(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
+) -> np.ndarray:
+    """(k,) 1/m mean of the principal curvatures at surface points, convex positive."""
+    return principal_curvatures(mesh, points, normals, tip_radius_m)[0].mean(axis=1)
 
-    A paraboloid fitted to the nodes within 1.8 surface edges whose triangles face the normal
-    within 50 degrees: near an edge that keeps the other face out. Fewer than 6 nodes count as flat.
+
+def principal_curvatures(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
+) -> tuple[np.ndarray, np.ndarray]:
+    """(k, 2) 1/m at surface points, convex positive, the greatest first, and its unit direction (k, 3).
+
+    Where the mesh's shape is known, means over the width of a tip's contact. Else of a paraboloid fitted to
+    the nodes within 1.8 surface edges whose triangles face the normal within 50 degrees: near an edge that
+    keeps the other face out. Fewer than 6 nodes count as flat.
     """
+    if mesh.shape is not None:
+        return mesh.shape.curvatures(points, normals, contact_width(tip_radius_m))
     triangles = mesh.touchable_surface[:, :3]
     nodes = np.unique(triangles)
     facing = vertex_normals(mesh.points, triangles)[nodes]
     reach = 1.8 * typical_edge(mesh)
-    result = np.zeros(len(points))
+    result, direction = np.zeros((len(points), 2)), np.zeros((len(points), 3))
     for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
+        u, v = tangents(normal)
+        direction[i] = u
         offset = mesh.points[nodes] - point
         near = (np.linalg.norm(offset, axis=1) < reach) & (facing @ normal > np.cos(np.radians(50)))
         if near.sum() < 6:
             continue
-        u, v = tangents(normal)
         x, y, z = offset[near] @ u, offset[near] @ v, offset[near] @ normal
         columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
         fit = np.linalg.lstsq(columns, z, rcond=None)[0]
-        result[i] = -(fit[3] + fit[5])
-    return result
+        values, axes = np.linalg.eigh(-np.array([[2 * fit[3], fit[4]], [fit[4], 2 * fit[5]]]))
+        result[i] = values[::-1]
+        direction[i] = axes[0, 1] * u + axes[1, 1] * v
+    return result, direction

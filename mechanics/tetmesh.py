@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from mechanics.errors import MeshError
+from mechanics.true_shape import TrueShape
 
 FACES = np.array([[1, 2, 3], [0, 3, 2], [0, 1, 3], [0, 2, 1]])
 """Corner triples of a tetrahedron's faces, outward for positive volume; face i is opposite to corner i."""
@@ -27,6 +28,7 @@ class TetMesh:
     """points: (n, 3) m, device frame. tetrahedra: (m, 4) linear or (m, 10) quadratic, VTK order.
 
     fixed: (n,) bool, base nodes with zero displacement. touchable: (n,) bool, surface nodes off the base.
+    shape: the surface that the mesh fills, where that is known; None where the mesh is all there is.
     Raises MeshError where shapes disagree, a volume is not positive, or nothing is fixed or touchable.
     """
 
@@ -34,6 +36,7 @@ class TetMesh:
     tetrahedra: np.ndarray
     fixed: np.ndarray
     touchable: np.ndarray
+    shape: TrueShape | None = None
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "points", np.ascontiguousarray(self.points, dtype=float))
@@ -99,7 +102,11 @@ class TetMesh:
         index = np.full(len(self.points), -1)
         index[used] = np.arange(len(used))
         return TetMesh(
-            self.points[used], index[self.tetrahedra[:, :4]], self.fixed[used], self.touchable[used]
+            self.points[used],
+            index[self.tetrahedra[:, :4]],
+            self.fixed[used],
+            self.touchable[used],
+            self.shape,
         )
 
     def quadratic(self) -> TetMesh:
@@ -128,6 +135,7 @@ class TetMesh:
             np.hstack([self.tetrahedra, mid]),
             np.concatenate([self.fixed, fixed_mid]),
             np.concatenate([self.touchable, touch_mid]),
+            self.shape,
         )
 
 

@@ -142,7 +142,7 @@ def _reconstructed(
         exploration, surface, placed = _with_traced_base(run, progress)
     progress("meshing", 0.3)
     found = exploration.presses
-    where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal)
+    where = cast(surface.vertices, surface.triangles, found.point, found.contact_normal).on(surface.shape)
     least = options.contact.least_palpations
     exploration, kept = on_surface(exploration, where.points, where.normals, least)
     where = where.of(kept)

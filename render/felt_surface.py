@@ -159,10 +159,11 @@ def _shape_key(model: Model) -> str:
     mesh = model.mesh
     sd = model.shape_uncertainty_m
     return content_key(
-        "felt surface 1",
+        "felt surface 2",
         mesh.points,
         mesh.tetrahedra,
         mesh.fixed,
+        "" if mesh.shape is None else mesh.shape.key,
         np.zeros(0) if sd is None else sd,
         np.hstack([model.presses.point, model.presses.normal]),
         float(model.tool.tip_radius_m),

@@ -9,7 +9,7 @@ import numpy as np
 from mechanics.model import Model
 from mechanics.near_field import surface_softness
 from mechanics.patch import half_space_compliance
-from mechanics.sites import mean_curvature
+from mechanics.sites import principal_curvatures
 from mechanics.surface_compliance import SurfaceCompliance
 from render.surface import ContactSurface
 
@@ -17,12 +17,17 @@ from render.surface import ContactSurface
 class Field(NamedTuple):
     """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base.
 
+    curvatures: (v, 2) 1/m the principal ones whose mean that is, convex positive, the greatest first; bend:
+    (v, 3) unit direction of the greatest.
+
     softness: (v,) of the material under a tip, global modulus over its own.
     parents: (k, 3) numbers of each fine triangle's mesh corners among the compliance's, -1 on the base.
     """
 
     far: np.ndarray
     curvature: np.ndarray
+    curvatures: np.ndarray
+    bend: np.ndarray
     softness: np.ndarray
     parents: np.ndarray
 
@@ -48,6 +53,7 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
         far[v] += (1 - softness[v]) * half_space_compliance(
             arrays.normals[v], model.material.poisson_ratio, width
         )
-    curvature = np.zeros(len(arrays.vertices))
-    curvature[touched] = mean_curvature(mesh, points, normals)
-    return Field(far, curvature, softness, parents)
+    curvatures, bend = np.zeros((len(arrays.vertices), 2)), np.zeros((len(arrays.vertices), 3))
+    found = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
+    curvatures[touched], bend[touched] = found
+    return Field(far, curvatures.mean(axis=1), curvatures, bend, softness, parents)

@@ -28,9 +28,10 @@ LARGEST_M = 4e-3  # a palpation further off than this is no witness of the surfa
 
 
 def touched_surface(model: Model, options: RenderOptions) -> ContactSurface:
-    """The model's contact surface, through its palpations' first touches where the options ask for it."""
+    """The model's contact surface: its shape where that is known; else the mesh's, through its palpations'
+    first touches where the options ask for it."""
     surface = contact_surface(model.mesh, edge_m=options.surface_edge_m)
-    if not options.snap_to_touches or not len(model.presses):
+    if model.mesh.shape is not None or not options.snap_to_touches or not len(model.presses):
         return surface
     feet, normals, gaps = touch_gaps(surface.arrays, model)
     if not len(gaps):

@@ -18,14 +18,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
 from mechanics.errors import MeshError
+from mechanics.nearest import neighbours
 from mechanics.tetmesh import TetMesh
 from render.bvh import Bvh, build_bvh
+from render.shaped import EASED_AGREEMENT, EDGE_ROUNDING_M, NORMAL_SMOOTHING_M, edge_for, on_shape
 
 CREASE_DEGREES = 35.0
-NORMAL_SMOOTHING_M = 2.5e-3
-EDGE_ROUNDING_M = 2.2e-3
-EASED_AGREEMENT = (0.99, 0.93)
-"""Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
 
 
 class SurfaceArrays(NamedTuple):
@@ -68,12 +66,16 @@ class ContactSurface:
 def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_000) -> ContactSurface:
     """Round and refine a mesh's boundary to about `edge_m`, with at most about `largest` triangles.
 
-    Raises MeshError where the boundary is not closed.
+    Where the mesh's shape is known every vertex is put onto it, and the edges are as much shorter as its
+    bends need. Raises MeshError where the boundary is not closed.
     """
+    shape = mesh.shape
     corners = mesh.surface[:, :3]
     touchable = ~mesh.fixed[corners].all(axis=1)
     edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]
     longest = float(np.median(np.linalg.norm(edges, axis=2)))
+    if shape is not None:
+        edge_m = min(edge_m, edge_for(shape))
     parts = max(1, round(longest / edge_m))
     while parts > 1 and len(corners) * parts**2 > largest:
         parts -= 1
@@ -94,13 +96,17 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     for corner in range(3):
         nodes[triangles[:, corner]] = parents
         node_weights[triangles[:, corner]] = parent_weights[:, corner]
-    neighbours = _neighbours(triangles)
-    if (neighbours < 0).any():
+    across = neighbours(triangles)
+    if (across < 0).any():
         raise MeshError("the mesh's boundary is not closed: mesh the surface again")
-    vertices = _rounded_edges(vertices, triangles, free)
-    return ContactSurface(
-        with_vertices(vertices, triangles, neighbours, free), nodes, node_weights, parents, parent_weights
-    )
+    if shape is None:
+        vertices, normals = _rounded_edges(vertices, triangles, free), None
+    else:
+        vertices, normals = on_shape(shape, vertices, triangles, free)
+    arrays = with_vertices(vertices, triangles, across, free)
+    if normals is not None:
+        arrays = arrays._replace(normals=normals)
+    return ContactSurface(arrays, nodes, node_weights, parents, parent_weights)
 
 
 def with_vertices(
@@ -205,10 +211,10 @@ def _corner_normals(points: np.ndarray, triangles: np.ndarray, touchable: np.nda
     area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     face = area / np.maximum(np.linalg.norm(area, axis=1, keepdims=True), 1e-300)
     k = len(triangles)
-    neighbours = _neighbours(triangles)
+    across = neighbours(triangles)
     rows, columns = [], []
     for edge in range(3):
-        other = neighbours[:, edge]
+        other = across[:, edge]
         smooth = (other >= 0) & (
             np.einsum("ij,ij->i", face, face[other]) > np.cos(np.radians(CREASE_DEGREES))
         )
@@ -229,27 +235,13 @@ def _corner_normals(points: np.ndarray, triangles: np.ndarray, touchable: np.nda
     return total[group].reshape(k, 3, 3)
 
 
-def _neighbours(triangles: np.ndarray) -> np.ndarray:
-    """(k, 3) the triangle across the edge from corner i to corner i+1; -1 where there is none."""
-    k = len(triangles)
-    start = triangles.ravel()
-    end = np.roll(triangles, -1, axis=1).ravel()
-    n = int(triangles.max()) + 1
-    forward, backward = start * np.int64(n) + end, end * np.int64(n) + start
-    order = np.argsort(forward, kind="stable")
-    place = np.searchsorted(forward[order], backward)
-    place = np.minimum(place, len(order) - 1)
-    found = order[place]
-    return np.where(forward[found] == backward, found // 3, -1).reshape(k, 3)
-
-
 def _flat_edges(triangles: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k, 3) edges whose two sides disagree on the normals: creases, which stay straight so that no gap
     opens."""
-    neighbours = _neighbours(triangles)
+    across = neighbours(triangles)
     flat = np.zeros(triangles.shape, dtype=bool)
     for edge in range(3):
-        other = neighbours[:, edge]
+        other = across[:, edge]
         for corner in (edge, (edge + 1) % 3):
             match = (triangles[other] == triangles[:, corner][:, None]).argmax(axis=1)
             differs = np.abs(normals[:, corner] - normals[other, match]).max(axis=1) > 1e-9

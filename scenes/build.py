@@ -26,6 +26,7 @@ from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from mechanics.recording import read_recording, recording_files
 from mechanics.surface_files import surface_of
+from mechanics.true_shape import TrueShape
 from reconstruct.pipeline import reconstruct
 from reconstruct.shapes.coarse_drawing import decimated
 from reconstruct.steps.s4_surface.surface import Surface
@@ -35,7 +36,7 @@ from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene, ball_of
 from scenes.virtual_presses import palpate_model
 
-VERSION = 6
+VERSION = 7
 MESH_SIZE_M, LEAST_EDGES = 0.010, 8
 """Edge length of the tetrahedra, and the least number of edges along an object."""
 
@@ -169,6 +170,7 @@ def _built(
         method="known",
         reason="the shape is given",
         redraw=lambda edge_m: decimated(stood, edge_m),
+        shape=TrueShape(stood.vertices, stood.triangles),
     )
     edge = scene.mesh_size_m or min(MESH_SIZE_M, float(np.ptp(stood.vertices, axis=0).max()) / LEAST_EDGES)
     meshing = mesh_surface(surface, MeshingOptions(mesh_size_m=edge), lambda s, f: progress(s, 0.4 * f))

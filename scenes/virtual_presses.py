@@ -34,6 +34,8 @@ def palpate_model(
     """The model with a table of presses: one to `depth_m` at each of `sites` places."""
     chosen = spread_places(model, sites)
     points, normals = model.mesh.points[chosen], model.normals[chosen]
+    if model.mesh.shape is not None:
+        points, normals = model.mesh.shape.foot(points, normals)
     nu, balls = model.material.poisson_ratio, tuple(model.material.inclusions.values())
     touched = touch_sites(
         model.mesh,

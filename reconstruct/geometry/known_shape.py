@@ -18,6 +18,7 @@ from mechanics.progress import Progress, silent
 from mechanics.recording import Recording
 from mechanics.surface_files import ClosedSurface, read_surface
 from mechanics.tetmesh import vertex_normals
+from mechanics.true_shape import TrueShape
 from reconstruct.geometry.known_base import base_of_rim
 from reconstruct.geometry.placed import Placed, foot_rim
 from reconstruct.geometry.registration import (
@@ -181,6 +182,7 @@ def _placed(
         method="known shape",
         reason=f"{given.name}, {how}; first touches lie {1e3 * found.rms_m:.2f} mm rms off it",
         redraw=redraw,
+        shape=TrueShape(found.to_device(stood.vertices), stood.triangles),
     )
     about = {
         "kind": "shape",

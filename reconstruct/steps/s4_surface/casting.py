@@ -8,6 +8,7 @@ import numpy as np
 import trimesh
 
 from mechanics.tetmesh import vertex_normals
+from mechanics.true_shape import TrueShape
 
 
 @dataclass(frozen=True)
@@ -17,6 +18,12 @@ class CastPoints:
     points: np.ndarray
     normals: np.ndarray
     triangle: np.ndarray
+
+    def on(self, shape: TrueShape | None) -> CastPoints:
+        """The same on the shape that the surface draws; themselves where none is known."""
+        if shape is None:
+            return self
+        return CastPoints(*shape.foot(self.points, self.normals), self.triangle)
 
     def of(self, chosen: np.ndarray) -> CastPoints:
         """Only some of them, (k,) bool."""

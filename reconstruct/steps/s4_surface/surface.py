@@ -14,6 +14,7 @@ from mechanics.errors import SurfaceError
 from mechanics.frames import support_axes
 from mechanics.options import option
 from mechanics.progress import Progress, silent
+from mechanics.true_shape import TrueShape
 from reconstruct.shapes.candidates import FITTED, HiddenOutlineError
 from reconstruct.shapes.coarse_drawing import balanced
 from reconstruct.shapes.convex_bounds import gap_to_other_bound, hull_surface, tangent_surface, volume_bounds
@@ -69,7 +70,8 @@ class Surface:
     parameters: what the shape's fit found (support frame). held_out_m: rms error of touches that were held
     out, place by place, for every shape tried. bracket_m3: volumes of the hull of the touches and of the
     tangent planes' intersection, between which a convex object's lies. redraw: the same surface with
-    triangles of another edge length (m), of the same volume; None where it has no finer truth.
+    triangles of another edge length (m), of the same volume; None where it has no finer truth. shape: what
+    is known of it beforehand; None where it was found by the touches.
     """
 
     vertices: np.ndarray
@@ -83,6 +85,7 @@ class Surface:
     held_out_m: Mapping[str, float] = field(default_factory=dict)
     bracket_m3: tuple[float, float] = (float("nan"), float("nan"))
     redraw: Redraw | None = field(default=None, repr=False, compare=False)
+    shape: TrueShape | None = field(default=None, repr=False, compare=False)
 
     def __post_init__(self) -> None:
         if not self.mesh.is_watertight:

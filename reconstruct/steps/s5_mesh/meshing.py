@@ -125,7 +125,7 @@ def _standing(
     on_surface = np.zeros(len(points), dtype=bool)
     on_surface[_boundary(cells)] = True
     points = relaxed(points, cells, ratio, on_surface=on_surface, fixed=fixed, up=up, limit_m=envelope)
-    return TetMesh(points, cells, fixed, on_surface & ~fixed)
+    return TetMesh(points, cells, fixed, on_surface & ~fixed, surface.shape)
 
 
 def _input(surface: Surface, options: MeshingOptions) -> tuple[np.ndarray, np.ndarray]:

@@ -1,0 +1,162 @@
+"""The contact surface put onto the shape that the mesh fills.
+
+A mesh of 10 mm cuts a fillet of 12 mm by a millimetre, and another mesh cuts it elsewhere. Where the shape is
+known, each vertex of the contact surface lies on it, those of creases on its creases; triangles between them
+are so small that they leave it by some micrometres, and lie on it in the mean.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
+
+from mechanics.true_shape import TrueShape
+
+SAG_M = 1.2e-5
+"""Between a triangle of the contact surface and a fillet over it."""
+SHARPEST = 1 / 2.5e-3
+"""1/m: bends tighter than this are edges to the tip; the surface need not follow them."""
+EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 2.2e-3, 2.5e-3
+"""Widths of the Gaussians by which a crease is rounded, and its contact normal turned. With 1.5 mm a tip that
+friction holds, 4 mm deep, snapped over a sharp rim by a seventh of its force."""
+EASED_AGREEMENT = (0.99, 0.93)
+"""Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
+_CREASE_SPACING_M = 1e-4
+_REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
+_CROSSES = np.cos(np.radians(25))
+_ROUNDS = 4
+_ALIKE = 0.8
+_MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
+
+
+def edge_for(shape: TrueShape) -> float:
+    """The edge, m, by which triangles leave the shape's fillets by SAG_M."""
+    bend = shape.sharpest_bend(SHARPEST)
+    return float(np.sqrt(8 * SAG_M / max(bend, 1e-3)))
+
+
+def on_shape(
+    shape: TrueShape, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (v, 3) m put onto the shape and their contact normals (v, 3), unit, outward.
+
+    triangles: (k, 3), free: (k,) 1 where they may be touched; the base's inner vertices stay.
+    """
+    touch = triangles[free > 0]
+    used = np.unique(touch)
+    placed, normals = vertices.copy(), np.zeros_like(vertices)
+    normals[np.unique(triangles[free == 0])] = _mean_normal(vertices, triangles[free == 0])
+    placed[used], normals[used] = shape.foot(vertices[used])
+    rim = np.intersect1d(used, triangles[free == 0])
+    edge = float(np.median(np.linalg.norm(vertices[touch[:, 0]] - vertices[touch[:, 1]], axis=1)))
+    creased = _on_creases(shape, placed, normals, touch, rim, edge)
+    placed[used] = _lifted(shape, placed, normals, touch, creased)[used]
+    creased[rim] = False  # no tip gets under it
+    if not creased.any():
+        return placed, normals
+    return _eased(placed, normals, touch, np.setdiff1d(used, rim), cKDTree(placed[creased]))
+
+
+def _on_creases(
+    shape: TrueShape,
+    placed: np.ndarray,
+    normals: np.ndarray,
+    touch: np.ndarray,
+    rim: np.ndarray,
+    edge_m: float,
+) -> np.ndarray:
+    """(v,) bool, the vertices drawn onto creases: `placed` changes.
+
+    Those of the base's rim, and of a triangle's edge whose ends look to either side of a crease the nearer
+    end.
+    """
+    creased = np.zeros(len(placed), dtype=bool)
+    samples = shape.crease_points(_CREASE_SPACING_M)
+    if not len(samples):
+        return creased
+    tree = cKDTree(samples)
+    away, nearest = tree.query(placed)
+    start = np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2)
+    pairs = np.unique(np.sort(start, axis=1), axis=0)
+    wanted = np.zeros(len(placed), dtype=bool)
+    wanted[rim] = away[rim] < edge_m
+    for _ in range(_ROUNDS):
+        for vertex in np.flatnonzero(wanted):
+            creased[vertex] = True
+            placed[vertex] = samples[nearest[vertex]]
+        a, b = pairs.T
+        crosses = np.einsum("kx,kx->k", normals[a], normals[b]) < _CROSSES
+        crosses &= ~creased[a] & ~creased[b]
+        nearer = np.where(away[a] <= away[b], a, b)[crosses]
+        wanted = np.zeros(len(placed), dtype=bool)
+        wanted[nearer[away[nearer] < _REACH * edge_m]] = True
+        if not wanted.any():
+            break
+    return creased
+
+
+def _lifted(
+    shape: TrueShape, placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, creased: np.ndarray
+) -> np.ndarray:
+    """Vertices moved along their normals until the triangles around them lie on the shape in the mean."""
+    gap = -shape.distance(placed[touch].mean(axis=1))
+    facing = normals[touch]
+    alike = np.einsum("kcx,kcx->kc", facing, np.roll(facing, 1, axis=1)).min(axis=1) > _ALIKE
+    smooth = alike & ~creased[touch].any(axis=1)
+    total = np.bincount(touch[smooth].ravel(), np.repeat(gap[smooth], 3), len(placed))
+    count = np.bincount(touch[smooth].ravel(), minlength=len(placed))
+    lift = _MEAN_GAP * total / np.maximum(count, 1)
+    return placed + lift[:, None] * normals
+
+
+def _eased(
+    placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, own: np.ndarray, creases: cKDTree
+) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices `own` beside creases moved to the mean of the surface around them, and turned with it.
+
+    Over a sharp edge a tip that is held by friction would snap from one face to the other.
+    """
+    p = placed[touch]
+    area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    # the middles of its edges integrate a triangle to second order
+    places = ((p + np.roll(p, -1, axis=1)) / 2).reshape(-1, 3)
+    parts = np.repeat(area / 6, 3, axis=0)
+    size = np.linalg.norm(parts, axis=1)
+    widest = max(EDGE_ROUNDING_M, NORMAL_SMOOTHING_M)
+    near = creases.query(placed[own], distance_upper_bound=3 * widest)[0]
+    own, near = own[np.isfinite(near)], near[np.isfinite(near)]
+    pairs = cKDTree(placed[own]).sparse_distance_matrix(cKDTree(places), 3 * widest, output_type="ndarray")
+    row, column, shape = pairs["i"], pairs["j"], (len(own), len(places))
+    # the far side of a thin wall is no neighbour
+    same = np.einsum("ij,ij->i", normals[own][row], parts[column]) > -0.3 * size[column]
+
+    def mean(values: np.ndarray, width: float) -> np.ndarray:
+        weight = size[column] * same * np.exp(-((pairs["v"] / width) ** 2) / 2)
+        around = sp.csr_matrix((weight, (row, column)), shape=shape)
+        return (around @ values) / np.maximum(np.asarray(around.sum(axis=1)), 1e-300)
+
+    moved, turned = placed.copy(), normals.copy()
+    unit = parts / np.maximum(size, 1e-300)[:, None]
+    agreement = np.linalg.norm(mean(unit, EDGE_ROUNDING_M), axis=1)
+    flat, crease = EASED_AGREEMENT
+    # round faces agree better than that: the mean would draw them inwards
+    share = _smooth_step((flat - agreement) / (flat - crease))
+    moved[own] += share * (mean(places, EDGE_ROUNDING_M) - placed[own])
+    facing = mean(unit, NORMAL_SMOOTHING_M)
+    share = _smooth_step(3 - near / NORMAL_SMOOTHING_M)
+    turned[own] += share * (facing / np.linalg.norm(facing, axis=1, keepdims=True) - normals[own])
+    turned[own] /= np.linalg.norm(turned[own], axis=1, keepdims=True)
+    return moved, turned
+
+
+def _smooth_step(x: np.ndarray) -> np.ndarray:
+    """(k, 1), 0 below 0 and 1 above 1."""
+    x = np.clip(x, 0.0, 1.0)[:, None]
+    return x * x * (3 - 2 * x)
+
+
+def _mean_normal(vertices: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    p = vertices[triangles]
+    total = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
+    return total / max(float(np.linalg.norm(total)), 1e-300)

@@ -1,0 +1,132 @@
+"""Where the shape itself is known, it is what is felt: fillets and rims included, whatever the mesh."""
+
+from __future__ import annotations
+
+import dataclasses
+
+import numpy as np
+import pytest
+
+from mechanics.model_files import read_model, write_model
+from mechanics.nearest import sample
+from mechanics.tetmesh import TetMesh
+from mechanics.true_shape import TrueShape
+from render.field import far_field
+from render.surface import contact_surface
+
+from . import shapes
+
+RADIUS, HEIGHT, FILLET = 0.040, 0.050, 0.012
+TIP = 0.005
+
+
+def turned_on_a_lathe(profile: np.ndarray, around: int = 140) -> TrueShape:
+    """The file of a body of revolution: chords of its profile (k, 2) of radius and height, base first."""
+    angle = 2 * np.pi * np.arange(around) / around
+    rim = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    rings = [np.column_stack([r * rim, np.full(around, z)]) for r, z in profile]
+    i, j, k = np.arange(around), (np.arange(around) + 1) % around, len(rings)
+    faces = [np.column_stack([np.full(around, k * around), j, i])]
+    for a, b in ((around * n, around * (n + 1)) for n in range(k - 1)):
+        faces += [np.column_stack([a + i, a + j, b + j]), np.column_stack([a + i, b + j, b + i])]
+    faces.append(
+        np.column_stack([(k - 1) * around + i, (k - 1) * around + j, np.full(around, k * around + 1)])
+    )
+    ends = [[0, 0, profile[0, 1]], [0, 0, profile[-1, 1]]]
+    return TrueShape(np.vstack([*rings, ends]), np.vstack(faces))
+
+
+def filleted() -> TrueShape:
+    turn = np.linspace(0, np.pi / 2, 12)
+    fillet = np.column_stack([np.cos(turn), np.sin(turn)]) * FILLET + [RADIUS - FILLET, HEIGHT - FILLET]
+    return turned_on_a_lathe(np.vstack([[RADIUS, 0.0], fillet]))
+
+
+def off_filleted(p: np.ndarray) -> np.ndarray:
+    """(k,) m, signed distance of points from the true body above its base."""
+    q = np.column_stack([np.hypot(p[:, 0], p[:, 1]) - RADIUS, p[:, 2] - HEIGHT]) + FILLET
+    return np.hypot(*np.maximum(q, 0).T) + np.minimum(q.max(axis=1), 0) - FILLET
+
+
+def meshed(shape: TrueShape, cells: tuple[int, int]) -> TetMesh:
+    """A coarse mesh of it, its surface nodes on the file's facets."""
+    mesh = shapes.cylinder(RADIUS, HEIGHT, cells, order=1)
+    points = mesh.points.copy()
+    on = mesh.touchable & ~mesh.fixed
+    points[on] = shape.foot(points[on])[0]
+    return TetMesh(points, mesh.tetrahedra, mesh.fixed, mesh.touchable, shape)
+
+
+@pytest.mark.parametrize("cells", [(6, 5), (9, 7)])
+def test_the_felt_surface_is_the_shape_on_its_fillets(cells):
+    mesh = meshed(filleted(), cells)
+    arrays = contact_surface(mesh).arrays
+    felt = sample(arrays.vertices, arrays.triangles[arrays.free > 0], 20_000)
+    felt = felt[felt[:, 2] > 3e-3]
+    assert np.abs(off_filleted(felt)).max() < 2e-5
+    # of the mesh alone it is an order of magnitude off
+    alone = contact_surface(dataclasses.replace(mesh, shape=None)).arrays
+    assert np.abs(off_filleted(alone.vertices[alone.vertices[:, 2] > 3e-3])).max() > 2e-4
+
+
+def test_a_sharp_rim_is_eased_alike_by_every_mesh_and_its_faces_are_not():
+    shape, eased = turned_on_a_lathe(np.array([[RADIUS, 0.0], [RADIUS, HEIGHT]])), []
+    for cells in ((6, 5), (9, 7)):
+        arrays = contact_surface(meshed(shape, cells)).arrays
+        felt = sample(arrays.vertices, arrays.triangles[arrays.free > 0], 20_000)
+        felt = felt[felt[:, 2] > 3e-3]
+        outward = np.hypot(felt[:, 0], felt[:, 1])
+        off = np.maximum(outward - RADIUS, felt[:, 2] - HEIGHT)
+        beside = np.minimum(HEIGHT - felt[:, 2], RADIUS - outward) < 7e-3
+        beside &= np.maximum(HEIGHT - felt[:, 2], RADIUS - outward) < 7e-3
+        assert np.abs(off[~beside]).max() < 2e-5
+        eased.append(((outward + felt[:, 2])[beside] - RADIUS - HEIGHT).max() / np.sqrt(2))
+    assert -1.6e-3 < eased[0] < -0.5e-3
+    assert eased[1] == pytest.approx(eased[0], abs=1e-4)
+
+
+def test_curvatures_are_the_shapes_and_not_the_meshs():
+    shape = filleted()
+    wall, fillet = np.array([RADIUS, 0, 0.02]), FILLET / np.sqrt(2)
+    middle = np.array([RADIUS - FILLET + fillet, 0.0, HEIGHT - FILLET + fillet])
+    places = np.array([wall, middle, [0.005, 0.0, HEIGHT]])
+    normals = np.array([[1, 0, 0], [np.sqrt(0.5), 0, np.sqrt(0.5)], [0, 0, 1.0]])
+    values, direction = shape.curvatures(places, normals, 2.2e-3)
+    around = np.sqrt(0.5) / middle[0]
+    assert values == pytest.approx(np.array([[1 / RADIUS, 0], [1 / FILLET, around], [0, 0]]), abs=1.5)
+    assert abs(direction[0] @ [0, 1, 0]) == pytest.approx(1, abs=1e-3)
+    assert abs(direction[1] @ [np.sqrt(0.5), 0, -np.sqrt(0.5)]) == pytest.approx(1, abs=1e-2)
+    made = shapes.model(meshed(shape, (6, 5)).quadratic())
+    field = far_field(made, contact_surface(made.mesh), shapes.quick_compliance(made))
+    assert field.curvatures.mean(axis=1) == pytest.approx(field.curvature)
+    assert field.curvatures[:, 0].max() == pytest.approx(1 / FILLET, rel=0.05)
+
+
+@pytest.mark.parametrize("mu", [np.inf, 0.3, 0.0])
+def test_sliding_over_a_fillet_and_a_sharp_rim_never_steps(mu):
+    step = 2e-6
+    round_ = filleted()
+    for shape in (round_, turned_on_a_lathe(np.array([[RADIUS, 0.0], [RADIUS, HEIGHT]]))):
+        made = shapes.model(meshed(shape, (6, 6)).quadratic())
+        renderer = shapes.fem(made, dent_law="linear", friction=mu)
+        top = HEIGHT + TIP
+        inwards = np.linspace([0.024, 0.003, top + 5e-4], [0.024, 0.003, top - 2e-3], 200)
+        bend = FILLET + 0.003 if shape is round_ else 0.0095
+        angle = np.arange(0, np.pi / 2, step / bend)
+        centre = np.array([RADIUS + TIP - 0.002 - bend, 0.003, top - 0.002 - bend])
+        over = centre + bend * np.column_stack([np.sin(angle), 0 * angle, np.cos(angle)])
+        along = np.arange(inwards[-1, 0], over[0, 0], step)[:, None] * [1, 0, 0] + inwards[-1] * [0, 1, 1]
+        path = np.vstack([inwards, along] if mu == np.inf else [inwards, along, over])
+        force = renderer.follow(renderer.start([TIP]), path[:, None], np.full(len(path), 1e-3))[200:, 0]
+        size = np.linalg.norm(force, axis=1)
+        assert size.min() > 0.02
+        assert (np.linalg.norm(np.diff(force, axis=0), axis=1) / size[:-1]).max() < 0.02
+
+
+def test_a_model_keeps_its_shape(tmp_path):
+    made = shapes.model(meshed(filleted(), (6, 5)).quadratic())
+    again = read_model(write_model(tmp_path / "M", made))
+    assert again.mesh.shape.key == made.mesh.shape.key
+    assert again.mesh.linear().shape is again.mesh.shape
+    plain = dataclasses.replace(made, mesh=dataclasses.replace(made.mesh, shape=None))
+    assert read_model(write_model(tmp_path / "M", plain)).mesh.shape is None
