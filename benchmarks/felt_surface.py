@@ -37,7 +37,7 @@ TIP_M, MODULUS_PA, NU = 0.005, 20e3, 0.49
 DEPTHS_M = (0.001, 0.003, 0.006)
 REACHED_M = 0.003
 """Height over the support from which a tip can touch."""
-RIM_M = 0.007
+RIM_M = 0.008
 """Within this of a sharp edge, which is eased so that friction cannot snap over it, a place counts as at a
 rim."""
 _AROUND_M = 0.012
@@ -158,7 +158,7 @@ def report(
             if chosen.any() and len(force) > 1:
                 part = spread[chosen]
                 spreads.append(part)
-                rows.append([f"{shape.name}, {kind}", int(chosen.sum()), len(force)])
+                rows.append([f"{shape.name}, {kind}", str(chosen.sum()), str(len(force))])
                 rows[-1] += [
                     f"{np.percentile(part[:, d], 95):.2f} / {part[:, d].max():.2f}" for d in range(3)
                 ]
@@ -179,7 +179,7 @@ def report(
     if rim.any():
         figures.append(
             Figure(
-                "felt from true surface, greatest within 7 mm of a sharp edge",
+                "felt from true surface, greatest within 8 mm of a sharp edge",
                 float(off[rim].max()),
                 unit="mm",
             ).at_most(0.02)

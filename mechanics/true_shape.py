@@ -15,7 +15,7 @@ import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import cKDTree
 
-from mechanics.nearest import closest, neighbours, triangle_areas
+from mechanics.nearest import closest, neighbours
 from mechanics.store import content_key
 
 CREASE_DEGREES = 35.0
@@ -79,18 +79,6 @@ class TrueShape:
         weights[np.arange(len(row)), edge[row]] = 1 - share
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
         return self.on(triangle[row], weights)[0]
-
-    def sharpest_bend(self, limit: float) -> float:
-        """1/m: the greatest curvature of the faces up to `limit`, but for the sharpest 2 % of their area."""
-        tensors = _bends(self.vertices[self.triangles], self.corner_normals)
-        bend = np.abs(np.linalg.eigvalsh(tensors)).max(axis=1)
-        area = triangle_areas(self.vertices, self.triangles)
-        kept = (bend < limit) & (area > 0)
-        if not kept.any():
-            return 0.0
-        order = np.argsort(bend[kept])
-        share = np.cumsum(area[kept][order]) / area[kept].sum()
-        return float(bend[kept][order][np.searchsorted(share, 0.98)])
 
     def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""

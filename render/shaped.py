@@ -2,7 +2,7 @@
 
 A mesh of 10 mm cuts a fillet of 12 mm by a millimetre, and another mesh cuts it elsewhere. Where the shape is
 known, each vertex of the contact surface lies on it, those of creases on its creases; triangles between them
-are so small that they leave it by some micrometres, and lie on it in the mean.
+are so small, where it bends, that they leave it by some micrometres, and lie on it in the mean.
 """
 
 from __future__ import annotations
@@ -13,10 +13,8 @@ from scipy.spatial import cKDTree
 
 from mechanics.true_shape import TrueShape
 
-SAG_M = 1.2e-5
-"""Between a triangle of the contact surface and a fillet over it."""
-SHARPEST = 1 / 2.5e-3
-"""1/m: bends tighter than this are edges to the tip; the surface need not follow them."""
+SAG_M = 8e-6
+"""Between the middle of a fine edge and the shape: what is more is halved."""
 EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 2.2e-3, 2.5e-3
 """Widths of the Gaussians by which a crease is rounded, and its contact normal turned. With 1.5 mm a tip that
 friction holds, 4 mm deep, snapped over a sharp rim by a seventh of its force."""
@@ -25,15 +23,82 @@ EASED_AGREEMENT = (0.99, 0.93)
 _CREASE_SPACING_M = 1e-4
 _REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
 _CROSSES = np.cos(np.radians(25))
-_ROUNDS = 4
+_ROUNDS, _HALVINGS = 4, 3
+_PATTERNS = tuple(
+    np.array(p)
+    for p in (
+        [[0, 1, 2]],
+        [[0, 3, 2], [3, 1, 2]],
+        [[3, 1, 4], [0, 3, 4], [0, 4, 2]],
+        [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
+    )
+)
+"""Triangles of corners 0 to 2 and middles 3 to 5 of the edges 01, 12, 20, by how many of these are cut."""
 _ALIKE = 0.8
 _MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
 
 
-def edge_for(shape: TrueShape) -> float:
-    """The edge, m, by which triangles leave the shape's fillets by SAG_M."""
-    bend = shape.sharpest_bend(SHARPEST)
-    return float(np.sqrt(8 * SAG_M / max(bend, 1e-3)))
+def halved_where_bent(
+    shape: TrueShape,
+    vertices: np.ndarray,
+    triangles: np.ndarray,
+    free: np.ndarray,
+    weights: np.ndarray,
+    largest: int,
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices and triangles with those edges halved whose middles the shape leaves by more than SAG_M.
+
+    With them the one (k,) of the given triangles that each lies in, and weights (k, 3, 3) at its corners, of
+    what interpolates over the triangles. At most `largest` triangles. Edges over creases stay.
+    """
+    within = np.arange(len(triangles))
+    for _ in range(_HALVINGS):
+        touch = triangles[free[within] > 0]
+        ends = np.sort(np.stack([touch, np.roll(touch, -1, axis=1)], axis=2).reshape(-1, 2), axis=1)
+        ends = np.unique(ends, axis=0)
+        used = np.unique(touch)
+        placed, normals = vertices.copy(), np.zeros_like(vertices)
+        placed[used], normals[used] = shape.foot(vertices[used])
+        bent = np.linalg.norm(normals[ends[:, 0]] - normals[ends[:, 1]], axis=1)
+        ends = ends[(bent > 1e-6) & (np.einsum("kx,kx->k", *normals[ends.T]) > _CROSSES)]
+        gap = np.abs(shape.distance(placed[ends].mean(axis=1)))
+        room = max(0, largest - len(triangles)) // 2  # an edge more makes two triangles more
+        chosen = np.argsort(-gap)[:room]
+        ends = ends[chosen[gap[chosen] > SAG_M]]
+        if not len(ends):
+            break
+        vertices, triangles, part, weights = _halved(vertices, triangles, weights, ends)
+        within = within[part]
+    return vertices, triangles, within, weights
+
+
+def _halved(
+    vertices: np.ndarray, triangles: np.ndarray, weights: np.ndarray, ends: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Triangles cut at the middles of edges (e, 2), ends ascending: two for one such edge, three for two."""
+    n = len(vertices)
+    key = ends[:, 0] * np.int64(n) + ends[:, 1]
+    order = np.argsort(key)
+    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
+    wanted = sides[..., 0] * np.int64(n) + sides[..., 1]
+    place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
+    middle = np.where(key[order][place] == wanted, n + order[place], -1)
+    cut = (middle >= 0).sum(axis=1)
+    # turned so that the first edge is cut, and of two the second as well
+    first = np.where(cut == 2, ((middle < 0).argmax(axis=1) + 1) % 3, (middle >= 0).argmax(axis=1))
+    turn = (first[:, None] + np.arange(3)) % 3
+    rows = np.arange(len(triangles))[:, None]
+    six = np.concatenate([triangles[rows, turn], middle[rows, turn]], axis=1)
+    corner = weights[rows, turn]
+    six_weights = np.concatenate([corner, (corner + np.roll(corner, -1, axis=1)) / 2], axis=1)
+    new, part, new_weights = [], [], []
+    for count, pattern in enumerate(_PATTERNS):
+        own = np.flatnonzero(cut == count)
+        new.append(six[own][:, pattern].reshape(-1, 3))
+        part.append(np.repeat(own, len(pattern)))
+        new_weights.append(six_weights[own][:, pattern].reshape(-1, 3, weights.shape[2]))
+    points = np.vstack([vertices, vertices[ends].mean(axis=1)])
+    return points, np.concatenate(new), np.concatenate(part), np.concatenate(new_weights)
 
 
 def on_shape(
@@ -53,7 +118,7 @@ def on_shape(
     creased = _on_creases(shape, placed, normals, touch, rim, edge)
     placed[used] = _lifted(shape, placed, normals, touch, creased)[used]
     creased[rim] = False  # no tip gets under it
-    if not creased.any():
+    if not creased.any() or edge > 2 * EDGE_ROUNDING_M:
         return placed, normals
     return _eased(placed, normals, touch, np.setdiff1d(used, rim), cKDTree(placed[creased]))
 

@@ -21,7 +21,7 @@ from mechanics.errors import MeshError
 from mechanics.nearest import neighbours
 from mechanics.tetmesh import TetMesh
 from render.bvh import Bvh, build_bvh
-from render.shaped import EASED_AGREEMENT, EDGE_ROUNDING_M, NORMAL_SMOOTHING_M, edge_for, on_shape
+from render.shaped import EASED_AGREEMENT, EDGE_ROUNDING_M, NORMAL_SMOOTHING_M, halved_where_bent, on_shape
 
 CREASE_DEGREES = 35.0
 
@@ -66,16 +66,14 @@ class ContactSurface:
 def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_000) -> ContactSurface:
     """Round and refine a mesh's boundary to about `edge_m`, with at most about `largest` triangles.
 
-    Where the mesh's shape is known every vertex is put onto it, and the edges are as much shorter as its
-    bends need. Raises MeshError where the boundary is not closed.
+    Where the mesh's shape is known every vertex is put onto it, and edges are halved where it bends.
+    Raises MeshError where the boundary is not closed.
     """
     shape = mesh.shape
     corners = mesh.surface[:, :3]
     touchable = ~mesh.fixed[corners].all(axis=1)
     edges = mesh.points[corners] - mesh.points[np.roll(corners, 1, axis=1)]
     longest = float(np.median(np.linalg.norm(edges, axis=2)))
-    if shape is not None:
-        edge_m = min(edge_m, edge_for(shape))
     parts = max(1, round(longest / edge_m))
     while parts > 1 and len(corners) * parts**2 > largest:
         parts -= 1
@@ -91,8 +89,13 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
     free = np.repeat(touchable, len(cells)).astype(np.int64)
     parents = np.repeat(corners, len(cells), axis=0)
     parent_weights = np.tile(barycentric[cells], (len(corners), 1, 1))
-    nodes = np.zeros((count, 3), dtype=np.int64)
-    node_weights = np.zeros((count, 3))
+    if shape is not None:
+        vertices, triangles, within, parent_weights = halved_where_bent(
+            shape, vertices, triangles, free, parent_weights, largest
+        )
+        free, parents = free[within], parents[within]
+    nodes = np.zeros((len(vertices), 3), dtype=np.int64)
+    node_weights = np.zeros((len(vertices), 3))
     for corner in range(3):
         nodes[triangles[:, corner]] = parents
         node_weights[triangles[:, corner]] = parent_weights[:, corner]

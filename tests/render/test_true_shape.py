@@ -63,7 +63,7 @@ def test_the_felt_surface_is_the_shape_on_its_fillets(cells):
     arrays = contact_surface(mesh).arrays
     felt = sample(arrays.vertices, arrays.triangles[arrays.free > 0], 20_000)
     felt = felt[felt[:, 2] > 3e-3]
-    assert np.abs(off_filleted(felt)).max() < 2e-5
+    assert np.abs(off_filleted(felt)).max() < 1.5e-5
     # of the mesh alone it is an order of magnitude off
     alone = contact_surface(dataclasses.replace(mesh, shape=None)).arrays
     assert np.abs(off_filleted(alone.vertices[alone.vertices[:, 2] > 3e-3])).max() > 2e-4
@@ -77,8 +77,8 @@ def test_a_sharp_rim_is_eased_alike_by_every_mesh_and_its_faces_are_not():
         felt = felt[felt[:, 2] > 3e-3]
         outward = np.hypot(felt[:, 0], felt[:, 1])
         off = np.maximum(outward - RADIUS, felt[:, 2] - HEIGHT)
-        beside = np.minimum(HEIGHT - felt[:, 2], RADIUS - outward) < 7e-3
-        beside &= np.maximum(HEIGHT - felt[:, 2], RADIUS - outward) < 7e-3
+        beside = np.minimum(HEIGHT - felt[:, 2], RADIUS - outward) < 8e-3
+        beside &= np.maximum(HEIGHT - felt[:, 2], RADIUS - outward) < 8e-3
         assert np.abs(off[~beside]).max() < 2e-5
         eased.append(((outward + felt[:, 2])[beside] - RADIUS - HEIGHT).max() / np.sqrt(2))
     assert -1.6e-3 < eased[0] < -0.5e-3
