@@ -13,6 +13,7 @@ import argparse
 from typing import Any
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
@@ -26,6 +27,7 @@ from mechanics.store import content_key
 from mechanics.tetmesh import TetMesh
 from palpate.output import progress_bar
 from render.fem import FemRenderer
+from render.force_error import place_numbers
 from scenes.laboratory.mesh import laboratory_cache
 from scenes.laboratory.specimen import Fineness, Specimen, build
 from scenes.laboratory.surface import Surface
@@ -57,8 +59,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         mesh = meshed(shape, 1e-3 * arguments.size_mm)
         progress("places", (k + 1) / len(arguments.shapes))
         for tag, bent in (("without", False), ("law", True)):
-            error = 100 * (_rendered(mesh, points, normals, bent) / truth - 1)
-            found[f"{name}, {tag}"] = {"points_m": points, "error_percent": error}
+            force, numbers = _rendered(mesh, points, normals, bent)
+            error = 100 * (force / truth - 1)
+            found[f"{name}, {tag}"] = {"points_m": points, "error_percent": error, "place": numbers}
             rows.append([name, tag, *(_band(error, low, high) for low, high in BANDS_MM), *_whole(error)])
             if bent:
                 rms = float(np.sqrt(np.nanmean(error**2)))
@@ -114,8 +117,10 @@ def _solved(shape: KnownShape, point: np.ndarray, normal: np.ndarray, progress: 
     return force
 
 
-def _rendered(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool) -> np.ndarray:
-    """(places, depths) m^2: normal force over the modulus as rendered."""
+def _rendered(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """(places, depths) m^2: normal force over the modulus as rendered; (2, places) render.force_error."""
     model = Model(
         mesh=mesh.quadratic(),
         material=Material(1e4, NU, dent_law="neo-hookean"),
@@ -132,4 +137,5 @@ def _rendered(mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool
         path = point + (TIP_M - way)[:, None] * normal
         force = renderer.follow(renderer.start([TIP_M]), path[:, None], np.full(len(way), 10.0))[:, 0]
         row[:] = np.interp(DEPTHS_M, way, force @ normal) / model.material.young_modulus_pa
-    return result
+    vertices = renderer.contact.arrays.vertices
+    return result, place_numbers(renderer, TIP_M)[:, cKDTree(vertices).query(points)[1]]
