@@ -1,11 +1,13 @@
 """The dent: laws of a rigid sphere pressed into an elastic half-space, normal force against indentation.
 
-Every law is a table over x = delta / R of three numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
-    normal force        E* R^2 c(x) x^1.5
+Every law is a table over x = delta / R of four numbers, with E* = E / (1 - nu^2), G = E / (2 (1 + nu)):
+    normal force        E* R^2 c(x) (1 + k R g(x)) x^1.5    (k: mean curvature of the surface)
     contact radius      R alpha(x) x^0.5
     sideways stiffness  8 G / (2 - nu) R tau(x) x^0.5    (stick; Mindlin's 8 G a / (2 - nu) where tau =
     alpha)
-Hertz is c = 4/3, alpha = tau = 1. One numba kernel reads them all, so a new law is a new table.
+Hertz is c = 4/3, alpha = tau = 1, g = 0. On a curved surface R is the effective radius, which is Hertz's
+answer for a small contact; g is what a deep one on a bump or in a hollow has beyond it. One numba kernel
+reads them all, so a new law is a new table.
 """
 
 from __future__ import annotations
@@ -23,6 +25,8 @@ from mechanics.quantities import USUAL_POISSON_RATIO
 
 DEPTH_LIMIT = 3.0  # of the tables, in tip radii; beyond it the last row holds
 _STEPS = 600
+BENT = (-0.3, 0.4)
+"""Mean curvatures times the tip's radius that curved bodies were solved for; beyond, the nearest holds."""
 _RATIOS = {
     "linear": (0.10, 0.30, 0.40, USUAL_POISSON_RATIO),
     "neo-hookean": (0.40, USUAL_POISSON_RATIO),
@@ -32,7 +36,7 @@ _RATIOS = {
 
 @dataclass(frozen=True)
 class DentLaw:
-    """A named law: table (n, 3) of c, alpha, tau at x = 0 to DEPTH_LIMIT in equal steps; its source in
+    """A named law: table (n, 4) of c, alpha, tau, g at x = 0 to DEPTH_LIMIT in equal steps; its source in
     words."""
 
     name: str
@@ -45,7 +49,7 @@ class DentLaw:
         """Force on the object along -n, N, for indentations (k,) m of a half-space (0 where not positive)."""
         plane_strain = young_modulus_pa / (1 - poisson_ratio**2)
         depth = np.atleast_1d(np.asarray(depth_m, dtype=float))
-        return np.array([dent_force(self.table, d, tip_radius_m, plane_strain)[0] for d in depth])
+        return np.array([dent_force(self.table, d, tip_radius_m, 0.0, plane_strain)[0] for d in depth])
 
     def scaled(self, c: np.ndarray | float, tau: np.ndarray | float = 1.0, *, name: str = "") -> DentLaw:
         """The law with c and tau multiplied by factors, one or one a row of `grid()`."""
@@ -62,7 +66,8 @@ def dent_law(name: str, poisson_ratio: float = USUAL_POISSON_RATIO) -> DentLaw:
     if name not in _LAWS:
         raise OptionError(f"'{name}' is no dent law; allowed are {', '.join(_LAWS)}")
     table, source = _LAWS[name](poisson_ratio)
-    table = np.ascontiguousarray(table, dtype=float)
+    bent = _beyond_hertz() if name in _FOLLOWED else np.zeros(len(table))
+    table = np.column_stack([table, bent])
     table.setflags(write=False)
     return DentLaw(name, table, source)
 
@@ -112,6 +117,16 @@ def _read(name: str, poisson_ratio: float) -> np.ndarray:
     return np.stack([np.interp(grid(), x, y) for y in columns], axis=1)
 
 
+@lru_cache(maxsize=1)
+def _beyond_hertz() -> np.ndarray:
+    """(n,) g of the tables: from bodies of revolution with a bump or a hollow (tools.dent_bend)."""
+    x, slope = np.loadtxt(Path(__file__).with_name("dent_bend.csv"), delimiter=",", unpack=True)
+    return np.interp(grid(), x, slope)
+
+
+_FOLLOWED = ("linear", "neo-hookean")
+"""Laws whose contact grips the tip and is followed to great depths, on curved surfaces too."""
+
 _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
     "hertz": lambda nu: _hertz(),
     "sphere": lambda nu: _sphere(),
@@ -121,9 +136,9 @@ _LAWS: dict[str, Callable[[float], tuple[np.ndarray, str]]] = {
 
 
 @kernel
-def dent_force(table, depth, radius, plane_strain_modulus):
+def dent_force(table, depth, radius, bend, plane_strain_modulus):
     """(force N, stiffness N/m, stick radius R tau x^0.5 m) at an indentation, m; zeros where it is not
-    positive."""
+    positive. radius: effective, m. bend: mean curvature of the surface times the tip's radius."""
     if not depth > 0.0:
         return 0.0, 0.0, 0.0
     x = depth / radius
@@ -133,11 +148,13 @@ def dent_force(table, depth, radius, plane_strain_modulus):
     i = int(position)
     slope = 0.0
     if i >= last:
-        c, tau = table[last, 0], table[last, 2]
+        c, tau = table[last, 0] * (1.0 + bend * table[last, 3]), table[last, 2]
     else:
         f = position - i
-        slope = (table[i + 1, 0] - table[i, 0]) / step
-        c = table[i, 0] + f * (table[i + 1, 0] - table[i, 0])
+        low = table[i, 0] * (1.0 + bend * table[i, 3])
+        high = table[i + 1, 0] * (1.0 + bend * table[i + 1, 3])
+        slope = (high - low) / step
+        c = low + f * (high - low)
         tau = table[i, 2] + f * (table[i + 1, 2] - table[i, 2])
     root = np.sqrt(x)
     force = plane_strain_modulus * radius * radius * c * x * root
@@ -151,6 +168,12 @@ def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> floa
     1 / R_eff = 1 / R + curvature (Hertz; convex positive). A hollow tighter than the tip is cut at 4 R.
     """
     return 1.0 / np.maximum(1.0 / tip_radius_m + curvature, 0.25 / tip_radius_m)
+
+
+def bend_of(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:
+    """Mean curvature times the tip's radius, as `dent_force` takes it: within what `effective_radius` keeps
+    and the table of curved bodies was solved for."""
+    return np.clip(np.asarray(curvature, dtype=float) * tip_radius_m, *BENT)
 
 
 @kernel

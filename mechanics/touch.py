@@ -21,7 +21,7 @@ from dataclasses import dataclass
 import numpy as np
 from numba import njit
 
-from mechanics.dent import DentLaw, dent_force, dent_law, effective_radius
+from mechanics.dent import DentLaw, bend_of, dent_force, dent_law, effective_radius
 from mechanics.frames import local_frames
 from mechanics.kernels import kernel
 from mechanics.sites import TouchSites
@@ -107,7 +107,7 @@ def touch_remember(state, dent, a, du, dv, radius):
 
 
 @kernel
-def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
+def touch_solve(state, d, far, table, radius, bend, plane_strain_modulus, stick):
     """Force at displacement d without writing the memory: (f_n, f_u, f_v, dent, a, d_u, d_v, k_n).
 
     Arguments as for touch_step. f: N on the tool, local frame. dent: m. a: stick radius, m. d_u, d_v:
@@ -125,7 +125,7 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
     tolerance = 1e-10 * radius
     fn = fu = fv = a = du = dv = stiffness = compliance = 0.0
     for _ in range(80):
-        fn, stiffness, a = dent_force(table, dent, radius, plane_strain_modulus)
+        fn, stiffness, a = dent_force(table, dent, radius, bend, plane_strain_modulus)
         # a support close below makes cnn negative; a contact wider than its patch must not turn unstable by
         # that
         compliance = max(cnn, -_STIFFEST / stiffness)
@@ -154,22 +154,24 @@ def touch_solve(state, d, far, table, radius, plane_strain_modulus, stick):
 
 
 @kernel
-def touch_step(state, d, far, table, radius, plane_strain_modulus, stick):
+def touch_step(state, d, far, table, radius, bend, plane_strain_modulus, stick):
     """Advance one touch to displacement d: (f_n, f_u, f_v) on the tool, N, local frame (n, u, v).
 
     state: (STATE_SIZE,), changed in place; all zero before first touch.
     d: (3,) m since first touch, local frame (n outward: d[0] < 0 presses in).
     far: (3, 3) m/N of the actual modulus, local frame, symmetric. table: of a dent law. radius: effective,
-    m.
+    m. bend: mean curvature times the tip's radius (mechanics.dent.bend_of).
     plane_strain_modulus: E / (1 - nu^2), Pa. stick: 8 G / (2 - nu), Pa.
     """
-    fn, fu, fv, dent, a, du, dv, _ = touch_solve(state, d, far, table, radius, plane_strain_modulus, stick)
+    fn, fu, fv, dent, a, du, dv, _ = touch_solve(
+        state, d, far, table, radius, bend, plane_strain_modulus, stick
+    )
     touch_remember(state, dent, a, du, dv, radius)
     return fn, fu, fv
 
 
 @njit(cache=True, error_model="numpy")
-def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out):
+def touch_path(d, frame, far, table, radius, bend, plane_strain_modulus, stick, out):
     """Follow a path: d (n, 3) m and out (n, 3) N on the tool in the global frame; far (3, 3) m/N global."""
     local_far = frame @ far @ frame.T
     state = np.zeros(STATE_SIZE)
@@ -177,16 +179,18 @@ def touch_path(d, frame, far, table, radius, plane_strain_modulus, stick, out):
     for i in range(d.shape[0]):
         for r in range(3):
             local[r] = frame[r, 0] * d[i, 0] + frame[r, 1] * d[i, 1] + frame[r, 2] * d[i, 2]
-        fn, fu, fv = touch_step(state, local, local_far, table, radius, plane_strain_modulus, stick)
+        fn, fu, fv = touch_step(state, local, local_far, table, radius, bend, plane_strain_modulus, stick)
         for c in range(3):
             out[i, c] = frame[1, c] * fu + frame[2, c] * fv + frame[0, c] * fn
 
 
 @njit(cache=True, error_model="numpy")
-def _touch_paths(d, starts, frames, fars, table, radii, plane_strain_modulus, stick, out):
+def _touch_paths(d, starts, frames, fars, table, radii, bends, plane_strain_modulus, stick, out):
     for k in range(len(starts) - 1):
         part = slice(starts[k], starts[k + 1])
-        touch_path(d[part], frames[k], fars[k], table, radii[k], plane_strain_modulus, stick, out[part])
+        touch_path(
+            d[part], frames[k], fars[k], table, radii[k], bends[k], plane_strain_modulus, stick, out[part]
+        )
 
 
 def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]:
@@ -252,16 +256,13 @@ def touch_forces(
     displacement = np.ascontiguousarray(displacement, dtype=float)
     starts = np.ascontiguousarray(starts, dtype=np.int64)
     count = len(starts) - 1
-    radii = np.broadcast_to(
-        effective_radius(tip_radius_m, np.asarray(places.curvature, dtype=float)), (count,)
-    )
+    curvature = np.broadcast_to(np.asarray(places.curvature, dtype=float), (count,))
+    radii, bends = effective_radius(tip_radius_m, curvature), bend_of(tip_radius_m, curvature)
     plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
     out = np.zeros_like(displacement)
     frames = local_frames(places.normals)
     fars = np.ascontiguousarray(np.asarray(places.far, dtype=float) / young_modulus_pa)
-    _touch_paths(
-        displacement, starts, frames, fars, table, np.ascontiguousarray(radii), plane_strain, stick, out
-    )
+    _touch_paths(displacement, starts, frames, fars, table, radii, bends, plane_strain, stick, out)
     return out
 
 

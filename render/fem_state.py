@@ -89,6 +89,7 @@ class FemState(NamedTuple):
     local_far: np.ndarray
     radius: np.ndarray
     curvature: np.ndarray
+    bend: np.ndarray
     young: np.ndarray
     vectors: np.ndarray
     stack: np.ndarray
@@ -120,6 +121,7 @@ def new_fem_state(parameters: FemParameters, radii: np.ndarray, dt_s: float) -> 
         local_far=np.zeros((m, 3, 3)),
         radius=np.zeros(m),
         curvature=np.zeros(m),
+        bend=np.zeros(m),
         young=np.zeros(m),
         vectors=np.zeros((6, 3)),
         stack=np.zeros(STACK, dtype=np.int64),

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from mechanics.dent import BENT
 from mechanics.effects.friction_slip import SLIPS, slip_excess, slip_length
 from mechanics.kernels import part
 from mechanics.touch import touch_solve
@@ -52,6 +53,7 @@ def settle(p, state, i):
     radius = state.radii_m[i] * p.effects.dent_radius[0]
     state.radius[i] = 1.0 / max(1.0 / radius + curvature, 0.25 / radius)
     state.curvature[i] = curvature
+    state.bend[i] = min(max(curvature * radius, BENT[0]), BENT[1])
     state.young[i] = young / softness
 
 
@@ -72,8 +74,9 @@ def solve_one(p, state, tips, i):
             d[k] += state.carried[k, i]
         for r in range(3):
             local[r] = frame[r, 0] * d[0] + frame[r, 1] * d[1] + frame[r, 2] * d[2]
+        bent, memory = state.bend[i], state.memory[i]
         fn, fu, fv, dent, a, du, dv, tangent = touch_solve(
-            state.memory[i], local, state.local_far[i], p.table, state.radius[i], plane_strain, stick
+            memory, local, state.local_far[i], p.table, state.radius[i], bent, plane_strain, stick
         )
         state.memory[i, 1] = dent  # where the next solution starts from
         pull = np.sqrt(fu * fu + fv * fv)

@@ -9,6 +9,7 @@ from __future__ import annotations
 import csv
 import io
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,7 @@ from mechanics.quantities import TIP_RADIUS
 from mechanics.result import Result
 from render.base import Renderer
 from render.bvh import STACK, closest_triangle
+from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
 from render.surface import SurfaceArrays
 from render.walking import foot
@@ -49,6 +51,15 @@ class Curve(Result):
     normal: np.ndarray | None = None
     renderer: Renderer | None = None
     tip_radius_m: float | None = None
+
+    @cached_property
+    def error_figures(self) -> dict[str, float]:
+        """What the force at the deepest may be off by, N: keys of render.force_error; {} where unknown."""
+        if self.renderer is None or self.tip_radius_m is None:
+            return {}
+        part = slice(self.deepest, self.deepest + 1)
+        errors = force_errors(self.renderer, self.position[part], self.force[part], self.tip_radius_m)
+        return error_figures(errors, 0)
 
     @property
     def deepest(self) -> int:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -16,6 +17,7 @@ from mechanics.recording import Recording
 from mechanics.result import Result
 from mechanics.samples import runs
 from render.base import Renderer
+from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
 
 FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
@@ -99,8 +101,8 @@ def replay_error(recording: Recording, presses: Presses, forces: np.ndarray) -> 
 class ReplayResult(Result, ReplayError):
     """Forces of a renderer along a recorded path, against those measured.
 
-    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. `plot`: both forces over time. `show`:
-    the object, each touch coloured by its rms error.
+    t: (n,) s. force_n: (n, 3) N rendered, on the tool, device frame. used: the renderer itself. `plot`: both
+    forces over time. `show`: the object, each touch coloured by its rms error.
     """
 
     recording: Recording
@@ -108,6 +110,7 @@ class ReplayResult(Result, ReplayError):
     renderer: str
     t: np.ndarray
     force_n: np.ndarray
+    used: Renderer | None = None
 
     @property
     def error_n(self) -> np.ndarray:
@@ -119,6 +122,18 @@ class ReplayResult(Result, ReplayError):
         """N, rms length of the sensor's noise, where the recording states it."""
         noise = self.recording.force_noise_std_n
         return None if noise is None else float(noise * np.sqrt(3.0))
+
+    @cached_property
+    def error_figures(self) -> dict[str, float]:
+        """What the rendered force may be off by, N rms over the contact samples: keys of render.force_error;
+        {} where unknown."""
+        if self.used is None or not self.contact.any():
+            return {}
+        felt = self.contact
+        path, radius = self.recording.position[felt], self.recording.tip_radius_m
+        return error_figures(
+            force_errors(self.used, path, self.force_n[felt], radius), np.arange(int(felt.sum()))
+        )
 
     def save(self, path: Path | str) -> Path:
         """Write `t,fx,fy,fz` (s, and N on the tool) as `palpate replay` does."""

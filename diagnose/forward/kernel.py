@@ -22,13 +22,13 @@ SUB_PLACES = 5
 
 
 @numba.njit(cache=True, error_model="numpy")
-def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, mu, out):
+def integrate(start, y, far, radius, bend, e_dent, e_far, nu, table, tool_compliance, mu, out):
     """Force on the tool along every press.
 
     start: (p + 1,) first sample of each press. y: (n, 3) m. far: (p, 3, 3) unit modulus, 1/m.
-    radius: (p,) m, of tip and surface together. e_dent, e_far: (p,) Pa, modulus under the tip and of the
-    whole. table: of a dent law. tool_compliance: 1 / k of a spring in series, m/N. mu: friction; inf: the tip
-    sticks. Writes out: (n, 3) N.
+    radius: (p,) m, of tip and surface together. bend: (p,) mechanics.dent.bend_of. e_dent, e_far: (p,) Pa,
+    modulus under the tip and of the whole. table: of a dent law. tool_compliance: 1 / k of a spring in
+    series, m/N. mu: friction; inf: the tip sticks. Writes out: (n, 3) N.
     """
     state = np.zeros(STATE_SIZE)
     compliance = np.empty((3, 3))
@@ -57,7 +57,7 @@ def integrate(start, y, far, radius, e_dent, e_far, nu, table, tool_compliance, 
                 d[1] = anchor1 - y[i, 1]
                 d[2] = anchor2 - y[i, 2]
                 fn, fu, fv, dent, a, du, dv, _k = touch_solve(
-                    state, d, compliance, table, radius[p], plane_strain, stick
+                    state, d, compliance, table, radius[p], bend[p], plane_strain, stick
                 )
                 state[1] = dent  # where the next solution starts from
                 pull = np.sqrt(fu * fu + fv * fv)

@@ -15,7 +15,7 @@ import numpy as np
 
 from diagnose.forward import kernel
 from diagnose.forward.touches import place_of
-from mechanics.dent import effective_radius
+from mechanics.dent import bend_of, effective_radius
 from mechanics.effects.laws_along_path import new_memory, path_numbers
 from mechanics.effects.settings import Settings
 from mechanics.kinematics import acceleration
@@ -123,14 +123,13 @@ class Forward:
         key = hash((tip, s.nu, compliance, s.touch.friction, *(a.tobytes() for a in arrays)))
         f = self._kept.get(key)
         if f is None:
-            radius = effective_radius(tip, self.places.curvature)
-            radius = np.ascontiguousarray(np.broadcast_to(radius, (len(t),)))
+            curvature = np.broadcast_to(np.asarray(self.places.curvature, dtype=float), (len(t),))
+            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature)
             f = np.zeros_like(y)
             modulus = usual * s.stiffness
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)
-            kernel.integrate(
-                t.starts, y, far, radius, modulus * s.dent_ratio, modulus, s.nu, table, compliance, mu, f
-            )
+            touched = (radius, bend, modulus * s.dent_ratio, modulus)
+            kernel.integrate(t.starts, y, far, *touched, s.nu, table, compliance, mu, f)
             if len(self._kept) >= KEPT:
                 self._kept.pop(next(iter(self._kept)))
             self._kept[key] = f

@@ -68,6 +68,7 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         renderer=scene.renderer.name,
         t=measured.t,
         force_n=forces,
+        used=scene.renderer,
     )
 
 

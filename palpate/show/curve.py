@@ -8,6 +8,7 @@ import numpy as np
 
 from mechanics.errors import OptionError
 from render.base import Renderer
+from render.force_error import said
 from render.press import Curve
 
 if TYPE_CHECKING:
@@ -25,6 +26,7 @@ def lines(result: Curve) -> list[str]:
         f"{result.renderer.name}: {result.peak_force_n:.4g} N at most; at {depth * 1e3:.3g} mm the force "
         f"on the tool is {', '.join(f'{f:.4g}' for f in result.force_at(depth))} N",
         f"  normal there ({normal}); {len(result.t)} samples in {result.t[-1]:.3g} s",
+        *([f"  {words}"] if (words := said(result.error_figures)) else []),
     ]
 
 
@@ -37,6 +39,7 @@ def as_json(result: Curve) -> dict[str, Any]:
         "depth_m": depth,
         "force_at_depth_n": result.force_at(depth),
         "peak_force_n": result.peak_force_n,
+        **result.error_figures,
     }
 
 

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from palpate.show.quantities import ERROR
+from render.force_error import said
 from render.replay import ReplayResult
 
 if TYPE_CHECKING:
@@ -21,7 +22,8 @@ def lines(result: ReplayResult) -> list[str]:
     return [
         f"{result.renderer}: error {result.rmse_n:.4g} N rms over {int(result.contact.sum())} contact "
         f"samples, {100 * result.relative:.3g} % of the measured {result.force_rms_n:.4g} N rms"
-        + (f" (sensor noise {result.noise_n:.3g} N)" if result.noise_n is not None else "")
+        + (f" (sensor noise {result.noise_n:.3g} N)" if result.noise_n is not None else ""),
+        *([f"  {words}"] if (words := said(result.error_figures)) else []),
     ]
 
 
@@ -35,6 +37,7 @@ def as_json(result: ReplayResult) -> dict[str, Any]:
         "force_rms_n": result.force_rms_n,
         "relative_rmse": result.relative,
         "peak_force_n": float(np.linalg.norm(result.force_n, axis=1).max()),
+        **result.error_figures,
     }
     return figures if result.noise_n is None else {**figures, "noise_n": result.noise_n}
 

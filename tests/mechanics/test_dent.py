@@ -34,25 +34,39 @@ def test_sphere_table_is_sneddon():
     assert R * np.sqrt(x) * np.interp(x, grid(), law.table[:, 1]) == pytest.approx(a, rel=2e-4)
 
 
+@pytest.mark.parametrize("bend", [-0.2, 0.0, 0.3])
 @pytest.mark.parametrize("name", dent_laws())
-def test_stiffness_is_the_slope_of_the_force(name):
+def test_stiffness_is_the_slope_of_the_force(name, bend):
     table = dent_law(name).table
     for depth in (0.13e-3, 1.02e-3, 6.3e-3, 16e-3):
         step = 1e-9
-        up, down = (dent_force(table, depth + s, R, E)[0] for s in (step, -step))
-        assert dent_force(table, depth, R, E)[1] == pytest.approx((up - down) / (2 * step), rel=1e-4)
+        up, down = (dent_force(table, depth + s, R, bend, E)[0] for s in (step, -step))
+        assert dent_force(table, depth, R, bend, E)[1] == pytest.approx((up - down) / (2 * step), rel=1e-4)
 
 
 def test_nothing_without_a_dent():
-    assert dent_force(dent_law("sphere").table, -1e-3, R, E) == (0.0, 0.0, 0.0)
-    assert dent_force(dent_law("sphere").table, 0.0, R, E) == (0.0, 0.0, 0.0)
+    assert dent_force(dent_law("sphere").table, -1e-3, R, 0.0, E) == (0.0, 0.0, 0.0)
+    assert dent_force(dent_law("sphere").table, 0.0, R, 0.0, E) == (0.0, 0.0, 0.0)
+
+
+def test_a_bump_answers_a_deep_dent_harder_than_its_effective_radius_says_and_a_hollow_softer():
+    table = dent_law("neo-hookean").table
+    flat, bump, hollow = (dent_force(table, 6e-3, R, bend, E)[0] for bend in (0.0, 0.1, -0.1))
+    # 1.7 % at 1.2 radii on a bump of a tenth of the tip's curvature (axisymmetric finite strain)
+    assert 1.01 < bump / flat < 1.03 and 0.97 < hollow / flat < 0.99
+    assert dent_force(table, 1e-5, R, 0.1, E)[0] == pytest.approx(
+        dent_force(table, 1e-5, R, 0.0, E)[0], rel=1e-3
+    )
+    assert dent_force(dent_law("hertz").table, 6e-3, R, 0.1, E) == dent_force(
+        dent_law("hertz").table, 6e-3, R, 0, E
+    )
 
 
 def test_finite_strain_is_softer_down_and_stiffer_sideways():
     linear, finite = dent_law("linear"), dent_law("neo-hookean")
     depth = np.array([5e-3])
     assert 0.94 < (finite.force(depth, E, NU, R) / linear.force(depth, E, NU, R))[0] < 0.98
-    sideways = [dent_force(law.table, 5e-3, R, E)[2] for law in (linear, finite)]
+    sideways = [dent_force(law.table, 5e-3, R, 0.0, E)[2] for law in (linear, finite)]
     assert 1.15 < sideways[1] / sideways[0] < 1.3
 
 

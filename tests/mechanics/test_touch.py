@@ -124,7 +124,7 @@ def test_any_displacement_gives_a_finite_force(radius):
     far = np.diag([-20.0, -25.0, -25.0]) / E  # a rigid support close below
     for _ in range(3000):
         d = rng.normal(scale=6e-3, size=3)
-        force = np.array(touch_step(state, d, far, table, radius, plane_strain, stick))
+        force = np.array(touch_step(state, d, far, table, radius, 0.1, plane_strain, stick))
         assert np.isfinite(force).all()
         assert np.linalg.norm(force) < 1e3
         assert force[0] >= 0

@@ -95,7 +95,7 @@ def stiffened(ratio: float, depth: np.ndarray, elastic: np.ndarray) -> np.ndarra
     """The dent's force times the family's factor, in series with the same object."""
     dents = TIP * grid()[grid() <= 1.5]
     law = dent_law("linear").table
-    plain = np.array([dent_force(law, d, TIP, E_STAR)[0] for d in dents])
+    plain = np.array([dent_force(law, d, TIP, 0.0, E_STAR)[0] for d in dents])
     hard = plain * stiffening(ratio)[0][: len(dents)]
     out = np.zeros(len(depth))
     for i in np.flatnonzero((depth > 0) & (elastic > 0)):

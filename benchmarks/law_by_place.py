@@ -1,0 +1,141 @@
+"""How far the law is off at every place of known shapes, by depth, beside the laboratory's whole bodies.
+
+The shapes are files of chords (benchmarks._known_shapes). At places spread over each, the laboratory presses
+a sticking tip of 5 mm straight in (finite strain, nu 0.49, its mesh graded towards the touch); the renderer
+follows the same path on its own mesh, with the exact modulus. Depths are counted from each one's own surface.
+`without` is the same renderer whose dent knows of the surface's curvature by the effective radius alone.
+Solved presses are kept in the user's cache.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from benchmarks._known_shapes import SHAPES, KnownShape
+from benchmarks.evidence import Figure
+from benchmarks.felt_surface import NU, TIP_M, meshed, own_compliance_near
+from benchmarks.timing import table
+from mechanics.errors import PalpateError
+from mechanics.files import atomic_file
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
+from mechanics.store import content_key
+from mechanics.tetmesh import TetMesh
+from palpate.output import progress_bar
+from render.fem import FemRenderer
+from render.force_error import place_numbers
+from scenes.laboratory.mesh import laboratory_cache
+from scenes.laboratory.specimen import Fineness, Specimen, build
+from scenes.laboratory.surface import Surface
+from scenes.phantoms import Phantom
+
+DEPTHS_M = 1e-3 * np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
+BANDS_MM = ((1, 2), (2, 4), (4, 6), (6, 8))
+FINENESS = Fineness(2.0, 6.0, 0.5)
+"""Of the laboratory: twice as fine moves a press from 1 mm on by at most 0.6 %."""
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Which shapes, how many places."""
+    parser.add_argument("--shapes", nargs="+", choices=tuple(SHAPES), default=list(SHAPES))
+    parser.add_argument("--places", type=int, default=12, help="of each shape (default: 12)")
+    parser.add_argument("--size-mm", type=float, default=10.0, help="of the renderer's mesh (default: 10)")
+    parser.add_argument("--seed", type=int, default=11, help="of the places (default: 11)")
+
+
+def run(arguments: argparse.Namespace) -> dict[str, Any]:
+    """Press both; print a table by depth; return the errors and the figures."""
+    progress, rows, found, figures = progress_bar("places"), [], {}, []
+    for k, name in enumerate(arguments.shapes):
+        shape = SHAPES[name]()
+        points, normals = shape.places(arguments.places, arguments.seed)
+        truth = np.array([
+            _solved(shape, point, normal, progress) for point, normal in zip(points, normals, strict=True)
+        ])  # fmt: skip
+        mesh = meshed(shape, 1e-3 * arguments.size_mm)
+        progress("places", (k + 1) / len(arguments.shapes))
+        for tag, bent in (("without", False), ("law", True)):
+            force, numbers = _rendered(mesh, points, normals, bent)
+            error = 100 * (force / truth - 1)
+            found[f"{name}, {tag}"] = {"points_m": points, "error_percent": error, "place": numbers}
+            rows.append([name, tag, *(_band(error, low, high) for low, high in BANDS_MM), *_whole(error)])
+            if bent:
+                rms = float(np.sqrt(np.nanmean(error**2)))
+                each = np.sqrt(np.nanmean(error**2, axis=1))
+                figures.append(
+                    Figure(f"normal force beside the laboratory, {name}, rms", rms, _ends(each), "%").at_most(
+                        1.5
+                    )
+                )
+                worst = float(np.nanmax(np.abs(error)))
+                figures.append(Figure(f"the same, {name}, worst", worst, unit="%").at_most(4.0))
+    progress.close()
+    print(table(["shape", "law", *(f"{a} to {b} mm" for a, b in BANDS_MM), "rms", "worst"], rows))
+    return {"errors": found, "figures": figures}
+
+
+def _ends(values: np.ndarray) -> tuple[float, float]:
+    return float(np.nanmin(values)), float(np.nanmax(values))
+
+
+def _band(error: np.ndarray, low: float, high: float) -> str:
+    some = error[:, (DEPTHS_M >= 1e-3 * low - 1e-9) & (DEPTHS_M < 1e-3 * high + 1e-9)]
+    return f"{np.nanmean(some):+.1f} ± {np.nanmean(np.nanstd(some, axis=0)):.1f} %"
+
+
+def _whole(error: np.ndarray) -> tuple[str, str]:
+    return f"{np.sqrt(np.nanmean(error**2)):.1f} %", f"{error.flat[np.nanargmax(np.abs(error))]:+.1f} %"
+
+
+def _solved(shape: KnownShape, point: np.ndarray, normal: np.ndarray, progress: Any) -> np.ndarray:
+    """(depths,) m^2: normal force over the modulus by the laboratory; NaN from where it finds no
+    equilibrium."""
+    key = content_key(
+        "law by place 1", shape.vertices, shape.triangles, point, normal, DEPTHS_M, repr(FINENESS)
+    )
+    path = laboratory_cache() / "presses" / f"{key}.npy"
+    if path.is_file():
+        return np.load(path)
+    thing = Phantom(shape.name, shape.name, shape.vertices, shape.triangles, 1.0, NU)
+    at = Surface(1e3 * shape.vertices, shape.triangles).nearest(1e3 * point)[0][0]
+    radius, force = 1e3 * TIP_M, np.full(len(DEPTHS_M), np.nan)
+    problem = build(thing, Specimen(finite=True, tip_radius=radius), at, travel=0.0, fineness=FINENESS)
+    state = problem.rest(at + radius * normal)
+    try:
+        for k, depth in enumerate(DEPTHS_M):
+            state = problem.advance(state, at + (radius - 1e3 * depth) * normal)
+            force[k] = 1e-6 * state.force @ normal
+    except PalpateError as error:
+        progress.note(f"{shape.name}: {error}") if hasattr(progress, "note") else None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    with atomic_file(path) as temporary, temporary.open("wb") as handle:
+        np.save(handle, force)
+    return force
+
+
+def _rendered(
+    mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool
+) -> tuple[np.ndarray, np.ndarray]:
+    """(places, depths) m^2: normal force over the modulus as rendered; (2, places) render.force_error."""
+    model = Model(
+        mesh=mesh.quadratic(),
+        material=Material(1e4, NU, dent_law="neo-hookean"),
+        support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
+        tool=Tool(TIP_M),
+        mesh_size_m=0.01,
+    )
+    renderer = FemRenderer(model, compliance=own_compliance_near(mesh, points))
+    if not bent:
+        renderer.parameters.table[:, 3] = 0.0
+    way = np.linspace(-0.002, DEPTHS_M[-1], 101)
+    result = np.empty((len(points), len(DEPTHS_M)))
+    for row, point, normal in zip(result, points, normals, strict=True):
+        path = point + (TIP_M - way)[:, None] * normal
+        force = renderer.follow(renderer.start([TIP_M]), path[:, None], np.full(len(way), 10.0))[:, 0]
+        row[:] = np.interp(DEPTHS_M, way, force @ normal) / model.material.young_modulus_pa
+    vertices = renderer.contact.arrays.vertices
+    return result, place_numbers(renderer, TIP_M)[:, cKDTree(vertices).query(points)[1]]

@@ -1,0 +1,85 @@
+"""What a rendered force may be off by: the law itself, the felt shape, where the first touch lay.
+
+Half widths of 95 % intervals, N. The law's own share of the force was fitted to whole-body solutions at
+places of known shapes (benchmarks.law_by_place): it grows with the depth on curved ground, and near rims and
+the base, where a push along the normal also moves the surface sideways.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from render.base import Renderer
+from render.felt_surface import felt_surface
+from render.fem import FemRenderer
+from render.snapping import ONSET_NOISE_M
+
+FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.0, 0.0
+_SURE = 1.96
+_STEEPNESS = 1.4
+"""d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
+
+
+@dataclass(frozen=True)
+class ForceErrors:
+    """95 % half widths, N, a sample each (n,): of the law (mesh and tables), of the shape's uncertainty, of
+    the first touches that it was drawn through."""
+
+    law_n: np.ndarray
+    shape_n: np.ndarray
+    first_touch_n: np.ndarray
+
+
+def force_errors(
+    renderer: Renderer, position: np.ndarray, force: np.ndarray, tip_radius_m: float
+) -> ForceErrors | None:
+    """For tip centres (n, 3) m and forces (n, 3) N on the tool; None for a renderer other than the
+    finite-element one: the 1D models know nothing between their presses."""
+    if not isinstance(renderer, FemRenderer):
+        return None
+    surface = renderer.contact.arrays
+    touchable = np.unique(surface.triangles[surface.free > 0])
+    near = touchable[cKDTree(surface.vertices[touchable]).query(position)[1]]
+    size = np.linalg.norm(force, axis=1)
+    above = np.einsum("nc,nc->n", position - surface.vertices[near], surface.normals[near])
+    depth = np.where(size > 0, np.maximum(tip_radius_m - above, 0.02 * tip_radius_m), 0.02 * tip_radius_m)
+    steepness = _STEEPNESS * size / depth
+    shares = law_share(depth / tip_radius_m, *place_numbers(renderer, tip_radius_m)[:, near])
+    uncertain = felt_surface(renderer.model).uncertainty_m
+    sd = uncertain[near] if len(uncertain) == len(surface.vertices) else np.zeros(len(size))
+    onset = ONSET_NOISE_M if len(renderer.model.presses) else 0.0
+    return ForceErrors(shares * size, _SURE * sd * steepness, _SURE * onset * steepness)
+
+
+def error_figures(errors: ForceErrors | None, counted: np.ndarray | int) -> dict[str, float]:
+    """Keys of `--json`: rms over the counted samples, or at one; nothing where nothing is known."""
+    if errors is None:
+        return {}
+    parts = {"force_error_n": errors.law_n, "shape_error_n": errors.shape_n}
+    parts["first_touch_error_n"] = errors.first_touch_n
+    return {key: float(np.sqrt(np.mean(np.square(part[counted])))) for key, part in parts.items()}
+
+
+def said(figures: dict[str, float]) -> str:
+    """The figures in words; '' for none."""
+    if not figures:
+        return ""
+    law, shape, touch = (f"{1e3 * value:.3g}" for value in figures.values())
+    return f"95 % of the time within {law} mN by the law, {shape} by the shape, {touch} by its first touches"
+
+
+def place_numbers(renderer: FemRenderer, tip_radius_m: float) -> np.ndarray:
+    """(2, v) at each vertex of the contact surface: |curvature| times the tip's radius; how far a push along
+    the normal moves the surface sideways, as compliance times the tip's radius and the modulus."""
+    p, normals = renderer.parameters, renderer.contact.arrays.normals
+    along = np.einsum("vab,vb->va", p.far, normals)
+    sideways = along - np.einsum("va,va->v", along, normals)[:, None] * normals
+    return np.stack([np.abs(p.curvature), np.linalg.norm(sideways, axis=1)]) * tip_radius_m
+
+
+def law_share(depth: np.ndarray, bent: np.ndarray, sideways: np.ndarray) -> np.ndarray:
+    """Half width of the law's 95 % interval over the force; depth in tip radii, the rest: place_numbers."""
+    return np.sqrt(FLOOR**2 + (BENT_SHARE * bent * depth) ** 2 + (SIDEWAYS_SHARE * sideways) ** 2)
