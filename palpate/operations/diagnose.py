@@ -77,7 +77,13 @@ def _answer(result: Diagnosis, asked: DiagnoseOperands, out: Output) -> int:
 
 
 @operation(
-    DiagnoseOperands, MeshFileOptions, DiagnoseOptions, AttributionOptions, NuisanceOptions, answer=_answer
+    DiagnoseOperands,
+    MeshFileOptions,
+    DiagnoseOptions,
+    AttributionOptions,
+    NuisanceOptions,
+    often="fast without",
+    answer=_answer,
 )
 def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis:
     """The sim-to-real gap: where simulated and measured force differ, which effect was left out, how far the
