@@ -67,4 +67,5 @@ def report(result: Opened, path: Path | str) -> Path:
     else:
         page.view(view, figure, "The result")
     plt.close(figure)
+    page.result(as_json(result))
     return page.write(path)

@@ -12,7 +12,7 @@ from pyvista import Plotter
 
 from mechanics.frames import tangents
 from palpate.show import recording as measured
-from palpate.show.page import Page
+from palpate.show.page import Page, file_words
 from palpate.show.quantities import DEPTH, ERROR, ORDER
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
@@ -73,7 +73,7 @@ def report(result: Simulation, path: Path | str) -> Path:
         f"{'with ' + effects if effects else 'without any effect'}."
     )
     page.paragraph(_meaning(result))
-    where = recording.path or "REC"
+    where = file_words(recording.path, "REC")
     page.next_step(
         f"What to do next: see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
         f"`palpate diagnose {where} --model MODEL --report PAGE.html`; feel it: `palpate touch MODEL`."
@@ -93,6 +93,7 @@ def report(result: Simulation, path: Path | str) -> Path:
                 for name, size in truth["sizes"].items()
             ],
         )
+    page.result(result.as_json())
     return page.write(path)
 
 

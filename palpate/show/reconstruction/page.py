@@ -13,7 +13,7 @@ from mechanics.model import Model
 from mechanics.touch import forces_at
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
-from palpate.show.page import Page, save_figures
+from palpate.show.page import Page, file_words, save_figures
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.reconstruction.differences import differences
 from palpate.show.reconstruction.exploration import exploration_figures
@@ -93,6 +93,7 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     for words in differences(result):
         page.paragraph(words)
     speed_table(page, result)
+    page.result(result.as_json())
     return page.write(path)
 
 
@@ -163,11 +164,12 @@ def _summary(page: Page, result: Reconstruction) -> None:
     model = result.model
     low, high = model.material.young_modulus_ci95_pa
     page.lead(
-        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
-        f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations."
+        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
+        f"(Young's modulus; 95 % sure: {low / 1e3:.1f} to {high / 1e3:.1f} kPa)."
     )
     page.paragraph(_meaning(result))
-    where, recording = model.path or "MODEL", result.exploration.recording.path or "REC"
+    where = file_words(model.path, "MODEL")
+    recording = file_words(result.exploration.recording.path, "REC")
     page.next_step(
         f"What to do next: feel it: `palpate touch {where}`; see what it leaves out: "
         f"`palpate diagnose {recording} --model {where} --report PAGE.html`."
