@@ -64,6 +64,8 @@ def _what_next(result: Diagnosis, model: Model, recording: str) -> str:
     kept = [name for name, domain in asked.items() if domain != "instrument"]
     instrument = [name for name, domain in asked.items() if domain == "instrument"]
     said = []
+    if model.path is not None:
+        recording += f" --model {file_words(model.path, 'MODEL')}"
     if kept:
         said.append(
             f"put {spoken(kept)} into the model, and feel it: `palpate diagnose {recording} --apply BETTER`, "

@@ -104,7 +104,7 @@ def consequence(result: Diagnosis, force_rms_n: float) -> str:
     size = f"{percent(result.gap_before_n / force_rms_n)} of its force"
     if result.kind == "none":
         return f"A typical touch is simulated to {before}, {size}; the sensor's noise alone is {noise}."
-    words = "; ".join(_what_it_is(result, name) for name in result.effects)
+    words = "; ".join(_what_it_is(result, name) for name in missing(result) or result.effects)
     said = f"{words[:1].upper()}{words[1:]}. " if words else ""
     if not result.effects:
         return f"A typical touch is off by {before}, {size}; the sensor's noise alone is {noise}."
@@ -149,11 +149,14 @@ def _how_sure(result: Diagnosis) -> tuple[str, str, str]:
     sure = {e.name: e.probability for e in result.entries if e.name in result.effects}
     least = min(sure, key=lambda name: sure[name])
     text = (
-        f"Of 100 such answers on simulated recordings whose truth is known, {100 * sure[least]:.0f} were "
-        "right. Every other effect that was tried explains less at places that the fit had not seen."
+        f"Of 100 such answers on simulated recordings whose truth is known, {100 * sure[least]:.0f} "
+        f"{'or more ' if len(sure) > 1 else ''}were right. Every other "
+        "effect that was tried explains less at places that the fit had not seen."
     )
-    answer = f"{percent(sure[least])} sure"
-    return question, answer if len(sure) == 1 else f"{answer}, of the least sure ({spoken([least])})", text
+    if len(sure) == 1:
+        return question, f"{percent(sure[least])} sure", text
+    each = ", ".join(f"{name.replace('_', ' ')} {percent(share)}" for name, share in sure.items())
+    return question, each[0].upper() + each[1:], text
 
 
 def _where(result: Diagnosis) -> tuple[str, str, str]:
