@@ -47,7 +47,7 @@ class Terms:
         return "".join(out)
 
     def _link(self, found: re.Match[str]) -> str:
-        word = _known()[found[0].lower()]
+        word = _known()[found[1].lower()]
         if word in self.used:
             return found[0]
         self.used[word] = _slug(word)
@@ -76,4 +76,4 @@ def _known() -> dict[str, str]:
 @cache
 def _pattern() -> re.Pattern[str]:
     words = sorted(_known(), key=len, reverse=True)
-    return re.compile(r"(?<![\w-])(" + "|".join(map(re.escape, words)) + r")(?![\w-])", re.IGNORECASE)
+    return re.compile(r"(?<![\w-])(" + "|".join(map(re.escape, words)) + r")s?(?![\w-])", re.IGNORECASE)

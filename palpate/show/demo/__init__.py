@@ -16,7 +16,7 @@ from palpate.servo.report import ServoReport
 from palpate.show import model as made
 from palpate.show.demo.figures import figures, view
 from palpate.show.diagnosis.gaps import known
-from palpate.show.diagnosis.words import spoken, verdict
+from palpate.show.diagnosis.words import force_words, spoken, verdict
 from palpate.show.page import Page, file_words, save_figures
 from palpate.show.reconstruction.exploration import force_over_time
 
@@ -75,7 +75,7 @@ def report(result: DemoResult, path: Path | str) -> Path:
     page = Page(f"Palpate: {result.recording.object_name}, touched and felt")
     page.lead(
         f"{len(model.presses)} presses became a model that feels like the object: it is typically "
-        f"{1e3 * result.replay_rmse_n:.0f} mN off, in touches of {1e3 * result.contact_force_rms_n:.0f} mN."
+        f"{force_words(result.replay_rmse_n)} off, in touches of {force_words(result.contact_force_rms_n)}."
     )
     page.paragraph(
         f"{_meaning(result)} The object's stiffness: a Young's modulus of "

@@ -44,6 +44,12 @@ def spoken(names: tuple[str, ...] | list[str], last: str = "and") -> str:
     return f" {last} ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
+def between_words(low: float, high: float) -> str:
+    """An interval of shares: '85 to 91 %', with a decimal where its ends would be one number."""
+    digits = 0 if round(100 * low) != round(100 * high) else 1
+    return f"{100 * low:.{digits}f} to {100 * high:.{digits}f}\u00a0%"
+
+
 def force_words(newtons: float) -> str:
     """A force in millinewtons, in newtons from one on."""
     return f"{newtons:.2f} N" if newtons >= 1 else f"{newtons * 1e3:.0f} mN"
@@ -171,7 +177,9 @@ def _where(result: Diagnosis) -> tuple[str, str, str]:
             f"largest difference is {force_words(rms)}, at {largest} (the press shown)."
         )
         return question, "Nowhere in particular", text
-    there = f"It is largest at {largest} (the press shown): {force_words(rms)}."
+    # the gap of held-out places may exceed what a fit leaves at the worst place: the smaller one is not said
+    size = f": {force_words(rms)}" if rms > result.gap_before_n else ""
+    there = f"It is largest at {largest} (the press shown){size}."
     if axis.share < LITTLE:
         most = f"What it goes with most is {AXIS_WORDS[axis.axis]}, and that is {percent(axis.share)} of it."
         return question, "Everywhere alike", f"{most} {there}"
@@ -201,7 +209,7 @@ def _how_far(result: Diagnosis) -> tuple[str, str, str]:
             )  # fmt: skip
         text = (
             f"{typical}. The sensor's own noise is {noise}: {percent(result.gap_closed)} of what lies above "
-            f"it is gone (95 % sure: {percent(low)} to {percent(high)})."
+            f"it is gone (95 % sure: {between_words(low, high)})."
         )
         return question, f"From {before} to {after}", text
     text = f"{typical}: {before}. The sensor's own noise is {noise}."
@@ -217,11 +225,10 @@ def lines(result: Diagnosis) -> list[str]:
     off = f"how far: a typical touch is {force_words(result.gap_before_n)} off"
     noise = f"; the sensor's noise is {force_words(result.noise_n)}"
     if result.gap_closed is not None and result.gap_closed_ci95 is not None and result.effects:
-        low, high = (100 * v for v in result.gap_closed_ci95)
         text.append(f"{off}, {force_words(result.gap_after_n)} with what was found{noise}")
         text.append(
-            f"  {100 * result.gap_closed:.0f} % of what lies above the noise is gone (95 % sure: {low:.0f} "
-            f"to {high:.0f} %), at places that were not fitted"
+            f"  {percent(result.gap_closed)} of what lies above the noise is gone (95 % sure: "
+            f"{between_words(*result.gap_closed_ci95)}), at places that were not fitted"
         )
     else:
         text.append(f"{off}{noise}")

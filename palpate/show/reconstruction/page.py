@@ -208,18 +208,19 @@ _SOFTNESS = (
 def _how(page: Page, result: Reconstruction) -> None:
     surface = result.surface
     page.paragraph(
-        f"Surface: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. Force "
-        "noise "
-        f"{result.exploration.noise_n * 1e3:.1f} mN an axis. Method: {result.model.provenance['method']}."
+        f"Shape: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. The sensor's "
+        f"noise is {result.exploration.noise_n * 1e3:.1f} mN an axis. Method: "
+        f"{result.model.provenance['method']}."
     )
     if result.modulus:
         fit = result.modulus
         page.paragraph(
-            f"{fit.reason[0].upper()}{fit.reason[1:]}. Spread between sites {100 * fit.between:.1f} %; the "
-            f"shape's uncertainty makes {100 * fit.shape_error:.2f} % of the modulus's standard error."
+            f"{fit.reason[0].upper()}{fit.reason[1:]}. From place to place the modulus differs by "
+            f"{100 * fit.between:.1f} %; what is not known of the shape makes it uncertain by another "
+            f"{100 * fit.shape_error:.2f} %."
         )
         page.table(
-            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen by resamples"],
+            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen in resamples"],
             [
                 [name, e / 1e3, 1e3 * misfit, f"{100 * share:.0f} %"]
                 for name, (e, misfit, share) in fit.by_law.items()

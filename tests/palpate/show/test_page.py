@@ -77,6 +77,8 @@ def test_a_word_is_linked_where_it_is_first_used_and_explained_at_the_end():
     text = page.html()
     assert text.count('href="#word-young-s-modulus"') == 1 and text.count('id="word-young-s-modulus"') == 1
     assert "#word-noise" not in text
+    page.paragraph("Two 1D models.")
+    assert '<a class="term" href="#word-1d-model">1D models</a>' in page.html()
 
 
 def test_pages_and_docs_have_one_glossary():
