@@ -5,7 +5,8 @@ from __future__ import annotations
 from typing import Any
 
 from diagnose.verdict.result import Diagnosis
-from mechanics.quantities import fitting_unit, number_words, quantity_words, split_key
+from mechanics.quantities import fitting_unit, quantity_words, split_key
+from mechanics.quantities import number_words as number
 
 WORDS = {
     "mu": "friction coefficient",
@@ -46,14 +47,16 @@ WORDS = {
 }
 
 
-def plain_key(key: str) -> str:
-    """A parameter's key in words."""
-    return WORDS.get(key, split_key(key)[0].replace("_", " "))
+def plain_key(key: str, value: Any = None) -> tuple[str, float, str]:
+    """(words, factor from SI, unit) of a parameter's key, in units that a hand knows; value: what the unit is
+    to fit."""
+    unit, factor = fitting_unit(key, value)
+    return WORDS.get(key, split_key(key)[0].replace("_", " ")), factor, unit
 
 
 def short(parameters: dict[str, Any]) -> str:
     """Parameters in one line."""
-    return ", ".join(f"{plain_key(key)} {quantity_words(key, value)}" for key, value in parameters.items())
+    return ", ".join(f"{plain_key(key)[0]} {quantity_words(key, value)}" for key, value in parameters.items())
 
 
 def parameter_rows(result: Diagnosis) -> list[list[str]]:
@@ -61,10 +64,8 @@ def parameter_rows(result: Diagnosis) -> list[list[str]]:
     rows = []
     for entry in result.entries:
         for key, value in entry.parameters.items() if entry.name in result.effects else ():
-            unit, factor = fitting_unit(key, value)
+            words, factor, unit = plain_key(key, value)
             low, high = entry.intervals.get(key, (None, None))
-            span = "-" if low is None else f"{number_words(low, factor)} to {number_words(high, factor)}"
-            rows.append(
-                [entry.name.replace("_", " "), plain_key(key), number_words(value, factor), span, unit]
-            )
+            span = "-" if low is None else f"{number(low, factor)} to {number(high, factor)}"
+            rows.append([entry.name.replace("_", " "), words, number(value, factor), span, unit])
     return rows
