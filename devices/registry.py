@@ -9,6 +9,7 @@ from typing import Any
 
 from devices.base import Availability, Clock, DeviceSpec, PositionSource, host_clock
 from mechanics.errors import DeviceError
+from mechanics.names import unknown
 
 DEVICES: dict[str, tuple[str, str, str]] = {
     "mouse": ("devices.mouse", "MouseDevice", "MouseOptions"),
@@ -37,7 +38,7 @@ class DeviceChoice:
 
 def _module(name: str) -> Any:
     if name not in DEVICES:
-        raise DeviceError(f"'{name}' is no device; allowed are {', '.join(DEVICES)} (see 'palpate devices')")
+        raise DeviceError(unknown(name, "device", DEVICES, " (see 'palpate devices')"))
     return importlib.import_module(DEVICES[name][0])
 
 

@@ -105,8 +105,8 @@ def page(evidence: Evidence) -> str:
         f"`{evidence.command}`, commit {evidence.commit[:10]}, {evidence.date}, {evidence.processor}.",
         "",
     ]
-    if age := _age(evidence):
-        lines += [age, ""]
+    if words := age(evidence):
+        lines += [words, ""]
     return "\n".join(lines)
 
 
@@ -115,26 +115,82 @@ def _cell(words: str) -> str:
     return re.sub(r"([*<|]|-(?=-))", r"\\\1", words)
 
 
-def _age(evidence: Evidence) -> str:
-    """A warning where the figures are of an earlier version of the program."""
-    then, now = _version(evidence.commit), _version("")
-    if not then or then == now:
+def age(evidence: Evidence, root: Path = ROOT) -> str:
+    """What a page says of figures that are older than the code they measure by more than a release, or of a
+    state that this history does not have; '' for others. root: of the clone."""
+    commit = evidence.commit.removesuffix("-dirty")
+    if not _git(root, "rev-parse", "--git-dir"):
+        return ""  # not a clone: nothing is known of what came when
+    then, now = _version(root, commit), _version(root, "HEAD")
+    if not then:
+        return "**These figures are of a state that this history does not have.** Run the command again."
+    releases = _releases_between(root, commit)
+    changed = _git(
+        root, "rev-list", "--count", f"{commit}..HEAD", "--", *_measured(root, evidence.name)
+    ).strip()
+    if releases < 1 or changed in ("", "0"):
         return ""
-    return f"**These figures are of version {then}; this is {now}.** Run the command again for today's."
+    much = f"{releases} release{'s' * (releases > 1)}"
+    return (
+        f"**These figures are older than the code by {much}** (of version {then}; this is {now}): what they "
+        f"measure has changed in {changed} commits since. Run the command again."
+    )
 
 
-def _version(commit: str) -> str:
-    """The program's version at a commit ('': in this folder); '' where that cannot be told."""
-    if not commit:
-        text = (ROOT / "pyproject.toml").read_text(encoding="utf-8")
-    else:
-        said = subprocess.run(
-            ["git", "-C", str(ROOT), "show", f"{commit}:pyproject.toml"], capture_output=True, text=True
-        )
-        if said.returncode:
-            return ""
-        text = said.stdout
-    return str(tomllib.loads(text)["project"]["version"])
+def _git(root: Path, *words: str) -> str:
+    """What git says; '' where it fails."""
+    said = subprocess.run(["git", "-C", str(root), *words], capture_output=True, text=True)
+    return "" if said.returncode else said.stdout
+
+
+def _version(root: Path, commit: str) -> str:
+    """The program's version at a commit; '' where that cannot be told."""
+    text = _git(root, "show", f"{commit}:pyproject.toml")
+    return str(tomllib.loads(text)["project"]["version"]) if text else ""
+
+
+def _releases_between(root: Path, commit: str) -> int:
+    """How many times the version changed since a commit."""
+    asked = ("log", "--format=%H", f"{commit}..HEAD", "--", "pyproject.toml")
+    states = [commit, *reversed(_git(root, *asked).split()), "HEAD"]
+    versions = [_version(root, state) for state in states]
+    return sum(one != two for one, two in zip(versions, versions[1:], strict=False))
+
+
+def _measured(root: Path, name: str) -> list[str]:
+    """The packages that a benchmark imports, itself and by its helpers; all where it is gone."""
+    seen: set[str] = set()
+    waiting = [f"benchmarks.{name.replace('-', '_')}"]
+    packages: set[str] = set()
+    while waiting:
+        module = waiting.pop()
+        path = root / (module.replace(".", "/") + ".py")
+        if module in seen or not path.is_file():
+            continue
+        seen.add(module)
+        for found in re.findall(
+            r"^\s*(?:from|import) ([\w.]+)", path.read_text(encoding="utf-8"), re.MULTILINE
+        ):
+            if found.startswith("benchmarks."):
+                waiting.append(found)
+            elif (root / found.partition(".")[0] / "__init__.py").is_file():
+                packages.add(found.partition(".")[0])
+    return sorted(packages) or ["."]
+
+
+_NUMBER = re.compile(
+    r"(?<![\w./,-])\d[\d,]*(?:\.\d+)?(?:\s?(?:to|of|±)\s\d[\d,.]*)?\s?(?:%|times\b|(?:[munkM]?(?:N|Pa|s|m|Hz|J|W)|[µu]s|kg|g|"
+    r"min|MB|GB|ticks|cases|presses|lines|points)(?:/\w+)?(?![\w]))"
+)
+_SETTING = re.compile(r"<!-- setting -->.*?<!-- end -->", re.DOTALL)
+
+
+def unmarked(text: str) -> list[str]:
+    """Numbers with a unit in a page of evidence that stand neither between evidence markers nor between
+    `<!-- setting -->` and `<!-- end -->` (what was asked of a benchmark, not measured), nor in code."""
+    parts = "".join(text.split("```")[::2])
+    plain = re.sub(r"`[^`]*`", "", _SETTING.sub("", MARKED.sub("", parts)))
+    return [found[0] for found in _NUMBER.finditer(plain)]
 
 
 def write(folder: Path, source: Path = EVIDENCE) -> None:

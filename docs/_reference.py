@@ -41,7 +41,7 @@ def options() -> dict[str, Sequence[Any]]:
 def command_page(name: str, words: str, parser: argparse.ArgumentParser) -> str:
     """Purpose, arguments and options of one command, in the groups of its help."""
     os.environ["COLUMNS"] = "84"  # argparse asks it for the width
-    text = parser.format_help()
+    text = parser.format_all_help() if hasattr(parser, "format_all_help") else parser.format_help()
     usage, _, rest = text.partition("\n\n")
     description, _, groups = rest.partition("\npositional arguments:\n")
     if not groups:

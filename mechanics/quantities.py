@@ -11,7 +11,7 @@ import math
 import re
 from collections.abc import Iterable
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from mechanics.errors import OptionError
 from mechanics.schema import Key
@@ -151,6 +151,53 @@ def read_unit(unit: str) -> tuple[str, float]:
     shown = _READ.get(unit, unit)
     scale = 1.0 if shown == unit else parse_unit(unit).scale / parse_unit(shown).scale
     return shown.replace("^2", "²").replace("deg", "degrees"), scale
+
+
+MOST_NUMBERS = 12
+"""Of a list that are written out; of longer ones the least and the greatest."""
+
+
+def number_words(value: Any, factor: float = 1.0) -> str:
+    """A value, or a list of values, times `factor`, to three digits: '0.35', '(1, 2, 3)', 'yes'."""
+    if isinstance(value, list | tuple) and len(value) == 1:
+        return number_words(value[0], factor)
+    if isinstance(value, list | tuple) and len(value) > MOST_NUMBERS and not isinstance(value[0], list):
+        return (
+            f"{number_words(min(value), factor)} to {number_words(max(value), factor)} ({len(value)} values)"
+        )
+    if isinstance(value, list | tuple):
+        return "(" + ", ".join(number_words(v, factor) for v in value) + ")"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if not isinstance(value, (int, float)):
+        return str(value)
+    scaled = value * factor
+    if abs(scaled) >= 100 or abs(scaled) < 1e-5:
+        return f"{scaled:.0f}"
+    return f"{scaled:.2g}" if abs(scaled) < 1 else f"{scaled:.3g}"
+
+
+_LARGER = {"ms": ("s", 1e-3), "mN": ("N", 1e-3), "kPa": ("MPa", 1e-3), "g": ("kg", 1e-3), "mm": ("m", 1e-3)}
+
+
+def fitting_unit(key: str, value: Any) -> tuple[str, float]:
+    """(unit, factor to it from SI) in which people write this value of a key: seconds of 20 s, ms of 0.02."""
+    unit, factor = read_unit(unit_of_key(key))
+    numbers = [abs(v) for v in (value if isinstance(value, list | tuple) else [value]) if _is_number(v)]
+    if unit in _LARGER and max(numbers, default=0.0) * factor >= 1000:
+        unit, more = _LARGER[unit]
+        factor *= more
+    return unit, factor
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, (int, float)) and not isinstance(value, bool)
+
+
+def quantity_words(key: str, value: Any) -> str:
+    """A value as people write it, with the unit that its key ends with: '68 N/mm' of stiffness_n_per_m."""
+    unit, factor = fitting_unit(key, value)
+    return f"{number_words(value, factor)} {unit}".strip()
 
 
 def prefixed(unit: str, greatest: float) -> tuple[str, float]:

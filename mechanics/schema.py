@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from mechanics import names
 from mechanics.errors import PalpateError
 
 _WORDS = {float: "a number", int: "a whole number", bool: "true or false", str: "a text"}
@@ -95,8 +95,7 @@ def span(low: float, high: float, unit: str) -> str:
 
 def near(name: str, allowed: Mapping[str, Any] | tuple[str, ...]) -> str | None:
     """The allowed name that was probably meant."""
-    found = difflib.get_close_matches(name, list(allowed), 1, cutoff=0.75)
-    return found[0] if found else None
+    return next(iter(names.near(name, allowed, cutoff=0.75)), None)
 
 
 def check_table(

@@ -69,7 +69,9 @@ def _loaded(argv: list[str]) -> tuple[argparse.ArgumentParser, str | None, int]:
         return parser, None, 2 if not argv else 0
     name = argv[0]
     if name not in commands():
-        parser.error(f"'{name}' is no command; allowed are {', '.join(commands())}")
+        from mechanics.names import unknown
+
+        parser.exit(2, f"palpate: {unknown(name, 'command', commands())}\n")
     from palpate.operations._run import parser_of
 
     return parser_of(name), name, 0

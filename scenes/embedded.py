@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from mechanics.errors import SceneError
+from mechanics.names import unknown
 
 FOLDER = Path(__file__).parent / "recordings"
 DEFAULT = "silicone-1-cylinder"
@@ -19,5 +20,5 @@ def embedded_recording(name: str = DEFAULT) -> Path:
     """Path of an embedded recording's description; raises SceneError for an unknown name."""
     path = FOLDER / f"{name}.toml"
     if not path.is_file():
-        raise SceneError(f"'{name}' is no embedded recording; allowed are {', '.join(embedded_names())}")
+        raise SceneError(unknown(name, "embedded recording", embedded_names()))
     return path

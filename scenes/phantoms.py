@@ -15,6 +15,7 @@ import numpy as np
 from mechanics.errors import SceneError
 from mechanics.files import no_file
 from mechanics.flat_foot import standing
+from mechanics.names import unknown
 from mechanics.quantities import USUAL_POISSON_RATIO
 from mechanics.surface_files import SUFFIXES, is_surface_file, read_surface
 
@@ -253,8 +254,7 @@ def phantom(name: str | Path) -> Phantom:
     path = Path(name)
     if not is_surface_file(path):
         raise SceneError(
-            f"'{name}' is no phantom: allowed are {', '.join(PHANTOMS)}, or a closed surface as "
-            f"{', '.join(SUFFIXES)}"
+            unknown(str(name), "phantom", PHANTOMS, f", or a closed surface as {', '.join(SUFFIXES)}")
         )
     if not path.is_file():
         raise SceneError(

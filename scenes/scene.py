@@ -28,6 +28,7 @@ from devices.mapper import MapperOptions, axis_matrix
 from mechanics.errors import OptionError, SceneError
 from mechanics.files import named_in, read_toml
 from mechanics.material import BALL, Ball
+from mechanics.names import unknown
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from mechanics.schema import Key, Listed, Schema, check_table
 from mechanics.surface_files import SUFFIXES, is_surface_file
@@ -136,9 +137,14 @@ def load_scene(name: str | Path) -> Scene:
     if str(name) in PHANTOMS:
         return Scene(path.stem, "phantom", str(name), title=path.stem)
     raise SceneError(
-        f"'{name}' is no scene: allowed are {', '.join(scene_names())}, a scene's .toml, a MODEL folder, a "
-        f"recording ({', '.join(embedded_names())} or a file), a phantom ({', '.join(PHANTOMS)}), or a "
-        f"file of a surface or mesh ({', '.join(SUFFIXES)})"
+        unknown(
+            str(name),
+            "scene",
+            scene_names(),
+            f", a scene's .toml, a MODEL folder, a recording ({', '.join(embedded_names())} or a file), a "
+            f"phantom ({', '.join(PHANTOMS)}), or a file of a surface or mesh ({', '.join(SUFFIXES)})",
+            others=(*embedded_names(), *PHANTOMS),
+        )
     )
 
 

@@ -13,7 +13,6 @@ from diagnose.forward.prediction import Forward
 from diagnose.instrument.free_air import FreeAir
 from diagnose.search.attribution import Attribution
 from diagnose.verdict.where import Where
-from mechanics.effects.registry import effect
 from mechanics.model import Model
 from mechanics.recording import Recording
 from mechanics.result import Result
@@ -25,11 +24,6 @@ _SENTENCES = {
     "unknown": "there is a gap, and no effect known here explains it",
     "effect+unknown": "{effects} {explain} part of the gap; something unknown remains",
 }
-
-
-def _said(entry: EffectEntry) -> str:
-    in_words = effect(entry.name).keys_in_words
-    return in_words(entry.parameters) if in_words and entry.parameters else str(entry.parameters or "")
 
 
 def _listed(names: tuple[str, ...]) -> str:
@@ -167,39 +161,6 @@ class Diagnosis(Result):
             candidates=_listed(self.candidates),
             explain="explains" if len(self.effects) == 1 else "explain",
         )
-
-    def lines(self) -> list[str]:
-        """The three answers, a line each, with units."""
-        near = self.where.leading
-        lines = [
-            "; ".join(
-                [
-                    "verdict: " + self.summary,
-                    *(f"{each} stands at the end of its range" for each in self.at_bound),
-                ]
-            ),
-            f"where: gap {self.gap_before_n:.4f} N (noise {self.noise_n:.4f} N); it follows {near.axis} most "
-            f"(share {near.share:.0%}, p = {near.p:.2g})",
-            *(f"which: {e.name} {_said(e)}" for e in self.entries if e.name in self.effects),
-        ]
-        if self.gap_closed is not None and self.gap_closed_ci95 is not None:
-            low, high = self.gap_closed_ci95
-            lines.append(
-                f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N on places not fitted, "
-                f"{self.gap_closed:.0%} closed (95 % interval {low:.0%} to {high:.0%})"
-            )
-        if self.constant_n is not None:
-            lines.append(
-                f"floor: the sensor noise {self.noise_n:.4f} N; ceiling: a constant push "
-                f"{self.constant_n:.4f} N"
-            )
-        lines += [f"  {reason}" for reason in self.reasons]
-        if self.next_touch is not None and self.unsettled:
-            lines.append(f"next touch: {self.next_touch.why}")
-        if self.left_out:
-            names = ", ".join(n.replace("_", " ") for n in self.left_out)
-            lines.append(f"not tried (these presses cannot show it, or --fast leaves it out): {names}")
-        return lines
 
     @property
     def constant_n(self) -> float | None:

@@ -61,7 +61,7 @@ def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, An
 
 def _in_words(keys: Keys) -> str:
     return (
-        f"the fluid first bears {keys['share']:.0%} beside the solid, and drains at "
+        f"the fluid first bears {100 * keys['share']:.0f} % beside the solid, and drains at "
         f"{1e6 * keys['diffusivity_m2_per_s']:.3g} mm²/s"
     )
 

@@ -52,7 +52,7 @@ def _touch(touch: Touch, keys: Keys, model: Model) -> None:
 def _in_words(keys: Keys) -> str:
     share, exponent = keys["share"], keys["exponent"]
     later = share * 10**-exponent
-    return f"extra force after a fast press: {share:.0%} after 1 s, {later:.0%} after 10 s"
+    return f"extra force after a fast press: {100 * share:.0f} % after 1 s, {100 * later:.0f} % after 10 s"
 
 
 def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, Any]:

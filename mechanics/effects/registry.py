@@ -6,6 +6,7 @@ import importlib
 
 from mechanics.effects.base import Effect
 from mechanics.errors import OptionError
+from mechanics.names import unknown
 from mechanics.schema import Schema
 
 NAMES = (
@@ -41,7 +42,7 @@ NAMES = (
 def effect(name: str) -> Effect:
     """The effect of that name; raises OptionError for an unknown one."""
     if name not in NAMES:
-        raise OptionError(f"'{name}' is no effect; allowed are {', '.join(NAMES)}")
+        raise OptionError(unknown(name, "effect", NAMES))
     return importlib.import_module(f"mechanics.effects.{name}").EFFECT
 
 

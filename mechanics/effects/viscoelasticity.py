@@ -18,6 +18,7 @@ from mechanics.effects.settings import Scene, Settings, Touch
 from mechanics.errors import ModelError
 from mechanics.kernels import kernel
 from mechanics.model import Model
+from mechanics.quantities import quantity_words
 from mechanics.schema import Key
 
 
@@ -95,7 +96,7 @@ def _report(values: np.ndarray, scene: Scene, modulus_pa: float) -> dict[str, An
 
 def _in_words(keys: Keys) -> str:
     pairs = zip(keys["g"], keys["tau_s"], strict=True)
-    terms = [f"{g:.0%} that fades within {tau:.2g} s" for g, tau in pairs]
+    terms = [f"{100 * g:.0f} % that fades within {quantity_words('tau_s', tau)}" for g, tau in pairs]
     return f"extra force right after a fast press: {' and '.join(terms)}"
 
 

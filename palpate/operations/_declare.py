@@ -16,7 +16,6 @@ help of `palpate stretch` (`palpate.operations._flags`).
 from __future__ import annotations
 
 import dataclasses
-import difflib
 import functools
 import importlib
 import inspect
@@ -28,6 +27,7 @@ from typing import Any, TypeVar
 
 from mechanics.errors import OptionError
 from mechanics.files import FolderKind, Kind, check_target
+from mechanics.names import near, unknown
 from mechanics.options import check_range, option, span_of
 from mechanics.progress import Progress, silent
 from palpate.operations._list import calls
@@ -51,7 +51,7 @@ class OnCommandLine:
     nargs ("?", "+", "*", "..."), or "repeat" for a flag that may be given several times; parse: from text to
     the value; reads: names a file or folder that is read; writes: one that is written, its
     `mechanics.files.Kind`, or where that is as "module:NAME"; needed: on the command line, though it has a
-    default; only: "command" or "python" where it is one's alone.
+    default; only: "command" or "python" where it is one's alone; rare: `--help` leaves it to `--help-all`.
     """
 
     metavar: str = ""
@@ -63,6 +63,7 @@ class OnCommandLine:
     writes: Kind | FolderKind | str | None = None
     needed: bool = False
     only: str = ""
+    rare: bool = False
 
     def kind(self) -> Kind | FolderKind | None:
         """What is written; None for nothing."""
@@ -133,8 +134,9 @@ class Call:
 class Operation:
     """What was declared; every function made by `operation` has it as its attribute `operation`.
 
-    before: what the command alone looks at before the work; answer: what it does with the result
-    (`palpate.operations._run`); None prints its lines, and writes JSON and files.
+    often: the options of `kinds` that `--help` shows; the others wait for `--help-all`. before: what the
+    command alone looks at before the work; answer: what it does with the result (`palpate.operations._run`);
+    None prints its lines, and writes JSON and files.
     """
 
     def __init__(
@@ -143,6 +145,7 @@ class Operation:
         operands: Any,
         kinds: Sequence[type],
         *,
+        often: str | None,
         before: Callable[[Any], None] | None,
         answer: Callable[..., int] | None,
         has_progress: bool,
@@ -156,6 +159,11 @@ class Operation:
         for kind in (operands, *kinds):
             for each in declared(kind):
                 self.fields.setdefault(each.name, each)
+        self.often = set(self.fields) - self.own if often is None else set(often.split())
+
+    def is_often(self, field: dataclasses.Field[Any]) -> bool:
+        """Whether `--help` shows it."""
+        return field.name in self.often or (field.name in self.own and not written(field).rare)
 
     def signature(self, result: Any) -> inspect.Signature:
         """That of the Python call: operands in their order, then every option by name."""
@@ -220,16 +228,25 @@ class Operation:
 def operation(
     operands: type,
     *kinds: type,
+    often: str | None = None,
     before: Callable[[Any], None] | None = None,
     answer: Callable[..., int] | None = None,
     progress: bool = True,
     json: bool = True,
 ) -> Callable[[Callable[[Any, Call], R]], Callable[..., R]]:
-    """Make a function of (operands, Call) an operation. kinds: the options dataclasses that it takes too."""
+    """Make a function of (operands, Call) an operation. kinds: the options dataclasses that it takes too;
+    often: names of those of their options that most people use, with blanks; None: all."""
 
     def made(function: Callable[[Any, Call], R]) -> Callable[..., R]:
         this = Operation(
-            function, operands, kinds, before=before, answer=answer, has_progress=progress, has_json=json
+            function,
+            operands,
+            kinds,
+            often=often,
+            before=before,
+            answer=answer,
+            has_progress=progress,
+            has_json=json,
         )
         signature = this.signature(function.__annotations__.get("return"))
 
@@ -251,7 +268,7 @@ def operation_of(name: str) -> Operation:
     """The operation behind a Python name; raises OptionError for another."""
     homes = calls()
     if name not in homes:
-        raise OptionError(f"'{name}' is no operation; allowed are {', '.join(homes)}")
+        raise OptionError(unknown(name, "operation", homes))
     return getattr(importlib.import_module(homes[name]), name).operation
 
 
@@ -259,8 +276,8 @@ def known(name: str, given: Mapping[str, Any], allowed: Mapping[str, Any]) -> No
     """Raise OptionError for a name that no operand or option has."""
     for each in given:
         if each not in allowed:
-            near = difflib.get_close_matches(each, allowed, 3)
-            meant = f"did you mean {', '.join(near)}? " if near else ""
+            like = near(each, allowed, 3)
+            meant = f"did you mean {', '.join(like)}? " if like else ""
             raise OptionError(
                 f"pp.{name} has no option '{each}': {meant}allowed are {', '.join(sorted(allowed))}"
             )
@@ -295,7 +312,9 @@ def check(name: str, value: Any, field: dataclasses.Field[Any]) -> None:
         return
     choices = field.metadata["choices"]
     if choices and value not in choices:
-        raise OptionError(f"{name} is {value!r}; allowed are {', '.join(choices)}")
+        like = near(str(value), choices)
+        meant = f"did you mean {like[0]}? " if like else ""
+        raise OptionError(f"{name} is {value!r}; {meant}allowed are {', '.join(choices)}")
     plain = types - {"None"}
     if len(plain) == 1 and (word := plain.pop()) in _KINDS and not _KINDS[word][0](value):
         unit = f" in {field.metadata['unit']}" if field.metadata["unit"] else ""

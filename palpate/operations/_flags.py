@@ -6,11 +6,13 @@ import argparse
 import dataclasses
 import math
 import re
+import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
 from mechanics.errors import OptionError
 from mechanics.files import JSON
+from mechanics.names import near, unknown
 from mechanics.options import check_range, flag_of
 from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, type_words, written
 
@@ -50,26 +52,80 @@ class HelpWords(argparse.RawDescriptionHelpFormatter):
 
 
 class OneLineParser(argparse.ArgumentParser):
-    """Wrong words are an OptionError, which the command line prints in one line; help is `HelpWords`."""
+    """Wrong words are an OptionError, which the command line prints in one line, with what was probably
+    meant; help is `HelpWords`, and shows what most people use; `--help-all` shows the rest too."""
 
     def __init__(self, **keywords: Any) -> None:
-        super().__init__(**{"formatter_class": HelpWords, **keywords})
+        super().__init__(**{"formatter_class": HelpWords, "add_help": False, **keywords})
+        self.add_argument("-h", "--help", action="help", help="show this, and leave")
 
     def error(self, message: str) -> NoReturn:
         """Raise it."""
-        raise OptionError(f"{message}; '{self.prog} --help' tells all options")
+        raise OptionError(f"{message}; '{self.prog} --help' lists the options")
+
+    def parse_args(self, args: Any = None, namespace: Any = None) -> Any:
+        """As argparse, but a flag that is not there is answered with the one that was probably meant."""
+        words = sys.argv[1:] if args is None else list(args)
+        flags = [f for action in self._actions for f in action.option_strings if f.startswith("--")]
+        if not any(action.nargs == argparse.REMAINDER for action in self._actions):
+            for word in words[: words.index("--") if "--" in words else None]:
+                flag = word.partition("=")[0]
+                if word.startswith("--") and not any(each.startswith(flag) for each in flags):
+                    like = near(flag, flags)
+                    self.error(f"'{flag}' is no option" + (f"; did you mean {like[0]}?" if like else ""))
+        return super().parse_args(words, namespace)
+
+    def _check_value(self, action: argparse.Action, value: Any) -> None:
+        if action.choices is not None and value not in action.choices:
+            choices = [str(each) for each in action.choices]
+            raise argparse.ArgumentError(action, unknown(str(value), "choice", choices))
+
+    def rare(self) -> list[argparse.Action]:
+        """What `--help` does not show."""
+        return [action for action in self._actions if getattr(action, "rare", False)]
+
+    def format_help(self) -> str:
+        """What most people use, and how many options there are beside it."""
+        rare = {action: action.help for action in self.rare()}
+        if not rare:
+            return super().format_help()
+        for action in rare:
+            action.help = argparse.SUPPRESS
+        try:
+            text = super().format_help()
+        finally:
+            for action, words in rare.items():
+                action.help = words
+        return f"{text}\n{len(rare)} more options: {self.prog} --help-all\n"
+
+    def format_all_help(self) -> str:
+        """Every option."""
+        return super().format_help()
+
+
+class _AllHelp(argparse.Action):
+    """--help-all"""
+
+    def __init__(self, option_strings: Any, dest: str, **keywords: Any) -> None:
+        super().__init__(option_strings, argparse.SUPPRESS, nargs=0, default=argparse.SUPPRESS, **keywords)
+
+    def __call__(self, parser: Any, namespace: Any, values: Any, option_string: Any = None) -> None:
+        print(parser.format_all_help(), end="")
+        parser.exit()
 
 
 def add_operation(parser: argparse.ArgumentParser, operation: Operation) -> None:
     """Add every operand and option; what is not given is left out of the namespace."""
     for name, field in operation.fields.items():
         if name in operation.own and written(field).only != "python":
-            _add(parser, field)
+            _add(parser, field, operation.is_often(field))
     for kind in operation.kinds:
         group = parser.add_argument_group(_title(kind))
         for field in declared(kind):
             if operation.fields[field.name] is field:
-                _add(group, field)
+                _add(group, field, operation.is_often(field))
+    if any(getattr(action, "rare", False) for action in parser._actions):
+        parser.add_argument("--help-all", action=_AllHelp, help="show every option, and leave")
     if operation.has_json:
         action = parser.add_argument(
             "--json",
@@ -84,7 +140,7 @@ def _title(kind: type) -> str:
     return getattr(kind, "title", kind.__name__.removesuffix("Options").lower() + " options")
 
 
-def _add(parser: Any, field: dataclasses.Field[Any]) -> None:
+def _add(parser: Any, field: dataclasses.Field[Any], often: bool) -> None:
     meta, how, types = field.metadata, written(field), type_words(field) - {"None"}
     name = next((word for word in ("bool", "int", "float") if word in types), "str")
     required = field.default is dataclasses.MISSING or how.needed
@@ -114,7 +170,7 @@ def _add(parser: Any, field: dataclasses.Field[Any]) -> None:
     else:
         flags = [how.short] * bool(how.short) + [flag_of(field)]
         action = parser.add_argument(*flags, dest=field.name, required=required, **keywords)
-    action.on_command_line = how
+    action.on_command_line, action.rare = how, not often
 
 
 def _parser(field: dataclasses.Field[Any], how: OnCommandLine, name: str) -> Callable[[str], Any]:

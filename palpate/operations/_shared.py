@@ -141,7 +141,7 @@ def with_friction(options: RenderOptions, scene: Scene) -> RenderOptions:
     return options if options.friction is not None else replace(options, friction=scene.friction)
 
 
-def columns_operand(roles: str) -> Any:
+def columns_operand(roles: str, **more: Any) -> Any:
     """--column ROLE=NAME, repeatable; in Python {role: name}."""
     return operand(
         None,
@@ -149,6 +149,7 @@ def columns_operand(roles: str) -> Any:
         flag="--column",
         metavar="ROLE=NAME",
         count="repeat",
+        **more,
     )
 
 

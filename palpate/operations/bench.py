@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import OptionError
+from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._flags import OneLineParser
 from palpate.output import Output, emit_json
@@ -84,7 +85,7 @@ def _without_evidence(words: list[str]) -> list[str]:
 def bench(asked: BenchOperands, call: Call) -> Any:
     """Find one benchmark; what is returned runs it. Raises OptionError for one that is not there."""
     if asked.name not in names():
-        raise OptionError(f"'{asked.name}' is no benchmark; allowed are {', '.join(names())}")
+        raise OptionError(unknown(asked.name, "benchmark", names()))
     sys.path.insert(0, str(clone()))
     module = importlib.import_module(f"benchmarks.{asked.name.replace('-', '_')}")
 

@@ -53,7 +53,7 @@ def _answer(result: Calibration, asked: CalibrateOperands, out: Output) -> int:
     return answer(result, asked, out, lines=[f"written: {asked.save}"] if asked.save else [])
 
 
-@operation(CalibrateOperands, GeometryOptions, answer=_answer)
+@operation(CalibrateOperands, GeometryOptions, often="shape slab_m unit", answer=_answer)
 def calibrate(asked: CalibrateOperands, call: Call) -> Calibration:
     """The instrument, from presses on something known: tool's stiffness, sensor, bias, delay, play.
 

@@ -58,7 +58,7 @@ class CompareOperands:
     seed: int = seed_operand()
 
 
-@operation(CompareOperands, MeshFileOptions, CompareOptions)
+@operation(CompareOperands, MeshFileOptions, CompareOptions, often="folds field")
 def compare(asked: CompareOperands, call: Call) -> Comparison:
     """FEM against the interpolated 1D models, on presses and regions that no fit has seen; errors N rms.
 

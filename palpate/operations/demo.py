@@ -53,7 +53,7 @@ def _answer(found: tuple[DemoResult, Path], asked: DemoOperands, out: Output) ->
     return 0
 
 
-@operation(DemoOperands, DemoOptions, answer=_answer, progress=False)
+@operation(DemoOperands, DemoOptions, often="seconds renderer diagnosis fast", answer=_answer, progress=False)
 def demo(asked: DemoOperands, call: Call) -> tuple[DemoResult, Path]:
     """Do all of it, and write the report; what was found, and where it is written."""
     from scenes.build import keep

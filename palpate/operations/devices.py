@@ -42,7 +42,7 @@ def _answer(found: list[tuple[Availability, Rate | None]], asked: DevicesOperand
     return 0
 
 
-@operation(DevicesOperands, *map(options_of, HARDWARE), answer=_answer, progress=False)
+@operation(DevicesOperands, *map(options_of, HARDWARE), often="", answer=_answer, progress=False)
 def devices(asked: DevicesOperands, call: Call) -> list[tuple[Availability, Rate | None]]:
     """Every device that was asked for, with its rate, Hz, where that was measured."""
     if asked.measure is not None and not asked.measure >= LEAST_MEASURE_S:

@@ -128,6 +128,7 @@ def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
     AttributionOptions,
     NuisanceOptions,
     ForcesOptions,
+    often="fast without",
     answer=_answer,
 )
 def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:

@@ -52,9 +52,11 @@ class ExploreOperands:
     )
     robot: bool = operand(False, "talk with a robot: lines of JSON, in and out")
     device: str | None = operand(None, "explore in the touch window: mouse, or another", metavar="NAME")
-    scene: str = operand("nodule", "with --device: what is felt", metavar="MODEL_OR_SCENE")
-    screenshot: str | None = operand(None, "with --device: save the window at its end", metavar="PNG")
-    seconds: float | None = operand(None, "with --device: stop after this time", unit="s")
+    scene: str = operand("nodule", "with --device: what is felt", metavar="MODEL_OR_SCENE", rare=True)
+    screenshot: str | None = operand(
+        None, "with --device: save the window at its end", metavar="PNG", rare=True
+    )
+    seconds: float | None = operand(None, "with --device: stop after this time", unit="s", rare=True)
     going_on: str | None = operand(
         None, "go on with what was explored so far", flag="--continue", metavar="REC", reads=True
     )
@@ -67,9 +69,10 @@ class ExploreOperands:
         flag="--effect",
         metavar="NAME=STRENGTH",
         count="repeat",
+        rare=True,
     )
     tip_radius_m: float = tip_radius_operand("of the spherical tip", 0.005)
-    rate_hz: float = operand(1000.0, "with --robot: samples a second", unit="Hz")
+    rate_hz: float = operand(1000.0, "with --robot: samples a second", unit="Hz", rare=True)
     poisson_ratio: float = poisson_operand("of the object", 0.49)
     young_modulus_pa: float | None = operand(
         None,
@@ -86,7 +89,15 @@ def _answer(figures: dict[str, Any], asked: ExploreOperands, out: Output) -> int
     return 0
 
 
-@operation(ExploreOperands, GoalOptions, ReachOptions, RobotOptions, answer=_answer, progress=False)
+@operation(
+    ExploreOperands,
+    GoalOptions,
+    ReachOptions,
+    RobotOptions,
+    often="complete most",
+    answer=_answer,
+    progress=False,
+)
 def explore(asked: ExploreOperands, call: Call) -> dict[str, Any]:
     """Explore until a goal, the limit or the robot ends it; the figures of what is known then."""
     if (asked.phantom is not None) + asked.robot + (asked.device is not None) != 1:

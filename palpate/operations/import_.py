@@ -77,31 +77,40 @@ class ImportOperands:
     frame: str | None = operand(None, "of the force; None: device", choices=("device", "tool"))
     rotation: Any = operand(None, "(3, 3) from the file's axes to the device frame", only="python")
     flange_to_tip_m: Sequence[float] | None = operand(
-        None, "in the tool's frame, (3,)", unit="m", metavar="X,Y,Z", parse=_list
+        None, "in the tool's frame, (3,)", unit="m", metavar="X,Y,Z", parse=_list, rare=True
     )
     mass_kg: float | None = operand(
-        None, "beyond the sensor; its weight is taken off", unit="kg", flag="--tool-mass"
+        None, "beyond the sensor; its weight is taken off", unit="kg", flag="--tool-mass", rare=True
     )
     tare_s: Sequence[float] | None = operand(
         None, "take off the mean force of this time", unit="s", metavar="START,END", parse=_tare
     )
     offset_s: float | str | None = operand(
-        None, "of the force's clock, or auto (cross-correlation)", unit="s", metavar="NUMBER", parse=_offset
+        None,
+        "of the force's clock, or auto (cross-correlation)",
+        unit="s",
+        metavar="NUMBER",
+        parse=_offset,
+        rare=True,
     )
     clock: str | None = operand(
-        None, "where time goes back: one clock, or blocks with their own", choices=("one", "blocks")
+        None,
+        "where time goes back: one clock, or blocks with their own",
+        choices=("one", "blocks"),
+        rare=True,
     )
-    rate_hz: float | None = operand(None, "to resample to, or of rows without a time", unit="Hz")
+    rate_hz: float | None = operand(None, "to resample to, or of rows without a time", unit="Hz", rare=True)
     thing: Mapping[str, Any] | None = operand(None, "what [object] of the recording is to say", only="python")
-    name: str | None = operand(None, "of the object", only="command")
-    slab: float | None = operand(None, "the object is a slab so thick", unit="m", only="command")
-    half_space: bool = operand(False, "the object is deep and wide", only="command")
+    name: str | None = operand(None, "of the object", only="command", rare=True)
+    slab: float | None = operand(None, "the object is a slab so thick", unit="m", only="command", rare=True)
+    half_space: bool = operand(False, "the object is deep and wide", only="command", rare=True)
     picture: str | None = operand(
         None,
         "what was understood; default: beside REC, 'none' for no picture",
         metavar="PNG",
         writes="palpate.importing.write_imported:PICTURE",
         only="command",
+        rare=True,
     )
     dry_run: bool = operand(False, "picture and summary only: write no recording", only="command")
 

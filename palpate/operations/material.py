@@ -44,19 +44,22 @@ class MaterialOperands:
     tip_radius_m: float | None = tip_radius_operand("of an indenter's sphere, where the files do not say")
     layer_m: float | None = operand(None, "thickness of the sample; None: a half-space", unit="m")
     poisson_ratio: float = poisson_operand("of the material", 0.49)
-    specimens: bool = operand(False, "each indentation is of another piece; default: one piece")
+    specimens: bool = operand(False, "each indentation is of another piece; default: one piece", rare=True)
     columns: Mapping[str, str] | None = columns_operand("t, depth (or height), load")
     units: Mapping[str, str] | None = units_operand()
     travel: str | None = operand(
         None, "which way the position counts; None: by what a solid does", choices=("into", "out")
     )
     compression: str | None = operand(
-        None, "the load's sign as it presses; None: by what a solid does", choices=("positive", "negative")
+        None,
+        "the load's sign as it presses; None: by what a solid does",
+        choices=("positive", "negative"),
+        rare=True,
     )
     clock: str | None = operand(
         None, "where time goes back: one clock, or blocks with their own", choices=("one", "blocks")
     )
-    fast: bool = operand(False, "fewer effects are tried")
+    fast: bool = operand(False, "fewer effects are tried", rare=True)
     seed: int = seed_operand()
 
 

@@ -46,7 +46,7 @@ class ModelOperands:
     mesh_size_m: float | None = operand(None, "edge of the tetrahedra; None: 0.010 or an eighth", unit="m")
 
 
-@operation(ModelOperands, MeshFileOptions)
+@operation(ModelOperands, MeshFileOptions, often="unit up")
 def model_of(asked: ModelOperands, call: Call) -> Model:
     """The model of an object whose shape is known, in the frame of its file.
 

@@ -46,20 +46,24 @@ class OpenOperands:
     )
     report: str | None = report_operand("the page; default: NAME-palpate.html here, 'none' for no page")
     tip_radius_m: float | None = tip_radius_operand("of the tool or indenter, where no file says it")
-    columns: Mapping[str, str] | None = columns_operand("as of import; of curves t, depth (or height), load")
+    columns: Mapping[str, str] | None = columns_operand(
+        "as of import; of curves t, depth (or height), load", rare=True
+    )
     units: Mapping[str, str] | None = units_operand()
     force_on: str | None = operand(None, "whose force it is", choices=("tool", "object"))
-    travel: str | None = operand(None, "which way a machine's position counts", choices=("into", "out"))
-    compression: str | None = operand(
-        None, "a machine's load as it presses", choices=("positive", "negative")
+    travel: str | None = operand(
+        None, "which way a machine's position counts", choices=("into", "out"), rare=True
     )
-    clock: str | None = operand(None, "where time goes back", choices=("one", "blocks"))
+    compression: str | None = operand(
+        None, "a machine's load as it presses", choices=("positive", "negative"), rare=True
+    )
+    clock: str | None = operand(None, "where time goes back", choices=("one", "blocks"), rare=True)
     slab_m: float | None = operand(None, "the object is a slab so thick", unit="m", flag="--slab")
     half_space: bool = operand(False, "the object is deep and wide")
     layer_m: float | None = operand(None, "thickness of a machine's sample; None: a half-space", unit="m")
     young_modulus_pa: float | None = operand(None, "of a surface's file", unit="Pa", flag="--modulus")
     unit: str = operand("m", "of a surface's file: m, cm, mm, um, in")
-    fast: bool = operand(False, "fewer effects are tried")
+    fast: bool = operand(False, "fewer effects are tried", rare=True)
     seed: int = seed_operand()
 
 

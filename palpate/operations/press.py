@@ -50,9 +50,9 @@ class PressOperands:
     depth_m: float = operand(0.004, "along the surface's normal after first touch", unit="m")
     speed_m_per_s: float = operand(0.01, "of the tip", unit="m/s", flag="--speed")
     _: KW_ONLY
-    hold_s: float = operand(0.0, "at depth", unit="s")
-    approach_m: float = operand(2e-3, "of free air before", unit="m")
-    rate_hz: float = operand(1000.0, "samples a second", unit="Hz")
+    hold_s: float = operand(0.0, "at depth", unit="s", rare=True)
+    approach_m: float = operand(2e-3, "of free air before", unit="m", rare=True)
+    rate_hz: float = operand(1000.0, "samples a second", unit="Hz", rare=True)
     tip_radius_m: float | None = tip_radius_operand("of the tool; None: the model's")
     renderer: str = renderer_operand()
     output: str | None = output_operand("write the curve", "CURVE.csv", "render.press:CURVE")
@@ -88,7 +88,14 @@ def _answer(curve: Curve, asked: PressOperands, out: Output) -> int:
     return code
 
 
-@operation(PressOperands, MeshFileOptions, RenderOptions, SupportOptions, answer=_answer)
+@operation(
+    PressOperands,
+    MeshFileOptions,
+    RenderOptions,
+    SupportOptions,
+    often="friction young_modulus_pa",
+    answer=_answer,
+)
 def press(asked: PressOperands, call: Call) -> Curve:
     """One scripted press: the force response of a model at one place.
 

@@ -64,6 +64,7 @@ class ReconstructOperands:
         reads=True,
         count="repeat",
         only="command",
+        rare=True,
     )
 
 
@@ -81,7 +82,13 @@ def _answer(result: Reconstruction, asked: ReconstructOperands, out: Output) -> 
     return 1 if result.doubt else 0
 
 
-@operation(ReconstructOperands, ReconstructOptions, *_STEPS, answer=_answer)
+@operation(
+    ReconstructOperands,
+    ReconstructOptions,
+    *_STEPS,
+    often="method poisson_ratio mesh_size_m surface contact_threshold_n indentation_m shape slab_m",
+    answer=_answer,
+)
 def reconstruct(asked: ReconstructOperands, call: Call) -> Reconstruction:
     """A recording becomes a model: contacts, base, surface, tetrahedra, Young's modulus, 1D models.
 

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
+from mechanics.names import unknown
 from mechanics.progress import Progress
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import with_friction
@@ -58,7 +59,7 @@ def touched_scene(model: Any, name: str, call: Call) -> Callable[[Progress], Tou
         return lambda tell: scene_of(model, support)
     allowed = (*names(), *simulator_names())
     if name not in allowed:
-        raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(allowed)}")
+        raise OptionError(unknown(name, "renderer", allowed))
     chosen = _with_scene(model, call.of(RenderOptions))
 
     def make(tell: Progress) -> TouchScene:

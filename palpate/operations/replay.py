@@ -40,7 +40,7 @@ class ReplayOperands:
     output: str | None = output_operand("write the forces", "FORCES.csv", "render.replay:FORCES")
 
 
-@operation(ReplayOperands, RenderOptions, SupportOptions)
+@operation(ReplayOperands, RenderOptions, SupportOptions, often="friction dent_law effects")
 def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     """Feed a recorded tip path to a renderer and compare its force with the measured one.
 

@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
 from mechanics.files import JSON, PNG, atomic_file
+from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._flags import natural
 from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand
@@ -57,7 +58,7 @@ class SimulateOperands:
         only="command",
     )
     person: int = operand(0, "whose hand: 0 the average, 1... others", low=0, high=2**63 - 1, parse=natural)
-    sizes: bool = operand(True, "state each effect's size in newtons, which solves without it too")
+    sizes: bool = operand(True, "state each effect's size in newtons, which solves without it too", rare=True)
     ideal: bool = operand(False, "also what the ideal object would answer", only="python")
     pictures: str | None = operand(
         None,
@@ -70,7 +71,12 @@ class SimulateOperands:
         "write the object to be turned, and every touch beside the ideal object's, as one HTML page"
     )
     workers: int | None = operand(
-        None, "processes that solve touches; None: one a core", low=1, high=2**63 - 1, parse=natural
+        None,
+        "processes that solve touches; None: one a core",
+        low=1,
+        high=2**63 - 1,
+        parse=natural,
+        rare=True,
     )
     seed: int = seed_operand()
 
@@ -83,7 +89,7 @@ def effects_from(given: Mapping[str, float] | Sequence[str] | None) -> dict[str,
     for text in given:
         name, _, value = text.partition("=")
         if name not in REGISTRY:
-            raise OptionError(f"--effect {text}: '{name}' is unknown; allowed are {', '.join(REGISTRY)}")
+            raise OptionError(f"--effect {text}: {unknown(name, 'effect', REGISTRY)}")
         try:
             out[name] = float(value) if value else 1.0
         except ValueError:
@@ -118,7 +124,9 @@ def _answer(result: Simulation, asked: SimulateOperands, out: Output) -> int:
     return 0
 
 
-@operation(SimulateOperands, SimulateOptions, HandOptions, answer=_answer)
+@operation(
+    SimulateOperands, SimulateOptions, HandOptions, often="young_modulus_pa presses protocol", answer=_answer
+)
 def simulate(asked: SimulateOperands, call: Call) -> Simulation:
     """The virtual laboratory: a person explores a phantom, and what a device would have read is written down.
 

@@ -25,6 +25,7 @@ from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
 from mechanics.errors import DeviceError, OptionError
 from mechanics.files import PNG
 from mechanics.model import Model
+from mechanics.names import unknown
 from mechanics.progress import Progress
 from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
@@ -65,7 +66,10 @@ class TouchOperands:
     )
     renderer: str | None = operand(None, f"one of {', '.join(names())}; None: the scene's", metavar="NAME")
     beside: str | None = operand(
-        None, "a second renderer, driven by the same tip, or 'none'; None: the scene's", metavar="NAME"
+        None,
+        "a second renderer, driven by the same tip, or 'none'; None: the scene's",
+        metavar="NAME",
+        rare=True,
     )
     screenshot: str | Path | None = operand(None, "save the window at its end", metavar="PNG", writes=PNG)
     seed: int = seed_operand()
@@ -110,6 +114,7 @@ def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
     SafetyOptions,
     *map(options_of, DEVICES),
     ExplorationOptions,
+    often="young_modulus_pa unit friction max_force_n",
     answer=_answer,
     progress=False,
 )
@@ -199,7 +204,7 @@ def _check(asked: TouchOperands, name: str) -> None:
         (asked.beside, (*names(), "none"), "renderer"),
     ):
         if value is not None and value not in allowed:
-            raise OptionError(f"'{value}' is no {what}; allowed are {', '.join(allowed)}")
+            raise OptionError(unknown(value, what, allowed))
     if asked.seconds is not None and not asked.seconds > 0:
         raise OptionError(f"--seconds is {asked.seconds}; it must be greater than 0")
     if name == "replay" and not asked.replay:

@@ -7,16 +7,17 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from mechanics.calibration import Calibration
+from mechanics.quantities import fitting_unit
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_SHOWN = (
-    ("tip_radius_m", "tip's radius", 1e3, "mm"),
-    ("stiffness_n_per_m", "tool's stiffness", 1.0, "N/m"),
-    ("play_m", "play", 1e3, "mm"),
-    ("delay_s", "the force reads late by", 1e3, "ms"),
-)
+_SHOWN = {
+    "tip_radius_m": "tip's radius",
+    "stiffness_n_per_m": "tool's stiffness",
+    "play_m": "play",
+    "delay_s": "the force reads late by",
+}
 
 
 def lines(result: Calibration) -> list[str]:
@@ -24,13 +25,14 @@ def lines(result: Calibration) -> list[str]:
     text = [
         f"calibrated on {result.about.get('on', 'something')}, {result.about.get('presses', '?')} presses"
     ]
-    for key, words, scale, unit in _SHOWN:
+    for key, words in _SHOWN.items():
         value = getattr(result, key)
         between = result.interval.get(key)
         if value is not None:
+            unit, scale = fitting_unit(key, value)
             within = ""
             if between is not None:
-                within = f" (95 % interval {scale * between[0]:.4g} to {scale * between[1]:.4g})"
+                within = f" (95 % sure: {scale * between[0]:.4g} to {scale * between[1]:.4g})"
             text.append(f"  {words}: {scale * value:.4g} {unit}{within}")
     if result.matrix is not None:
         rows = ["[" + ", ".join(f"{v:.3f}" for v in row) + "]" for row in np.asarray(result.matrix)]

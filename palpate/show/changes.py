@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnose.compare.before_after import Changes, Side
+from palpate.show.diagnosis.words import verdict
 from palpate.show.model_view import thing_of, usual_colourings
-from palpate.show.page import Page, new_figure
+from palpate.show.page import Page, file_words, new_figure
 from palpate.show.quantities import Quantity
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import View
@@ -28,7 +29,7 @@ def lines(result: Changes) -> list[str]:
     text = [result.summary]
     for side, words in ((result.before, "first"), (result.after, "second")):
         low, high = side.model.material.young_modulus_ci95_pa
-        named = f"; {side.diagnosis.summary}" if side.diagnosis is not None else ""
+        named = f"; {verdict(side.diagnosis)}" if side.diagnosis is not None else ""
         text.append(
             f"{words}, {side.recording.name}: {side.modulus_pa / 1e3:.2f} kPa (95 % interval "
             f"{low / 1e3:.2f} to {high / 1e3:.2f} kPa){named}"
@@ -129,15 +130,16 @@ def report(result: Changes, path: Path | str) -> Path:
     rows = []
     for side in (result.before, result.after):
         interval = side.model.material.young_modulus_ci95_pa
-        verdict = side.diagnosis.summary if side.diagnosis is not None else "not diagnosed"
+        said = verdict(side.diagnosis) if side.diagnosis is not None else "not diagnosed"
         kilo = (v / 1e3 for v in (side.modulus_pa, *interval, side.beside_effects_pa))
-        rows.append([side.recording.name, *kilo, verdict])
+        rows.append([side.recording.name, *kilo, said])
     page.heading("Both by themselves")
     page.table(["recording", "modulus [kPa]", "from", "to", "beside effects [kPa]", "verdict"], rows)
     for reason in result.reasons:
         page.paragraph(reason[:1].upper() + reason[1:] + ".")
     if result.places:
         page.figure(figure, "The ratio at every place that both pressed, with its 95 % interval.")
+    page.result(as_json(result))
     return page.write(path)
 
 
@@ -152,7 +154,8 @@ def view(result: Changes) -> View:
 
 
 def _what_next(result: Changes) -> str:
-    first, second = result.before.recording.path or "REC", result.after.recording.path or "REC2"
+    first = file_words(result.before.recording.path, "REC")
+    second = file_words(result.after.recording.path, "REC2")
     if result.before.diagnosis is None:
         words = f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"
     elif result.explained_by:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.recording import Recording
-from palpate.show.page import Page, save_figures, subplots
+from palpate.show.page import Page, file_words, save_figures, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
@@ -102,6 +102,7 @@ def report(result: Checkup, path: Path | str) -> Path:
         page.figure(figures[f"finding-{k + 1}"], _caption(finding))
     page.heading("What was measured")
     page.table(["quantity", "here", "usual"], [_seen(*row) for row in result.seen])
+    page.result(as_json(result))
     return page.write(path)
 
 
@@ -121,7 +122,7 @@ def _meaning(result: Checkup) -> str:
 def _what_next(result: Checkup) -> str:
     if any(f.grave for f in result.findings):
         return f"What to do next: {result.findings[0].todo}."
-    return f"What to do next: `palpate reconstruct {result.recording.path or 'REC'} -o MODEL`."
+    return f"What to do next: `palpate reconstruct {file_words(result.recording.path, 'REC')} -o MODEL`."
 
 
 def stretch_figure(recording: Recording, finding: Finding) -> Figure:

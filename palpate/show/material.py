@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from diagnose.specimen.result import Material
-from mechanics.quantities import read_unit, split_key, unit_of_key
+from mechanics.quantities import fitting_unit, quantity_words, split_key
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -19,8 +19,11 @@ def lines(result: Material) -> list[str]:
     text = [f"{result.kind}: {result.curves} curve{'s' * (result.curves != 1)}; {_first(result)}"]
     if np.isfinite(result.young_modulus_pa):
         low, high = result.young_modulus_ci95_pa
-        between = f" (95 % interval {low:.4g} to {high:.4g} Pa)" if np.isfinite(low) else ""
-        text.append(f"Young's modulus {result.young_modulus_pa:.4g} Pa{between}")
+        unit, factor = fitting_unit("young_modulus_pa", result.young_modulus_pa)
+        between = (
+            f" (95 % sure: {factor * low:.3g} to {factor * high:.3g} {unit})" if np.isfinite(low) else ""
+        )
+        text.append(f"Young's modulus {factor * result.young_modulus_pa:.3g} {unit}{between}")
     ranked = sorted(result.error.items(), key=lambda item: item[1])
     text.append(f"held out ({result.held_out}): " + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked))
     if result.closed is not None and result.closed_ci95 is not None:
@@ -58,8 +61,7 @@ def in_words(name: str, value: Any) -> str:
         return ", ".join(in_words(name, v) for v in value) or "none"
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
-    unit, factor = read_unit(unit_of_key(name))
-    return f"{value * factor:.4g}" + (f" {unit}" if unit not in ("", "1") else "")
+    return quantity_words(name, value)
 
 
 def as_json(result: Material) -> dict[str, Any]:

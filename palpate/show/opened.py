@@ -66,4 +66,5 @@ def report(result: Opened, path: Path | str) -> Path:
     else:
         held = result.result if isinstance(result.result, Model) else getattr(result.result, "model", None)
         page.view(view, figure, "The result", held)
+    page.result(as_json(result))
     return page.write(path)

@@ -4,16 +4,21 @@ fetched."""
 from __future__ import annotations
 
 import base64
+import gzip
 import html
 import io
+import json
+import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.files import PNG, Kind, atomic_file, reading
+from palpate.output import plain
+from palpate.show.glossary import Terms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -23,7 +28,11 @@ if TYPE_CHECKING:
 
 PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
 _LEGIBLE = 0.6
-"""Of a picture's own width: the least at which its letters can be read; a phone scrolls the rest."""
+"""Of a picture's own width: the least at which its letters can be read; a tap on a phone shows it so."""
+_MOST_COLUMNS = 3
+"""Of a table that a phone shows side by side; in wider ones each row becomes a list."""
+_MOST_SVG, _MOST_PARTS = 400_000, 3000
+"""Bytes of a packed drawing that a page carries, and its dots and faces; a picture of more stays a PNG."""
 
 
 class Page:
@@ -33,6 +42,8 @@ class Page:
         self.title = title
         self._parts: list[str] = [f"<h1>{html.escape(title)}</h1>"]
         self._live = False
+        self._terms = Terms()
+        self._result = ""
 
     def heading(self, text: str) -> None:
         """A section's heading."""
@@ -40,21 +51,21 @@ class Page:
 
     def lead(self, text: str) -> None:
         """The answer, in large type."""
-        self._parts.append(f'<p class="lead">{html.escape(text)}</p>')
+        self._parts.append(f'<p class="lead">{self._words(text)}</p>')
 
     def paragraph(self, text: str) -> None:
         """Plain words; what stands between backticks is code."""
-        self._parts.append(f"<p>{_words(text)}</p>")
+        self._parts.append(f"<p>{self._words(text)}</p>")
 
     def next_step(self, text: str) -> None:
         """What to do now, marked; what stands between backticks is code."""
-        self._parts.append(f'<p class="next">{_words(text)}</p>')
+        self._parts.append(f'<p class="next">{self._words(text)}</p>')
 
     def cards(self, cards: Sequence[tuple[str, str, str]]) -> None:
         """Answers side by side: (question, answer in a few words, a sentence or two) each."""
         inside = "".join(
             f'<div class="card"><h2>{html.escape(question)}</h2><strong>{html.escape(answer)}</strong>'
-            f"<p>{html.escape(text)}</p></div>"
+            f"<p>{self._words(text)}</p></div>"
             for question, answer, text in cards
         )
         self._parts.append(f'<div class="cards">{inside}</div>')
@@ -64,11 +75,17 @@ class Page:
         wordy = [any(_is_words(row[k]) for row in rows) for k in range(len(header))]
         kind = [' class="words"' if w else "" for w in wordy]
         head = "".join(f"<th{k}>{html.escape(h)}</th>" for k, h in zip(kind, header, strict=True))
+        names = [f' data-of="{html.escape(h)}"' for h in header]
         body = "".join(
-            "<tr>" + "".join(f"<td{k}>{_cell(v)}</td>" for k, v in zip(kind, row, strict=True)) + "</tr>"
+            "<tr>"
+            + "".join(f"<td{k}{of}>{_cell(v)}</td>" for k, of, v in zip(kind, names, row, strict=True))
+            + "</tr>"
             for row in rows
         )
-        self._parts.append(scrolling(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"))
+        stacked = ' class="stack"' if len(header) > _MOST_COLUMNS else ""
+        self._parts.append(
+            scrolling(f"<table{stacked}><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>")
+        )
 
     def part(self, text: str) -> None:
         """HTML as it is."""
@@ -76,12 +93,22 @@ class Page:
 
     def figure(self, picture: Any, caption: str) -> None:
         """A picture: a matplotlib figure, a PNG's path, or an (h, w, 3) uint8 image."""
-        self._parts.append(_figure(picture, caption))
+        self._parts.append(self._figure(picture, caption))
+
+    def figures(self, pictures: Sequence[tuple[Any, str]]) -> None:
+        """Small pictures side by side where there is room, each with its caption."""
+        inside = "".join(self._figure(picture, caption) for picture, caption in pictures)
+        self._parts.append(f'<div class="side">{inside}</div>')
+
+    def result(self, figures: Mapping[str, Any]) -> None:
+        """The numbers of the command's `--json`, which the page offers to keep."""
+        text = json.dumps(plain(dict(figures)), indent=1).replace("</", "<\\/")
+        self._result = f'<script type="application/json" class="result">{text}</script>'
 
     def view(self, view: View, picture: Any, caption: str, model: Model | None = None) -> None:
         """The object to be turned, and of a model a button to press it; without scripts the picture with its
         caption."""
-        self._parts.append(view.html(_figure(picture, caption)))
+        self._parts.append(view.html(self._figure(picture, caption)))
         self._live = True
         if model is not None:
             from palpate.exporting.page.button import button
@@ -93,8 +120,10 @@ class Page:
         return (
             '<!doctype html><html lang="en"><head><meta charset="utf-8">'
             '<meta name="viewport" content="width=device-width, initial-scale=1">'
-            f"<title>{html.escape(self.title)}</title><style>{_style()}</style></head><body>"
+            f"<title>{html.escape(self.title)}</title><style>{_file('page.css')}</style></head><body>"
             + "\n".join(self._parts)
+            + self._terms.listed()
+            + self._result
             + "<footer>Made by palpate. Positions are in the device's frame, forces are those on the tool."
             + f"</footer>{self._scripts()}</body></html>"
         )
@@ -106,11 +135,24 @@ class Page:
         return Path(path)
 
     def _scripts(self) -> str:
+        own = f"<script>{_file('page.js')}</script>"
         if not self._live:
-            return ""
+            return own
         from palpate.show.view3d import scripts
 
-        return scripts()
+        return scripts() + own
+
+    def _words(self, text: str) -> str:
+        return self._terms.linked(_words(text))
+
+    def _figure(self, picture: Any, caption: str) -> str:
+        data, said = png_bytes(picture), html.escape(caption)
+        drawn = (
+            f'<img alt="{said}" style="--legible:{_LEGIBLE * _width(data):.0f}px" '
+            f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
+        )
+        words = f"<figcaption>{self._terms.linked(said)}</figcaption>"
+        return f"<figure>{scrolling(drawn)}{words}{_svg(picture)}</figure>"
 
 
 def scrolling(wide: str) -> str:
@@ -119,22 +161,45 @@ def scrolling(wide: str) -> str:
 
 
 @cache
-def _style() -> str:
-    return files("palpate.show").joinpath("page.css").read_text(encoding="utf-8")
+def _file(name: str) -> str:
+    return files("palpate.show").joinpath(name).read_text(encoding="utf-8")
 
 
 def _words(text: str) -> str:
-    return re.sub(r"`([^`]+)`", r"<code>\1</code>", html.escape(text))
+    marked = re.sub(r"`(palpate [^`]+)`", r'<code class="command">\1</code>', html.escape(text))
+    return re.sub(r"`([^`]+)`", r"<code>\1</code>", marked)
 
 
-def _figure(picture: Any, caption: str) -> str:
-    data = png_bytes(picture)
-    caption = html.escape(caption)
-    drawn = (
-        f'<img alt="{caption}" style="--legible:{_LEGIBLE * _width(data):.0f}px" '
-        f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
-    )
-    return f"<figure>{scrolling(drawn)}<figcaption>{caption}</figcaption></figure>"
+def file_words(path: str | Path | None, otherwise: str) -> str:
+    """A file as one would type it in a command: an embedded recording's name, else the path from here where
+    that is shorter; `otherwise` for None."""
+    if not path:
+        return otherwise
+    from scenes.embedded import embedded_names, embedded_recording
+
+    name = Path(path).name.split(".")[0]
+    if name in embedded_names() and embedded_recording(name).resolve().parent == Path(path).resolve().parent:
+        return name
+    return min(str(path), os.path.relpath(path), key=len)
+
+
+def _svg(picture: Any) -> str:
+    """A matplotlib figure as a packed drawing, for `page.js` to unpack; '' for other pictures."""
+    if not hasattr(picture, "savefig") or _parts(picture) > _MOST_PARTS:
+        return ""
+    from matplotlib import rc_context
+
+    buffer = io.BytesIO()
+    with rc_context({"svg.hashsalt": "palpate", "svg.fonttype": "none"}):
+        picture.savefig(buffer, format="svg", bbox_inches="tight", metadata={"Date": None})
+    packed = base64.b64encode(gzip.compress(buffer.getvalue(), mtime=0)).decode()
+    return f'<script type="text/plain" class="svg">{packed}</script>' if len(packed) < _MOST_SVG else ""
+
+
+def _parts(picture: Any) -> int:
+    """Of a matplotlib figure: what a drawing would hold one by one."""
+    collections = (each for ax in picture.axes for each in ax.collections)
+    return sum(max(len(each.get_paths()), len(each.get_offsets())) for each in collections)
 
 
 def _width(png: bytes) -> int:

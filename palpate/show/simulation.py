@@ -9,7 +9,7 @@ import numpy as np
 
 from mechanics.frames import tangents
 from palpate.show import recording as measured
-from palpate.show.page import Page, new_figure
+from palpate.show.page import Page, file_words, new_figure
 from palpate.show.quantities import DEPTH, ERROR, ORDER
 from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line, Thing, Traces
@@ -75,7 +75,7 @@ def report(result: Simulation, path: Path | str) -> Path:
         f"{'with ' + effects if effects else 'without any effect'}."
     )
     page.paragraph(_meaning(result))
-    where = recording.path or "REC"
+    where = file_words(recording.path, "REC")
     page.next_step(
         f"What to do next: see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
         f"`palpate diagnose {where} --model MODEL --report PAGE.html`; feel it: `palpate touch MODEL`."
@@ -95,6 +95,7 @@ def report(result: Simulation, path: Path | str) -> Path:
                 for name, size in truth["sizes"].items()
             ],
         )
+    page.result(result.as_json())
     return page.write(path)
 
 

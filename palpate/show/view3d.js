@@ -227,7 +227,10 @@ function start(root) {
     halo.visible = true;
     const row = data.table.rows[k];
     part("press-name").textContent = `Press ${k + 1}`;
-    part("numbers").textContent = data.table.head.slice(1).map((name, i) => `${name} ${row[i + 1]}`).join("; ");
+    part("numbers").textContent = data.table.head.slice(1).map((name, i) => {
+      const [, what, unit] = name.match(/^(.*?)(?: \[(.*)\])?$/);
+      return `${what.replace("at x, y, z", "at")} ${row[i + 1]}${unit ? " " + unit : ""}`;
+    }).join("; ");
     part("numbers").setAttribute("aria-live", told ? "polite" : "off");
     for (const other of root.querySelectorAll("tr[aria-selected]")) other.removeAttribute("aria-selected");
     root.querySelectorAll("details.presses tbody tr")[k]?.setAttribute("aria-selected", "true");

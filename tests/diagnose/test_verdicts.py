@@ -4,6 +4,7 @@ name."""
 from __future__ import annotations
 
 import dataclasses
+import re
 from types import SimpleNamespace
 
 import numpy as np
@@ -18,6 +19,7 @@ from diagnose.verdict.held_out import held_out_by_refit
 from diagnose.verdict.next_touch import next_touch
 from mechanics.gap_bins import gap_by_bin
 from palpate.show.demo import diagnosis_json, diagnosis_words
+from palpate.show.diagnosis.words import spoken, verdict
 from reconstruct.placing import presses_on
 
 FAST = DiagnoseOptions(fast=True, bootstrap=100)
@@ -240,16 +242,39 @@ def test_the_page_says_what_to_do_and_its_view_switches_effects_on(delayed, tmp_
     assert not any(line.shown for line in effects)
 
 
-def test_a_bar_says_what_finite_strain_takes_away_beside_an_effect(delayed):
+def test_bars_are_few_and_are_the_gaps_without_and_with_what_was_found(delayed):
     result = delayed[2]
     ax = Figure().subplots()
     result.plot(ax)
-    names = [label.get_text() for label in ax.get_yticklabels()]
-    for name, entry in zip(names, (e for e in result.entries if e.gap_closed is not None), strict=False):
-        alone = entry.name == "finite_strain" or "finite_strain" not in (
-            result.attribution.scores[entry.name].candidate.found.names
-        )
-        assert ("and finite strain" in name) != alone
+    names = [label.get_text().replace("\n", " ") for label in ax.get_yticklabels()]
+    widths = [bar.get_width() for bar in ax.patches]
+    assert names[:2] == ["the simplest simulation", f"with {spoken(result.effects)}"]
+    assert widths[:2] == pytest.approx([1e3 * result.gap_before_n, 1e3 * result.gap_after_n])
+    assert 2 <= len(widths) <= 5 and ax.get_xlabel().endswith("[mN]")
+    assert ax.lines[0].get_xdata()[0] == pytest.approx(1e3 * result.noise_n)
+
+
+def test_what_the_model_already_has_is_not_proposed_again(delayed, tmp_path):
+    """The verdict, the terminal and the page agree; JSON still names every effect."""
+    recording, model, found = delayed
+    both = dataclasses.replace(found, effects=("time_delay", "finite_strain"), kind="effect")
+    linear = dataclasses.replace(both, model=model.with_material(dent_law="linear"))
+    neo = dataclasses.replace(both, model=model.with_material(dent_law="neo-hookean"))
+    alone = dataclasses.replace(neo, effects=("finite_strain",))
+    assert verdict(linear) == "The simulation leaves out time delay and finite strain."
+    assert verdict(neo) == "The simulation leaves out time delay (the model already has finite strain)."
+    assert verdict(alone).startswith("Nothing new is missing") and "already has" in alone.lines()[0]
+    pages = [r.report(tmp_path / "page.html").read_text(encoding="utf-8") for r in (linear, neo, alone)]
+    assert ["put finite strain into the model" in page for page in pages] == [True, False, False]
+    assert ["--corrected" in page for page in pages] == [True, True, False]
+    assert [r.as_json()["verdict"]["effects"] for r in (linear, neo)] == [list(both.effects)] * 2
+
+
+def test_a_terminal_speaks_as_people_do(delayed):
+    said = "\n".join(delayed[2].lines())
+    assert "share" not in said and "p =" not in said and "{" not in said and " ms" in said
+    assert re.search(r"how far: a typical touch is \d+ mN off, \d+ mN with what was found", said)
+    assert max(map(len, said.splitlines())) < 260
 
 
 def test_the_demo_says_which_simulation_is_diagnosed_and_its_json_has_the_verdict(delayed):
@@ -257,7 +282,7 @@ def test_the_demo_says_which_simulation_is_diagnosed_and_its_json_has_the_verdic
     words = diagnosis_words(
         SimpleNamespace(diagnosis=result, model=model, recording=SimpleNamespace(path="demo.csv.gz"))
     )
-    assert "starts from the simplest one" in words and "do not have time delay" in words
+    assert "The simplest simulation" in words and "does not have time delay" in words
     found = diagnosis_json(result)
     assert found["verdict"]["effects"] == ["time_delay"] and found["gap_after_n"] < found["gap_before_n"]
     assert diagnosis_json(None) is None

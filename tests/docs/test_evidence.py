@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 import re
+import subprocess
 import sys
 from pathlib import Path
 
@@ -50,6 +52,60 @@ def test_every_file_can_be_read(path):
     read = evidence.read(path)
     assert read.figures and all(isinstance(f["value"], int | float) for f in read.figures)
     assert all(f["met"] is not None for f in read.figures if f["target"])
+
+
+@pytest.mark.parametrize("page", sorted(evidence.EVIDENCE.glob("*.md")), ids=lambda page: page.stem)
+def test_no_measured_number_of_an_evidence_page_was_typed(page):
+    typed = evidence.unmarked(page.read_text(encoding="utf-8"))
+    assert not typed, (
+        "write it by 'palpate bench NAME --evidence', between <!-- evidence: NAME what --> marks"
+    )
+
+
+def test_a_typed_number_is_seen():
+    page = (
+        "It takes 12.3 ms, closes 96 % and holds 0.022 N (0.021 to 0.026 N) at 1,250 Hz, 3.5 times less; "
+        "<!-- evidence: modulus nodes -->5,000 kPa<!-- end --> `7 s` 2026-11-23 seeds 70,000 size 2 "
+        "<!-- setting -->60 presses<!-- end --> of order 10\n```\n8 mN\n```\n"
+    )
+    seen = [re.sub(r"\s", " ", number) for number in evidence.unmarked(page)]
+    assert seen == ["12.3 ms", "96 %", "0.022 N", "0.021 to 0.026 N", "1,250 Hz", "3.5 times"]
+
+
+def test_a_page_says_when_its_figures_are_older_than_the_code_by_a_release(tmp_path):
+    def git(*words):
+        identity = ("-c", "user.name=x", "-c", "user.email=x@x", "-c", "commit.gpgsign=false")
+        subprocess.run(["git", "-C", str(tmp_path), *identity, *words], check=True, capture_output=True)
+
+    def state(version, code, other=""):
+        (tmp_path / "pyproject.toml").write_text(f'[project]\nname = "p"\nversion = "{version}"\n')
+        for folder, words in (("mechanics", code), ("scenes", other), ("benchmarks", "")):
+            (tmp_path / folder).mkdir(exist_ok=True)
+            (tmp_path / folder / "__init__.py").write_text(words)
+        (tmp_path / "benchmarks" / "speed.py").write_text("from benchmarks._deep import run\n")
+        (tmp_path / "benchmarks" / "_deep.py").write_text("import mechanics\n")
+        git("add", "-A")
+        git("commit", "-q", "--allow-empty", "-m", version)
+        said = subprocess.run(
+            ["git", "-C", str(tmp_path), "rev-parse", "HEAD"], capture_output=True, text=True
+        )
+        return said.stdout.strip()
+
+    git("init", "-q")
+    first = state("0.1.0", "a = 1")
+    made = evidence.Evidence("speed", "palpate bench speed", first, "2026-11-24", "2 cores", ())
+    assert evidence.age(made, tmp_path) == ""
+    state("0.1.0", "a = 2")
+    assert evidence.age(made, tmp_path) == "", "within a release"
+    state("0.2.0", "a = 3")
+    assert "older than the code by 1 release** (of version 0.1.0; this is 0.2.0)" in evidence.age(
+        made, tmp_path
+    )
+    fresh = dataclasses.replace(made, commit=state("0.2.0", "a = 3") + "-dirty")
+    state("0.3.0", "a = 3", "other = 1")
+    assert evidence.age(fresh, tmp_path) == "", "what it measures has not changed"
+    assert "by 2 releases" in evidence.age(made, tmp_path)
+    assert "does not have" in evidence.age(dataclasses.replace(made, commit="f" * 40), tmp_path)
 
 
 def test_a_number_is_filled_with_its_own_decimals(folder):

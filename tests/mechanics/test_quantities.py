@@ -10,7 +10,7 @@ import pytest
 from mechanics import model_files, recording
 from mechanics.effects.registry import effects
 from mechanics.errors import OptionError
-from mechanics.quantities import parse_unit, prefixed, read_unit, unit_of_key
+from mechanics.quantities import parse_unit, prefixed, quantity_words, read_unit, unit_of_key
 from mechanics.schema import Key
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -75,3 +75,24 @@ def test_every_unit_that_the_program_states_can_be_parsed():
     assert len(stated) > 40
     for _, unit in stated:
         parse_unit(unit)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "said"),
+    [
+        ("stiffness_n_per_m", 68e3, "68 N/mm"),
+        ("delay_s", 0.025, "25 ms"),
+        ("tau_s", [0.084, 20.0], "(0.084, 20) s"),
+        ("tau_s", 20.0, "20 s"),
+        ("young_modulus_pa", 28910.0, "28.9 kPa"),
+        ("young_modulus_pa", 2.5e6, "2.5 MPa"),
+        ("bias_n", [0.05, 0.0, -0.01], "(50, 0, -10) mN"),
+        ("mu", 0.123, "0.12"),
+        ("diffusivity_m2_per_s", 8.7e-7, "0.87 mm²/s"),
+        ("inside", True, "yes"),
+        ("g", [0.3], "0.3"),
+        ("pattern", list(range(20)), "0 to 19 (20 values)"),
+    ],
+)
+def test_values_are_said_as_people_write_them(key, value, said):
+    assert quantity_words(key, value) == said

@@ -10,20 +10,91 @@ import sys
 
 import pytest
 
+from mechanics.names import near, unknown
 from palpate import cli
 from palpate.child import module_environment
 from palpate.operations._flags import in_order
 from palpate.operations._list import commands
-from palpate.operations._run import parser_of
+from palpate.operations._run import command_operation, parser_of
 from palpate.operations.completion import SHELLS, completion
 
 UNITS = {"m", "n", "s", "hz", "pa", "kg", "n/m", "m/s", "mm", "deg", "rad", "n/s", "n_s/m", "m_per_s", "1"}
 
 
+CONTRACT = {
+    "demo": "--fast",
+    "reconstruct": "-o --method --mesh-size --poisson-ratio --contact-threshold --indentation --surface",
+    "replay": "-o --renderer",
+    "press": "--at --direction --depth --speed -o --expect --tolerance",
+    "compare": "--model",
+    "diagnose": "--model --apply",
+    "touch": "--device --headless --seconds --record",
+    "simulate": "-o --effect --seal --truth",
+    "batch": "-o --do --scheduler",
+    "import": "-o",
+    "export": "--to -o",
+    "calibrate": "-o",
+}
+"""Flags that others were promised: help always shows them."""
+RANDOM = ("reconstruct", "compare", "diagnose", "touch", "simulate", "batch", "explore", "open", "material")
+
+
+@pytest.mark.parametrize("name", commands())
+def test_help_shows_what_most_use_and_all_that_was_promised(name):
+    parser = parser_of(name)
+    short, whole = parser.format_help(), getattr(parser, "format_all_help", parser.format_help)()
+    flags = {f: a for a in parser._actions for f in a.option_strings}
+    shown = {a for a in flags.values() if not getattr(a, "rare", False)}
+    assert len(shown) <= 15, "ten of its own, and help, --json, --seed, what was promised"
+    for flag in CONTRACT.get(name, "").split() + ["--seed"] * (name in RANDOM):
+        assert flags[flag] in shown and flag in short
+    assert all(re.search(rf"{flag}\b", whole) for flag in flags)
+    hidden = [f for f, a in flags.items() if a not in shown]
+    assert not [f for f in hidden if re.search(rf"(?<![\w-]){f}(?![\w-])", short.partition("options:")[2])]
+    assert bool(hidden) == (f"more options: palpate {name} --help-all" in short)
+    operation, _ = command_operation(name)
+    assert operation.often <= {f for f in operation.fields if f not in operation.own}
+
+
+def test_help_all_ends_well(capsys):
+    with pytest.raises(SystemExit) as stop:
+        cli.main(["press", "--help-all"])
+    assert not stop.value.code and "--snap-to-touches" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize(
+    ("words", "meant"),
+    [
+        (["tuch"], "'tuch' is no command; did you mean touch?"),
+        (["press", "demo", "--att", "0,0,0"], "'--att' is no option; did you mean --at?"),
+        (["press", "demo", "--spede=1"], "'--spede' is no option; did you mean --speed?"),
+        (["press", "demo", "--at", "0,0,0", "--renderer", "fme"], "did you mean fem?"),
+        (["press", "noduel", "--at", "0,0,0"], "'noduel' is no scene; did you mean nodule?"),
+        (["simulate", "block", "-o", "x.csv", "--effect", "friction-slipp=1"], "did you mean friction_slip?"),
+        (["diagnose", "silicone-1-cylinder", "--without", "frction"], "did you mean friction_slip?"),
+        (["touch", "--headless", "--device", "simulted"], "did you mean simulated?"),
+    ],
+)
+def test_what_was_meant_is_told_in_one_line(words, meant, capsys, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    try:
+        code = cli.main(words)
+    except SystemExit as stop:
+        code = stop.code
+    said = capsys.readouterr().err.strip().splitlines()
+    assert code == 2 and meant in said[-1] and len(said) == 1
+
+
+def test_what_is_like_nothing_is_answered_with_what_is_allowed():
+    assert near("zzz", commands()) == []
+    assert unknown("zzz", "command", ["a", "b"]) == "'zzz' is no command; allowed are a, b"
+    assert near("MESH-SIZE-M", ["mesh_size_m"]) == ["mesh_size_m"]
+
+
 @pytest.mark.parametrize("name", commands())
 def test_help_says_units_before_defaults_and_nothing_that_only_python_has(name):
     parser = parser_of(name)
-    text = " ".join(parser.format_help().split())
+    text = " ".join(getattr(parser, "format_all_help", parser.format_help)().split())
     assert "(default: )" not in text and "(default: None)" not in text and "SUPPRESS" not in text
     assert not re.search(r"\bNone\b", text)
     assert not re.search(r"\(default: [^()]*\) \[", text), "a unit stands after the default"

@@ -8,6 +8,7 @@ import numpy as np
 
 from diagnose.compare.comparison import Comparison
 from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS, stiffness_along
+from palpate.show.bars import draw_errors, height_of
 from palpate.show.model_view import facing, local, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, spread_over
 from palpate.show.page import new_figure
@@ -70,6 +71,14 @@ def still(result: Comparison) -> Figure:
 
 def _worst(result: Comparison) -> int:
     return int(np.argmax(result.press_rmse_n["fem"]))
+
+
+def error_bars(result: Comparison) -> Figure:
+    """Error of each model over all held-out presses."""
+    bars = [(name, result.rmse_n[name], COLOURS[name]) for name in compared(result)]
+    figure = Figure(figsize=(5.5, height_of(len(bars))), layout="constrained")
+    draw_errors(figure.subplots(), bars, result.noise_n, "typical error of a held-out press [mN]")
+    return figure
 
 
 def by_press(result: Comparison) -> Figure:

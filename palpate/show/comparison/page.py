@@ -4,10 +4,19 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from diagnose.compare.comparison import Comparison, verdict
+from diagnose.compare.comparison import Comparison
 from diagnose.compare.models import HOMOGENEOUS, RIVALS
-from palpate.show.comparison.figures import DEPTH_M, across_region, by_press, compared, scatter, still, view
-from palpate.show.page import Page
+from palpate.show.comparison.figures import (
+    DEPTH_M,
+    across_region,
+    by_press,
+    compared,
+    error_bars,
+    scatter,
+    still,
+    view,
+)
+from palpate.show.page import Page, file_words
 
 
 def report(result: Comparison, path: Path | str) -> Path:
@@ -15,13 +24,12 @@ def report(result: Comparison, path: Path | str) -> Path:
     recording = result.recording
     assert recording is not None, "only what `compare` returned knows its recording"
     page = Page(f"Who predicts the next touch: {recording.name}")
-    words = verdict(result)
-    page.lead(words[:1].upper() + words[1:] + ".")
+    page.lead(lead(result))
     page.paragraph(meaning(result))
-    model = result.model.path or "MODEL"
+    model = file_words(result.model.path, "MODEL")
     page.next_step(
         f"What to do next: feel it: `palpate touch {model} --beside hunt-crossley`; ask what the FEM still "
-        f"leaves out: `palpate diagnose {recording.path or 'REC'} --model {model}`."
+        f"leaves out: `palpate diagnose {file_words(recording.path, 'REC')} --model {model}`."
     )
     page.view(
         view(result),
@@ -29,6 +37,7 @@ def report(result: Comparison, path: Path | str) -> Path:
         "Left: FEM's error at each press, held out of every fit. Right: the press that it predicts worst.",
         result.model,
     )
+    page.figure(error_bars(result), "Error at places that were held out of every fit, of each model.")
     page.paragraph(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
         "paths. Errors are root mean squares of the force vector; the sensor's noise alone is "
@@ -69,7 +78,26 @@ def report(result: Comparison, path: Path | str) -> Path:
         "and they have no tangential force. FEM carries shape and base to untouched places, and is as "
         "good as the shape."
     )
+    page.result(result.as_json())
     return page.write(path)
+
+
+def lead(result: Comparison) -> str:
+    """Which model predicts the next touch best, and by how much."""
+    best = min(RIVALS, key=lambda name: result.rmse_n[name])
+    ratio = result.rmse_n[best] / max(result.rmse_n["fem"], 1e-12)
+    if ratio >= 1.05:
+        return (
+            f"The FEM predicts a touch that it has not seen {ratio:.1f} times better than the better of the "
+            f"two 1D models ({_named(best)})."
+        )
+    if ratio > 0.95:
+        return f"The FEM and the better of the two 1D models ({_named(best)}) predict the next touch alike."
+    return f"A 1D model ({_named(best)}) predicts the next touch {1 / ratio:.1f} times better than the FEM."
+
+
+def _named(model: str) -> str:
+    return {"kelvin-voigt": "Kelvin–Voigt", "hunt-crossley": "Hunt–Crossley", "fem": "FEM"}.get(model, model)
 
 
 def meaning(result: Comparison) -> str:
@@ -77,8 +105,8 @@ def meaning(result: Comparison) -> str:
     best = min(RIVALS, key=lambda name: result.rmse_n[name])
     fem, other, noise = (1e3 * v for v in (result.rmse_n["fem"], result.rmse_n[best], result.noise_n))
     words = (
-        f"At a place that it has not seen the FEM is {fem:.0f} mN off, {best} {other:.0f} mN, of which the "
-        f"sensor's noise is {noise:.0f} mN."
+        f"At a place that it has not seen the FEM is {fem:.0f} mN off, {_named(best)} {other:.0f} mN, of "
+        f"which the sensor's noise is {noise:.0f} mN."
     )
     if result.rmse_n["fem"] < 1.3 * result.noise_n:
         words += " The FEM's share of its error is smaller than what the sensor can tell."

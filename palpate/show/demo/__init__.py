@@ -13,7 +13,8 @@ from palpate.servo.report import ServoReport
 from palpate.show import model as made
 from palpate.show.demo.figures import figures, view
 from palpate.show.diagnosis.gaps import known
-from palpate.show.page import Page, save_figures
+from palpate.show.diagnosis.words import force_words, spoken, verdict
+from palpate.show.page import Page, file_words, save_figures
 from palpate.show.reconstruction.exploration import force_over_time
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ def lines(result: DemoResult) -> list[str]:
         f"rendered against measured force: {result.replay_rmse_n:.3f} N rms of "
         f"{result.contact_force_rms_n:.3f} N rms",
         str(result.servo),
-        *([f"diagnosis: {result.diagnosis.summary}"] if result.diagnosis else []),
+        *([f"diagnosis: {verdict(result.diagnosis)}"] if result.diagnosis else []),
     ]
 
 
@@ -74,41 +75,53 @@ def report(result: DemoResult, path: Path | str) -> Path:
     low, high = (v / 1e3 for v in model.material.young_modulus_ci95_pa)
     page = Page(f"Palpate: {result.recording.object_name}, touched and felt")
     page.lead(
-        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
-        f"(95 % interval {low:.1f} to {high:.1f} kPa{_truth(result)}) that feels like the object to "
-        f"{1e3 * result.replay_rmse_n:.0f} mN, of {1e3 * result.contact_force_rms_n:.0f} mN in a touch."
+        f"{len(model.presses)} presses became a model that feels like the object: it is typically "
+        f"{force_words(result.replay_rmse_n)} off, in touches of {force_words(result.contact_force_rms_n)}."
     )
     page.paragraph(
-        f"{_meaning(result)} The loop that a hand would feel held {servo.rate_hz:.0f} Hz with "
-        f"{servo.missed_ticks} ticks missed."
+        f"{_meaning(result)} The object's stiffness: a Young's modulus of "
+        f"{model.material.young_modulus_pa / 1e3:.1f} kPa (95 % sure: {low:.1f} to {high:.1f} kPa"
+        f"{_truth(result)}). A hand would have felt it at {servo.rate_hz:.0f} forces a second"
+        f"{_missed(servo)}."
     )
-    page.next_step(f"What to do next: feel it: `palpate touch {model.path or folder / 'model'}`.")
+    page.next_step(
+        "What to do next: feel it: `palpate touch "
+        f"{file_words(model.path or folder / 'model', 'MODEL')}`; then bring in your own recording: "
+        "`palpate open FILE`."
+    )
     drawn = figures(result)
     saved = save_figures(folder, drawn)
     page.view(
         view(result),
         saved["object"],
-        "Left: contact points and fixed base. Right: how uncertain the shape is.",
+        "Left: where the object was touched, and its glued base. Right: how uncertain its shape is.",
         result.model,
     )
-    page.paragraph(
-        f"Surface: {result.reconstruction.surface.method}; {result.reconstruction.surface.reason}."
-    )
-    page.heading("What the hand did")
-    page.figure(saved["force"], "Force over time: the base is traced in phase I; circles are first touches.")
-    page.heading("Measured against rendered")
-    page.figure(
-        saved["presses"], "Four presses, from the softest to the hardest, replayed through the renderer."
-    )
+    page.heading("Measured beside rendered")
+    page.figure(drawn["presses"], "Four presses, from the softest to the hardest, measured and rendered.")
     if result.diagnosis is not None:
         page.heading("What a simpler simulation would leave out")
         page.paragraph(diagnosis_words(result))
-    page.heading("The 1 kHz loop")
-    page.paragraph(f"{str(servo).replace(chr(10), '; ')}. {sent_words(servo)}".strip())
-    page.figure(saved["servo"], "Every tick of the servo process against the simulated hand.")
-    page.heading("Time")
+    page.heading("What the hand did")
+    page.figure(
+        drawn["force"], "Force over time: first the base is traced (phase I), then the object is pressed."
+    )
+    page.heading("How it was made")
+    surface = result.reconstruction.surface
+    page.paragraph(f"Shape: {surface.method}, {surface.reason}.")
+    page.paragraph(
+        f"The loop of 1000 forces a second: {str(servo).replace(chr(10), '; ')}. {sent_words(servo)}"
+    )
     page.table(["stage", "time [s]"], [[name, round(s, 1)] for name, s in result.seconds.items()])
+    page.result(as_json(result))
+    for figure in drawn.values():
+        plt.close(figure)
     return page.write(path)
+
+
+def _missed(servo: ServoReport) -> str:
+    missed = servo.missed_ticks
+    return f", {missed} of which came late" if missed else ", none of them late"
 
 
 def _meaning(result: DemoResult) -> str:
@@ -122,22 +135,23 @@ def diagnosis_words(result: DemoResult) -> str:
     """What the diagnosis found, and which of the two simulations it is about."""
     found, law = result.diagnosis, result.model.material.dent_law
     assert found is not None
-    deep = law != "linear"
+    there = {known()} if law != "linear" else set()
     words = (
-        "Two simulations are compared with the hand here. The renderer, whose curves stand above, uses the "
-        f"dent law that the presses fit best ({law}). The diagnosis starts from the simplest one, linear and "
-        f"for small strain, and asks what that leaves out: {found.summary}. At places that it was not fitted "
-        f"to, the simplest simulation is {1e3 * found.gap_before_n:.0f} mN off"
+        "The simplest simulation, of small deformations and one stiffness, is "
+        f"{1e3 * found.gap_before_n:.0f} mN off at places that it was not fitted to"
     )
     if found.effects:
-        words += f", with what was found {1e3 * found.gap_after_n:.0f} mN"
-    words += f"; the sensor's noise is {1e3 * found.noise_n:.0f} mN."
-    if deep and known() in found.effects:
-        words += " Finite strain is in the rendered curves already: that is what the law stands for."
-    rest = [name.replace("_", " ") for name in found.effects if not (deep and name == known())]
+        words += f"; with {spoken(found.effects)} it is {1e3 * found.gap_after_n:.0f} mN off"
+    words += f". The sensor's noise is {1e3 * found.noise_n:.0f} mN."
+    has = [name for name in found.effects if name in there]
+    if has:
+        words += f" The model that you feel has {spoken(has)} already: its {law} law stands for it."
+    rest = [name for name in found.effects if name not in there]
     if rest:
-        words += f" The rendered curves do not have {' and '.join(rest)}: what to do about that stands in "
-        words += f"the page of `palpate diagnose {result.recording.path or 'REC'} --report PAGE.html`."
+        words += f" It does not have {spoken(rest)}: what to do about that stands in the page of "
+        words += f"`palpate diagnose {file_words(result.recording.path, 'REC')} --report PAGE.html`."
+    if found.candidates:
+        words += f" These touches cannot rule out {spoken(found.candidates, 'or')}."
     return words
 
 

@@ -1,4 +1,4 @@
-"""The demo's pictures and view: what was touched, measured against rendered force, the servo's ticks."""
+"""The demo's pictures and view: what was touched, measured against rendered force."""
 
 from __future__ import annotations
 
@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from palpate.demo import DemoResult
-from palpate.servo.histogram import lower_edge_ns
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
 from palpate.show.page import subplots
@@ -91,28 +90,6 @@ def _simulated(result: DemoResult, t: np.ndarray) -> list[Line]:
     return lines if found.effects else lines[:1]
 
 
-def servo_histogram(axes: np.ndarray, result: DemoResult) -> np.ndarray:
-    """Compute time and lateness of every tick, logarithmic counts."""
-    from matplotlib.ticker import LogLocator, NullFormatter
-
-    for ax, histogram, name in (
-        (axes[0], result.servo.compute, "compute time of a tick [µs]"),
-        (axes[1], result.servo.lateness, "start after the deadline [µs]"),
-    ):
-        lower_us = np.array([lower_edge_ns(i) for i in range(len(histogram.counts) + 1)]) / 1e3
-        used = np.flatnonzero(histogram.counts)
-        least = max(lower_us[used[0]], 0.1) if len(used) else 0.1
-        edges = np.geomspace(least, max(histogram.greatest_ns / 1e3, 2 * least) * 1.05, 41)
-        counts, _ = np.histogram(lower_us[:-1].clip(least), edges, weights=histogram.counts)
-        ax.stairs(counts, edges, fill=True, color="#457b9d")
-        ax.set(xlabel=name, ylabel="ticks", yscale="log", xscale="log", xlim=(edges[0], edges[-1]))
-        wide = edges[-1] > 300 * edges[0]
-        ax.xaxis.set_major_locator(LogLocator(subs=(1.0,) if wide else (1.0, 2.0, 5.0)))
-        ax.xaxis.set_major_formatter("{x:g}")
-        ax.xaxis.set_minor_formatter(NullFormatter())
-    return axes
-
-
 def figures(result: DemoResult) -> dict[str, Figure]:
     """The report's pictures by name."""
     force, ax = subplots(1, 1, figsize=(9, 3))
@@ -123,6 +100,4 @@ def figures(result: DemoResult) -> dict[str, Figure]:
     draw_object(axes[1], result.model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
     presses, axes = subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True)
     measured_against_rendered(axes, result)
-    loop, axes = subplots(1, 2, figsize=(9, 2.6))
-    servo_histogram(axes, result)
-    return {"force": force, "object": thing, "presses": presses, "servo": loop}
+    return {"force": force, "object": thing, "presses": presses}

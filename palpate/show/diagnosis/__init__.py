@@ -1,4 +1,4 @@
-"""A diagnosis: pictures, view, page. Its lines and JSON are the science's own."""
+"""A diagnosis: lines, pictures, view, page. Its JSON is the science's own."""
 
 from __future__ import annotations
 
@@ -10,13 +10,14 @@ from diagnose.verdict.result import Diagnosis
 from palpate.show.diagnosis.figures import draw, view
 from palpate.show.diagnosis.gaps import diagnosed, gap_at, sites_of
 from palpate.show.diagnosis.page import report
+from palpate.show.diagnosis.words import lines
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_arrow, add_dots, add_object, surface_of
 
 if TYPE_CHECKING:
     from pyvista import Plotter
 
-__all__ = ["draw", "place", "report", "view"]
+__all__ = ["draw", "lines", "place", "report", "view"]
 
 
 def place(result: Diagnosis, plotter: Plotter) -> None:

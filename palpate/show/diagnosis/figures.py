@@ -10,22 +10,21 @@ from scipy.spatial.distance import cdist
 
 from diagnose.verdict.result import Diagnosis
 from mechanics.model import Model
+from palpate.show.bars import draw_errors, height_of
 from palpate.show.diagnosis.gaps import (
     beside,
     diagnosed,
     gap_at,
     gap_of,
-    known,
     press_gaps,
     ranked,
     residual_with,
     shown_entries,
     sideways,
     sites_of,
-    with_strain,
     worst_press,
 )
-from palpate.show.diagnosis.words import percent
+from palpate.show.diagnosis.words import spoken
 from palpate.show.model_view import facing, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, view_axes
 from palpate.show.page import new_figure
@@ -34,7 +33,7 @@ from palpate.show.view3d import View
 from palpate.show.view3d_parts import Colouring, Line
 from render.felt_surface import felt_surface
 
-MEASURED, IDEAL, IMPROVED, PALE = "#1d3557", "#e76f51", "#2a9d8f", "#c9c9c9"
+MEASURED, IDEAL, IMPROVED, RIVAL = "#1d3557", "#e76f51", "#2a9d8f", "#e9b44c"
 
 
 def first_picture(model: Model, result: Diagnosis) -> Any:
@@ -49,9 +48,8 @@ def first_picture(model: Model, result: Diagnosis) -> Any:
 
 
 def gains_picture(result: Diagnosis) -> Any:
-    """What each effect takes away."""
-    bars = len(shown_entries(result))
-    figure = new_figure(9, 1.3 + 0.36 * bars, layout="constrained")
+    """How far the simulation is off, as it is and with what was found."""
+    figure = new_figure(5.5, height_of(len(_bars(result))), layout="constrained")
     draw(result, figure.subplots())
     return figure
 
@@ -132,64 +130,50 @@ def _press(ax: Any, result: Diagnosis, press: int) -> None:
     ax.spines[["top", "right"]].set_visible(False)
 
 
+def _bars(result: Diagnosis) -> list[tuple[str, float, str]]:
+    """(what is simulated, gap N, colour): as it is, with what was found, with each that is not ruled out;
+    where nothing was found, with the best that was tried."""
+    bars = [("the simplest simulation", result.gap_before_n, IDEAL)]
+    if result.effects:
+        bars.append((f"with {spoken(result.effects)}", result.gap_after_n, IMPROVED))
+    rest = [e for e in shown_entries(result) if e.name not in result.effects]
+    if not result.effects and not result.candidates:
+        rest = sorted(rest, key=lambda e: e.gap_after_n)[:1]
+    return bars + [(f"with {beside(result, e.name)}", e.gap_after_n, RIVAL) for e in rest]
+
+
 def draw(result: Diagnosis, ax: Any) -> None:
-    """The share of the gap that each effect closes at places not fitted, best first; hatched: what finite
-    strain, which an effect was tried beside, closes by itself."""
-    entries = shown_entries(result)
-    colours = [
-        IMPROVED if e.name in result.effects else "#f4a261" if e.name in result.candidates else PALE
-        for e in entries
-    ]
-    values = [float(np.clip(e.gap_closed or 0.0, 0.0, 1.0)) for e in entries]
-    names = [beside(result, e.name) for e in entries]
-    ax.barh(names, values, color=colours)
-    strain = next((e.gap_closed or 0.0 for e in result.entries if e.name == known()), 0.0)
-    both = [
-        float(np.clip(strain, 0.0, v)) * with_strain(result, e.name)
-        for v, e in zip(values, entries, strict=True)
-    ]
-    if any(both):
-        ax.barh(
-            names,
-            both,
-            color="none",
-            edgecolor="#4a5560",
-            hatch="////",
-            lw=0,
-            label=f"by {known().replace('_', ' ')} itself",
-        )
-        ax.legend(fontsize=8.5, frameon=False, loc="lower right")
-    for k, (value, entry) in enumerate(zip(values, entries, strict=True)):
-        worse = (entry.gap_closed or 0.0) < 0
-        ax.text(value + 0.015, k, "none (worse)" if worse else percent(value), va="center", fontsize=8.5)
-    ax.invert_yaxis()
-    ax.set(xlim=(0, 1.12), xlabel="share of the difference that it takes away")
-    ax.set_xticks([0, 0.5, 1], ["0 %", "50 %", "100 %"])
-    ax.set_title("effects tried (green: named, orange: not ruled out)", fontsize=11)
-    ax.spines[["top", "right"]].set_visible(False)
+    """How far the simulation is off at places not fitted (mN rms): as it is, with what was found (green),
+    with what is not ruled out (yellow); the line is the sensor's noise."""
+    draw_errors(ax, _bars(result), result.noise_n, "typical difference from the measured force [mN]")
 
 
-def curves_picture(result: Diagnosis) -> Any:
-    """The mean gap along depth and along speed."""
-    figure = new_figure(11, 3.0, layout="constrained")
-    names = ("depth (mm)", "speed of pressing (mm/s)")
-    for ax, name, colour in zip(figure.subplots(1, 2, sharey=True), names, (MEASURED, MEASURED), strict=True):
+def curve_pictures(result: Diagnosis) -> list[tuple[Any, str]]:
+    """The mean gap along depth and along speed, a picture each."""
+    made = []
+    for name, along in (
+        ("depth (mm)", "depth [mm]"),
+        ("speed of pressing (mm/s)", "speed of the tip, going in positive [mm/s]"),
+    ):
+        figure = new_figure(5.2, 2.9, layout="constrained")
+        ax = figure.subplots()
         x, mean, error = result.where.curves[name]
-        ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", color=colour)
+        ax.errorbar(x, mean * 1e3, error * 1e3, marker="o", ms=4, color=MEASURED)
         ax.axhline(0, color="#999999", lw=0.8)
-        ax.set_xlabel(
-            name.replace("(", "[").replace(")", "]") + (", going in positive" if "speed" in name else "")
-        )
+        ax.set(xlabel=along, ylabel="measured less simulated [mN]")
         ax.spines[["top", "right"]].set_visible(False)
-    figure.axes[0].set_ylabel("measured less simulated [mN]")
-    return figure
+        of = "depth" if "depth" in name else "speed of the tip"
+        made.append((figure, f"Mean difference at each {of}."))
+    return made
 
 
-def presses_picture(result: Diagnosis, count: int = 4) -> Any:
-    """Force against time of the presses with the largest gap, after the first."""
-    shown = [press for press in ranked(result) if press != worst_press(result)][:count]
-    figure = new_figure(13, 3.2, layout="constrained")
-    for ax, press in zip(figure.subplots(1, len(shown), squeeze=False)[0], shown, strict=True):
+def press_pictures(result: Diagnosis, count: int = 4) -> list[tuple[Any, str]]:
+    """Force against time of the presses with the largest gap, after the first, a picture each."""
+    made = []
+    for press in [press for press in ranked(result) if press != worst_press(result)][:count]:
+        figure = new_figure(5.2, 2.9, layout="constrained")
+        ax = figure.subplots()
         _press(ax, result, int(press))
-    figure.axes[0].legend(fontsize=8, frameon=False)
-    return figure
+        ax.legend(fontsize=8.5, frameon=False)
+        made.append((figure, f"Press {int(press) + 1}."))
+    return made

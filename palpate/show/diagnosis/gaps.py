@@ -9,6 +9,7 @@ import numpy as np
 
 from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
+from mechanics.effects.finite_strain import LAW as FINITE_STRAIN_LAW
 from mechanics.effects.registry import effects
 from mechanics.model import Model
 from mechanics.presses import Presses
@@ -16,6 +17,8 @@ from mechanics.recording import Recording
 from palpate.show.object3d import spread_over
 
 MOST_EFFECTS = 8
+MOST_SHOWN = 3
+"""Effects that a picture shows; the table has the rest."""
 
 
 def diagnosed(result: Diagnosis) -> tuple[Recording, Model]:
@@ -59,6 +62,26 @@ def worst_press(result: Diagnosis) -> int:
     return int(there[np.argmax(press_gaps(result)[there])])
 
 
+def in_model(result: Diagnosis) -> set[str]:
+    """The effects that the model which was diagnosed renders already, by its law or its [effects]."""
+    if result.model is None:
+        return set()
+    law = {known()} if result.model.material.dent_law == FINITE_STRAIN_LAW else set()
+    return law | set(result.model.effects)
+
+
+def depth_contrast(result: Diagnosis) -> float:
+    """How many times larger (rms) the gap is in the deepest third of the contact samples than in the
+    shallowest; nan where nothing was counted."""
+    t, before, _ = gap_of(result)
+    depth, square = t.travel[t.counted, 0], (before[t.counted] ** 2).sum(axis=1)
+    if not len(depth):
+        return float("nan")
+    low, high = np.quantile(depth, [1 / 3, 2 / 3])
+    shallow = np.maximum(square[depth <= low].mean() - 3 * t.noise_n**2, 1e-3 * square.mean())
+    return float(np.sqrt(max(square[depth >= high].mean() - 3 * t.noise_n**2, 0.0) / shallow))
+
+
 def sideways(result: Diagnosis) -> bool:
     """Whether the gap is in the force along the surface more than in that into it."""
     return result.where.leading.axis == "direction"
@@ -98,4 +121,7 @@ def beside(result: Diagnosis, name: str) -> str:
 
 
 def shown_entries(result: Diagnosis) -> list[Any]:
-    return [e for e in result.entries if e.gap_closed is not None][:MOST_EFFECTS]
+    """Those that pictures show: what is named and its rivals, else the best that were tried."""
+    judged = [e for e in result.entries if e.gap_closed is not None]
+    named = {*result.effects, *result.candidates}
+    return ([e for e in judged if e.name in named] or judged)[:MOST_SHOWN]

@@ -1,4 +1,4 @@
-"""The report of a diagnosis: the three answers on the first screen, with pictures, then the evidence."""
+"""The report of a diagnosis: the answer, what it means, what to do, how sure it is; then the evidence."""
 
 from __future__ import annotations
 
@@ -10,67 +10,74 @@ from diagnose.apply import improved
 from diagnose.verdict.result import Diagnosis
 from mechanics.model import Model
 from palpate.show.diagnosis.figures import (
-    curves_picture,
+    curve_pictures,
     first_picture,
     gains_picture,
     modulus_picture,
-    presses_picture,
+    press_pictures,
     view,
 )
-from palpate.show.diagnosis.gaps import MOST_EFFECTS, beside, diagnosed, gap_of, with_strain
+from palpate.show.diagnosis.gaps import MOST_EFFECTS, diagnosed, gap_of, in_model, known, with_strain
 from palpate.show.diagnosis.parameters import parameter_rows, short
 from palpate.show.diagnosis.words import (
     AXIS_WORDS,
     ERROR_WORDS,
     answers,
+    chance_words,
+    consequence,
     force_words,
     meaning,
+    missing,
     percent,
     share_words,
     spoken,
+    touch_words,
     verdict,
 )
-from palpate.show.page import Page
+from palpate.show.page import Page, file_words
 
 
 def report(result: Diagnosis, path: Path | str) -> Path:
     """Write one self-contained HTML page; returns its path."""
     recording, model = diagnosed(result)
-    t, _, _ = gap_of(result)
-    typical = t.force_rms_n
-    page = Page(f"Simulated touch against measured touch: {recording.name}")
+    typical = gap_of(result)[0].force_rms_n
+    page = Page(f"Measured and simulated touch: {recording.name}")
     page.lead(verdict(result))
-    page.cards(answers(result, typical))
-    page.next_step(_what_next(result, model, recording.path or "REC"))
+    page.paragraph(consequence(result, typical))
+    page.next_step(_what_next(result, model, file_words(recording.path, "REC")))
+    page.cards(answers(result))
     page.view(view(result), first_picture(model, result), _caption(result), model)
     page.figure(gains_picture(result), _gains_caption(result))
     _next_touch(page, result)
-    _modulus_after(page, model, result)
-    _how_large(page, result)
+    _how_large(page, model, result)
     _moduli(page, model, result)
     _tried(page, result)
     _follows(page, result)
     _own_errors(page, result)
+    page.result(result.as_json())
     return page.write(path)
 
 
-def _what_next(result: Diagnosis, model: Model, recording: Path | str) -> str:
+def _what_next(result: Diagnosis, model: Model, recording: str) -> str:
     """What to do with the answer, in a sentence."""
-    kept = [e.name for e in result.entries if e.name in result.effects and e.domain != "instrument"]
-    instrument = [e.name for e in result.entries if e.name in result.effects and e.domain == "instrument"]
+    asked = {e.name: e.domain for e in result.entries if e.name in missing(result)}
+    kept = [name for name, domain in asked.items() if domain != "instrument"]
+    instrument = [name for name, domain in asked.items() if domain == "instrument"]
     said = []
+    if model.path is not None:
+        recording += f" --model {file_words(model.path, 'MODEL')}"
     if kept:
         said.append(
-            f"feel the object with {spoken(kept)}: `palpate diagnose {recording} --apply BETTER`, then "
-            "`palpate touch BETTER`"
+            f"put {spoken(kept)} into the model, and feel it: `palpate diagnose {recording} --apply BETTER`, "
+            "then `palpate touch BETTER`"
         )
     if instrument:
         said.append(
-            f"take {spoken(instrument)} off the readings: "
+            f"take {spoken(instrument)} off the readings, since it is the instrument's and not the object's: "
             f"`palpate diagnose {recording} --corrected BETTER.csv.gz`"
         )
     if not said:
-        said.append(f"feel it: `palpate touch {model.path or 'MODEL'}`")
+        said.append(f"feel it: `palpate touch {file_words(model.path, 'MODEL')}`")
     if result.next_touch is not None and result.unsettled:
         said.append("touch once more where it says below, which would settle what is open")
     return "What to do next: " + "; ".join(said) + "."
@@ -86,59 +93,39 @@ def _caption(result: Diagnosis) -> str:
 
 
 def _gains_caption(result: Diagnosis) -> str:
-    strain = any(with_strain(result, e.name) for e in result.entries)
-    return (
-        "How much of the difference each effect takes away at places that the fit had not seen"
-        + (
-            "; most were tried beside finite strain, which every soft solid has, and the hatched part of a "
-            "bar is what that takes away by itself"
-            if strain
-            else ""
-        )
-        + "."
-        + ("" if result.effects else " None of them is large and steady enough to be named.")
-    )
+    simplest = "The simplest simulation knows small deformations of one stiffness alone"
+    there = [n for n in result.effects if n in in_model(result)]
+    has = f"; the model itself has {spoken(there)} already" if there else ""
+    nothing = "" if result.effects else " Nothing that was tried is large and steady enough to be named."
+    return f"{simplest}{has}. All at places that the fit had not seen.{nothing}"
 
 
 def _next_touch(page: Page, result: Diagnosis) -> None:
-    touch = result.next_touch
-    if touch is None:
+    if result.next_touch is None:
         return
     page.heading("To be sure: touch here next" if result.unsettled else "If you touch it once more")
     hangs = "" if result.unsettled else " Nothing hangs on it: the answer above stands without."
-    if touch.kind != "press":
-        page.paragraph(
-            f"To tell {' from '.join(n.replace('_', ' ') for n in touch.separates)}: {touch.why}.{hangs}"
-        )
-        return
-    x, y, z = (1e3 * v for v in (touch.x, touch.y, touch.z))
-    direction = ", ".join(f"{d:.2f}" for d in touch.direction)
-    hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
-    page.paragraph(
-        f"To tell {' from '.join(n.replace('_', ' ') for n in touch.separates)}, press at ({x:.0f}, {y:.0f}, "
-        f"{z:.0f}) mm in the direction ({direction}), {touch.depth_m * 1e3:.1f} mm deep at "
-        f"{touch.speed_m_per_s * 1e3:.0f} mm/s{hold}: {touch.why}.{hangs}"
-    )
+    words = touch_words(result)
+    page.paragraph(f"{words[0].upper()}{words[1:]}.{hangs}")
 
 
-def _modulus_after(page: Page, model: Model, result: Diagnosis) -> None:
+def _modulus_words(model: Model, result: Diagnosis) -> str:
     before, after = model.material.young_modulus_pa, result.young_modulus_pa
     low, high = model.material.young_modulus_ci95_pa
     known = np.isfinite([low, high]).all()
-    page.paragraph(
+    return (
         f"Young's modulus: {before / 1e3:.2f} kPa in the model"
-        + (f" ({low / 1e3:.2f} to {high / 1e3:.2f} kPa, 95 %)" if known else "")
+        + (f" (95 % sure: {low / 1e3:.2f} to {high / 1e3:.2f} kPa)" if known else "")
         + f", {after / 1e3:.2f} kPa fitted anew with what was found ({100 * (after / before - 1):+.1f} %)."
     )
 
 
-def _how_large(page: Page, result: Diagnosis) -> None:
+def _how_large(page: Page, model: Model, result: Diagnosis) -> None:
+    page.heading("How large")
     rows = parameter_rows(result)
     if rows:
-        page.heading("How large, and how sure")
         page.table(["effect", "quantity", "found", "95 % sure between", "unit"], rows)
-    elif result.reasons:
-        page.heading("Remarks")
+    page.paragraph(_modulus_words(model, result))
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
     if result.held_out_n:
@@ -163,21 +150,28 @@ def _moduli(page: Page, model: Model, result: Diagnosis) -> None:
 
 
 def _tried(page: Page, result: Diagnosis) -> None:
-    page.heading("The effects that were tried")
+    page.heading("Everything that was tried")
+    strain = next((e.gap_closed for e in result.entries if e.name == known()), None)
+    both = any(with_strain(result, e.name) for e in result.entries)
     page.paragraph(
-        "Each effect was put into the simulation by itself, or beside finite strain (large deformations, "
-        "which stretch and squeeze the material by more than a few per cent) where its name says so, fitted, "
-        "and judged at places that the fit had not seen. Best first."
+        "Each effect was put into the simulation, fitted, and judged at places that the fit had not seen. "
+        "The best comes first."
+        + (
+            f" Those marked + were tried beside {known().replace('_', ' ')}, which every soft solid shows "
+            "when it is pressed deep; of them only what they take away on top of that counts."
+            if both
+            else ""
+        )
     )
     page.table(
         ["effect", "what it means", "how likely", "difference left [mN]", "taken away", "fitted values"],
         [
             [
-                beside(result, e.name),
+                ("+ " if with_strain(result, e.name) else "") + e.name.replace("_", " "),
                 meaning(e.name),
                 percent(e.probability),
                 f"{e.gap_after_n * 1e3:.0f}",
-                share_words(e.gap_closed),
+                _taken(e.gap_closed, strain if with_strain(result, e.name) else None),
                 short(e.parameters) if e.probability > 0.01 else "",
             ]
             for e in result.entries[:MOST_EFFECTS]
@@ -191,14 +185,26 @@ def _tried(page: Page, result: Diagnosis) -> None:
         page.paragraph(f"{words}: {spoken(result.left_out)}.")
 
 
+def _taken(closed: float | None, strain: float | None) -> str:
+    """A share of the gap that is taken away; beside finite strain, what comes on top of that."""
+    if closed is None or strain is None:
+        return share_words(closed)
+    more = 100 * (closed - strain)
+    return "nothing more" if more < 0.5 else f"{more:.0f}\u00a0% more"
+
+
 def _follows(page: Page, result: Diagnosis) -> None:
-    page.heading("What the difference depends on")
+    page.heading("What the difference goes with")
     page.table(
-        ["the difference depends on", "share of it", "probability that this is chance"],
-        [[AXIS_WORDS[a.axis], percent(a.share), f"{a.p:.2g}"] for a in result.where.axes],
+        ["the difference goes with", "share of it", "how often chance does this"],
+        [
+            [AXIS_WORDS[a.axis], percent(a.share), chance_words(a.p)]
+            for a in sorted(result.where.axes, key=lambda a: -a.share)
+        ],
     )
-    page.figure(curves_picture(result), "Mean difference at each depth, and at each speed of the tip.")
-    page.figure(presses_picture(result), "The presses that differ most, after the first picture's.")
+    page.figures(curve_pictures(result))
+    page.paragraph("The presses that differ most, after the one above:")
+    page.figures(press_pictures(result))
 
 
 def _own_errors(page: Page, result: Diagnosis) -> None:

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-
 from diagnose.verdict.result import Diagnosis
-from mechanics.quantities import read_unit, split_key
+from mechanics.quantities import fitting_unit, quantity_words, split_key
+from mechanics.quantities import number_words as number
 
 WORDS = {
     "mu": "friction coefficient",
@@ -46,43 +45,18 @@ WORDS = {
     "shift_m": "shift, x y z",
     "rotation_rad": "turn, x y z",
 }
-MOST_NUMBERS = 12
-"""Of a list that are written out; of longer ones the least and the greatest."""
 
 
-def plain_key(key: str) -> tuple[str, float, str]:
-    """(words, factor from SI, unit) of a parameter's key, in units that a hand knows."""
-    name, si = split_key(key)
-    unit, factor = read_unit(si)
-    return WORDS.get(key, name.replace("_", " ")), factor, unit
-
-
-def number(value: Any, factor: float = 1.0) -> str:
-    """A parameter's value, or a list of values, to three digits."""
-    if isinstance(value, list) and len(value) == 1:
-        return number(value[0], factor)
-    if isinstance(value, list) and len(value) > MOST_NUMBERS:
-        least, most = (number(float(f(value)), factor) for f in (np.min, np.max))
-        return f"{least} to {most} ({len(value)} values)"
-    if isinstance(value, list):
-        return "(" + ", ".join(number(v, factor) for v in value) + ")"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if not isinstance(value, (int, float)):
-        return str(value)
-    scaled = value * factor
-    return f"{scaled:.0f}" if 100 <= abs(scaled) < 1e5 else f"{scaled:.2g}" if abs(scaled) < 1 else (
-        f"{scaled:.3g}"
-    )  # fmt: skip
+def plain_key(key: str, value: Any = None) -> tuple[str, float, str]:
+    """(words, factor from SI, unit) of a parameter's key, in units that a hand knows; value: what the unit is
+    to fit."""
+    unit, factor = fitting_unit(key, value)
+    return WORDS.get(key, split_key(key)[0].replace("_", " ")), factor, unit
 
 
 def short(parameters: dict[str, Any]) -> str:
     """Parameters in one line."""
-    said = []
-    for key, value in parameters.items():
-        words, factor, unit = plain_key(key)
-        said.append(f"{words} {number(value, factor)} {unit}".strip())
-    return ", ".join(said)
+    return ", ".join(f"{plain_key(key)[0]} {quantity_words(key, value)}" for key, value in parameters.items())
 
 
 def parameter_rows(result: Diagnosis) -> list[list[str]]:
@@ -90,7 +64,7 @@ def parameter_rows(result: Diagnosis) -> list[list[str]]:
     rows = []
     for entry in result.entries:
         for key, value in entry.parameters.items() if entry.name in result.effects else ():
-            words, factor, unit = plain_key(key)
+            words, factor, unit = plain_key(key, value)
             low, high = entry.intervals.get(key, (None, None))
             span = "-" if low is None else f"{number(low, factor)} to {number(high, factor)}"
             rows.append([entry.name.replace("_", " "), words, number(value, factor), span, unit])

@@ -27,13 +27,14 @@ def lines(result: Reconstruction) -> list[str]:
     low, high = model.material.young_modulus_ci95_pa
     not_used = [*exploration.rejected, *(result.paper_fit.not_used if result.paper_fit else ())]
     more = len(not_used) - _NAMED
+    contacts = "1 contact" if len(not_used) == 1 else f"{len(not_used)} contacts"
     lines = [
-        f"{exploration.recording.name}: {len(exploration.presses)} palpations"
-        + (f", {len(not_used)} contacts not used:" if not_used else ""),
+        f"{exploration.recording.name}: {len(exploration.presses)} palpations, "
+        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa "
+        f"(95 % sure: {low / 1e3:.2f} to {high / 1e3:.2f} kPa)",
+        *([f"{contacts} not used:"] if not_used else []),
         *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
         *([f"  and {more} more (as_json, or --json, names all)"] if more > 0 else []),
-        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, "
-        f"95 % interval {low / 1e3:.2f} to {high / 1e3:.2f} kPa",
     ]
     if result.doubt:
         lines.append(f"not to be believed: {result.doubt}")
@@ -48,11 +49,11 @@ def lines(result: Reconstruction) -> list[str]:
         )
     lines += [
         *exploration.dropped,
-        f"surface: {surface.method} ({surface.reason}), {surface.volume_m3 * 1e6:.1f} cm^3",
+        f"surface: {surface.method}, {surface.volume_m3 * 1e6:.1f} cm³; {surface.reason}",
         *(f"  {note}" for note in (result.placed.notes if result.placed else ())),
-        f"mesh: {len(model.mesh.points)} nodes, {len(model.mesh.tetrahedra)} tetrahedra, "
-        f"l = {model.mesh_size_m * 1e3:g} mm; radius-edge ratio {_spread(quality.radius_edge_ratio)}, "
-        f"distance to the surface {_spread(1e3 * quality.surface_distance_m)} mm (50, 95, 100 %)",
+        f"mesh: {len(model.mesh.tetrahedra)} tetrahedra of {model.mesh_size_m * 1e3:g} mm "
+        f"({len(model.mesh.points)} nodes), at most {1e3 * quality.surface_distance_m.max():.2f} mm off the "
+        "surface",
     ]
     return lines
 
@@ -116,7 +117,3 @@ def place(result: Reconstruction, plotter: Plotter) -> None:
 
 def _percentiles(values: np.ndarray) -> dict[str, float]:
     return {name: float(np.percentile(values, at)) for name, at in (("p50", 50), ("p95", 95), ("max", 100))}
-
-
-def _spread(values: np.ndarray) -> str:
-    return " / ".join(f"{v:.2f}" for v in _percentiles(values).values())

@@ -12,7 +12,7 @@ from mechanics.model import Model
 from mechanics.touch import forces_at
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
-from palpate.show.page import Page, save_figures, subplots
+from palpate.show.page import Page, file_words, save_figures, subplots
 from palpate.show.quantities import ERROR, MODULUS
 from palpate.show.reconstruction.differences import differences
 from palpate.show.reconstruction.exploration import exploration_figures
@@ -96,6 +96,7 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     for words in differences(result):
         page.paragraph(words)
     speed_table(page, result)
+    page.result(result.as_json())
     return page.write(path)
 
 
@@ -166,11 +167,12 @@ def _summary(page: Page, result: Reconstruction) -> None:
     model = result.model
     low, high = model.material.young_modulus_ci95_pa
     page.lead(
-        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa, 95 % interval {low / 1e3:.2f} to "
-        f"{high / 1e3:.2f} kPa, from {len(model.presses)} palpations."
+        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
+        f"(Young's modulus; 95 % sure: {low / 1e3:.1f} to {high / 1e3:.1f} kPa)."
     )
     page.paragraph(_meaning(result))
-    where, recording = model.path or "MODEL", result.exploration.recording.path or "REC"
+    where = file_words(model.path, "MODEL")
+    recording = file_words(result.exploration.recording.path, "REC")
     page.next_step(
         f"What to do next: feel it: `palpate touch {where}`; see what it leaves out: "
         f"`palpate diagnose {recording} --model {where} --report PAGE.html`."
@@ -209,18 +211,19 @@ _SOFTNESS = (
 def _how(page: Page, result: Reconstruction) -> None:
     surface = result.surface
     page.paragraph(
-        f"Surface: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. Force "
-        "noise "
-        f"{result.exploration.noise_n * 1e3:.1f} mN an axis. Method: {result.model.provenance['method']}."
+        f"Shape: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. The sensor's "
+        f"noise is {result.exploration.noise_n * 1e3:.1f} mN an axis. Method: "
+        f"{result.model.provenance['method']}."
     )
     if result.modulus:
         fit = result.modulus
         page.paragraph(
-            f"{fit.reason[0].upper()}{fit.reason[1:]}. Spread between sites {100 * fit.between:.1f} %; the "
-            f"shape's uncertainty makes {100 * fit.shape_error:.2f} % of the modulus's standard error."
+            f"{fit.reason[0].upper()}{fit.reason[1:]}. From place to place the modulus differs by "
+            f"{100 * fit.between:.1f} %; what is not known of the shape makes it uncertain by another "
+            f"{100 * fit.shape_error:.2f} %."
         )
         page.table(
-            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen by resamples"],
+            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen in resamples"],
             [
                 [name, e / 1e3, 1e3 * misfit, f"{100 * share:.0f} %"]
                 for name, (e, misfit, share) in fit.by_law.items()

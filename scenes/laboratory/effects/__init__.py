@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from mechanics.errors import OptionError
+from mechanics.names import unknown
 from scenes.laboratory.effects import contact, instrument, solid, stiffness_field
 from scenes.laboratory.effects.base import Bench, Effect, Readings
 
@@ -24,7 +25,7 @@ UNNAMED = tuple(effect.name for effect in contact.UNNAMED)
 def effect(name: str) -> Effect:
     """The effect of that name; raises OptionError with the allowed names."""
     if name not in REGISTRY:
-        raise OptionError(f"effect '{name}' is unknown; allowed are {', '.join(REGISTRY)}")
+        raise OptionError(unknown(name, "effect", REGISTRY))
     return REGISTRY[name]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import dataclasses
 import inspect
 from collections.abc import Iterator
@@ -153,16 +154,43 @@ def test_no_two_options_of_one_operation_share_a_name(name):
 
 
 @pytest.mark.parametrize("name", [n for n, entry in OPERATIONS.items() if entry.command and entry.calls])
-def test_a_command_and_its_call_take_the_same_names_and_defaults(name):
+def test_a_command_and_its_call_take_the_same_names_defaults_and_needs(name):
+    """But for a file to write that a command alone needs: a call hands its result back."""
     operation, _ = command_operation(name)
-    flags = {a.dest: a for a in parser_of(name)._actions if a.dest not in ("help", "json")}
+    flags = {a.dest: a for a in parser_of(name)._actions if a.dest not in ("help", "json", argparse.SUPPRESS)}
     parameters = dict(inspect.signature(getattr(pp, operation.name)).parameters)
     parameters.pop("progress", None)
     only = {n: written(f).only for n, f in operation.fields.items()}
     assert {n for n in flags if only[n] != "command"} == {n for n in parameters if only[n] != "python"}
     for each, parameter in parameters.items():
-        if each in flags and parameter.kind is parameter.KEYWORD_ONLY:
-            assert parameter.default == operation.fields[each].default
+        field = operation.fields[each]
+        if parameter.kind is parameter.VAR_POSITIONAL:
+            assert flags[each].nargs in ("+", "*")
+            continue
+        needed = parameter.default is parameter.empty
+        assert needed == (field.default is dataclasses.MISSING)
+        assert needed or parameter.default == field.default
+        if each in flags:
+            assert flags[each].default is argparse.SUPPRESS or needed, "the one default is the field's"
+            assert flags[each].required == needed or (each == "save" and written(field).needed)
+
+
+@pytest.mark.parametrize("name", [n for n, entry in OPERATIONS.items() if entry.command])
+def test_what_is_the_command_lines_alone_says_so(name):
+    """What a call has no name for: files, pages, and what only a terminal needs."""
+    operation, module = command_operation(name)
+    alone = {n for n, f in operation.fields.items() if written(f).only == "command"}
+    files = {n for n in alone if written(operation.fields[n]).writes or written(operation.fields[n]).reads}
+    assert alone - files <= {
+        "tolerance",
+        "seal",
+        "diagnosed",
+        "name",
+        "slab",
+        "half_space",
+        "dry_run",
+        "full",
+    }
 
 
 @pytest.mark.parametrize("name", FUNCTIONS)
@@ -181,12 +209,12 @@ def test_near_misses_and_wrong_kinds_are_told(recording, rooms):
     ):
         with pytest.raises(pp.OptionError, match=words):
             call("reconstruct", recording, **options)
-    with pytest.raises(pp.OptionError, match="'lod' is no operation; allowed are check"):
+    with pytest.raises(pp.OptionError, match="'lod' is no operation; did you mean load. allowed are check"):
         pp.options("lod")
 
 
 def test_a_renderer_keeps_its_own_options(felt, recording):
     with pytest.raises(pp.OptionError, match="friction: a renderer that is there keeps its options"):
         pp.replay(felt, recording, friction=0.5)
-    with pytest.raises(pp.OptionError, match="'rem' is no renderer; allowed are fem"):
+    with pytest.raises(pp.OptionError, match="'rem' is no renderer; did you mean fem. allowed are fem"):
         pp.renderer(felt.model, "rem", progress=False)
