@@ -66,6 +66,8 @@ class DemoResult(Result):
 
 def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int = 0) -> DemoResult:
     """Do all of it; the model goes to `folder/model`."""
+    from diagnose.verdict.result import Diagnosis
+
     seconds: dict[str, float] = {}
 
     @contextmanager
@@ -93,7 +95,8 @@ def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int =
     if options.diagnosis:
         with stage("diagnose") as progress:
             most = AttributionOptions().most
-            diagnosis = diagnose(recording, model, fast=options.fast, most=most, seed=seed, progress=progress)
+            found = diagnose(recording, model, fast=options.fast, most=most, seed=seed, progress=progress)
+            diagnosis = found if isinstance(found, Diagnosis) else None  # no simulator was named
     return DemoResult(
         recording,
         done,

@@ -104,6 +104,7 @@ def changes(asked: ChangesOperands, call: Call) -> Changes:
     """
     from diagnose.compare.before_after import Side
     from diagnose.compare.before_after import changes as weighed
+    from diagnose.verdict.result import Diagnosis
 
     sides = []
     both = read_recording(asked.before), read_recording(asked.after)  # a wrong name is refused at once
@@ -128,5 +129,6 @@ def changes(asked: ChangesOperands, call: Call) -> Changes:
                     seed=asked.seed,
                     progress=lambda s, x: step(s, 0.4 + 0.6 * x),
                 )
-            sides.append(Side(measured, made.model, found))
+            own = found if isinstance(found, Diagnosis) else None  # no simulator was named
+            sides.append(Side(measured, made.model, own))
     return weighed(*sides)

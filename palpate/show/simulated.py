@@ -14,7 +14,7 @@ from diagnose.simulated.result import PARTS, SimulatedGap
 from diagnose.verdict.result import Diagnosis, EffectEntry
 from mechanics.effects.registry import effect
 from palpate.show.diagnosis import place as place_gap
-from palpate.show.diagnosis.figures import curves_picture, first_picture, presses_picture
+from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_pictures
 from palpate.show.diagnosis.figures import view as view_of_gap
 from palpate.show.diagnosis.parameters import number, plain_key
 from palpate.show.diagnosis.words import AXIS_WORDS, force_words, percent, share_words, spoken
@@ -186,8 +186,8 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
         ["the difference depends on", "share of it", "probability that this is chance"],
         [[AXIS_WORDS[a.axis], percent(a.share), f"{a.p:.2g}"] for a in result.where.axes],
     )
-    page.figure(curves_picture(shown), "Mean difference at each depth, and at each speed of the tip.")
-    page.figure(presses_picture(shown), "The presses that differ most, after the first picture's.")
+    page.figures(curve_pictures(shown))
+    page.figures(press_pictures(shown))
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
     return page.write(path)

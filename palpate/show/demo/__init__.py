@@ -114,8 +114,6 @@ def report(result: DemoResult, path: Path | str) -> Path:
     )
     page.table(["stage", "time [s]"], [[name, round(s, 1)] for name, s in result.seconds.items()])
     page.result(as_json(result))
-    for figure in drawn.values():
-        plt.close(figure)
     return page.write(path)
 
 
