@@ -120,7 +120,7 @@ class Timing:
 
 @njit(cache=True, nogil=True)
 def enabled_pose():
-    """(IN_WIDTH,) what a device gives that is connected, calibrated, enabled and not turned, at the origin."""
+    """(IN_WIDTH,) of a device that is connected, calibrated, enabled and not turned, at the origin."""
     pose = np.zeros(IN_WIDTH)
     pose[IN_CONNECTED] = 1.0
     pose[IN_CALIBRATED] = 1.0

@@ -2,7 +2,7 @@
 
 Files and folders are either whole or not there (written to a temporary name beside the target, then
 renamed); an output replaces nothing but its own kind; what the operating system refuses is said in one line
-(FileError). Temporary names carry host and process: what a killed one left is swept by the next.
+(FileError). What a killed process left is swept by the next (mechanics.scratch).
 """
 
 from __future__ import annotations
@@ -12,7 +12,6 @@ import gzip
 import hashlib
 import os
 import shutil
-import socket
 import tempfile
 import tomllib
 import zlib
@@ -24,6 +23,7 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import FileError, PalpateError
+from mechanics.scratch import OLD, sweep, sweep_scratch, temporary_prefix
 
 FOLLOW_PATHS = "PALPATE_FOLLOW_PATHS"
 """Set to 1: paths in a TOML may leave its folder."""
@@ -343,7 +343,7 @@ def atomic_folder(path: Path | str, kind: FolderKind) -> Iterator[Path]:
             temporary.chmod(0o755)
             if target.exists():
                 _carry_over(target, temporary, kind)
-                old = Path(tempfile.mkdtemp(prefix=temporary_prefix(_OLD), dir=target.parent))
+                old = Path(tempfile.mkdtemp(prefix=temporary_prefix(OLD), dir=target.parent))
                 os.replace(target, old / target.name)
             os.replace(temporary, target)
         except BaseException:
@@ -387,16 +387,6 @@ def sole_writer(folder: Path | str) -> Iterator[None]:
                 path.unlink(missing_ok=True)
 
 
-_OLD = "old-"
-_swept: set[Path] = set()
-
-
-def temporary_prefix(label: str = "") -> str:
-    """How the name of every temporary file or folder of this process begins."""
-    host = zlib.crc32(socket.gethostname().encode(errors="replace")) & 0xFFFF
-    return f".palpate-{host:04x}-{os.getpid()}-{label}"
-
-
 @contextmanager
 def temporary_folder(label: str = "") -> Iterator[Path]:
     """A folder for scratch files, removed at the end; what killed processes left is swept first.
@@ -410,58 +400,10 @@ def temporary_folder(label: str = "") -> Iterator[Path]:
             yield Path(name)
 
 
-def memory_folder() -> Path | None:
-    """Where files cost no disk, swept; None where the system has no such place."""
-    shared = Path("/dev/shm")
-    if not os.access(shared, os.W_OK):
-        return None
-    sweep(shared)
-    return shared
-
-
-def sweep_scratch() -> None:
-    """Sweep where scratch files and shared memory go."""
-    sweep(Path(tempfile.gettempdir()))
-    memory_folder()
-
-
-def sweep(folder: Path) -> None:
-    """Remove what processes of this host that are gone left in `folder`; a folder that was being replaced
-    goes back to its place. Once a process and folder."""
-    if folder in _swept or os.name == "nt":
-        return
-    _swept.add(folder)
-    ours = temporary_prefix().rsplit("-", 2)[0] + "-"
-    with suppress(OSError):
-        for left in list(folder.iterdir()):
-            process, _, label = left.name.removeprefix(ours).partition("-")
-            if not left.name.startswith(ours) or not process.isdigit() or _alive(int(process)):
-                continue
-            with suppress(OSError):
-                if label.startswith(_OLD):
-                    for kept in left.iterdir():
-                        if not (folder / kept.name).exists():
-                            os.replace(kept, folder / kept.name)
-                if left.is_dir() and not left.is_symlink():
-                    shutil.rmtree(left, ignore_errors=True)
-                else:
-                    left.unlink()
-
-
 def sha256_of_file(path: Path | str) -> str:
     """Hexadecimal SHA-256 of a file's bytes."""
     with reading(path), open(path, "rb") as file:
         return hashlib.file_digest(file, "sha256").hexdigest()
-
-
-def _alive(process: int) -> bool:
-    try:
-        os.kill(process, 0)
-    except ProcessLookupError:
-        return False
-    except (PermissionError, OverflowError):
-        return True
-    return True
 
 
 def _target(path: Path, kind: Kind | FolderKind) -> Path:

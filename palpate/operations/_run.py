@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import Any
 
 from mechanics.errors import OptionError, PalpateError
-from mechanics.files import FolderKind, Kind, check_target, sweep_scratch, written_at
+from mechanics.files import FolderKind, Kind, check_target, written_at
+from mechanics.scratch import sweep_scratch
 from palpate.operations._declare import STREAMS, Operation
 from palpate.operations._flags import OneLineParser, add_operation
 from palpate.operations._list import OPERATIONS, module_of

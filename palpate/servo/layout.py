@@ -14,7 +14,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.files import memory_folder, temporary_prefix, writing
+from mechanics.files import writing
+from mechanics.scratch import memory_folder, temporary_prefix
 from palpate.servo.histogram import BINS
 
 RING_ROWS = 8192

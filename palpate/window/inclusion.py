@@ -16,13 +16,13 @@ import scipy.sparse as sp
 
 from mechanics import inclusion
 from mechanics.effects.hold import base_hold
-from mechanics.files import memory_folder, temporary_prefix
 from mechanics.model import Model
 from mechanics.moduli import balls_ratio
 from mechanics.near_field import contact_width
 from mechanics.nearest import closest
 from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
+from mechanics.scratch import memory_folder, temporary_prefix
 from mechanics.solver import Solver
 from palpate.servo import Servo
 from render.base import Renderer

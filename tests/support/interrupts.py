@@ -34,9 +34,9 @@ import psutil
 
 from benchmarks.timing import table
 from mechanics.errors import OptionError, PalpateError
-from mechanics.files import temporary_prefix
 from mechanics.model_files import read_model, write_model
 from mechanics.recording import read_recording, recording_files, write_recording
+from mechanics.scratch import temporary_prefix
 from palpate.child import module_command, module_environment
 from scenes.embedded import embedded_names, embedded_recording
 

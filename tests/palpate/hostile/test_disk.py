@@ -132,7 +132,7 @@ def test_what_killed_processes_left_is_swept(tmp_path, monkeypatch):
     assert sorted(p.name for p in tmp_path.iterdir()) == sorted([f"{temporary_prefix()}alive", "model"])
     assert (tmp_path / "model" / "kept").exists(), "what was being replaced goes back"
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    monkeypatch.setattr("mechanics.files._swept", set())
+    monkeypatch.setattr("mechanics.scratch._swept", set())
     (tmp_path / f"{ours}mesh-x").mkdir()
     command("press", "nothing", "--at", "0,0,0", "--direction", "0,0,-1", "--depth", "0.001")
     assert not list(tmp_path.glob("*mesh-x")), "whatever command is next sweeps the scratch files"
