@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from diagnose.explore.explorer import Explorer as Explorer
     from diagnose.explore.segments import Instrument as Instrument
     from diagnose.explore.segments import Segment as Segment
-    from diagnose.specimen.result import Material as Material
     from diagnose.simulated.result import SimulatedGap as SimulatedGap
+    from diagnose.specimen.result import Material as Material
     from diagnose.verdict.result import Diagnosis as Diagnosis
     from mechanics.calibration import Calibration as Calibration
     from mechanics.errors import CacheError as CacheError
