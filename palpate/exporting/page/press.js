@@ -189,11 +189,12 @@ class Presser {
 
   inward(at) {
     const { points, normals } = this.presses;
+    let best = 1e-4, found = -1;
     for (let i = 0; i < points.length; i += 3) {
-      if (Math.hypot(points[i] - at[0], points[i + 1] - at[1], points[i + 2] - at[2]) < 1e-4) {
-        return [-normals[i], -normals[i + 1], -normals[i + 2]];
-      }
+      const far = Math.hypot(points[i] - at[0], points[i + 1] - at[1], points[i + 2] - at[2]);
+      if (far < best) [best, found] = [far, i];
     }
+    if (found >= 0) return [-normals[found], -normals[found + 1], -normals[found + 2]];
     return times(this.surface.at(this.surface.nearest(at).place).normal, -1);
   }
 
