@@ -10,7 +10,9 @@ import numpy as np
 from mechanics.press_solver.condensing import Condensed
 from mechanics.press_solver.contact import Grip, SphereContact, Traction
 
-_PASSES, _ITERATIONS = 3, 60
+_ROUNDS, _SLIDING_ROUNDS, _ITERATIONS = 3, 8, 60
+_AT_REST = 5e-3
+"""Change of the friction's bounds from round to round, over their sum."""
 _SETTLED = 1e-9
 """Of the residual over the contact's forces."""
 _REACH = 0.12
@@ -91,7 +93,7 @@ class Settling:
         local[few] = np.arange(len(few))
         unknowns = local[self._of_face[chosen]]
         x = np.zeros(len(few))
-        for _ in range(_PASSES):
+        for _ in range(_SLIDING_ROUNDS if self.contact.friction > 0 else _ROUNDS):
             solved = self._newton(x, small.stiffness, pull, chosen, few, unknowns, u, centre, trial)
             if solved is None:
                 return None
@@ -115,27 +117,39 @@ class Settling:
         unknowns: np.ndarray, u: np.ndarray, centre: np.ndarray, trial: Grip,
     ) -> tuple[np.ndarray, Traction, np.ndarray] | None:  # fmt: skip
         moved = u.copy()
-        for iteration in range(_ITERATIONS):
+
+        def at(x: np.ndarray) -> tuple[np.ndarray, Traction, np.ndarray]:
             moved[few] = u[few] + x
             relative = self._relative(moved, chosen, centre)
             traction = self.contact.evaluate(relative, chosen, unknowns, len(few), trial)
-            residual = small @ x - pull + traction.forces
-            scale = np.linalg.norm(traction.forces) + 1e-9 * self.contact.radius**2
-            if np.linalg.norm(residual) < _SETTLED * scale and iteration:
-                return x, traction, relative
+            return small @ x - pull + traction.forces, traction, relative
+
+        residual, traction, relative = at(x)
+        for _ in range(_ITERATIONS):
             step = np.linalg.solve(small + traction.stiffness, -residual)
             longest = np.abs(step).max()
             if not np.isfinite(longest):
                 return None
-            # points that come and go in turn are calmed by shorter steps
-            calm = 1.0 if iteration < 15 else 0.5 if iteration < 35 else 0.25
-            x = x + step * min(calm, 0.5 * self.contact.radius / max(longest, 1e-300))
+            step *= min(1.0, 0.5 * self.contact.radius / max(longest, 1e-300))
+            slope, share = float(step @ residual), 1.0
+            for _ in range(8):
+                residual, traction, relative = at(x + share * step)
+                now = float(step @ residual)
+                if now <= 0.5 * abs(slope):
+                    break
+                # the energy's valley was overstepped
+                share *= min(max(slope / (slope - now), 0.15), 0.7)
+            x = x + share * step
+            scale = float(np.linalg.norm(traction.forces)) + 1e-9 * self.contact.radius**2
+            if np.linalg.norm(residual) < _SETTLED * scale:
+                return x, traction, relative
         return None
 
     def _arrived(
         self, own: np.ndarray, traction: Traction, relative: np.ndarray, before: Grip, trial: Grip
     ) -> bool:
-        """Anchor the points that began to press in this step where they met the sphere; whether any moved.
+        """Anchor the points that began to press in this step where they met the sphere, and set the friction's
+        bounds; whether any of it moved.
 
         A held point that pulls is let go; it slides until the step ends, should it press again.
         """
@@ -151,6 +165,12 @@ class Settling:
         fresh = ~trial.anchored[points]
         trial.anchored[points], trial.anchor[points] = True, met
         far = 1e-4 * self.contact.radius
+        bound = self.contact.friction * np.maximum(traction.overlap, 0.0)
+        change = np.abs(bound - trial.bound[own]).sum()
+        # pressure answers friction: half way, the two do not chase each other
+        trial.bound[own] = np.where(trial.bound[own] > 0, 0.5 * (bound + trial.bound[own]), bound)
+        if self.contact.friction > 0:
+            return bool(change > _AT_REST * bound.sum())
         return bool(pulls.any() or fresh.any() or (shift > far).any())
 
     def kept_grip(self, u: np.ndarray, centre: np.ndarray, found: Settled) -> Grip:
@@ -164,4 +184,4 @@ class Settling:
         here = relative * (self.contact.radius / np.linalg.norm(relative, axis=1, keepdims=True))
         anchor = np.where(held[:, None], traction.slid, here)
         self.refused[:] = False
-        return Grip(pressing, anchor, relative)
+        return Grip(pressing, anchor, relative, grip.bound)
