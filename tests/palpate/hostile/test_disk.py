@@ -19,12 +19,11 @@ from mechanics.files import (
     check_room,
     check_target,
     sole_writer,
-    sweep,
     temporary_folder,
-    temporary_prefix,
 )
 from mechanics.model_files import MODEL, read_model, write_model
 from mechanics.recording import read_recording
+from mechanics.scratch import sweep, temporary_prefix
 from mechanics.store import read_arrays, write_arrays
 
 from .inputs import block, command, contents, full_disk, one_line

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import ast
 import importlib
 import json
 import subprocess
 import sys
 from dataclasses import dataclass
+from pathlib import Path
 from types import ModuleType
 
 import numpy as np
@@ -131,3 +133,19 @@ def test_without_palpate_a_result_prints_its_numbers_and_says_what_to_import():
     assert error == "a Calibration is drawn by palpate: `import palpate.show` first"
     assert loaded == "[]"
     assert "  tip's radius: 5 mm" in shown, done.stderr
+
+
+def test_only_drawing_loads_what_draws():
+    """A command that prints lines waits for neither matplotlib nor PyVista."""
+    found = []
+    for path in Path(show.__file__).parent.rglob("*.py"):
+        tree = ast.parse(path.read_text(encoding="utf-8"))
+        for node in tree.body:
+            if isinstance(node, ast.Import):
+                names = [alias.name for alias in node.names]
+            else:
+                names = [node.module or ""] if isinstance(node, ast.ImportFrom) else []
+            found += [
+                f"{path.name}: {n}" for n in names if n.partition(".")[0] in ("matplotlib", "pyvista", "vtk")
+            ]
+    assert not found
