@@ -16,6 +16,7 @@ import json
 import secrets
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -49,7 +50,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--controls", type=int, default=12, help="cases with none")
     parser.add_argument("--seed", type=int, default=0, help="of all that is drawn")
     parser.add_argument(
-        "--judged", nargs="+", type=Path, help="count what these files of --json hold, instead of judging"
+        "--work", type=Path, help="folder that keeps every judged case; all that lie there are counted"
     )
 
 
@@ -96,22 +97,28 @@ class _Case:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Plant, seal, judge, open; print what was found."""
-    if arguments.judged:
-        rows = [row for path in arguments.judged for row in json.loads(path.read_text())["cases"]]
-        _check_seals(rows)
-        return _said(rows)
     block = Block()
-    worlds = [_world(block, late) for late in (False, False, True)]
+    world = cache(lambda late: _world(block, late))
     drawn = np.random.default_rng(arguments.seed)
     plan = [_single(drawn, k) for k in range(arguments.singles)]
     plan += [_pair(drawn) for _ in range(arguments.pairs)] + [()] * arguments.controls
-    cases = []
+    rows: dict[str, dict[str, Any]] = {}
+    if arguments.work is not None:
+        arguments.work.mkdir(parents=True, exist_ok=True)
+        rows = {path.stem: json.loads(path.read_text()) for path in sorted(arguments.work.glob("*.json"))}
+        _check_seals(list(rows.values()))
     with progress_bar("cases") as tell:
-        for number, planted in enumerate(plan):
-            tell("cases", number / len(plan))
-            world = worlds[number % 3]
-            cases.append(_judged(block, world, planted, 1000 * arguments.seed + number, number))
-    return _said([_row(case) for case in cases])
+        # a mixture from the first on, as a run may be ended early
+        for k, number in enumerate(drawn.permutation(len(plan))):
+            tell("cases", k / len(plan))
+            name = f"{arguments.seed}-{number}"
+            if name in rows:
+                continue
+            seed = 1000 * arguments.seed + int(number)
+            rows[name] = _row(_judged(block, world(number % 3 == 2), plan[number], seed, int(number)))
+            if arguments.work is not None:
+                (arguments.work / f"{name}.json").write_text(json.dumps(rows[name], indent=1))
+    return _said(list(rows.values()))
 
 
 def _said(rows: list[dict[str, Any]]) -> dict[str, Any]:
