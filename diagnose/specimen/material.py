@@ -271,9 +271,9 @@ def _few(
 ) -> Material:
     """Fewer curves than can be held out: the laws of the dent, the machine beside them."""
     own = approach.modulus_pa
-    gone = f"{100 * approach.hysteresis:.0f} % of the work does not come back"
-    if not np.isfinite(approach.hysteresis):
-        gone = "it ends in its hold"
+    gone = "it ends in its hold"
+    if np.isfinite(approach.hysteresis):
+        gone = f"{round(100 * approach.hysteresis)} % of the work does not come back"
     pull = float(approach.pull_n.max())
     if pull > 0:
         gone += f", and it pulls by up to {pull:.2g} N on the way out"

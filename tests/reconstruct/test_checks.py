@@ -89,7 +89,10 @@ def test_grave_findings_refuse_unless_forced(cylinder):
     flipped = dataclasses.replace(cylinder[0], force_on_tool=-cylinder[0].force_on_tool)
     with pytest.raises(RecordingError, match="force sign: .*force_on.*--force"):
         Checkup(flipped)
-    assert Checkup(flipped, force=True).found[0].name == "force sign"
+    (finding, *_) = Checkup(flipped, force=True).found
+    assert finding.name == "force sign" and "--force-on object" in finding.todo
+    stated = dataclasses.replace(flipped, description={"recording": {"force_on": "object"}})
+    assert "--force-on tool" in Checkup(stated, force=True).found[0].todo
 
 
 def test_lesser_findings_widen_the_interval():

@@ -9,6 +9,7 @@ its peak, with the normal part of its force; its first touch is found anew along
 from __future__ import annotations
 
 import dataclasses
+from typing import Any
 
 import numpy as np
 
@@ -38,8 +39,8 @@ def slid_in(presses: Presses) -> np.ndarray:
 
 def straightened(presses: Presses) -> Presses:
     """The presses, which lie on a flat surface, those that slide made straight."""
-    slid = np.flatnonzero(slid_in(presses))
-    if not len(slid):
+    slid = np.flatnonzero(slid_in(presses)).tolist()
+    if not slid:
         return presses
     rows = [_loading_rows(presses, i) for i in slid]
     loadings = [_loading(presses, i, own) for i, own in zip(slid, rows, strict=True)]
@@ -48,7 +49,7 @@ def straightened(presses: Presses) -> Presses:
         shift, error = first_touches(loadings, float(noise))
     except ValueError:  # too few rows to tell any first touch
         return presses
-    arrays = {name: np.array(getattr(presses, name)) for name in (*_OF_ROWS, *_OF_PRESSES)}
+    arrays: dict[str, Any] = {name: np.array(getattr(presses, name)) for name in (*_OF_ROWS, *_OF_PRESSES)}
     for i, each, at, sd in zip(slid, loadings, shift, error, strict=True):
         if at >= 0:
             continue

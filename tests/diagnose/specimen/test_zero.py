@@ -3,6 +3,8 @@ with and without; intervals of few curves hold what curves differ in."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
@@ -71,3 +73,17 @@ def test_an_interval_of_few_curves_holds_what_they_differ_in_beside_the_fits_own
     assert 0 < width(one) < 0.3
     assert width(apart) > 3 * width(alike)
     assert width(apart) > 2 * 4.3 * 0.15 / np.sqrt(3)
+
+
+def test_what_stands_at_its_bound_is_in_the_first_line_and_fails_only_where_it_carries_the_modulus():
+    made = material([curve(0, begins=-0.2)])
+    bound = dataclasses.replace(made, at_bound=("friction slip: mu",))
+    assert bound.predicts and "friction slip: mu stands at the end of its range" in lines(bound)[0]
+    carried = dataclasses.replace(bound, bound_carries=True)
+    assert not carried.predicts and "NO ANSWER" in lines(carried)[0]
+    beaten = dataclasses.replace(
+        made, error={**made.error, made.law: 0.2, "kelvin-voigt": 0.1, "constant": 1}
+    )
+    assert beaten.predicts and "kelvin-voigt predicts held-out data better" in lines(beaten)[0]
+    closed = dataclasses.replace(made, closed=1.02, closed_ci95=(0.9, 1.1))
+    assert "closed 100% of the gap (95 % interval 90% to 100%)" in "\n".join(lines(closed))

@@ -56,6 +56,7 @@ def quick(monkeypatch):
                 "reconstruct": {
                     "object": about.get("object", {}).get("name"), "presses": 24,
                     "young_modulus_pa": e, "young_modulus_ci95_pa": [0.9 * e, 1.1 * e],
+                    "doubt": about.get("doubt", ""),
                 },
                 "compare": {
                     "rmse_n": {"fem": 0.1, "kelvin-voigt": 0.3, "hunt-crossley": 0.17, "fem-homogeneous": 0.1}
@@ -213,6 +214,17 @@ def test_parquet_has_the_same_columns(tmp_path, quick):
     assert tuple(table.column_names) == COLUMNS
     assert table["young_modulus_pa"].to_pylist() == [20e3, None]
     assert str(table.schema.field("gap_after_n").type) == "double"
+
+
+def test_a_model_that_is_not_to_be_believed_ends_with_1_and_says_why(tmp_path, quick, capsys):
+    recording(tmp_path / "in" / "good.csv")
+    why = "another object's shape"
+    recording(tmp_path / "in" / "odd.csv").with_suffix(".toml").write_text(f'e = 1.0\ndoubt = "{why}"')
+    out = tmp_path / "out"
+    assert cli.main(["batch", str(tmp_path / "in"), "-o", str(out)]) == 1
+    rows = {row["recording"]: row for row in csv.DictReader((out / "summary.csv").open())}
+    assert rows["odd"]["status"] == "done" and rows["odd"]["reason"] == f"not to be believed: {why}"
+    assert rows["good"]["reason"] == "" and why in capsys.readouterr().out
 
 
 def test_an_interruption_leaves_a_summary_that_says_what_waits(tmp_path, quick, monkeypatch):
