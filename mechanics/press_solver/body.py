@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from mechanics.press_solver.condensing import Assembly, partial_factor
 from mechanics.press_solver.graded_mesh import GradedMesh
 from mechanics.press_solver.solid import Response, Solid
+
+
+@dataclass(frozen=True)
+class BodyMaterial:
+    """poisson_ratio; stiffening and coupled: the law at finite strain (Solid); ratio: (m,) modulus of each
+    cell over the global one."""
+
+    poisson_ratio: float
+    stiffening: float
+    coupled: bool
+    ratio: np.ndarray
 
 
 class Body:
@@ -18,17 +31,11 @@ class Body:
     """
 
     def __init__(
-        self,
-        mesh: GradedMesh,
-        poisson_ratio: float,
-        stiffening: float,
-        ratio: np.ndarray,
-        near: np.ndarray,
-        kept_nodes: np.ndarray,
-        coupled: bool = False,
+        self, mesh: GradedMesh, material: BodyMaterial, near: np.ndarray, kept_nodes: np.ndarray
     ) -> None:
-        def solid(cells: np.ndarray, law: float) -> Solid:
-            return Solid(mesh.points, mesh.cells[cells], poisson_ratio, law, ratio[cells], coupled)
+        def solid(cells: np.ndarray) -> Solid:
+            law = (material.poisson_ratio, material.stiffening, material.ratio[cells], material.coupled)
+            return Solid(mesh.points, mesh.cells[cells], *law)
 
         self._count = len(mesh.points)
         free = ~mesh.fixed
@@ -38,7 +45,7 @@ class Body:
         self._free = np.flatnonzero(self.number >= 0)
         kept = self.number.reshape(-1, 3)[kept_nodes].ravel()
         self.kept = kept[kept >= 0]
-        self._near = solid(np.flatnonzero(near), stiffening)
+        self._near = solid(np.flatnonzero(near))
         far = np.flatnonzero(~near)
         shared = np.zeros(0, dtype=np.int64)
         block = np.zeros((0, 0))
@@ -47,7 +54,7 @@ class Body:
             joint = np.intersect1d(rest, mine) if near.any() else kept_nodes
             joint = joint[free[joint]]
             shared = self.number.reshape(-1, 3)[joint].ravel()
-            block = self._condensed(mesh, solid(far, 0.0), rest[free[rest]], joint)
+            block = self._condensed(mesh, solid(far), rest[free[rest]], joint)
         self._shared, self._block = shared, block
         if len(self._near):
             self._assembly = Assembly(self._near.cells, self.number, shared)

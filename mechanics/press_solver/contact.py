@@ -35,7 +35,7 @@ def _rule(parts: int) -> tuple[np.ndarray, float]:
 
 
 def _shapes(b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Shape functions (q, 6) of a quadratic triangle and their derivatives (q, 6, 2) at barycentric points."""
+    """Shape functions (q, 6) of a quadratic triangle and their derivatives (q, 6, 2)."""
     pairs = ((0, 1), (1, 2), (2, 0))
     values = np.hstack([b * (2 * b - 1), np.column_stack([4 * b[:, i] * b[:, j] for i, j in pairs])])
     slope = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
@@ -69,7 +69,8 @@ class Grip:
 @dataclass
 class Traction:
     """The contact's answer. forces (d,): resistance on the faces' unknowns; stiffness (d, d); force (3,): on
-    the sphere; overlap (p,) m: positive where a point presses; slid (p, 3) m: the anchors as they are then."""
+    the sphere; overlap (p,) m: positive where a point presses; slid (p, 3) m: the anchors as they are then.
+    """
 
     forces: np.ndarray
     stiffness: np.ndarray
@@ -127,7 +128,8 @@ class SphereContact:
         overlap, slid = np.zeros(len(own)), np.zeros((len(own), 3))
         _evaluate(
             relative, self.weights[chosen].ravel(), unknowns, self.radius, self.friction, self.penalty,
-            grip.anchored[own], grip.anchor[own], grip.bound[own], SHAPES, np.empty((3, 3)), np.empty(3), np.empty(3),
+            grip.anchored[own], grip.anchor[own], grip.bound[own], SHAPES,
+            np.empty((3, 3)), np.empty(3), np.empty(3),
             forces, stiffness, force, overlap, slid,
         )  # fmt: skip
         return Traction(forces, stiffness, force, overlap, slid)
@@ -182,7 +184,8 @@ def _evaluate(
                 t[0], t[1], t[2] = -deep * mx, -deep * my, -deep * mz
             if anchored[k] and friction > 0.0:
                 along = anchor[k, 0] * mx + anchor[k, 1] * my + anchor[k, 2] * mz
-                s[0], s[1], s[2] = along * mx - anchor[k, 0], along * my - anchor[k, 1], along * mz - anchor[k, 2]
+                s[0], s[1] = along * mx - anchor[k, 0], along * my - anchor[k, 1]
+                s[2] = along * mz - anchor[k, 2]
                 size = np.sqrt(s[0] * s[0] + s[1] * s[1] + s[2] * s[2])
                 most = bound[k]
                 slips = size > most and size > 0.0

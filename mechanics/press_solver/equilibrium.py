@@ -97,9 +97,16 @@ class Path:
             resistance, energy, response = answer
         return None
 
+    def contact_radius(self, normal: np.ndarray) -> float:
+        """m, of the circle of the contact's area as it is seen along `normal` (3,)."""
+        contact = self._settling.contact
+        points = contact.points + self._settling.displaced(self.state.displacement[self.body.kept])
+        area = (contact.area_vectors(points) @ normal).ravel()[self.state.pressing].sum()
+        return float(np.sqrt(max(area, 0.0) / np.pi))
+
     @property
     def _size(self) -> float:
-        return self._settling.contact.radius ** 2
+        return self._settling.contact.radius**2
 
     def _moved(self, u: np.ndarray, step: np.ndarray) -> tuple[float, tuple] | None:
         """(share of the step that turns no element inside out, the body's answer there)."""

@@ -48,7 +48,7 @@ class FeltSurface:
 
 @kernel
 def _nearest(points, near, vertices, triangles, found, triangle, weights):
-    """The nearest point of the candidate triangles `near` (k, c) to each point (Ericson 2005, section 5.1)."""
+    """The nearest point of the candidate triangles `near` (k, c) to each point (Ericson 2005, 5.1)."""
     for k in range(points.shape[0]):
         least = np.inf
         px, py, pz = points[k, 0], points[k, 1], points[k, 2]

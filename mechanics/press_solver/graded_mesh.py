@@ -1,4 +1,4 @@
-"""An object's own tetrahedra made fine under a tip: bisected (Rivara 1984), quadratic, curved as it is felt."""
+"""An object's own tetrahedra made fine under a tip: bisected (Rivara 1984), quadratic, curved."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ class GradedMesh:
 
 
 def drawn_to(mesh: TetMesh, surface: FeltSurface | None) -> TetMesh:
-    """The linear mesh with its touchable nodes on the felt surface, except where that would flatten a cell."""
+    """The linear mesh with its touchable nodes on the felt surface, as far as its cells stay sound."""
     mesh = mesh.linear()
     if surface is None:
         return mesh
@@ -61,9 +61,7 @@ def graded_mesh(
         if len(tets) > _MOST_TETRAHEDRA:
             raise MeshError(f"a graded mesh grew beyond {_MOST_TETRAHEDRA} tetrahedra: ask for less fineness")
         split = _splittable(of_tet, longest, too_long, len(ends))
-        points, tets, fixed, parent = _bisected(
-            points, tets, fixed, parent, (ends, longest, split), surface
-        )
+        points, tets, fixed, parent = _bisected(points, tets, fixed, parent, (ends, longest, split), surface)
     flat = TetMesh(points, tets, fixed, ~fixed)
     whole = flat.quadratic()
     faces = whole.touchable_surface

@@ -6,24 +6,32 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.press_solver.body import Body
+from mechanics.errors import OptionError
+from mechanics.press_solver.body import Body, BodyMaterial
 from mechanics.press_solver.contact import SphereContact
 from mechanics.press_solver.equilibrium import Path
 from mechanics.press_solver.felt_surface import FeltSurface
-from mechanics.press_solver.graded_mesh import GradedMesh, drawn_to, graded_mesh
+from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.settling import Settling
 from mechanics.tetmesh import TetMesh
+
+_LONGEST = 1.3
+"""Longest over typical edge of a tetrahedron."""
+
+LAWS = ("linear", "neo-hookean")
 
 
 @dataclass(frozen=True)
 class PressOptions:
     """How a press is solved.
 
-    law: 'neo-hookean' (with `stiffening` of mechanics.effects.strain_stiffening) at finite strain, or
-    'linear'. friction: Coulomb's coefficient; None sticks. finest: edges under the first contact, contact
-    radii; growth: edges a distance from the place. zone: of finite strain, radii of the deepest contact;
-    inf solves the whole body so. step: longest load step, tip radii. penalty: traction an overlap, of E over
-    the first contact's radius.
+    law: 'linear', or 'neo-hookean' at finite strain; stiffening: with it, r of
+    mechanics.effects.strain_stiffening; coupled: its energy (mechanics.press_solver.solid). friction: Coulomb's coefficient, 0 for none; None
+    sticks. finest: edges at the place, radii of the first contact, sqrt(R depth); growth: edges over their
+    distance from the way of the tip. zone: of finite strain, radii of the deepest contact; inf: the whole
+    body. reach: of what may be touched, in the same. step: longest load step, tip radii. penalty: traction
+    an overlap, of Young's modulus over the first contact's radius. tolerance: residual over the contact's
+    forces. Raises OptionError for a law or friction that is not allowed.
     """
 
     law: str = "neo-hookean"
@@ -37,6 +45,12 @@ class PressOptions:
     step: float = 0.2
     penalty: float = 1500.0
     tolerance: float = 2e-4
+
+    def __post_init__(self) -> None:
+        if self.law not in LAWS:
+            raise OptionError(f"law is '{self.law}'; allowed are {', '.join(LAWS)}")
+        if self.friction is not None and not self.friction >= 0:
+            raise OptionError(f"friction is {self.friction:g}; it must be at least 0, or None to stick")
 
 
 @dataclass(frozen=True)
@@ -78,25 +92,27 @@ class PressSolver:
     def press(
         self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, slide: np.ndarray | None = None
     ) -> PressSolution:
-        """Press at `point` (3,) m against the outward normal (3,) to `depths` (k,) m, increasing; then move the
-        tip by each of `slide` (s, 3) m from where it is deepest. Results hold k + s places of the path."""
-        point = np.asarray(point, dtype=float)
+        """Press at `point` (3,) m against the outward normal (3,) to `depths` (k,) m, then move the tip.
+
+        slide: (s, 3) m, where the tip goes from where it is deepest. The solution holds k + s places. Raises
+        OptionError where depths are not positive and increasing.
+        """
+        point, depths = np.asarray(point, dtype=float), np.atleast_1d(np.asarray(depths, dtype=float))
         normal = np.asarray(normal, dtype=float) / np.linalg.norm(normal)
-        depths = np.asarray(depths, dtype=float)
+        if not (len(depths) and depths[0] > 0 and (np.diff(depths) > 0).all()):
+            raise OptionError(f"depths are {depths.tolist()}; they must be positive and increasing, m")
         start = point + self.tip_radius_m * normal
         centres = start - depths[:, None] * normal
         if slide is not None:
             centres = np.vstack([centres, centres[-1] + np.asarray(slide, dtype=float)])
-        path, settling = self._prepared(point, normal, depths, centres, start)
-        self.last = path
+        path = self._prepared(point, normal, depths, centres[-1] - centres[0])
         count, scale = len(centres), self.young_modulus_pa
         force, radius, energy = np.full((count, 3), np.nan), np.full(count, np.nan), np.full(count, np.nan)
         for k, centre in enumerate(centres):
             if not self._driven(path, start, centre):
                 break
-            state = path.state
-            force[k], energy[k] = scale * state.force, scale * state.energy
-            radius[k] = self._contact_radius(settling, path, normal)
+            force[k], energy[k] = scale * path.state.force, scale * path.state.energy
+            radius[k] = path.contact_radius(normal)
         return PressSolution(force, radius, energy, np.isfinite(energy))
 
     def _driven(self, path: Path, start: np.ndarray, centre: np.ndarray) -> bool:
@@ -111,55 +127,39 @@ class PressSolver:
                 return False
         return True
 
-    def _prepared(
-        self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, centres: np.ndarray, start: np.ndarray
-    ) -> tuple[Path, Settling]:
+    def _prepared(self, point: np.ndarray, normal: np.ndarray, depths: np.ndarray, way: np.ndarray) -> Path:
+        """The body around a place, and the sphere that just touches it. way: (3,) m, of the tip."""
         options, tip = self.options, self.tip_radius_m
-        first, last = (np.sqrt(tip * min(d, tip)) for d in (depths[0], depths[-1]))
-        across = centres[-1] - start
-        across = across - (across @ normal) * normal
+        first, last = (float(np.sqrt(tip * min(d, tip))) for d in (depths[0], depths[-1]))
+        last = max(last, 0.3 * tip)
+        across = way - (way @ normal) * normal
 
         def far(at: np.ndarray) -> np.ndarray:
             """Distance from the way of the tip along the surface."""
-            way = at - point
-            along = np.clip(way @ across / max(across @ across, 1e-300), 0.0, 1.0)
-            return np.linalg.norm(way - along[:, None] * across, axis=1)
+            along = np.clip((at - point) @ across / max(across @ across, 1e-300), 0.0, 1.0)
+            return np.linalg.norm(at - point - along[:, None] * across, axis=1)
 
         def size(at: np.ndarray) -> np.ndarray:
-            return 1.3 * np.maximum(options.finest * first, options.growth * far(at))
+            return _LONGEST * np.maximum(options.finest * first, options.growth * far(at))
 
         mesh = graded_mesh(self.mesh, self._surface, size)
-        middle = mesh.points[mesh.cells[:, :4]].mean(axis=1)
-        deepest = max(float(last), 0.3 * tip)
-        near = far(middle) < options.zone * deepest
-        if options.law == "linear":
-            near[:] = False
-        reach = far(mesh.points[mesh.faces[:, :3]].mean(axis=1)) < options.reach * deepest + 0.1 * tip
-        facing = np.einsum("fi,i->f", _across(mesh), normal) > 0.0
-        faces = mesh.faces[reach & facing]
-        if near.any():
+        corner = mesh.points[mesh.faces[:, :3]]
+        across_faces = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+        reach = far(corner.mean(axis=1)) < options.reach * last + 0.1 * tip
+        faces = mesh.faces[reach & (across_faces @ normal > 0)]
+        near = np.zeros(len(mesh.cells), dtype=bool)
+        if options.law != "linear":
+            near = far(mesh.points[mesh.cells[:, :4]].mean(axis=1)) < options.zone * last
             near |= np.isin(mesh.cells, faces).any(axis=1)
         nodes = np.unique(faces)
-        body = Body(mesh, self.poisson_ratio, options.stiffening, self._ratio[mesh.parent], near, nodes, options.coupled)
-        local = np.full(len(mesh.points), -1)
-        local[nodes] = np.arange(len(nodes))
-        contact = SphereContact(
-            mesh.points[nodes], local[faces], tip, options.friction, options.penalty / first
+        material = BodyMaterial(
+            self.poisson_ratio, options.stiffening, options.coupled, self._ratio[mesh.parent]
         )
-        number = body.number.reshape(-1, 3)[nodes]
+        body = Body(mesh, material, near, nodes)
+        contact = SphereContact(
+            mesh.points[nodes], np.searchsorted(nodes, faces), tip, options.friction, options.penalty / first
+        )
         rank = np.full(body.size + 1, -1)
         rank[body.kept] = np.arange(len(body.kept))
-        settling = Settling(contact, rank[number])
-        return Path(body, settling, start, options.tolerance), settling
-
-    @staticmethod
-    def _contact_radius(settling: Settling, path: Path, normal: np.ndarray) -> float:
-        contact = settling.contact
-        points = contact.points + settling.displaced(path.state.displacement[path.body.kept])
-        area = (contact.area_vectors(points) @ normal).ravel()[path.state.pressing].sum()
-        return float(np.sqrt(max(area, 0.0) / np.pi))
-
-
-def _across(mesh: GradedMesh) -> np.ndarray:
-    p = mesh.points[mesh.faces[:, :3]]
-    return np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+        settling = Settling(contact, rank[body.number.reshape(-1, 3)[nodes]])
+        return Path(body, settling, point + tip * normal, options.tolerance)

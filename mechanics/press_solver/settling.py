@@ -81,8 +81,8 @@ class Settling:
         self, chosen: np.ndarray, schur: np.ndarray, load: np.ndarray, u: np.ndarray, centre: np.ndarray,
         before: Grip, grip: Grip,
     ) -> Settled | None:  # fmt: skip
-        whole = np.zeros(len(u))
-        result = Settled(whole, np.zeros(len(u)), np.zeros(3), np.zeros(len(grip.anchored), bool), grip.copy())
+        nothing, nowhere = np.zeros(len(u)), np.zeros(len(grip.anchored), dtype=bool)
+        result = Settled(nothing, np.zeros(len(u)), np.zeros(3), nowhere, grip.copy())
         trial, own = result.grip, self.contact.of_faces(chosen)
         trial.relative = before.relative
         few = np.unique(self._of_face[chosen])
@@ -148,7 +148,7 @@ class Settling:
     def _arrived(
         self, own: np.ndarray, traction: Traction, relative: np.ndarray, before: Grip, trial: Grip
     ) -> bool:
-        """Anchor the points that began to press in this step where they met the sphere, and set the friction's
+        """Anchor the points that began to press in this step where they met the sphere, and set friction's
         bounds; whether any of it moved.
 
         A held point that pulls is let go; it slides until the step ends, should it press again.

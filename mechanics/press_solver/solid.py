@@ -58,9 +58,7 @@ class Solid:
         slopes = slopes[..., 1:] - slopes[..., :1]
         jacobian = np.einsum("qax,eay->eqxy", slopes, points[cells])
         self.weights = np.ascontiguousarray(np.linalg.det(jacobian) / 24)
-        self.gradients = np.ascontiguousarray(
-            np.einsum("eqyx,qax->eqay", np.linalg.inv(jacobian), slopes)
-        )
+        self.gradients = np.ascontiguousarray(np.einsum("eqyx,qax->eqay", np.linalg.inv(jacobian), slopes))
         lam, mu = lame_parameters(1.0, poisson_ratio)
         ratio = np.ones(len(cells)) if ratio is None else np.asarray(ratio, dtype=float)
         self.shear, self.bulk = mu * ratio, (lam if coupled else lam + 2 * mu / 3) * ratio
@@ -84,7 +82,8 @@ class Solid:
         given = np.empty(0) if pressure is None else pressure
         energy = _respond(
             self.cells, displacement, self.gradients, self.weights, self.shear, self.bulk, self.stiffening,
-            self.coupled, given, tangent, np.empty((4, 3, 3)), np.empty((10, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, 3)),
+            self.coupled, given, tangent,
+            np.empty((4, 3, 3)), np.empty((6, 3)), np.empty((3, 3, 3, 3)), np.empty((3, 3, 3)),
             forces, stiffness, own, slope, growth,
         )  # fmt: skip
         if not np.isfinite(energy):
@@ -200,9 +199,8 @@ def _respond(
                     for b in range(a, 10):
                         for i in range(3):
                             for k in range(3):
-                                stiffness[e, 3 * a + i, 3 * b + k] += (
-                                    half[i, k, 0] * g[b, 0] + half[i, k, 1] * g[b, 1] + half[i, k, 2] * g[b, 2]
-                                )
+                                for l in range(3):
+                                    stiffness[e, 3 * a + i, 3 * b + k] += half[i, k, l] * g[b, l]
         for r in range(30):
             forces[e, r] += pressure[e] * growth[e, r]
         if tangent:
