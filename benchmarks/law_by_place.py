@@ -42,7 +42,7 @@ FINENESS = Fineness(2.0, 6.0, 0.5)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which shapes, how many places."""
     parser.add_argument("--shapes", nargs="+", choices=tuple(SHAPES), default=list(SHAPES))
-    parser.add_argument("--places", type=int, default=12, help="of each shape (default: 12)")
+    parser.add_argument("--places", type=int, default=10, help="of each shape (default: 10)")
     parser.add_argument("--size-mm", type=float, default=10.0, help="of the renderer's mesh (default: 10)")
     parser.add_argument("--seed", type=int, default=11, help="of the places (default: 11)")
 

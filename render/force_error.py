@@ -54,13 +54,13 @@ def force_errors(
     return ForceErrors(shares * size, _SURE * sd * steepness, _SURE * onset * steepness)
 
 
-def error_figures(errors: ForceErrors | None, counted: np.ndarray | int) -> dict[str, float]:
-    """Keys of `--json`: rms over the counted samples, or at one; nothing where nothing is known."""
+def error_figures(errors: ForceErrors | None) -> dict[str, float]:
+    """Keys of `--json`: rms over the samples; nothing where nothing is known."""
     if errors is None:
         return {}
     parts = {"force_error_n": errors.law_n, "shape_error_n": errors.shape_n}
     parts["first_touch_error_n"] = errors.first_touch_n
-    return {key: float(np.sqrt(np.mean(np.square(part[counted])))) for key, part in parts.items()}
+    return {key: float(np.sqrt(np.mean(np.square(part)))) for key, part in parts.items()}
 
 
 def said(figures: dict[str, float]) -> str:
