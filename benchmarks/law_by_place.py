@@ -27,7 +27,7 @@ from mechanics.store import content_key
 from mechanics.tetmesh import TetMesh
 from palpate.output import progress_bar
 from render.fem import FemRenderer
-from render.force_error import place_numbers
+from render.force_error import law_share, place_numbers
 from scenes.laboratory.mesh import laboratory_cache
 from scenes.laboratory.specimen import Fineness, Specimen, build
 from scenes.laboratory.surface import Surface
@@ -74,8 +74,23 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 worst = float(np.nanmax(np.abs(error)))
                 figures.append(Figure(f"the same, {name}, worst", worst, unit="%").at_most(4.0))
     progress.close()
+    figures += _bounds([found[f"{name}, law"] for name in arguments.shapes])
     print(table(["shape", "law", *(f"{a} to {b} mm" for a, b in BANDS_MM), "rms", "worst"], rows))
     return {"errors": found, "figures": figures}
+
+
+def _bounds(found: list[dict[str, np.ndarray]]) -> list[Figure]:
+    """How often the stated 95 % width holds, and how wide it is beside the errors themselves."""
+    error = np.concatenate([one["error_percent"] for one in found]) / 100
+    bent, sideways = np.concatenate([one["place"] for one in found], axis=1)
+    stated = law_share(DEPTHS_M / TIP_M, bent[:, None], sideways[:, None])
+    known = np.isfinite(error)
+    beyond = float((np.abs(error) > stated)[known].mean())
+    wide = float(np.median(stated[known]) / np.sqrt((error[known] ** 2).mean()))
+    return [
+        Figure("forces beyond the stated width of the law's error", beyond).at_most(0.05),
+        Figure("median stated width over the rms error", wide).at_most(2.0),
+    ]
 
 
 def _ends(values: np.ndarray) -> tuple[float, float]:

@@ -17,7 +17,9 @@ from render.felt_surface import felt_surface
 from render.fem import FemRenderer
 from render.snapping import ONSET_NOISE_M
 
-FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.0, 0.0
+FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.031, 0.015, 0.21
+"""Fitted by maximum likelihood to 360 forces at 40 places of four shapes (`bench law-by-place --seed 11`);
+of half of the places, when fitted to the other half, it held 94 and 96 %."""
 _SURE = 1.96
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
