@@ -27,7 +27,7 @@ from mechanics.store import content_key
 from mechanics.tetmesh import TetMesh
 from palpate.output import progress_bar
 from render.fem import FemRenderer
-from render.force_error import place_numbers
+from render.force_error import law_share, place_numbers
 from scenes.laboratory.mesh import laboratory_cache
 from scenes.laboratory.specimen import Fineness, Specimen, build
 from scenes.laboratory.surface import Surface
@@ -42,7 +42,7 @@ FINENESS = Fineness(2.0, 6.0, 0.5)
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which shapes, how many places."""
     parser.add_argument("--shapes", nargs="+", choices=tuple(SHAPES), default=list(SHAPES))
-    parser.add_argument("--places", type=int, default=12, help="of each shape (default: 12)")
+    parser.add_argument("--places", type=int, default=10, help="of each shape (default: 10)")
     parser.add_argument("--size-mm", type=float, default=10.0, help="of the renderer's mesh (default: 10)")
     parser.add_argument("--seed", type=int, default=11, help="of the places (default: 11)")
 
@@ -74,8 +74,23 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 worst = float(np.nanmax(np.abs(error)))
                 figures.append(Figure(f"the same, {name}, worst", worst, unit="%").at_most(4.0))
     progress.close()
+    figures += _bounds([found[f"{name}, law"] for name in arguments.shapes])
     print(table(["shape", "law", *(f"{a} to {b} mm" for a, b in BANDS_MM), "rms", "worst"], rows))
     return {"errors": found, "figures": figures}
+
+
+def _bounds(found: list[dict[str, np.ndarray]]) -> list[Figure]:
+    """How often the stated 95 % width holds, and how wide it is beside the errors themselves."""
+    error = np.concatenate([one["error_percent"] for one in found]) / 100
+    bent, sideways = np.concatenate([one["place"] for one in found], axis=1)
+    stated = law_share(DEPTHS_M / TIP_M, bent[:, None], sideways[:, None])
+    known = np.isfinite(error)
+    beyond = float((np.abs(error) > stated)[known].mean())
+    wide = float(np.median(stated[known]) / np.sqrt((error[known] ** 2).mean()))
+    return [
+        Figure("forces beyond the stated width of the law's error", beyond).at_most(0.05),
+        Figure("median stated width over the rms error", wide).at_most(2.0),
+    ]
 
 
 def _ends(values: np.ndarray) -> tuple[float, float]:

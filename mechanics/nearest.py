@@ -33,7 +33,7 @@ def closest(
 
     shell = pyvista.PolyData.from_regular_faces(np.asarray(vertices, dtype=float), np.asarray(triangles))
     index, found = shell.find_closest_cell(np.asarray(points, dtype=float), return_closest_point=True)
-    index, found = np.atleast_1d(index), np.atleast_2d(found)
+    index, found = np.atleast_1d(index).astype(np.int64), np.reshape(found, (-1, 3))  # of no points too
     a, b, c = (np.asarray(vertices)[np.asarray(triangles)[index, k]] for k in range(3))
     u, v, w = b - a, c - a, found - a
     uu, vv, uv = (np.einsum("ij,ij->i", x, y) for x, y in ((u, u), (v, v), (u, v)))

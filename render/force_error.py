@@ -17,7 +17,9 @@ from render.felt_surface import felt_surface
 from render.fem import FemRenderer
 from render.snapping import ONSET_NOISE_M
 
-FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.02, 0.0, 0.0
+FLOOR, BENT_SHARE, SIDEWAYS_SHARE = 0.031, 0.015, 0.21
+"""Fitted by maximum likelihood to 360 forces at 40 places of four shapes (`bench law-by-place --seed 11`);
+of half of the places, when fitted to the other half, it held 94 and 96 %."""
 _SURE = 1.96
 _STEEPNESS = 1.4
 """d ln force / d ln depth of a press: 1.5 for a small dent, 1 where the object gives."""
@@ -54,13 +56,13 @@ def force_errors(
     return ForceErrors(shares * size, _SURE * sd * steepness, _SURE * onset * steepness)
 
 
-def error_figures(errors: ForceErrors | None, counted: np.ndarray | int) -> dict[str, float]:
-    """Keys of `--json`: rms over the counted samples, or at one; nothing where nothing is known."""
+def error_figures(errors: ForceErrors | None) -> dict[str, float]:
+    """Keys of `--json`: rms over the samples; nothing where nothing is known."""
     if errors is None:
         return {}
     parts = {"force_error_n": errors.law_n, "shape_error_n": errors.shape_n}
     parts["first_touch_error_n"] = errors.first_touch_n
-    return {key: float(np.sqrt(np.mean(np.square(part[counted])))) for key, part in parts.items()}
+    return {key: float(np.sqrt(np.mean(np.square(part)))) for key, part in parts.items()}
 
 
 def said(figures: dict[str, float]) -> str:

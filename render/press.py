@@ -59,7 +59,7 @@ class Curve(Result):
             return {}
         part = slice(self.deepest, self.deepest + 1)
         errors = force_errors(self.renderer, self.position[part], self.force[part], self.tip_radius_m)
-        return error_figures(errors, 0)
+        return error_figures(errors)
 
     @property
     def deepest(self) -> int:

@@ -147,3 +147,4 @@ def test_closest_point_on_triangles():
     assert found == pytest.approx(nearest)
     assert nearest == pytest.approx(np.array([[0.2, 0.2, 0], [0.9, 0.8, 0], [1, 0.5, 0], [0, 0, 0]]))
     assert (weights >= 0).all()
+    assert [len(part) for part in closest(corners, triangles, np.zeros((0, 3)))] == [0, 0, 0]

@@ -1,0 +1,37 @@
+"""What a press says of its own error: its parts, its size, where nothing is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import render
+from render.force_error import error_figures, force_errors, law_share
+
+
+def test_the_law_is_surer_on_flat_ground_than_deep_on_a_bump_or_beside_a_rim():
+    flat, bump, rim = (float(law_share(1.0, *at)) for at in ((0.0, 0.0), (0.3, 0.0), (0.0, 0.3)))
+    assert 0 < flat < bump and flat < rim
+    assert float(law_share(1.5, 0.3, 0.0)) > bump
+
+
+def test_error_grows_with_the_force_and_is_told_in_its_three_parts(block_renderer):
+    top, radius = np.array([0.0, 0.0, 0.08]), 0.005
+    centre = np.array([top + [0, 0, radius - 0.001], top + [0, 0, radius - 0.004]])
+    force = np.array([[0.0, 0.0, 0.1], [0.0, 0.0, 0.8]])
+    errors = force_errors(block_renderer, centre, force, radius)
+    assert 0.005 < errors.law_n[0] / 0.1 < 0.1
+    assert errors.law_n[1] == pytest.approx(8 * errors.law_n[0], rel=0.3)
+    figures = error_figures(errors)
+    assert list(figures) == ["force_error_n", "shape_error_n", "first_touch_error_n"]
+    assert all(np.isfinite(value) and value >= 0 for value in figures.values())
+
+
+def test_in_air_there_is_nothing_to_be_off_by(block_renderer):
+    errors = force_errors(block_renderer, np.array([[0.0, 0.0, 0.2]]), np.zeros((1, 3)), 0.005)
+    assert error_figures(errors) == {"force_error_n": 0, "shape_error_n": 0, "first_touch_error_n": 0}
+
+
+def test_a_one_d_renderer_says_nothing_of_its_own_error(one_d_model):
+    renderer = render.create("kelvin-voigt", one_d_model)
+    assert error_figures(force_errors(renderer, np.zeros((1, 3)), np.ones((1, 3)), 0.005)) == {}
