@@ -131,9 +131,7 @@ class ReplayResult(Result, ReplayError):
             return {}
         felt = self.contact
         path, radius = self.recording.position[felt], self.recording.tip_radius_m
-        return error_figures(
-            force_errors(self.used, path, self.force_n[felt], radius), np.arange(int(felt.sum()))
-        )
+        return error_figures(force_errors(self.used, path, self.force_n[felt], radius))
 
     def save(self, path: Path | str) -> Path:
         """Write `t,fx,fy,fz` (s, and N on the tool) as `palpate replay` does."""
