@@ -278,5 +278,6 @@ def _row(case: _Case) -> dict[str, Any]:
         "left_n": case.left_n, "kind": verdict.kind, "named": case.named,
         "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
         "shares": {name: part.share for name, part in verdict.parts.items()},
-        "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n, "adds_up": bool(abs(whole - 1) < 1e-9),
+        "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n,
+        "adds_up": bool(abs(whole - 1) < 1e-9),
     }  # fmt: skip
