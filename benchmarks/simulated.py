@@ -117,7 +117,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
             seed = 1000 * arguments.seed + int(number)
             rows[name] = _row(_judged(block, world(number % 3 == 2), plan[number], seed, int(number)))
             if arguments.work is not None:
-                (arguments.work / f"{name}.json").write_text(json.dumps(rows[name], indent=1))
+                (arguments.work / f"{name}.json").write_text(json.dumps(rows[name], indent=1, default=float))
     return _said(list(rows.values()))
 
 
@@ -278,5 +278,6 @@ def _row(case: _Case) -> dict[str, Any]:
         "left_n": case.left_n, "kind": verdict.kind, "named": case.named,
         "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
         "shares": {name: part.share for name, part in verdict.parts.items()},
-        "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n, "adds_up": abs(whole - 1) < 1e-9,
+        "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n,
+        "adds_up": bool(abs(whole - 1) < 1e-9),
     }  # fmt: skip

@@ -363,9 +363,10 @@ def _finite(value: float) -> float | None:
 
 def _advice(w: _Weighed) -> tuple[str, ...]:
     said = []
-    for name in w.numerics.named:
+    for name in (*w.numerics.named, *w.numerics.candidates):
         words = w.asked.advice.get(name) or numerical(name).advice
-        said.append(f"{name.replace('_', ' ')}: {words}")
+        which = "" if name in w.numerics.named else "or "
+        said.append(f"{which}{name.replace('_', ' ')}: {words}")
     units = {
         "stated_modulus": ("Young's modulus", "Pa"),
         "stated_poisson_ratio": ("Poisson's ratio", ""),
