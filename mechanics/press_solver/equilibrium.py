@@ -14,6 +14,7 @@ _ITERATIONS = 30
 _SLOW = 0.3
 """The tangent is taken anew where an iteration leaves more than this share of the residual."""
 _HALVINGS = 5
+_TOUCHING = 3e-3
 
 
 @dataclass(frozen=True)
@@ -35,6 +36,7 @@ class Path:
 
     def __init__(self, body: Body, settling: Settling, centre: np.ndarray, tolerance: float = 2e-4) -> None:
         self.body, self._settling, self._tolerance = body, settling, tolerance
+        self._start = centre
         grip = settling.contact.start(centre)
         self.state = State(
             np.zeros(body.size), centre, np.zeros(3), 0.0, None, grip, np.zeros(len(grip.anchored), bool)
@@ -98,10 +100,15 @@ class Path:
         return None
 
     def contact_radius(self, normal: np.ndarray) -> float:
-        """m, of the circle of the contact's area as it is seen along `normal` (3,)."""
-        contact = self._settling.contact
+        """m, of the circle of the contact's area as it is seen along `normal` (3,).
+
+        A point is in contact within _TOUCHING of the depth: a quadratic face meets a sphere point by point.
+        """
+        contact, state = self._settling.contact, self.state
+        gap = np.linalg.norm(state.grip.relative, axis=1) - contact.radius
+        touching = gap < _TOUCHING * ((self._start - state.centre) @ normal)
         points = contact.points + self._settling.displaced(self.state.displacement[self.body.kept])
-        area = (contact.area_vectors(points) @ normal).ravel()[self.state.pressing].sum()
+        area = (contact.area_vectors(points) @ normal).ravel()[touching].sum()
         return float(np.sqrt(max(area, 0.0) / np.pi))
 
     @property

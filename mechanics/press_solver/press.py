@@ -25,13 +25,14 @@ LAWS = ("linear", "neo-hookean")
 class PressOptions:
     """How a press is solved.
 
-    law: 'linear', or 'neo-hookean' at finite strain; stiffening: with it, r of
-    mechanics.effects.strain_stiffening; coupled: its energy (mechanics.press_solver.solid). friction: Coulomb's coefficient, 0 for none; None
-    sticks. finest: edges at the place, radii of the first contact, sqrt(R depth); growth: edges over their
-    distance from the way of the tip. zone: of finite strain, radii of the deepest contact; inf: the whole
-    body. reach: of what may be touched, in the same. step: longest load step, tip radii. penalty: traction
-    an overlap, of Young's modulus over the first contact's radius. tolerance: residual over the contact's
-    forces. Raises OptionError for a law or friction that is not allowed.
+    law: 'linear', or 'neo-hookean' at finite strain; with it stiffening, r of
+    mechanics.effects.strain_stiffening, and coupled, its energy (mechanics.press_solver.solid). friction:
+    Coulomb's coefficient, 0 for none; None sticks. finest: edges at the place, radii of the first contact,
+    sqrt(R depth); growth: edges over their distance from the way of the tip. zone: of finite strain, radii of
+    the deepest contact; inf: the whole body. reach: of what may be touched, in the same. step: longest load
+    step, tip radii. penalty: traction an overlap, of Young's modulus over the first contact's radius.
+    tolerance: residual over the contact's forces. Raises OptionError for a law or friction that is not
+    allowed.
     """
 
     law: str = "neo-hookean"

@@ -13,7 +13,7 @@ from mechanics.press_solver.contact import Grip, SphereContact, Traction
 _ROUNDS, _SLIDING_ROUNDS, _ITERATIONS = 3, 8, 60
 _AT_REST = 5e-3
 """Change of the friction's bounds from round to round, over their sum."""
-_SETTLED = 1e-9
+_SETTLED = 1e-7
 """Of the residual over the contact's forces."""
 _REACH = 0.12
 """Faces nearer to the sphere than this share of its radius are asked; more are taken where it turns out."""
