@@ -132,7 +132,8 @@ def pages() -> dict[str, str]:
         ["# Commands", "", "| command | does |", "| --- | --- |", *listed, "",
          "Exit codes: 0 done, 1 the answer is bad, 2 bad arguments or input. Every command has `--help`",
          "(`--help-all` for every option) and, where it has a result, `--json PATH`.",
-         "A misspelt name is answered with the one that was probably meant.", "", "```{toctree}", ":hidden:", "", names, "```", ""]
+         "A misspelt name is answered with the one that was probably meant.", "",
+         "```{toctree}", ":hidden:", "", names, "```", ""]
     )  # fmt: skip
     made["options.md"] = options_page()
     made["effects.md"] = effects_page()

@@ -67,14 +67,19 @@ class DiagnoseOperands:
         "documented",
         "of --renderer: as its own documentation says, or as good as it gets",
         choices=("documented", "best"),
+        rare=True,
     )
     simulator_set: str = operand(
-        "", "numbers of these settings to change: KEY=VALUE, comma separated", metavar="KEY=VALUE,..."
+        "",
+        "numbers of these settings to change: KEY=VALUE, comma separated",
+        metavar="KEY=VALUE,...",
+        rare=True,
     )
     mended: str | None = operand(
         None,
         "run --renderer once more with these numbers, and measure the gap that is left",
         metavar="KEY=VALUE,...",
+        rare=True,
     )
     stated: Any = operand(
         None,

@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 from xml.sax.saxutils import escape
 
 import numpy as np
@@ -101,7 +102,8 @@ def _ods(path: Path, content: Content, form: int, plain: bool) -> None:
 
 
 def _npz(path: Path, content: Content, form: int, plain: bool) -> None:
-    np.savez(path, **content.named())
+    arrays: dict[str, Any] = content.named()
+    np.savez(path, **arrays)
 
 
 def _npy(path: Path, content: Content, form: int, plain: bool) -> None:

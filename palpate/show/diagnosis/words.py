@@ -220,7 +220,8 @@ def _how_far(result: Diagnosis) -> tuple[str, str, str]:
 
 def lines(result: Diagnosis) -> list[str]:
     """What a terminal says: the answer, what it is, how far it goes, where it shows, how sure it is."""
-    text = [f"verdict: {verdict(result)}"]
+    ends = [f"{each} stands at the end of its range" for each in result.at_bound]
+    text = [f"verdict: {'; '.join([verdict(result), *ends])}"]
     text += [f"which: {_named(result, name)}" for name in result.effects]
     off = f"how far: a typical touch is {force_words(result.gap_before_n)} off"
     noise = f"; the sensor's noise is {force_words(result.noise_n)}"
@@ -232,6 +233,8 @@ def lines(result: Diagnosis) -> list[str]:
         )
     else:
         text.append(f"{off}{noise}")
+    if result.constant_n is not None:
+        text.append(f"  floor: the noise; ceiling: a constant push is {force_words(result.constant_n)} off")
     _, where, because = _where(result)
     text.append(f"where: {_small(where)}")
     text.append(f"  {because}".replace(" (the press shown)", ""))
