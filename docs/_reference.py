@@ -130,8 +130,10 @@ def pages() -> dict[str, str]:
     names = "\n".join(f"commands/{name}" for name in commands())
     made["commands.md"] = "\n".join(
         ["# Commands", "", "| command | does |", "| --- | --- |", *listed, "",
-         "Exit codes: 0 done, 1 the answer is bad, 2 bad arguments or input. Every command has `--help` and,",
-         "where it has a result, `--json PATH`.", "", "```{toctree}", ":hidden:", "", names, "```", ""]
+         "Exit codes: 0 done, 1 the answer is bad, 2 bad arguments or input. Every command has `--help`",
+         "(`--help-all` for every option) and, where it has a result, `--json PATH`.",
+         "A misspelt name is answered with the one that was probably meant.", "",
+         "```{toctree}", ":hidden:", "", names, "```", ""]
     )  # fmt: skip
     made["options.md"] = options_page()
     made["effects.md"] = effects_page()
