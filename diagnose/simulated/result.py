@@ -59,7 +59,8 @@ class SimulatedGap(Result):
     parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
     sensor's noise and touch_share what the object's own first touches take. reality: today's diagnosis of our
     ideal model. gaps: (n, 3) N, local frames of `touches`, as the parts are taken off, "simulated" first.
-    notes: what was told of the forces. `plot`: the parts. `report`: the page.
+    notes: what was told of the forces. `plot`: the parts as shares. `show`: the object coloured by
+    the gap.
     """
 
     simulator: Simulator
