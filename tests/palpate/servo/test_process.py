@@ -25,7 +25,7 @@ pytest.importorskip("websockets")
 
 # The emulator shares a machine with noisy neighbours, which stall it longer than a service is ever silent. A
 # late pose or a lost link rightly takes the force away, which is not what is looked for here.
-ANSWER_S = 10.0
+ANSWER_S, STALE_S = 10.0, 2.0
 
 
 def choice(fake: FakeInverse) -> DeviceChoice:
@@ -70,7 +70,7 @@ def fake():
 
 @pytest.fixture
 def servo(fake):
-    options = ServoOptions(safety=SafetyOptions(ramp_s=0.1, stale_s=ANSWER_S))
+    options = ServoOptions(safety=SafetyOptions(ramp_s=0.1, stale_s=STALE_S))
     with Servo(PlaneSource(500.0), device=choice(fake), options=options) as session:
         yield session.start()
 
