@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import json
 import math
@@ -61,8 +60,6 @@ def plain(value: Any) -> Any:
     return str(value) if isinstance(value, Path) else value
 
 
-EVERY_S = 10.0
-"""Between lines of progress where standard error is no terminal."""
 _REDRAWN_S, _SHORT_S = 1.0, 5.0
 
 
@@ -75,18 +72,17 @@ def progress_bar(label: str, *, left: bool = True) -> Bar:
 
 
 class Bar:
-    """The one display of every wait: a bar with the stage and what is left of it on a terminal; elsewhere a
-    line every ten seconds, and none for what takes less. It goes on while a stage tells of nothing."""
+    """The one display of every wait: on a terminal a bar with the stage and what is left of it, which goes on
+    while a stage tells of nothing; elsewhere nothing, so that standard error holds errors alone."""
 
     def __init__(self, label: str, left: bool = True) -> None:
         from tqdm import tqdm
 
-        self._stream = sys.stderr
-        terminal = self._stream.isatty()
+        terminal = sys.stderr.isatty()
         self._bar = tqdm(
             total=100.0,
             desc=label,
-            file=self._stream,
+            file=sys.stderr,
             disable=not terminal,
             bar_format="{percentage:3.0f}% {bar:16} {elapsed} {desc}",
             leave=True,
@@ -94,9 +90,9 @@ class Bar:
         self._terminal, self._label, self._stage, self._share = terminal, label, "", 0.0
         self._says_left, self._left, self._closed = left, Remaining(), threading.Event()
         self._left.tell(0.0)
-        self._every = _REDRAWN_S if terminal else EVERY_S
         self._thread = threading.Thread(target=self._go_on, name="progress", daemon=True)
-        self._thread.start()
+        if terminal:
+            self._thread.start()
 
     def __call__(self, stage: str, fraction: float) -> None:
         self._stage, self._share = stage, min(max(fraction, 0.0), 1.0)
@@ -104,11 +100,11 @@ class Bar:
         if self._terminal:
             self._draw()
 
-    def _words(self, *more: str) -> str:
-        """Label and stage, more, and what is left."""
+    def _words(self) -> str:
+        """Label and stage, and what is left."""
         late = self._says_left and self._left.elapsed_s > _SHORT_S
         about = ": ".join(word for word in (self._label, self._stage) if word)
-        return ", ".join(word for word in (about, *more, self._left.words() if late else "") if word)
+        return ", ".join(word for word in (about, self._left.words() if late else "") if word)
 
     def _draw(self) -> None:
         width = max(20, shutil.get_terminal_size().columns - 30)
@@ -117,18 +113,14 @@ class Bar:
         self._bar.refresh()
 
     def _go_on(self) -> None:
-        while not self._closed.wait(self._every):
-            if self._terminal:
-                self._draw()
-                continue
-            told = self._words(f"{100 * self._share:.0f} %", f"after {self._left.elapsed_s:.0f} s")
-            with contextlib.suppress(OSError, ValueError):  # nobody reads standard error any more
-                print(told, file=self._stream, flush=True)
+        while not self._closed.wait(_REDRAWN_S):
+            self._draw()
 
     def close(self) -> None:
         """Finish the bar's line."""
         self._closed.set()
-        self._thread.join()
+        if self._terminal:
+            self._thread.join()
         self._bar.close()
 
     def __enter__(self) -> Self:

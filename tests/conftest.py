@@ -13,7 +13,6 @@ for _threads in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(_threads, "1")
 
 import mechanics  # noqa: E402, F401  where compiled kernels are kept, before a test decorates one
-from palpate import output  # noqa: E402
 
 from .support.once import compile_one_at_a_time  # noqa: E402
 
@@ -21,14 +20,6 @@ if "PYTEST_XDIST_WORKER" in os.environ and os.name == "posix":
     compile_one_at_a_time()
 
 REPOSITORY = Path(__file__).resolve().parents[1]
-
-
-@pytest.fixture(autouse=True, scope="session")
-def no_lines_of_progress():
-    """What a command says on standard error has no line of progress in it, however busy the machine is."""
-    before, output.EVERY_S = output.EVERY_S, 1e6
-    yield
-    output.EVERY_S = before
 
 
 def _shared(name: str, words: str) -> Path:
