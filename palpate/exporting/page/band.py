@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.model import Model
+from render.fem import FemRenderer
+from render.force_error import law_share, place_numbers
 
-LAW_SHARE = 0.03
-"""Of the force: the error of the law that the fit of the modulus takes for itself (`--law-error`)."""
 UNKNOWN_SHARE = 0.1
 """Of the modulus, where a model states no interval."""
 
 
-def force_band(model: Model, place: np.ndarray, depth_m: np.ndarray) -> np.ndarray:
-    """(v, k) 95 % half width of the force over the force, at places (v, 3) m and depths (k,) m.
+def force_band(renderer: FemRenderer, depth_m: np.ndarray) -> np.ndarray:
+    """(v, k) 95 % half width of the force over the force, at the v vertices of the renderer's surface and
+    depths (k,) m.
 
-    The model's interval of its modulus and the law's own error, taken as independent.
+    The model's interval of its modulus and the law's own error (render.force_error), taken as independent.
     """
+    model = renderer.model
     low, high = model.material.young_modulus_ci95_pa
     modulus = UNKNOWN_SHARE
     if np.isfinite([low, high]).all():
         modulus = 0.5 * (high - low) / model.material.young_modulus_pa
-    return np.full((len(place), len(depth_m)), float(np.hypot(modulus, LAW_SHARE)))
+    radius = model.tool.tip_radius_m
+    bent, sideways = place_numbers(renderer, radius)
+    return np.hypot(modulus, law_share(depth_m / radius, bent[:, None], sideways[:, None]))

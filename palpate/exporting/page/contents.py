@@ -51,7 +51,7 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Block,
     if beside is not None:
         curves = straight_forces(beside, depths)
         block.modes("one_d", modes_of(curves, curves.mean(axis=0), ERROR))
-    band = force_band(model, arrays.vertices, depths)
+    band = force_band(renderer, depths)
     block.modes("band", modes_of(band, band.mean(axis=0), 0.02))
     _far(block, renderer)
     presses = _measured(block, model.presses)
