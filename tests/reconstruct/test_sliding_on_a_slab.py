@@ -37,6 +37,7 @@ def sliding(friction: float, *, leaves: bool = False, seed: int = 0) -> Recordin
     return dataclasses.replace(made, force_on_tool=force)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("friction", "leaves"), [(0.0, False), (0.3, False), (0.3, True)])
 def test_a_continuous_log_of_sliding_gives_the_modulus(friction, leaves):
     """It was refused, or given a third of the modulus, as a model's tip sticks."""
