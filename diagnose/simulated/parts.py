@@ -30,6 +30,9 @@ from diagnose.simulated.stated import Stated, StatedForward
 from diagnose.verdict.answer import Findings
 from diagnose.verdict.held_out import ITERATIONS, neighbours
 from mechanics.effects.base import Effect
+from mechanics.effects.friction_slip import EFFECT as SLIP
+from mechanics.effects.poisson_ratio import EFFECT as POISSON
+from mechanics.effects.tip_radius import EFFECT as TIP
 
 
 @dataclass(frozen=True)
@@ -67,7 +70,7 @@ PARAMETER_OF = {
     "stated_tip_radius": "tip_radius_m",
 }
 """Name in an answer -> field of Stated."""
-ALSO_PARAMETERS = ("poisson_ratio", "friction_slip", "tip_radius")
+ALSO_PARAMETERS = (POISSON.name, SLIP.name, TIP.name)
 """Effects of a diagnosis that say a parameter which a simulator is given."""
 
 
@@ -115,7 +118,7 @@ def measured_parameters(
     diagnosis found them, else as the model and the recording state them."""
     forward = findings.forward
     model = forward.model
-    slip = named.get("friction_slip", model.effects.get("friction_slip", {}))
+    slip = named.get(SLIP.name, model.effects.get(SLIP.name, {}))
     return dataclasses.replace(
         stated,
         young_modulus_pa=modulus_pa,
@@ -123,7 +126,7 @@ def measured_parameters(
             named.get("poisson_ratio", {}).get("poisson_ratio", model.material.poisson_ratio)
         ),
         friction=float(slip.get("mu", np.inf)),
-        tip_radius_m=float(named.get("tip_radius", {}).get("tip_radius_m", forward.tip_radius)),
+        tip_radius_m=float(named.get(TIP.name, {}).get("tip_radius_m", forward.tip_radius)),
     )
 
 

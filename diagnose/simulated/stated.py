@@ -9,7 +9,9 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar
 
 from diagnose.forward.prediction import Forward
+from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.effects.settings import STICKS, Settings
+from mechanics.effects.tip_radius import EFFECT as TIP
 from mechanics.errors import OptionError
 from mechanics.far_field import far_at_poisson
 from mechanics.model import Model
@@ -31,7 +33,7 @@ ALIASES = {
     "nu": "poisson_ratio",
     "poisson": "poisson_ratio",
     "mu": "friction",
-    "tip_radius": "tip_radius_m",
+    TIP.name: "tip_radius_m",
 }
 
 
@@ -73,7 +75,7 @@ def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> S
             raise OptionError(f"--stated {key}={value}: it must be a number") from error
         if math.isnan(values[name]) or not KEYS[name].takes(values[name]):
             raise OptionError(f"--stated {key}={value}: it must be {KEYS[name].words}")
-    slip = model.effects.get("friction_slip", {})
+    slip = model.effects.get(SLIP.name, {})
     usual = Stated(
         model.material.young_modulus_pa,
         model.material.poisson_ratio,

@@ -207,7 +207,7 @@ def _simulation(
         *(f"it cannot say: {x}" for x in made.adapter.cannot),
     )
     forces = Forces(measured.t, force, asked.renderer, notes)
-    stated = stated_of(made.adapter.stated, model)
+    stated = stated_of(asked.stated or made.adapter.stated, model)
     return Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), made.adapter.version, made.adapter.advice)
 
 
@@ -218,8 +218,9 @@ def _forces(asked: DiagnoseOperands) -> Any:
     if asked.mended is not None and asked.renderer is None:
         raise OptionError("--mended runs a simulator once more: name it by --renderer")
     if asked.simulated is None:
-        if asked.stated:
-            raise OptionError("--stated says what a simulator was given: name its forces by --simulated")
+        if asked.stated and asked.renderer is None:
+            words = "name its forces by --simulated, or the simulator by --renderer"
+            raise OptionError(f"--stated says what a simulator was given: {words}")
         return None
     from diagnose.simulated.forces import read_forces, sorted_forces
 

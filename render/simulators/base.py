@@ -15,6 +15,7 @@ from typing import Any, NamedTuple, Protocol, Self
 import numpy as np
 from scipy.spatial import cKDTree
 
+from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.errors import OptionError
 from mechanics.model import Model
 from mechanics.refine import refined_around
@@ -117,7 +118,7 @@ class SimulatorRenderer(Renderer):
     def __init__(self, name: str, model: Model, adapter: type[Adapter], options: RenderOptions) -> None:
         self.name, self.model, self.options = name, model, options
         self.contact = touched_surface(model, options)
-        slip = model.effects.get("friction_slip", {})
+        slip = model.effects.get(SLIP.name, {})
         usual = float(slip.get("mu", 1.0))
         friction = usual if options.friction is None else options.friction
         self.adapter = adapter(model, options, friction)

@@ -14,6 +14,7 @@ import pytest
 import palpate as pp
 import render.press
 import render.replay  # noqa: F401
+from diagnose.simulated.forces import ForcesOptions
 from palpate.operations._declare import declared, operation_of, written
 from palpate.operations._list import OPERATIONS, calls
 from palpate.operations._run import command_operation, parser_of
@@ -49,6 +50,7 @@ def rooms(monkeypatch):
         "reconstruct.pipeline.reconstruct_fully",
         "diagnose.compare.comparison.compare",
         "diagnose.pipeline.diagnose",
+        "diagnose.simulated.pipeline.diagnose_simulated",
         "scenes.laboratory.simulate.simulate",
     ):
         monkeypatch.setattr(name, listening)
@@ -122,8 +124,10 @@ def test_every_option_reaches_its_room(rooms, recording, name):
     every = [option for option in pp.options(name) if option.name in homes]
     assert {option.name for option in every} == set(homes)
     for option in every:
+        of_forces = homes[option.name] is ForcesOptions
+        told = {"simulated": (recording.t, recording.force_on_tool)} if of_forces else {}
         with room_is_reached() as found:
-            call(name, recording, **{option.name: other(option)})
+            call(name, recording, **told, **{option.name: other(option)})
         assert getattr(found[homes[option.name]], option.name) == other(option), option.name
 
 
