@@ -66,18 +66,27 @@ def _keep(path: str, asked: BenchOperands, figures: Any) -> None:
     evidence = importlib.import_module("benchmarks.evidence")  # it lies in the clone, not in the product
     if not figures:
         raise OptionError(f"--evidence: 'palpate bench {asked.name}' gives no figures to keep")
-    words = ["palpate", "bench", asked.name, *_without_evidence(list(asked.rest))]
+    words = ["palpate", "bench", asked.name, *_deciding(list(asked.rest))]
     kept = evidence.write(path, evidence.measured(" ".join(words), figures, clone()))
     print(f"kept: {kept}", file=sys.stderr)
 
 
-def _without_evidence(words: list[str]) -> list[str]:
-    """The options that decide what was measured."""
-    kept = [word for word in words if not word.startswith("--evidence=")]
-    if "--evidence" in kept:
-        at = kept.index("--evidence")
-        value = at + 1 < len(kept) and not kept[at + 1].startswith("-")
-        del kept[at : at + 1 + value]
+_WHERE_KEPT = ("--evidence", "--json", "--work")
+
+
+def _deciding(words: list[str]) -> list[str]:
+    """The options that decide what was measured, without those that say where results are kept."""
+    kept: list[str] = []
+    left_out = False
+    for word in words:
+        if word.startswith("-") and word != "-":
+            left_out = word in _WHERE_KEPT
+            if left_out or word.startswith(tuple(f"{name}=" for name in _WHERE_KEPT)):
+                continue
+        elif left_out:
+            left_out = False
+            continue
+        kept.append(word)
     return kept
 
 
