@@ -3,6 +3,7 @@ meet: S (x - u) = g - f(x), the contact's resistance f solved exactly by a semi-
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,6 +18,10 @@ _SETTLED = 1e-7
 """Of the residual over the contact's forces."""
 _REACH = 0.12
 """Faces nearer to the sphere than this share of its radius are asked; more are taken where it turns out."""
+
+
+Balance = tuple[np.ndarray, Traction, np.ndarray]
+"""(residual (k,) N, the contact's answer, places (p, 3) m of its points relative to the sphere)."""
 
 
 @dataclass
@@ -92,9 +97,17 @@ class Settling:
         local = np.full(len(u) + 1, -1)
         local[few] = np.arange(len(few))
         unknowns = local[self._of_face[chosen]]
+        moved = u.copy()
+
+        def at(x: np.ndarray) -> Balance:
+            moved[few] = u[few] + x
+            relative = self._relative(moved, chosen, centre)
+            traction = self.contact.evaluate(relative, chosen, unknowns, len(few), trial)
+            return small.stiffness @ x - pull + traction.forces, traction, relative
+
         x = np.zeros(len(few))
         for _ in range(_SLIDING_ROUNDS if self.contact.friction > 0 else _ROUNDS):
-            solved = self._newton(x, small.stiffness, pull, chosen, few, unknowns, u, centre, trial)
+            solved = self._newton(x, small.stiffness, at)
             if solved is None:
                 return None
             x, traction, relative = solved
@@ -113,17 +126,8 @@ class Settling:
         return known[2]
 
     def _newton(
-        self, x: np.ndarray, small: np.ndarray, pull: np.ndarray, chosen: np.ndarray, few: np.ndarray,
-        unknowns: np.ndarray, u: np.ndarray, centre: np.ndarray, trial: Grip,
-    ) -> tuple[np.ndarray, Traction, np.ndarray] | None:  # fmt: skip
-        moved = u.copy()
-
-        def at(x: np.ndarray) -> tuple[np.ndarray, Traction, np.ndarray]:
-            moved[few] = u[few] + x
-            relative = self._relative(moved, chosen, centre)
-            traction = self.contact.evaluate(relative, chosen, unknowns, len(few), trial)
-            return small @ x - pull + traction.forces, traction, relative
-
+        self, x: np.ndarray, small: np.ndarray, at: Callable[[np.ndarray], Balance]
+    ) -> tuple[np.ndarray, Traction, np.ndarray] | None:
         residual, traction, relative = at(x)
         for _ in range(_ITERATIONS):
             step = np.linalg.solve(small + traction.stiffness, -residual)
