@@ -70,7 +70,7 @@ def said(figures: dict[str, float]) -> str:
     if not figures:
         return ""
     law, shape, touch = (f"{1e3 * value:.3g}" for value in figures.values())
-    return f"95 % of the time within {law} mN by the law, {shape} by the shape, {touch} by its first touches"
+    return f"may be off (95 %) by {law} mN for the law, {shape} for the shape, {touch} for its first touches"
 
 
 def place_numbers(renderer: FemRenderer, tip_radius_m: float) -> np.ndarray:
