@@ -45,8 +45,8 @@ print(json.dumps(found))
 
 def compiled(cache: Path) -> list[str]:
     """What a process of its own compiles for steps, a press, a replay and a tick, with numba's cache here."""
-    # what is compiled, not how fast it runs: without LLVM's optimisation that takes half as long
-    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache), "NUMBA_OPT": "0"}
+    # with LLVM's optimisation: without it names of pointers stay behind, and numba keeps no such kernel on disk
+    environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache)}
     done = subprocess.run(
         [sys.executable, "-P", "-c", COMPILING], env=environment, capture_output=True, text=True
     )
