@@ -52,8 +52,6 @@ class FemRenderer(Renderer):
             surface=self.contact.arrays,
             far=field.far,
             curvature=field.curvature,
-            curvatures=field.curvatures,
-            bend=field.bend,
             softness=field.softness,
             parents=field.parents,
             parent_weights=self.contact.parent_weights,

@@ -17,8 +17,7 @@ from render.surface import ContactSurface
 class Field(NamedTuple):
     """far (v, 3, 3) 1/m and curvature (v,) 1/m at the fine vertices, unit modulus, zero on the base.
 
-    curvatures: (v, 2) 1/m the principal ones whose mean that is, convex positive, the greatest first; bend:
-    (v, 3) unit direction of the greatest.
+    curvatures: (v, 2) 1/m the principal ones whose mean that is, convex positive, the greatest first.
 
     softness: (v,) of the material under a tip, global modulus over its own.
     parents: (k, 3) numbers of each fine triangle's mesh corners among the compliance's, -1 on the base.
@@ -27,7 +26,6 @@ class Field(NamedTuple):
     far: np.ndarray
     curvature: np.ndarray
     curvatures: np.ndarray
-    bend: np.ndarray
     softness: np.ndarray
     parents: np.ndarray
 
@@ -53,7 +51,6 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
         far[v] += (1 - softness[v]) * half_space_compliance(
             arrays.normals[v], model.material.poisson_ratio, width
         )
-    curvatures, bend = np.zeros((len(arrays.vertices), 2)), np.zeros((len(arrays.vertices), 3))
-    found = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
-    curvatures[touched], bend[touched] = found
-    return Field(far, curvatures.mean(axis=1), curvatures, bend, softness, parents)
+    curvatures = np.zeros((len(arrays.vertices), 2))
+    curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)[0]
+    return Field(far, curvatures.mean(axis=1), curvatures, softness, parents)

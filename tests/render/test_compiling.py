@@ -45,7 +45,7 @@ print(json.dumps(found))
 
 def compiled(cache: Path) -> list[str]:
     """What a process of its own compiles for steps, a press, a replay and a tick, with numba's cache here."""
-    # with LLVM's optimisation: without it names of pointers stay behind, and numba keeps no such kernel on disk
+    # with LLVM's optimisation: without it names of pointers stay behind, and numba keeps no such kernel
     environment = {**os.environ, "PYTHONPATH": str(ROOT), "NUMBA_CACHE_DIR": str(cache)}
     done = subprocess.run(
         [sys.executable, "-P", "-c", COMPILING], env=environment, capture_output=True, text=True
