@@ -19,8 +19,8 @@ class FemParameters(NamedTuple):
 
     far: (v, 3, 3) 1/m. curvature: (v,) 1/m, mean of the principal ones. softness: (v,) of the material under
     a tip, 1 where its modulus is the global one. parents: (k, 3) compliance nodes that interpolate over a
-    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and factor: (n, 3, r) in their place,
-    see SurfaceCompliance. table: dent law.
+    triangle, -1 where fixed; parent_weights (k, 3, 3). blocks: (n, n, 3, 3) 1/m, or of no size and
+    factor: (n, 3, r) in their place, see SurfaceCompliance. table: dent law.
     young_modulus_pa, poisson_ratio, friction, series_compliance (m/N): (1,) each. edition: (1,) int64,
     that of the table.
     """
