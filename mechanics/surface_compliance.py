@@ -25,7 +25,7 @@ from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.recovery import edge_middles
 from mechanics.refine import typical_edge
-from mechanics.sites import SURFACE_EDGE_M, patch_width, touch_solver
+from mechanics.sites import PATCH_WIDTH_IN_EDGES, SURFACE_EDGE_M, patch_width, touch_solver
 from mechanics.solver import Solver
 from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -142,7 +142,9 @@ def surface_compliance(
     own_nodes, own_triangles = _corners(fine.mesh)
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
-    own_width = patch_width(fine.mesh)
+    # what stiff elements below add hangs on the load's width: there as narrow as the elements bear
+    uniform = modulus_ratio is None and not balls
+    own_width = patch_width(fine.mesh) if uniform else PATCH_WIDTH_IN_EDGES * typical_edge(fine.mesh)
     each = "compliance of each place"
     own = own_blocks(fine, own_points, own_width, lambda f: progress(each, 0.3 + 0.5 * f))
     if balls:  # what covers the whole surface is in the dent: its law, and the modulus under the tip

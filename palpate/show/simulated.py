@@ -18,7 +18,7 @@ from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_
 from palpate.show.diagnosis.figures import view as view_of_gap
 from palpate.show.diagnosis.parameters import number, plain_key
 from palpate.show.diagnosis.words import AXIS_WORDS, force_words, percent, share_words, spoken
-from palpate.show.page import Page
+from palpate.show.page import Page, new_figure
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -154,7 +154,6 @@ def _cards(result: SimulatedGap) -> list[tuple[str, str, str]]:
 
 def report(result: SimulatedGap, path: Path | str) -> Path:
     """Write one self-contained HTML page; returns its path."""
-    from matplotlib.figure import Figure
 
     shown = as_diagnosis(result)
     assert result.reality.model is not None and result.reality.recording is not None
@@ -165,7 +164,7 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
         page.next_step(f"What to do: {each}.")
     for note in result.notes:
         page.paragraph(f"Note: {note}.")
-    figure = Figure(figsize=(9, 1.7), layout="constrained")
+    figure = new_figure(9, 1.7, layout="constrained")
     draw(result, figure.subplots())
     page.figure(
         figure,

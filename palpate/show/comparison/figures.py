@@ -76,7 +76,7 @@ def _worst(result: Comparison) -> int:
 def error_bars(result: Comparison) -> Figure:
     """Error of each model over all held-out presses."""
     bars = [(name, result.rmse_n[name], COLOURS[name]) for name in compared(result)]
-    figure = Figure(figsize=(5.5, height_of(len(bars))), layout="constrained")
+    figure = new_figure(5.5, height_of(len(bars)), layout="constrained")
     draw_errors(figure.subplots(), bars, result.noise_n, "typical error of a held-out press [mN]")
     return figure
 

@@ -14,7 +14,7 @@ from mechanics.tetmesh import TetMesh
 from scenes.virtual_presses import palpate_model
 
 SIZE = np.array([0.08, 0.08, 0.04])
-CELLS = (5, 5, 3)
+CELLS = (6, 6, 3)
 
 
 def block_mesh() -> TetMesh:
