@@ -12,7 +12,7 @@ import subprocess
 import time
 import urllib.request
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +23,17 @@ _FLAGS = (
     "--enable-unsafe-swiftshader", "--use-angle=swiftshader", "--remote-debugging-port=0",
 )  # fmt: skip
 _PATIENCE_S = 60.0
+_ON_THE_WAY = (
+    "navigated or closed",
+    "context was destroyed",
+    "Cannot find context",
+    "Cannot find default execution context",
+)
+"""What the protocol answers while one page gives way to the next."""
+
+
+class OnTheWay(Exception):
+    """The page that was asked is giving way to another."""
 
 
 def browser_found() -> str | None:
@@ -46,6 +57,8 @@ class Tab:
         while True:
             answer = json.loads(self._socket.recv(timeout=_PATIENCE_S))
             if answer.get("id") == number:
+                if any(words in answer.get("error", {}).get("message", "") for words in _ON_THE_WAY):
+                    raise OnTheWay(method)
                 assert "error" not in answer, (method, answer["error"])
                 return dict(answer["result"])
             self._note(answer)
@@ -81,9 +94,12 @@ class Tab:
         return answer["result"].get("value")
 
     def wait(self, expression: str, seconds: float = _PATIENCE_S) -> None:
-        """Until an expression is true."""
+        """Until an expression is true, on this page or on the one that it gives way to."""
         end = time.monotonic() + seconds
-        while not self.evaluate(expression):
+        while True:
+            with suppress(OnTheWay):
+                if self.evaluate(expression):
+                    return
             assert time.monotonic() < end, f"never came true: {expression}; {self.complaints}"
             time.sleep(0.05)
 
