@@ -14,7 +14,7 @@ from diagnose.forward.touches import touches_of
 from diagnose.specimen.approach import APPROACH_LAWS, Approach, approach_of
 from diagnose.specimen.bench import Bench, Curve, bench_of
 from diagnose.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
-from diagnose.specimen.result import Material, Tests
+from diagnose.specimen.result import MachineTests, Material
 from diagnose.specimen.rivals import held_out_rivals
 from diagnose.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
 from diagnose.specimen.zero import bias, late_contact
@@ -45,7 +45,7 @@ INDENTATION_UNKNOWN = ("what differs from place to place", "sideways forces and 
 
 
 def material_of(
-    tests: Tests,
+    tests: MachineTests,
     files: Sequence[str | Path],
     *,
     layer_m: float | None = None,
@@ -87,7 +87,7 @@ def material_of(
     return _indentation(tests, found, names, fast, seed, progress)
 
 
-def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
+def _uniaxial(tests: MachineTests, names: tuple[str, ...]) -> Material:
     curves = tests.tests
     errors = held_out(curves)
     error = {name: float(np.median(e)) for name, e in errors.items()}
@@ -133,7 +133,7 @@ def _uniaxial(tests: Tests, names: tuple[str, ...]) -> Material:
     )
 
 
-def _relaxation(tests: Tests, names: tuple[str, ...]) -> Material:
+def _relaxation(tests: MachineTests, names: tuple[str, ...]) -> Material:
     found = [held_out_relaxation(t, value) for t, value in tests.holds]
     error = {name: float(np.median([e[name] for e, _ in found])) for name in found[0][0]}
     fit = found[0][1]
@@ -161,7 +161,7 @@ def _relaxation(tests: Tests, names: tuple[str, ...]) -> Material:
 
 
 def _indentation(
-    tests: Tests, bench: Bench, names: tuple[str, ...], fast: bool, seed: int, progress: Progress
+    tests: MachineTests, bench: Bench, names: tuple[str, ...], fast: bool, seed: int, progress: Progress
 ) -> Material:
     unused = [c.name for c, u in zip(tests.curves, bench.used, strict=True) if not u]
     notes = list(tests.notes)
@@ -257,7 +257,7 @@ def _both(modulus_pa: float, own: np.ndarray, interval: tuple[float, float]) -> 
     return modulus_pa * float(np.exp(-low)), modulus_pa * float(np.exp(high))
 
 
-def _ways(tests: Tests, bench: Bench) -> list[Way]:
+def _ways(tests: MachineTests, bench: Bench) -> list[Way]:
     """The ways in, in the machine's size."""
     return [
         way_of(curve.travel, curve.force, float(at))
@@ -267,7 +267,7 @@ def _ways(tests: Tests, bench: Bench) -> list[Way]:
 
 
 def _few(
-    tests: Tests, bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]
+    tests: MachineTests, bench: Bench, approach: Approach, names: tuple[str, ...], notes: list[str]
 ) -> Material:
     """Fewer curves than can be held out: the laws of the dent, the machine beside them."""
     own = approach.modulus_pa

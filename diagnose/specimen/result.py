@@ -25,7 +25,7 @@ BETTER = 0.95
 
 
 @dataclass(frozen=True)
-class Tests:
+class MachineTests:
     """The curves of one kind: curves of an indentation, with the tip's radius; tests of compression or
     tension; holds (t s, value) of relaxation. stated_modulus_pa: by the maker's own software, NaN where not
     said. notes: what was understood of the files; odds: of the least sure of it."""

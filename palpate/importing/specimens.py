@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 
 from diagnose.specimen.bench import Curve
-from diagnose.specimen.result import Tests
+from diagnose.specimen.result import MachineTests
 from mechanics.errors import OptionError, RecordingError
 from palpate.importing.curves import LEAST_ROWS, SaidOfCurves, numbers_in, read_curves, stated_radius
 from palpate.importing.meaning import MOST_ODDS, Unclear
@@ -38,7 +38,7 @@ def read_tests(
     kind: str = "auto",
     tip_radius_m: float | None = None,
     said: SaidOfCurves | None = None,
-) -> Tests:
+) -> MachineTests:
     """All files, which must be of one kind. Raises RecordingError where one cannot be read or is of another
     kind, OptionError for a kind that does not exist."""
     if kind not in ("auto", *KINDS):
@@ -54,11 +54,11 @@ def read_tests(
             "files of one kind"
         )
     if test_of[0] == "compression":
-        return Tests("compression", tests=tuple(of_compression(p, _specimen(p)) for p in paths))
+        return MachineTests("compression", tests=tuple(of_compression(p, _specimen(p)) for p in paths))
     if test_of[0] == "tension":
-        return Tests("tension", tests=tuple(map(read_tension, paths)))
+        return MachineTests("tension", tests=tuple(map(read_tension, paths)))
     if test_of[0] == "relaxation":
-        return Tests("relaxation", holds=tuple(_hold(p) for p in paths))
+        return MachineTests("relaxation", holds=tuple(_hold(p) for p in paths))
     return _indentations(paths, tip_radius_m, said or SaidOfCurves())
 
 
@@ -101,7 +101,7 @@ def _hold(path: Path) -> tuple[np.ndarray, np.ndarray]:
     return t[fresh], value[fresh]
 
 
-def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCurves) -> Tests:
+def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCurves) -> MachineTests:
     chiaro = [not said.columns and is_chiaro(path) for path in paths]
     curves, stated, notes, odds = [], [], [], MOST_ODDS
     for path in (p for p, own in zip(paths, chiaro, strict=True) if own):
@@ -128,7 +128,7 @@ def _indentations(paths: list[Path], tip_radius_m: float | None, said: SaidOfCur
         notes += read.notes
         odds = read.odds
     good = [s for s in stated if np.isfinite(s)]
-    return Tests(
+    return MachineTests(
         "indentation", curves=tuple(curves), tip_radius_m=tip_radius_m,
         stated_modulus_pa=float(np.median(good)) if good else float("nan"), notes=tuple(notes), odds=odds,
     )  # fmt: skip

@@ -8,7 +8,7 @@ import pytest
 
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.material import material_of
-from diagnose.specimen.result import Tests
+from diagnose.specimen.result import MachineTests
 from diagnose.specimen.yielding import machine_of, way_of
 from mechanics.dent import dent_law
 from palpate.show.material import as_json, in_words, lines
@@ -37,7 +37,7 @@ def stiffness_for(modulus: float, share: float) -> float:
 
 
 def material(given: list[Curve]):
-    tests = Tests("indentation", curves=tuple(given), tip_radius_m=RADIUS)
+    tests = MachineTests("indentation", curves=tuple(given), tip_radius_m=RADIUS)
     return material_of(tests, [c.name for c in given], fast=True)
 
 

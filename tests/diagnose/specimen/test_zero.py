@@ -10,7 +10,7 @@ import pytest
 
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.material import material_of
-from diagnose.specimen.result import Tests
+from diagnose.specimen.result import MachineTests
 from diagnose.specimen.zero import late_contact
 from mechanics.dent import dent_law
 from palpate.show.material import lines
@@ -31,7 +31,7 @@ def curve(seed: int, *, begins: float, zero: float = 0.0, modulus: float = MODUL
 
 
 def material(curves):
-    tests = Tests("indentation", curves=tuple(curves), tip_radius_m=RADIUS)
+    tests = MachineTests("indentation", curves=tuple(curves), tip_radius_m=RADIUS)
     return material_of(tests, [c.name for c in curves], fast=True)
 
 
