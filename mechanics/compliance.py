@@ -62,7 +62,7 @@ def load_or_condense(
     error = (options or ComplianceOptions()).error_of(model.mesh)
     form = () if error is None else ("low-rank", error)
     key = content_key(
-        "surface compliance 6",
+        "surface compliance 7",
         model.mesh.points,
         model.mesh.tetrahedra,
         model.mesh.fixed,

@@ -62,7 +62,7 @@ def sharpening(
     result = np.zeros((len(points), 3, 3))
     narrow = contact_width(tip_radius_m)
     ratio = solver.modulus_ratio
-    if ratio is None or not np.ptp(ratio) > 1e-9 * ratio.max() or narrow >= patch_width_m:
+    if ratio is None or solver.uniform or narrow >= patch_width_m:
         return result
     wide_patch, narrow_patch = (PatchSampler(solver.mesh, width) for width in (patch_width_m, narrow))
     softness = 1 / ratio[solver.mesh.touchable_elements]

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.compression import own_compliance
 from mechanics.errors import MeshError
 from mechanics.frames import tangents
 from mechanics.material import Ball
@@ -65,7 +66,7 @@ class TouchSites:
 
 @dataclass(frozen=True)
 class LoadPatch:
-    """How the load of a touch is spread. width_m: None takes `patch_width`. tip_radius_m: only matters where
+    """How the load of a touch is spread. width_m: None takes `load_width`. tip_radius_m: only matters where
     the modulus varies close below the surface (mechanics.near_field)."""
 
     width_m: float | None = None
@@ -107,6 +108,37 @@ def patch_width(mesh: TetMesh) -> float:
     return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), min(PATCH_WIDTH_M, PATCH_SHARE * diagonal))
 
 
+def load_width(solver: Solver) -> float:
+    """The width, m, of the patch of a touch on that object: `patch_width` where it is of one modulus.
+
+    Where its modulus varies, the narrowest that its elements bear: what they add hangs on the load's width.
+    """
+    return patch_width(solver.mesh) if solver.uniform else PATCH_WIDTH_IN_EDGES * typical_edge(solver.mesh)
+
+
+def shape_under_one_patch(
+    solver: Solver, points: np.ndarray, normals: np.ndarray, width_m: float
+) -> np.ndarray:
+    """(k, 3, 3) 1/m: to add to the far field of places (k, 3) under patches of `width_m`, unit modulus.
+
+    What the shape of an object of one modulus adds to a half-space under `patch_width`, the one patch of
+    every mesh, less what it adds under theirs. Zero where the two are alike; else it costs a factorisation.
+    """
+    wide = patch_width(solver.mesh)
+    result = np.zeros((len(points), 3, 3))
+    if width_m >= wide:
+        return result
+    plain = Solver(solver.mesh, solver.poisson_ratio, hold=solver.hold)
+    for width, sign in ((wide, 1.0), (width_m, -1.0)):
+        average = PatchSampler(plain.mesh, width).matrix(points)
+        for start in range(0, len(points), _BATCH):
+            some = slice(start, start + _BATCH)
+            result[some] += sign * own_compliance(plain, average[some])
+        half = np.array([half_space_compliance(n, plain.poisson_ratio, width) for n in normals])
+        result -= sign * half
+    return result
+
+
 def touch_sites(
     mesh: TetMesh,
     points: np.ndarray,
@@ -134,7 +166,7 @@ def touch_sites(
         )
     normals = normals / length
     solver = solver or touch_solver(mesh, poisson_ratio)
-    width = patch.width_m or patch_width(solver.mesh)
+    width = patch.width_m or load_width(solver)
     sampler = PatchSampler(solver.mesh, width)
     far = np.empty((len(points), 3, 3))
     for start in range(0, len(points), _BATCH):
@@ -145,6 +177,8 @@ def touch_sites(
     far += sharpening(solver, points, width, patch.tip_radius_m)
     for i, normal in enumerate(normals):
         far[i] -= half_space_compliance(normal, poisson_ratio, width)
+    if patch.width_m is None:
+        far += shape_under_one_patch(solver, points, normals, width)
     if curvature is None:
         curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))

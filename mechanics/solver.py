@@ -58,6 +58,12 @@ class Solver:
                 "line, in every connected part of the mesh"
             ) from error
 
+    @property
+    def uniform(self) -> bool:
+        """Whether all elements are of one modulus."""
+        ratio = self.modulus_ratio
+        return ratio is None or not np.ptp(ratio) > 1e-9 * ratio.max()
+
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """Nodal displacements times the modulus, m Pa; forces (n, 3) or (n, 3, r), N."""
         forces = np.asarray(forces, dtype=float)

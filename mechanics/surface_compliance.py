@@ -18,14 +18,20 @@ from mechanics.compression import compress, own_compliance, unit_loads
 from mechanics.floor import carried_by_floor
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
-from mechanics.near_field import sharpening, surface_softness
+from mechanics.near_field import sharpening
 from mechanics.nearest import closest
 from mechanics.patch import PatchSampler, half_space_compliance, triangle_shapes
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.recovery import edge_middles
 from mechanics.refine import typical_edge
-from mechanics.sites import PATCH_WIDTH_IN_EDGES, SURFACE_EDGE_M, patch_width, touch_solver
+from mechanics.sites import (
+    SURFACE_EDGE_M,
+    load_width,
+    patch_width,
+    shape_under_one_patch,
+    touch_solver,
+)
 from mechanics.solver import Solver
 from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
@@ -142,21 +148,11 @@ def surface_compliance(
     own_nodes, own_triangles = _corners(fine.mesh)
     own_points = fine.mesh.points[own_nodes]
     own_normals = _normals(fine.mesh, own_nodes)
-    own_width = patch_width(fine.mesh)
     each = "compliance of each place"
-    # with balls `sharpening` does the same
-    varied = not balls and modulus_ratio is not None and np.ptp(modulus_ratio) > 1e-9 * modulus_ratio.max()
-    narrow = PATCH_WIDTH_IN_EDGES * typical_edge(fine.mesh)
-    own = own_blocks(
-        fine, own_points, narrow if varied else own_width, lambda f: progress(each, 0.3 + 0.5 * f)
-    )
-    if varied and narrow < own_width:
-        # what elements of another modulus add hangs on the load's width: as narrow as they bear (near_field)
-        assert fine.modulus_ratio is not None
-        softness = surface_softness(fine.mesh, fine.modulus_ratio, own_points, tip_radius_m)
-        plain = Solver(fine.mesh, poisson_ratio, hold=hold)
-        bare = own_blocks(plain, own_points, narrow) - own_blocks(plain, own_points, own_width)
-        own -= softness[:, None, None] * bare
+    # with balls `sharpening` takes what they add under a narrower load
+    own_width = patch_width(fine.mesh) if balls else load_width(fine)
+    own = own_blocks(fine, own_points, own_width, lambda f: progress(each, 0.3 + 0.5 * f))
+    own += shape_under_one_patch(fine, own_points, own_normals, own_width)
     if balls:  # what covers the whole surface is in the dent: its law, and the modulus under the tip
         own += sharpening(fine, own_points, own_width, tip_radius_m, lambda s, f: progress(s, 0.8 + 0.2 * f))
     if loose:

@@ -8,8 +8,9 @@ import pytest
 from mechanics.errors import MeshError
 from mechanics.pardiso import available
 from mechanics.refine import refined_around, refined_near_surface, typical_edge
-from mechanics.sites import mean_curvature, patch_width, touch_sites, touch_solver
+from mechanics.sites import LoadPatch, mean_curvature, patch_width, touch_sites, touch_solver
 from mechanics.solver import Solver
+from mechanics.surface_compliance import surface_compliance
 from mechanics.touch import touch_force
 
 from .closed_forms import hertz_force
@@ -61,6 +62,30 @@ def test_sites_leave_the_callers_arrays_writable(box):
         sites.far[0] = 0
     with pytest.raises(MeshError, match="normals not 0"):
         touch_sites(mesh, points, normals * 0, 0.3)
+
+
+@pytest.mark.skipif(not available(), reason="large systems, slow without MKL")
+def test_what_a_stiff_layer_adds_does_not_hang_on_the_patch_that_the_shape_is_felt_under(box):
+    """The renderer's tables and a site agree, and both give the layer what a load as narrow as elements bear
+    tells of it."""
+    nu, point = 0.49, np.array([[0.0, 0.0, 0.04]])
+    mesh = box((6, 6, 3), (0.08, 0.08, 0.04)).quadratic()
+    layer = np.where(mesh.points[mesh.tetrahedra[:, :4]].mean(axis=1)[:, 2] > 0.0267, 3.0, 1.0)
+    solvers = [touch_solver(mesh, nu, ratio) for ratio in (None, layer)]
+    edge = 0.8 * typical_edge(solvers[0].mesh)
+    assert edge < 0.8 * patch_width(solvers[0].mesh)
+
+    def added(patch: LoadPatch) -> float:
+        bare, stiff = (
+            touch_sites(mesh, point, UP[None], nu, solver=s, curvature=0.0, patch=patch).far[0, 2, 2]
+            for s in solvers
+        )
+        return stiff - bare
+
+    assert added(LoadPatch()) == pytest.approx(added(LoadPatch(width_m=edge)), rel=1e-6)
+    tables = [surface_compliance(mesh, nu, ratio).far_at(point, UP[None])[0, 2, 2] for ratio in (None, layer)]
+    # a table has no sharper load than its elements bear
+    assert tables[1] - tables[0] == pytest.approx(added(LoadPatch(width_m=edge)), rel=0.15)
 
 
 def test_a_spot_of_tiny_elements_makes_no_place_softer(box):
