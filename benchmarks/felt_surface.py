@@ -18,12 +18,13 @@ from scipy.spatial import cKDTree
 from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
+from mechanics.compression import own_blocks
 from mechanics.flat_foot import Standing
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.nearest import sample
 from mechanics.sites import patch_width, touch_solver
-from mechanics.surface_compliance import SurfaceCompliance, own_blocks
+from mechanics.surface_compliance import SurfaceCompliance
 from mechanics.tetmesh import TetMesh, vertex_normals
 from mechanics.true_shape import TrueShape
 from palpate.output import progress_bar

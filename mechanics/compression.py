@@ -7,6 +7,7 @@ symmetric, positive semidefinite, from below). t places then take 3 t r numbers 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,6 +21,7 @@ from mechanics.patch import PatchSampler
 from mechanics.progress import Progress, silent
 from mechanics.solver import Solver
 
+_AT_ONCE = 32  # patches that are solved for together
 _STEP = 120  # load patterns before the first look at the error; then a third more each time
 
 
@@ -94,6 +96,19 @@ def own_compliance(solver: Solver, average: sp.csr_matrix) -> np.ndarray:
     """(k, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; weights (k, n)."""
     loads = unit_loads(average)
     return solver.quadratic_forms(loads.reshape(-1, *loads.shape[2:])[solver.free])
+
+
+def own_blocks(
+    solver: Solver, points: np.ndarray, width: float, tell: Callable[[float], None] = lambda share: None
+) -> np.ndarray:
+    """(t, 3, 3) 1/m: mean displacement of every patch for a unit force on itself; surface points (t, 3)."""
+    average = PatchSampler(solver.mesh, width).matrix(points)
+    own = np.empty((len(points), 3, 3))
+    for start in range(0, len(points), _AT_ONCE):
+        part = slice(start, min(start + _AT_ONCE, len(points)))
+        own[part] = own_compliance(solver, average[part])
+        tell(part.stop / len(points))
+    return own
 
 
 def unit_loads(average: sp.csr_matrix) -> np.ndarray:

@@ -57,7 +57,7 @@ def sharpening(
 
     (C[n, n] - C[s, s]) - (the same of the uniform object) / m, for the contact's width n, the patch's s and
     the modulus ratio m of the surface there. Zero for an object of one modulus, and where first-order
-    energies say that it does not matter; elsewhere it costs a factorisation and twelve solves a place.
+    energies say that it does not matter; elsewhere it costs `solver.plain` and twelve solves a place.
     """
     result = np.zeros((len(points), 3, 3))
     narrow = contact_width(tip_radius_m)
@@ -70,12 +70,11 @@ def sharpening(
     felt = np.flatnonzero(_estimate(solver, points, soft, narrow, patch_width_m) > _NEGLIGIBLE)
     if not len(felt):
         return result
-    plain = Solver(solver.mesh, solver.poisson_ratio, hold=solver.hold)
     for start in range(0, len(felt), _BATCH):
         some = felt[start : start + _BATCH]
         near, far = narrow_patch.matrix(points[some]), wide_patch.matrix(points[some])
         result[some] = own_compliance(solver, near) - own_compliance(solver, far)
-        uniform = own_compliance(plain, near) - own_compliance(plain, far)
+        uniform = own_compliance(solver.plain, near) - own_compliance(solver.plain, far)
         result[some] -= soft[some, None, None] * uniform
         progress("near field", min(1.0, (start + _BATCH) / len(felt)))
     return result

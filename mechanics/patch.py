@@ -131,8 +131,9 @@ def _subdivided(parts: int) -> tuple[np.ndarray, np.ndarray]:
 
 
 def half_space_compliance(normal: np.ndarray, poisson_ratio: float, width_m: float) -> np.ndarray:
-    """(3, 3) mean displacement a unit force of a half-space under a Gaussian patch, unit modulus, 1/m.
+    """(..., 3, 3) mean displacement a unit force of a half-space under a Gaussian patch, unit modulus, 1/m.
 
+    normal: (..., 3) unit normals.
     Load and mean share the weight exp(-r^2 / 2 s^2) / (2 pi s^2).
     Along the normal (Boussinesq): (1 - nu^2) / (2 sqrt(pi) s).
     Across it (Cerruti, averaged over directions): (1 + nu)(2 - nu) / (4 sqrt(pi) s).
@@ -141,5 +142,5 @@ def half_space_compliance(normal: np.ndarray, poisson_ratio: float, width_m: flo
     nu = poisson_ratio
     along = (1 - nu**2) / (2 * np.sqrt(np.pi) * width_m)
     across = (1 + nu) * (2 - nu) / (4 * np.sqrt(np.pi) * width_m)
-    nn = np.outer(normal, normal)
+    nn = normal[..., :, None] * normal[..., None, :]
     return along * nn + across * (np.eye(3) - nn)

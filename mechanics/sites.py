@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.compression import own_compliance
+from mechanics.compression import own_blocks
 from mechanics.errors import MeshError
 from mechanics.frames import tangents
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
 from mechanics.near_field import contact_width, sharpening
-from mechanics.patch import PatchSampler, half_space_compliance
+from mechanics.patch import half_space_compliance
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.refine import refined_around, refined_near_surface, typical_edge
@@ -24,7 +24,6 @@ from mechanics.tetmesh import TetMesh, vertex_normals
 PATCH_WIDTH_IN_EDGES = 0.8
 PATCH_WIDTH_M, PATCH_SHARE = 0.004, 1 / 30
 SURFACE_EDGE_M = 0.006
-_BATCH = 16
 
 
 @dataclass(frozen=True)
@@ -122,21 +121,16 @@ def shape_under_one_patch(
     """(k, 3, 3) 1/m: to add to the far field of places (k, 3) under patches of `width_m`, unit modulus.
 
     What the shape of an object of one modulus adds to a half-space under `patch_width`, the one patch of
-    every mesh, less what it adds under theirs. Zero where the two are alike; else it costs a factorisation.
+    every mesh, less what it adds under theirs. Zero where the two are alike; else it takes `solver.plain`.
     """
-    wide = patch_width(solver.mesh)
-    result = np.zeros((len(points), 3, 3))
+    wide, nu = patch_width(solver.mesh), solver.poisson_ratio
     if width_m >= wide:
-        return result
-    plain = Solver(solver.mesh, solver.poisson_ratio, hold=solver.hold)
-    for width, sign in ((wide, 1.0), (width_m, -1.0)):
-        average = PatchSampler(plain.mesh, width).matrix(points)
-        for start in range(0, len(points), _BATCH):
-            some = slice(start, start + _BATCH)
-            result[some] += sign * own_compliance(plain, average[some])
-        half = np.array([half_space_compliance(n, plain.poisson_ratio, width) for n in normals])
-        result -= sign * half
-    return result
+        return np.zeros((len(points), 3, 3))
+    under_wide, under_own = (
+        own_blocks(solver.plain, points, width) - half_space_compliance(normals, nu, width)
+        for width in (wide, width_m)
+    )
+    return under_wide - under_own
 
 
 def touch_sites(
@@ -167,16 +161,9 @@ def touch_sites(
     normals = normals / length
     solver = solver or touch_solver(mesh, poisson_ratio)
     width = patch.width_m or load_width(solver)
-    sampler = PatchSampler(solver.mesh, width)
-    far = np.empty((len(points), 3, 3))
-    for start in range(0, len(points), _BATCH):
-        batch = range(start, min(start + _BATCH, len(points)))
-        patches = [sampler.weights(points[i]) for i in batch]
-        far[list(batch)] = patch_compliance(solver, patches)
-        progress("touch sites", (batch[-1] + 1) / len(points))
+    far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
     far += sharpening(solver, points, width, patch.tip_radius_m)
-    for i, normal in enumerate(normals):
-        far[i] -= half_space_compliance(normal, poisson_ratio, width)
+    far -= half_space_compliance(normals, poisson_ratio, width)
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
     if curvature is None:

@@ -90,7 +90,7 @@ def solve_field(places: Places, log_ratio: np.ndarray) -> SolvedField:
     width = patch_width(mesh)
     moved = _moved(Solver(mesh, nu, ratio), places, PatchSampler(mesh, width))
     energy = _energies(mesh, nu, ratio, moved, parent, len(coarse.tetrahedra))
-    half = np.array([half_space_compliance(n, nu, width) for n in places.normal[places.first]])
+    half = half_space_compliance(places.normal[places.first], nu, width)
     return SolvedField(log_ratio, energy, half, width)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import scipy.sparse.linalg as spla
 
@@ -63,6 +65,11 @@ class Solver:
         """Whether all elements are of one modulus."""
         ratio = self.modulus_ratio
         return ratio is None or not np.ptp(ratio) > 1e-9 * ratio.max()
+
+    @cached_property
+    def plain(self) -> Solver:
+        """The same object of unit modulus throughout: another factorisation, made once."""
+        return Solver(self.mesh, self.poisson_ratio, hold=self.hold)
 
     def solve(self, forces: np.ndarray) -> np.ndarray:
         """Nodal displacements times the modulus, m Pa; forces (n, 3) or (n, 3, r), N."""

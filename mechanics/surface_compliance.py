@@ -14,7 +14,7 @@ from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
 
-from mechanics.compression import compress, own_compliance, unit_loads
+from mechanics.compression import compress, own_blocks, unit_loads
 from mechanics.floor import carried_by_floor
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
@@ -96,7 +96,7 @@ class SurfaceCompliance:
         six = np.concatenate([self.own[self.own_triangles[triangle]], self.own_middles[triangle]], axis=1)
         own = np.einsum("kc,kcab->kab", triangle_shapes(2, weights), six)
         nu, width = float(self.poisson_ratio[0]), float(self.own_width_m[0])
-        return own - np.array([half_space_compliance(n, nu, width) for n in normals])
+        return own - half_space_compliance(normals, nu, width)
 
     def displacement(self, corner: int, force: np.ndarray) -> np.ndarray:
         """(t, 3) m Pa: motion of all corners for a force (3,) N on the object at one, times the modulus."""
@@ -205,16 +205,3 @@ def patch_blocks(
         blocks[i, i:] = mean
         blocks[i:, i] = mean.transpose(0, 2, 1)
     return blocks
-
-
-def own_blocks(
-    solver: Solver, points: np.ndarray, width: float, tell: Callable[[float], None] = lambda share: None
-) -> np.ndarray:
-    """(t, 3, 3) 1/m: mean displacement of every patch for a unit force on itself."""
-    average = PatchSampler(solver.mesh, width).matrix(points)
-    own = np.empty((len(points), 3, 3))
-    for start in range(0, len(points), _CORNERS):
-        part = slice(start, min(start + _CORNERS, len(points)))
-        own[part] = own_compliance(solver, average[part])
-        tell(part.stop / len(points))
-    return own
