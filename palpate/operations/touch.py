@@ -12,7 +12,7 @@ import os
 import sys
 import time
 from collections.abc import Callable
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, nullcontext
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -31,6 +31,7 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
 from palpate.output import Output, progress_bar
 from palpate.servo import SafetyOptions, ServoOptions, ServoReport
+from palpate.warm_up import warming_up
 from palpate.window.session import SessionOptions, TouchSession
 from render.options import RenderOptions
 from render.registry import names
@@ -131,11 +132,17 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
     with ExitStack() as stack:
         channel = stack.enter_context(closing(PoseChannel.create())) if name == "mouse" else None
 
+        renderer = asked.renderer or scene.renderer
+
         def prepare(tell: Progress) -> tuple[TouchSession, float | None]:
-            model = model_of(scene, lambda stage, share: tell(stage, 0.5 * share))
-            if channel is not None:
-                channel.write(time.perf_counter(), tuple(_above(model)))
-            device, until = device_choice(asked, call, name, model, channel)
+            with warming_up() if renderer == "fem" else nullcontext() as compiling:
+                model = model_of(scene, lambda stage, share: tell(stage, 0.4 * share))
+                if channel is not None:
+                    channel.write(time.perf_counter(), tuple(_above(model)))
+                device, until = device_choice(asked, call, name, model, channel)
+                if compiling is not None:
+                    tell("compiling, once after an installation", 0.4)
+                    compiling()
             session = stack.enter_context(
                 TouchSession(
                     model,
@@ -143,7 +150,7 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
                     device=device,
                     mapping=_mapping(call, name, scene, model),
                     options=SessionOptions(
-                        renderer=asked.renderer or scene.renderer,
+                        renderer=renderer,
                         beside=_beside(asked, scene),
                         render=with_friction(call.of(RenderOptions), scene),
                         servo=servo_options,
