@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from scipy.special import logit
 
+from mechanics.effects.registry import effect
 from mechanics.options import option
 
 
@@ -23,6 +24,11 @@ class DiagnoseOptions:
     without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
     bootstrap: int = option(400, "resamplings of sites for intervals")
     seed: int = option(0, "seed of flips and resamplings")
+
+    @property
+    def excluded(self) -> frozenset[str]:
+        """The effects of `without`. Raises OptionError for a name that is none."""
+        return frozenset(effect(name.strip()).name for name in self.without.split(",") if name.strip())
 
 
 @dataclass(frozen=True)

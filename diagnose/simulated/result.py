@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -89,69 +88,6 @@ class SimulatedGap(Result):
     simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     gap_after_measured_n: float | None = None
 
-    @property
-    def summary(self) -> str:
-        """The answer in one sentence."""
-        first = max(PARTS, key=lambda name: self.parts[name].share)
-        if not self.effects:
-            return (
-                "nothing is named: neither numerics nor parameters nor what an ideal simulation lacks stands "
-                "out of this gap"
-            )
-        words = {
-            "numerics": "most of the gap is numerics",
-            "parameters": "most of the gap is parameters",
-            "reality": "most of the gap is what every ideal elastic simulation lacks",
-        }[first]
-        if self.unexplained > self.parts[first].share:
-            words = "most of the gap is not explained"
-        named = ", ".join(n.replace("_", " ") for n in self.effects)
-        rest = ", ".join(n.replace("_", " ") for n in self.candidates)
-        return f"{words}; named: {named}" + (f" (not ruled out: {rest})" if rest else "")
-
-    def lines(self) -> list[str]:
-        """The three parts, a line each, with units."""
-        given = self.simulator.stated
-        said = ", ".join(
-            f"{name} {_value(value)}{'' if name in given.given else ' (of the model)'}"
-            for name, value in given.as_json().items()
-        )
-        version = f" {self.simulator.version}" if self.simulator.version else ""
-        lines = [
-            f"simulator: {self.simulator.name}{version}; stated: {said}",
-            *(f"  note: {note}" for note in self.notes),
-            f"verdict: {self.summary}",
-            f"gap: {self.gap_before_n:.4f} N from simulated to measured force (noise {self.noise_n:.4f} N)",
-        ]
-        for name in PARTS:
-            part = self.parts[name]
-            lines.append(
-                f"  {name}: {part.gap_n:.4f} N, {part.share:.0%} of the gap's square{self._of(part)}"
-            )
-        lines.append(
-            f"  unexplained: {self.unexplained_n:.4f} N, {self.unexplained:.0%} "
-            f"(noise {self.noise_share:.0%}, first touches {self.touch_share:.0%})"
-        )
-        lines.append(
-            f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N once all of it is mended, "
-            "on places not fitted"
-        )
-        if self.gap_after_measured_n is not None:
-            lines.append(f"measured with the mended settings: {self.gap_after_measured_n:.4f} N")
-        lines += [f"  {reason}" for reason in self.reasons]
-        lines += [f"advice: {each}" for each in self.advice]
-        return lines
-
-    def _of(self, part: Part) -> str:
-        if not part.names:
-            return ""
-        words = {e.name: e for e in self.entries}
-        said = [
-            n.replace("_", " ") + (f" {words[n].parameters}" if n in words and words[n].parameters else "")
-            for n in part.names
-        ]
-        return ": " + "; ".join(said)
-
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
         closed = self.gap_closed_ci95
@@ -185,7 +121,3 @@ class SimulatedGap(Result):
             "gap_after_measured_n": self.gap_after_measured_n,
             "ideal": self.reality.as_json(),
         }
-
-
-def _value(value: float | None) -> str:
-    return "sticks" if value is None or not math.isfinite(value) else f"{value:g}"

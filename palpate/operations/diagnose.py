@@ -18,6 +18,7 @@ from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOption
 from diagnose.simulated.forces import ForcesOptions
 from mechanics.errors import OptionError
 from palpate.operations._declare import Call, operand, operation
+from palpate.operations._run import say_next
 from palpate.operations._shared import (
     MODEL,
     SAMPLES,
@@ -122,6 +123,10 @@ def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
         out.say(f"corrected recording: {asked.corrected}")
     if asked.report:
         out.say(f"report: {result.report(asked.report)}")
+    if asked.apply:
+        out.say(f"next: feel it: palpate touch {asked.apply}")
+    else:
+        say_next(result, out)
     out.json(result.as_json())
     return 0
 
@@ -152,6 +157,7 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     if asked.corrected and not str(asked.corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{asked.corrected}' must end in .csv or .csv.gz")
     options = call.of(DiagnoseOptions, seed=asked.seed)
+    options.excluded  # noqa: B018  a misspelt name is refused before the work
     most = {"most": 1} if options.fast and "most" not in call.given else {}
     source, measured = given_model(asked.model, call), read_recording(asked.recording)
     with call.progress("diagnose") as tell:

@@ -118,7 +118,7 @@ def report(result: Changes, path: Path | str) -> Path:
          "places within 12 mm of one another, each with its own ratio" if result.places
          else "the two recordings share too few places, or no frame"),
     ])  # fmt: skip
-    page.next_step(_what_next(result))
+    page.next_steps(next_steps(result))
     figure = new_figure(8, 3.4)
     draw(result, figure.subplots())
     page.view(
@@ -153,16 +153,17 @@ def view(result: Changes) -> View:
     return View(thing_of(model), np.array([place.point for place in result.places]), [ratio])
 
 
-def _what_next(result: Changes) -> str:
+def next_steps(result: Changes) -> list[str]:
+    """What to do with the answer."""
     first = file_words(result.before.recording.path, "REC")
     second = file_words(result.after.recording.path, "REC2")
     if result.before.diagnosis is None:
-        words = f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"
-    elif result.explained_by:
-        words = f"see the evidence: `palpate diagnose {second} --report PAGE.html`"
-    else:
-        words = f"feel either: `palpate touch {first}`, `palpate touch {second}`"
-    return f"What to do next: {words}."
+        return [f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"]
+    if result.explained_by:
+        return [f"see the evidence: `palpate diagnose {second} --report PAGE.html`"]
+    return [
+        f"make a model of each, and feel it: `palpate reconstruct {first} -o MODEL`, `palpate touch MODEL`"
+    ]
 
 
 def draw(result: Changes, ax: Axes) -> None:

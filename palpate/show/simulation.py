@@ -31,13 +31,16 @@ def lines(result: Simulation) -> list[str]:
     """What `print` says, with units."""
     recording = result.recording
     words = [
-        f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(result.touches)} palpations of the "
+        f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(result.touches)} touches of the "
         f"{result.phantom}",
-        f"  effects: {', '.join(result.truth['strengths']) or 'none'}",
+        f"  effects: {', '.join(n.replace('_', ' ') for n in result.truth['strengths']) or 'none'}",
     ]
     for name, size in result.truth.get("sizes", {}).items():
-        refit = size["rms_after_best_scale_n"]
-        words.append(f"  {name}: {size['rms_n']:.4f} N, {refit:.4f} N after a refit of the modulus")
+        left = 1e3 * size["rms_after_best_scale_n"]
+        words.append(
+            f"  {name.replace('_', ' ')} changes the force by {1e3 * size['rms_n']:.3g} mN; {left:.3g} mN "
+            "of that stays when another modulus is fitted"
+        )
     return words
 
 
@@ -75,11 +78,7 @@ def report(result: Simulation, path: Path | str) -> Path:
         f"{'with ' + effects if effects else 'without any effect'}."
     )
     page.paragraph(_meaning(result))
-    where = file_words(recording.path, "REC")
-    page.next_step(
-        f"What to do next: see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
-        f"`palpate diagnose {where} --model MODEL --report PAGE.html`; feel it: `palpate touch MODEL`."
-    )
+    page.next_steps(next_steps(result))
     page.view(
         view(result),
         simulation_figure(result),
@@ -97,6 +96,16 @@ def report(result: Simulation, path: Path | str) -> Path:
         )
     page.result(result.as_json())
     return page.write(path)
+
+
+def next_steps(result: Simulation) -> list[str]:
+    """What to do with the recording."""
+    where = file_words(result.recording.path, "REC")
+    return [
+        f"see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
+        f"`palpate diagnose {where} --model MODEL --report PAGE.html`",
+        "feel it: `palpate touch MODEL`",
+    ]
 
 
 _SIZES = ("rms_n", "rms_after_best_scale_n")

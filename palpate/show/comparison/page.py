@@ -26,11 +26,7 @@ def report(result: Comparison, path: Path | str) -> Path:
     page = Page(f"Who predicts the next touch: {recording.name}")
     page.lead(lead(result))
     page.paragraph(meaning(result))
-    model = file_words(result.model.path, "MODEL")
-    page.next_step(
-        f"What to do next: feel it: `palpate touch {model} --beside hunt-crossley`; ask what the FEM still "
-        f"leaves out: `palpate diagnose {file_words(recording.path, 'REC')} --model {model}`."
-    )
+    page.next_steps(next_steps(result))
     page.view(
         view(result),
         still(result),
@@ -80,6 +76,16 @@ def report(result: Comparison, path: Path | str) -> Path:
     )
     page.result(result.as_json())
     return page.write(path)
+
+
+def next_steps(result: Comparison) -> list[str]:
+    """What to do with the answer."""
+    model = file_words(result.model.path, "MODEL")
+    recording = file_words(None if result.recording is None else result.recording.path, "REC")
+    return [
+        f"feel it: `palpate touch {model} --beside hunt-crossley`",
+        f"ask what the FEM still leaves out: `palpate diagnose {recording} --model {model}`",
+    ]
 
 
 def lead(result: Comparison) -> str:
