@@ -11,7 +11,7 @@ import numpy as np
 from diagnose.specimen.result import FLOORS, Material
 from mechanics.quantities import fitting_unit, quantity_words, split_key
 from palpate.show.page import Page, subplots
-from palpate.show.quantities import softness
+from palpate.show.quantities import readable, softness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -70,7 +70,8 @@ def in_words(name: str, value: Any) -> str:
 
 def report(result: Material, path: Path | str) -> Path:
     """Write one page; returns its path."""
-    page = Page(f"Material: {', '.join(Path(name).name for name in result.files[:_NAMED])}")
+    more = f" and {len(result.files) - _NAMED} more" if len(result.files) > _NAMED else ""
+    page = Page(f"Material: {', '.join(Path(name).name for name in result.files[:_NAMED])}{more}")
     tell(result, page)
     page.result(as_json(result))
     return page.write(path)
@@ -138,7 +139,8 @@ def next_steps(result: Material) -> list[str]:
         return ["give more curves, or say what the files do not (`--tip-radius`, `--layer`, `--units`)"]
     if not np.isfinite(result.young_modulus_pa):
         return []
-    return [f"feel it in a shape of yours: `palpate touch SHAPE.stl --modulus {result.young_modulus_pa:.3g}`"]
+    modulus = float(f"{result.young_modulus_pa:.3g}")
+    return [f"feel it in a shape of yours: `palpate touch SHAPE.stl --modulus {modulus:.0f}`"]
 
 
 _NAMED = 3
@@ -152,6 +154,11 @@ _WAYS = {
     "hertz": "Hertz's law of a ball",
     "sphere": "the law of a true ball",
     "linear": "a linear law",
+    "neo-hookean": "the neo-Hookean law",
+    "yeoh": "Yeoh's law, two terms",
+    "yeoh-3": "Yeoh's law, three terms",
+    "fung": "Fung's law",
+    "ogden": "Ogden's law",
 }
 _KILO = 1e3
 
@@ -204,7 +211,9 @@ def draw(result: Material, ax: Axes) -> None:
         ax.spines[["top", "right"]].set_visible(False)
         return
     x, measured, predicted, across, up = result.seen
-    ax.plot(x, measured, ".", ms=2, color="#c1121f", label="measured")
-    ax.plot(x, predicted, "-", lw=1, color="#1d3557", label=result.law)
+    across, x = readable(across, x)
+    up, both = readable(up, [*measured, *predicted])
+    ax.plot(x, both[: len(measured)], ".", ms=4, color="#c1121f", label="measured")
+    ax.plot(x, both[len(measured) :], "-", lw=1, color="#1d3557", label=_way(result.law))
     ax.set(xlabel=across, ylabel=up)
     ax.legend(frameon=False)

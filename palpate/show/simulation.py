@@ -70,12 +70,14 @@ def report(result: Simulation, path: Path | str) -> Path:
     """Write one page: what was simulated, the object, and every touch as read beside the ideal object's."""
     recording, truth = result.recording, result.truth
     strengths = truth["strengths"]
-    effects = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in strengths.items())
+    effects = " and ".join(
+        f"{name.replace('_', ' ')} of strength {value:g}" for name, value in strengths.items()
+    )
     page = Page(f"Simulated exploration of {recording.object_name}")
     page.lead(
         f"{len(result.touches)} touches in {recording.t[-1]:.0f} s of an object of "
         f"{truth['young_modulus_pa'] / 1e3:.1f} kPa, "
-        f"{'with ' + effects if effects else 'without any effect'}."
+        f"{f'with {effects} (1 is usual)' if effects else 'without any effect'}."
     )
     page.paragraph(_meaning(result))
     page.next_steps(next_steps(result))
@@ -88,7 +90,7 @@ def report(result: Simulation, path: Path | str) -> Path:
     if truth.get("sizes"):
         page.heading("How large each effect is")
         page.table(
-            ["effect", "change of the force [mN]", "after a refit of the modulus [mN]"],
+            ["effect", "change of the force [mN]", "left with another modulus [mN]"],
             [
                 [name.replace("_", " "), *(f"{1e3 * size[key]:.1f}" for key in _SIZES)]
                 for name, size in truth["sizes"].items()

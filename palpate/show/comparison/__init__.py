@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from diagnose.compare.comparison import Comparison, verdict
-from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS
+from diagnose.compare.models import HOMOGENEOUS, MODELS
 from palpate.show.comparison.figures import draw, view
 from palpate.show.comparison.page import lead, meaning, next_steps, report
 from palpate.show.quantities import ERROR
@@ -36,15 +36,11 @@ def lines(result: Comparison) -> list[str]:
     text.append(row("single sites", len(result.presses), result.rmse_n, None))
     for r in result.regions:
         text.append(row(r.region.name, int(r.region.members.sum()), r.rmse_n, r.bias))
-    noise, constant = result.noise_n, result.constant_n
-    best = min(RIVALS, key=lambda name: result.rmse_n[name])
-    fem, rival = result.rmse_n["fem"], result.rmse_n[best]
-    lost = f"{best} predicts held-out presses better: {rival:.3f} N, FEM {fem:.3f} N"
     return [
-        *([lost] if rival < fem else []),
         *text,
-        f"floor: the sensor noise {noise:.3f} N, {best} {rival:.3f} N; ceiling: a constant push "
-        f"{constant:.3f} N; {verdict(result)}",
+        f"beside: the sensor's noise {1e3 * result.noise_n:.0f} mN, a constant push instead of a model "
+        f"{1e3 * result.constant_n:.0f} mN",
+        verdict(result),
     ]
 
 
