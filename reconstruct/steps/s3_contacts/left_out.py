@@ -24,7 +24,8 @@ SLIDE_RADII = 8.0
 """A contact whose tip wanders further than so many radii along the surface is no press: a drag within one is
 shorter."""
 _FAR_SPREADS = 6.0
-"""A first touch so many spreads of the others off the surface, and a tip's radius, lies on something else; nearer, its force may have an offset."""
+"""A first touch so many spreads of the others off the surface, and a tip's radius, lies on something else;
+nearer, its force may have an offset."""
 _LEAST_ROWS, _ODDS = 5, 9.0
 
 
