@@ -59,8 +59,8 @@ class Stated:
         return {name: value if math.isfinite(value) else None for name, value in values.items()}
 
 
-def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> Stated:
-    """KEY=VALUE words, or a mapping, over the model's values. Raises OptionError for what is not known."""
+def said_values(said: Iterable[str] | Mapping[str, Any] | None) -> dict[str, float]:
+    """KEY=VALUE words, or a mapping, by the names of `Stated`. Raises OptionError for what is not known."""
     pairs = said.items() if isinstance(said, Mapping) else (_pair(word) for word in said or ())
     values: dict[str, Any] = {}
     for key, value in pairs:
@@ -75,6 +75,12 @@ def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> S
             raise OptionError(f"--stated {key}={value}: it must be a number") from error
         if math.isnan(values[name]) or not KEYS[name].takes(values[name]):
             raise OptionError(f"--stated {key}={value}: it must be {KEYS[name].words}")
+    return values
+
+
+def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> Stated:
+    """What was said (`said_values`) over the model's values."""
+    values = said_values(said)
     slip = model.effects.get(SLIP.name, {})
     usual = Stated(
         model.material.young_modulus_pa,

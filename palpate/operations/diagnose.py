@@ -221,6 +221,11 @@ def _forces(asked: DiagnoseOperands) -> Any:
         if asked.stated and asked.renderer is None:
             words = "name its forces by --simulated, or the simulator by --renderer"
             raise OptionError(f"--stated says what a simulator was given: {words}")
+    if asked.stated:
+        from diagnose.simulated.stated import said_values
+
+        said_values(asked.stated)
+    if asked.simulated is None:
         return None
     from diagnose.simulated.forces import read_forces, sorted_forces
 
