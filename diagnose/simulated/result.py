@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
@@ -50,16 +51,30 @@ class Part:
         return {"gap_n": self.gap_n, "share": self.share, "effects": list(self.names)}
 
 
+@dataclass(frozen=True)
+class Mended:
+    """The same simulator, run once more. settings: in words. gap_n: N rms, to the measured force. effects:
+    what is named of it still."""
+
+    settings: str
+    gap_n: float
+    effects: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return {"settings": self.settings, "gap_n": self.gap_n, "effects": list(self.effects)}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulatedGap(Result):
     """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
     over contact samples, the parts at places that their fits have not seen.
 
     parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
-    sensor's noise and touch_share what the object's own first touches take. reality: today's diagnosis of our
-    ideal model. gaps: (n, 3) N, local frames of `touches`, as the parts are taken off, "simulated" first.
-    notes: what was told of the forces. `plot`: the parts as shares. `show`: the object coloured by
-    the gap.
+    sensor's noise and touch_share what the object's own first touches take. effects: what changes the force
+    most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames of `touches`, as
+    the parts are taken off, "simulated" first. notes: what was told of the forces. mended: where it was run
+    again. `plot`: the parts as shares. `show`: the object coloured by the gap.
     """
 
     simulator: Simulator
@@ -86,7 +101,12 @@ class SimulatedGap(Result):
     touches: Presses
     gaps: Mapping[str, np.ndarray] = field(default_factory=dict)
     simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    gap_after_measured_n: float | None = None
+    mended: Mended | None = None
+
+    @property
+    def without_numerics_n(self) -> float:
+        """N, the gap that is left once the numerics alone are mended, as it is said before that is run."""
+        return self.gap_before_n * math.sqrt(max(1 - self.parts["numerics"].share, 0.0))
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
@@ -118,6 +138,8 @@ class SimulatedGap(Result):
             "advice": list(self.advice),
             "notes": list(self.notes),
             "reasons": list(self.reasons),
-            "gap_after_measured_n": self.gap_after_measured_n,
+            "gap_after_measured_n": None if self.mended is None else self.mended.gap_n,
+            "gap_without_numerics_n": self.without_numerics_n,
+            "mended": None if self.mended is None else self.mended.as_json(),
             "ideal": self.reality.as_json(),
         }

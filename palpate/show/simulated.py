@@ -158,8 +158,8 @@ def lines(result: SimulatedGap) -> list[str]:
         f"  unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
         f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})"
     )
-    if result.gap_after_measured_n is not None:
-        text.append(f"measured with what was mended: {force_words(result.gap_after_measured_n)}")
+    if result.mended is not None:
+        text.append(f"run again with {result.mended.settings}: {mended_words(result)}")
     text += [f"advice: {each}" for each in result.advice]
     given, about = result.simulator.stated, result.simulator
     said = ", ".join(
@@ -170,6 +170,17 @@ def lines(result: SimulatedGap) -> list[str]:
     text += [f"  note: {note}" for note in result.notes]
     text += [f"  {reason}" for reason in result.reasons]
     return [line.replace("\u00a0", " ") for line in text]
+
+
+def mended_words(result: SimulatedGap) -> str:
+    """What the run with mended settings measured, beside what was said of it; '' where there is none."""
+    if result.mended is None:
+        return ""
+    return (
+        f"the gap went from {force_words(result.gap_before_n)} to {force_words(result.mended.gap_n)} "
+        f"({force_words(result.without_numerics_n)} was said once its numerics are mended); still named: "
+        f"{spoken(result.mended.effects) or 'nothing'}"
+    )
 
 
 def _numbered(result: SimulatedGap, part: str) -> list[str]:
@@ -229,6 +240,8 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     page.lead(_lead(result))
     page.cards(_cards(result))
     page.next_steps(result.advice)
+    if result.mended is not None:
+        page.paragraph(f"Run again with {result.mended.settings}: {mended_words(result)}.")
     for note in result.notes:
         page.paragraph(f"Note: {note}.")
     figure = new_figure(9, 1.7, layout="constrained")
