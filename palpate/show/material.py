@@ -211,9 +211,9 @@ def draw(result: Material, ax: Axes) -> None:
         ax.spines[["top", "right"]].set_visible(False)
         return
     x, measured, predicted, across, up = result.seen
-    across, x = readable(across, x)
+    across, along = readable(across, [*x])
     up, both = readable(up, [*measured, *predicted])
-    ax.plot(x, both[: len(measured)], ".", ms=4, color="#c1121f", label="measured")
-    ax.plot(x, both[len(measured) :], "-", lw=1, color="#1d3557", label=_way(result.law))
+    ax.plot(along, both[: len(measured)], ".", ms=4, color="#c1121f", label="measured")
+    ax.plot(along, both[len(measured) :], "-", lw=1, color="#1d3557", label=_way(result.law))
     ax.set(xlabel=across, ylabel=up)
     ax.legend(frameon=False)
