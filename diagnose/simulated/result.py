@@ -51,16 +51,30 @@ class Part:
         return {"gap_n": self.gap_n, "share": self.share, "effects": list(self.names)}
 
 
+@dataclass(frozen=True)
+class Mended:
+    """The same simulator, run once more. settings: in words. gap_n: N rms, to the measured force. effects:
+    what is named of it still."""
+
+    settings: str
+    gap_n: float
+    effects: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return {"settings": self.settings, "gap_n": self.gap_n, "effects": list(self.effects)}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulatedGap(Result):
     """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
     over contact samples, the parts at places that their fits have not seen.
 
     parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
-    sensor's noise and touch_share what the object's own first touches take. reality: today's diagnosis of our
-    ideal model. gaps: (n, 3) N, local frames of `touches`, as the parts are taken off, "simulated" first.
-    notes: what was told of the forces. `plot`: the parts as shares. `show`: the object coloured by
-    the gap.
+    sensor's noise and touch_share what the object's own first touches take. effects: what changes the force
+    most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames of `touches`, as
+    the parts are taken off, "simulated" first. notes: what was told of the forces. mended: where it was run
+    again. `plot`: the parts as shares. `show`: the object coloured by the gap.
     """
 
     simulator: Simulator
@@ -87,7 +101,7 @@ class SimulatedGap(Result):
     touches: Presses
     gaps: Mapping[str, np.ndarray] = field(default_factory=dict)
     simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    gap_after_measured_n: float | None = None
+    mended: Mended | None = None
 
     @property
     def summary(self) -> str:
@@ -108,6 +122,22 @@ class SimulatedGap(Result):
         named = ", ".join(n.replace("_", " ") for n in self.effects)
         rest = ", ".join(n.replace("_", " ") for n in self.candidates)
         return f"{words}; named: {named}" + (f" (not ruled out: {rest})" if rest else "")
+
+    @property
+    def without_numerics_n(self) -> float:
+        """N, the gap that is left once the numerics alone are mended, as it is said before that is run."""
+        return self.gap_before_n * math.sqrt(max(1 - self.parts["numerics"].share, 0.0))
+
+    @property
+    def mended_in_words(self) -> str:
+        """What the run with mended settings measured, beside what was said of it; "" where there is none."""
+        if self.mended is None:
+            return ""
+        still = ", ".join(n.replace("_", " ") for n in self.mended.effects) or "nothing"
+        return (
+            f"gap {self.gap_before_n:.4f} N -> {self.mended.gap_n:.4f} N measured "
+            f"({self.without_numerics_n:.4f} N was said once its numerics are mended); still named: {still}"
+        )
 
     def lines(self) -> list[str]:
         """The three parts, a line each, with units."""
@@ -136,8 +166,8 @@ class SimulatedGap(Result):
             f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N once all of it is mended, "
             "on places not fitted"
         )
-        if self.gap_after_measured_n is not None:
-            lines.append(f"measured with the mended settings: {self.gap_after_measured_n:.4f} N")
+        if self.mended is not None:
+            lines.append(f"run again, {self.mended.settings}: {self.mended_in_words}")
         lines += [f"  {reason}" for reason in self.reasons]
         lines += [f"advice: {each}" for each in self.advice]
         return lines
@@ -182,7 +212,9 @@ class SimulatedGap(Result):
             "advice": list(self.advice),
             "notes": list(self.notes),
             "reasons": list(self.reasons),
-            "gap_after_measured_n": self.gap_after_measured_n,
+            "gap_after_measured_n": None if self.mended is None else self.mended.gap_n,
+            "gap_without_numerics_n": self.without_numerics_n,
+            "mended": None if self.mended is None else self.mended.as_json(),
             "ideal": self.reality.as_json(),
         }
 

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
+from mechanics.key_values import pairs
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import seed_operand
 from palpate.output import Output
@@ -104,11 +105,11 @@ def options_of(
     if values is None or isinstance(values, Mapping):
         return values
     found: dict[str, dict[str, Any]] = {}
-    for text in values:
-        name, equals, value = text.partition("=")
+    example = "diagnose.fast=true"
+    for name, value in pairs(values, "--set", example):
         step, dot, option = name.partition(".")
-        if not (equals and dot and step and option):
-            raise OptionError(f"--set '{text}' must be STEP.OPTION=VALUE, such as diagnose.fast=true")
+        if not (dot and step and option):
+            raise OptionError(f"--set '{name}={value}' must be STEP.OPTION=VALUE, such as {example}")
         try:
             read: Any = tomllib.loads(f"x = {value}")["x"]
         except (tomllib.TOMLDecodeError, RecursionError):

@@ -162,6 +162,8 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     page.cards(_cards(result))
     for each in result.advice:
         page.next_step(f"What to do: {each}.")
+    if result.mended is not None:
+        page.paragraph(f"Run again with {result.mended.settings}: {result.mended_in_words}.")
     for note in result.notes:
         page.paragraph(f"Note: {note}.")
     figure = new_figure(9, 1.7, layout="constrained")

@@ -30,15 +30,14 @@ event.register("numba:compile", Watch())
 import palpate.warm_up
 from render.press import Stroke, press
 
-made = palpate.warm_up.block_renderer()
-with made as renderer:
-    for name, work in palpate.warm_up.stages(renderer):
-        work()
-    press(renderer, [0.0, 0.0, 0.04], [0.0, 0.0, -1.0], Stroke(1e-3, 0.05))
-    tips = np.array([[0.0, 0.0, 0.05]])
-    tips.setflags(write=False)
-    renderer.step(renderer.start(), tips)
-    renderer.step(renderer.start(radii_m=[0.005, 0.005]), np.zeros((3, 2)).T)
+renderer = palpate.warm_up.block_renderer()
+for work in palpate.warm_up.stages(renderer).values():
+    work()
+press(renderer, [0.0, 0.0, 0.012], [0.0, 0.0, -1.0], Stroke(1e-3, 0.05))
+tips = np.array([[0.0, 0.0, 0.05]])
+tips.setflags(write=False)
+renderer.step(renderer.start(), tips)
+renderer.step(renderer.start(radii_m=[0.005, 0.005]), np.zeros((3, 2)).T)
 print(json.dumps(found))
 """
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from diagnose.compare.comparison import Comparison, verdict
-from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS
+from diagnose.compare.models import RIVALS
 from palpate.show.comparison.figures import draw, view
 from palpate.show.comparison.page import report
 from palpate.show.quantities import ERROR
@@ -60,7 +60,7 @@ def as_json(result: Comparison) -> dict[str, Any]:
             }
             for r in result.regions
         ],
-        "wins": {name: result.wins(name) for name in MODELS if name != HOMOGENEOUS},
+        "wins": {name: result.wins(name) for name in ("fem", *RIVALS)},
         "noise_n": result.noise_n,
         "constant_rmse_n": result.constant_n,
         "young_modulus_pa": result.moduli_pa,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from diagnose.compare.comparison import Comparison
-from diagnose.compare.models import HOMOGENEOUS, RIVALS
+from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS
 from palpate.show.comparison.figures import (
     DEPTH_M,
     across_region,
@@ -37,6 +37,7 @@ def report(result: Comparison, path: Path | str) -> Path:
         "Left: FEM's error at each press, held out of every fit. Right: the press that it predicts worst.",
         result.model,
     )
+    names = compared(result)
     page.figure(error_bars(result), "Error at places that were held out of every fit, of each model.")
     page.paragraph(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
@@ -46,8 +47,12 @@ def report(result: Comparison, path: Path | str) -> Path:
         "field of it where the presses that it is fitted to ask for one: they did in "
         f"{sum(f is not None for f in result.fields)} of {len(result.fields)} folds."
     )
+    for name in (n for n in names if n not in MODELS):
+        page.paragraph(
+            f"{name} was run along the recorded path; its modulus is fitted to the same presses, as its "
+            "force goes with it."
+        )
     page.heading("Held-out palpations and regions")
-    names = compared(result)
     rows = [
         [
             "folds over sites",

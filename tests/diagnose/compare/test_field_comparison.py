@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from diagnose.compare.comparison import CompareOptions, compare_presses
+from diagnose.compare.comparison import Along, CompareOptions, compare_presses
 from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
 from mechanics import solved_fields
 from mechanics.press_making import PathErrors, of_paths
@@ -56,6 +56,18 @@ def test_a_first_touch_that_is_sure_stays():
     np.testing.assert_array_equal(
         as_touched(_spring(presses), presses, "moved"), as_touched(_spring(presses), presses, "read")
     )
+
+
+def test_a_simulator_beside_the_models_has_its_modulus_fitted_to_the_others_folds():
+    """Half the measured force is as good as all of it, and a constant push is not."""
+    slab = tissue(1, raster=3)
+    presses = slab.presses
+    halved = Along(presses.t, 0.5 * presses.net.force)
+    constant = Along(presses.t, np.ones_like(presses.force))
+    options = CompareOptions(folds=3, field="homogeneous")
+    result = compare_presses(presses, slab.model, options, simulated={"mujoco": halved, "constant": constant})
+    assert result.rmse_n["mujoco"] < 0.2 * result.rmse_n["fem"] < result.rmse_n["constant"]
+    assert all("mujoco" in region.bias for region in result.regions)
 
 
 def test_folds_share_factorisations_and_predict_what_each_alone_would(monkeypatch):
