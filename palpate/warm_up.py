@@ -7,6 +7,7 @@ done once. Run as `python -m palpate.warm_up STAGE...`; a failure costs only tim
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -112,8 +113,8 @@ def _tick(renderer: Any) -> None:
 
 
 def _mark(stage: str) -> Path | None:
-    folder = choose_folder()
-    return None if folder is None else folder / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}"
+    named = choose_folder() or os.environ.get("NUMBA_CACHE_DIR")  # the user's own folder
+    return Path(named) / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}" if named else None
 
 
 def _done(names: Sequence[str]) -> bool:

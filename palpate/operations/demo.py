@@ -40,12 +40,14 @@ class DemoOperands:
 
 
 def _answer(found: tuple[DemoResult, Path], asked: DemoOperands, out: Output) -> int:
+    from palpate.show import next_lines
+
     result, report = found
     at = Path(asked.folder) / "model"
     out.say(
         *result.lines(),
         f"report: {report.resolve()}",
-        f"to feel it: palpate touch {at if asked.recording else ''}".rstrip(),
+        *next_lines(result),
     )
     out.json({**result.as_json(), "report": str(report.resolve())})
     if asked.window or (asked.window is None and _has_screen()):

@@ -62,6 +62,10 @@ class ServoReport:
         return table
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, *, sent: bool = True) -> str:
+        """In lines. sent: whether there was a device to send a force to."""
         c, late = self.compute.summary(), self.lateness.summary()
         lines = [
             f"{self.ticks} ticks in {self.seconds:.1f} s ({self.rate_hz:.1f} Hz), "
@@ -71,8 +75,9 @@ class ServoReport:
             f"lateness median {late['median']:.1f}  p99 {late['p99']:.1f}  p99.9 {late['p99.9']:.1f}  "
             f"max {late['max']:.1f} us",
             f"in contact {100 * self.contact_share:.0f} % of the time, greatest force "
-            f"{self.peak_rendered_n:.2f} N rendered, {self.peak_force_n:.2f} N sent, "
-            f"energy given back at most {1000 * self.energy_given_back_j:.3f} mJ",
+            f"{self.peak_rendered_n:.2f} N rendered, "
+            + (f"{self.peak_force_n:.2f} N sent, " if sent else "")
+            + f"energy given back at most {1000 * self.energy_given_back_j:.3f} mJ",
         ]
         return "\n".join([*lines, *self.words])
 

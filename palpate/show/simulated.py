@@ -123,6 +123,85 @@ def keys_in_words(entry: EffectEntry) -> str:
     return ", ".join(said)
 
 
+_MOST = {
+    "numerics": "most of the gap is numerics",
+    "parameters": "most of the gap is parameters",
+    "reality": "most of the gap is what every ideal elastic simulation lacks",
+}
+
+
+def verdict(result: SimulatedGap) -> str:
+    """The answer in one sentence."""
+    if not result.effects:
+        return "nothing stands out: neither numerics nor parameters nor what an ideal simulation lacks"
+    first = max(PARTS, key=lambda name: result.parts[name].share)
+    most = _MOST[first]
+    if result.unexplained > result.parts[first].share:
+        most = "most of the gap is not explained"
+    rivals = f" (not ruled out: {spoken(result.candidates, 'or')})" if result.candidates else ""
+    return f"{most}; named: {spoken(result.effects)}{rivals}"
+
+
+def lines(result: SimulatedGap) -> list[str]:
+    """What `print` says: the answer, its three parts, what to mend, then what the simulator was given."""
+    after = f"{force_words(result.gap_after_n)} once all of it is mended, at places that were not fitted"
+    text = [
+        f"verdict: {verdict(result)}",
+        f"gap: simulated and measured force differ by {force_words(result.gap_before_n)} (the sensor's "
+        f"noise: {force_words(result.noise_n)}); {after}",
+    ]
+    for name in PARTS:
+        part = result.parts[name]
+        said = f"  {name}, {MEANING[name]}: {force_words(part.gap_n)}, {percent(part.share)}"
+        text.append(": ".join([said, *(["; ".join(_numbered(result, name))] if part.names else [])]))
+    text.append(
+        f"  unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
+        f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})"
+    )
+    if result.mended is not None:
+        text.append(f"run again with {result.mended.settings}: {mended_words(result)}")
+    text += [f"advice: {each}" for each in result.advice]
+    given, about = result.simulator.stated, result.simulator
+    said = ", ".join(
+        f"{words} {shown} {unit}".rstrip() + ("" if key in given.given else " (not stated: the model's)")
+        for key, words, shown, unit in _given(result)
+    )
+    text.append(f"given to {about.name}{' ' + about.version if about.version else ''}: {said}")
+    text += [f"  note: {note}" for note in result.notes]
+    text += [f"  {reason}" for reason in result.reasons]
+    return [line.replace("\u00a0", " ") for line in text]
+
+
+def mended_words(result: SimulatedGap) -> str:
+    """What the run with mended settings measured, beside what was said of it; '' where there is none."""
+    if result.mended is None:
+        return ""
+    return (
+        f"the gap went from {force_words(result.gap_before_n)} to {force_words(result.mended.gap_n)} "
+        f"({force_words(result.without_numerics_n)} was said once its numerics are mended); still named: "
+        f"{spoken(result.mended.effects) or 'nothing'}"
+    )
+
+
+def _numbered(result: SimulatedGap, part: str) -> list[str]:
+    """What is named in a part, each with its numbers."""
+    known = {e.name: e for e in result.entries}
+    said = []
+    for name in result.parts[part].names:
+        numbers = keys_in_words(known[name]) if name in known else ""
+        said.append(name.replace("_", " ") + (f" ({numbers})" if numbers else ""))
+    return said
+
+
+def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
+    """(key, words, value, unit) of what the simulator was given."""
+    rows = []
+    for key, value in result.simulator.stated.as_json().items():
+        words, factor, unit = plain_key(key, value)
+        rows.append((key, words, "none: it sticks" if value is None else number(value, factor), unit))
+    return rows
+
+
 def _lead(result: SimulatedGap) -> str:
     if not result.effects:
         return "Nothing stands out: this simulation is as near to the measured forces as they can tell."
@@ -160,8 +239,9 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     page = Page(f"{result.simulator.name} against measured touch: {result.reality.recording.name}")
     page.lead(_lead(result))
     page.cards(_cards(result))
-    for each in result.advice:
-        page.next_step(f"What to do: {each}.")
+    page.next_steps(result.advice)
+    if result.mended is not None:
+        page.paragraph(f"Run again with {result.mended.settings}: {mended_words(result)}.")
     for note in result.notes:
         page.paragraph(f"Note: {note}.")
     figure = new_figure(9, 1.7, layout="constrained")

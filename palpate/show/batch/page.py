@@ -34,7 +34,7 @@ def report(result: Batch, path: Path | str) -> Path:
     page.part(f"<style>\n{_file('batch.css')}</style>")
     page.lead(lead(result))
     page.paragraph(meaning(result))
-    page.next_step(_what_next(result))
+    page.next_steps(next_steps(result))
     if result.agreements:
         _agreement(page, result)
     page.heading("Recordings")
@@ -82,12 +82,13 @@ def meaning(result: Batch) -> str:
     return "No object was explored twice, so nothing is said about how far explorations agree."
 
 
-def _what_next(result: Batch) -> str:
+def next_steps(result: Batch) -> list[str]:
+    """What to do with the answers."""
     first = next((e.row.recording for e in result.entries if e.row.status == "done"), None)
     if any(e.row.status != "done" for e in result.entries):
-        return "What to do next: mend what a row names, and run the same command again; what is done is kept."
+        return ["mend what a row names, and run the same command again; what is done is kept"]
     feel = f"`palpate touch {result.folder / first / 'model'}`" if first else "`palpate touch OUT/NAME/model`"
-    return f"What to do next: open a recording's page by its name; feel one: {feel}."
+    return ["open a recording's page by its name", f"feel one: {feel}"]
 
 
 def _count(result: Batch) -> str:

@@ -27,7 +27,7 @@ def tab(tmp_path_factory):
 def written(tmp_path_factory):
     page = Page("A result, to be kept")
     page.lead("Young's modulus 28.9 kPa.")
-    page.next_step("What to do next: `palpate touch MODEL`.")
+    page.next_steps(["`palpate touch MODEL`"])
     figure = Figure(figsize=(13, 3))
     figure.subplots().plot([0, 1], [0, 1])
     page.figure(figure, "A wide one.")
