@@ -85,13 +85,13 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _parts(window: Any, count: int) -> dict[str, float]:
     """Median processor time, s, of drawing each part of the window by itself, and all of them."""
-    *pictures, panel = window.plotter.renderers
-    parts = {"what is felt": pictures[:1], "second picture": pictures[1:], "words and plots": [panel],
-             "all": [*pictures, panel]}  # fmt: skip
+    first, second, *others = window.plotter.renderers
+    shown = [renderer for renderer in (first, second, *others) if renderer.GetDraw()]
+    parts = {"what is felt": [first], "second picture": [second], "words and plots": others, "all": shown}
     found = {}
     for name, drawn in parts.items():
         for renderer in window.plotter.renderers:
-            renderer.SetDraw(renderer in drawn)
+            renderer.SetDraw(renderer in drawn and renderer in shown)
         found[name] = _frames(window, count, move=False)["cpu_s"]
     return found
 

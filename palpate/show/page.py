@@ -57,9 +57,11 @@ class Page:
         """Plain words; what stands between backticks is code."""
         self._parts.append(f"<p>{self._words(text)}</p>")
 
-    def next_step(self, text: str) -> None:
-        """What to do now, marked; what stands between backticks is code."""
-        self._parts.append(f'<p class="next">{self._words(text)}</p>')
+    def next_steps(self, steps: Sequence[str]) -> None:
+        """What to do now, marked; what stands between backticks is code. Nothing for none."""
+        if steps:
+            words = f"What to do next: {'; '.join(steps)}."
+            self._parts.append(f'<p class="next">{self._words(words)}</p>')
 
     def cards(self, cards: Sequence[tuple[str, str, str]]) -> None:
         """Answers side by side: (question, answer in a few words, a sentence or two) each."""
@@ -254,5 +256,7 @@ def _is_words(value: Any) -> bool:
 
 def _cell(value: Any) -> str:
     if isinstance(value, float):
-        return "&ndash;" if value != value else f"{value:.4g}"
+        if value != value:
+            return "&ndash;"
+        return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
     return html.escape(str(value))

@@ -11,6 +11,7 @@ from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
 from palpate.window import shadow
+from palpate.window.board import INK, set_type
 from palpate.window.frames import Frame, View
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
@@ -56,7 +57,7 @@ class ObjectPicture:
         self._shade()
         self._actor: pyvista.Actor | None = None
         self._bar = ""
-        self._title = f"{label}  " if label else ""
+        self._title = label
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
@@ -71,6 +72,7 @@ class ObjectPicture:
             pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20), color=INCLUSION_COLOUR
         )
         self._ball.SetVisibility(False)
+        self._inside: Region | None = None
         self._arrow.SetVisibility(False)
         blot = shadow.blot(SHADOW_IN_RADII * tip_radius_m)
         self._shadow = plotter.add_mesh(
@@ -101,7 +103,7 @@ class ObjectPicture:
             opacity, culling = self._actor.prop.opacity, self._actor.prop.culling
             self._plotter.remove_actor(self._actor, render=False)
             self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
-        self._bar = f"{self._title}{name}"
+        self._bar = f"{name}{self._title}"
         self._actor = self._plotter.add_mesh(
             self._surface,
             scalars=name,
@@ -112,18 +114,19 @@ class ObjectPicture:
             diffuse=0.62,
             scalar_bar_args={
                 "title": self._bar,
-                "title_font_size": 12,
-                "label_font_size": 11,
                 "n_labels": 2,  # a third would lie under the title
                 "fmt": "%.0f",
-                "color": "black",
                 "width": 0.42,
                 "height": 0.06,
                 "position_x": 0.56,
                 "position_y": 0.02,
+                "unconstrained_font_size": True,
             },
             render=False,
         )
+        bar = self._plotter.scalar_bars[self._bar]
+        for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+            set_type(words, 11, False, INK)
         self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
 
     def _shade(self) -> None:
@@ -132,17 +135,19 @@ class ObjectPicture:
         self._surface.point_data["normals"] = self._smooth + now - self._flat
         self._surface.point_data.active_normals_name = "normals"
 
-    def see_through(self, on: bool) -> None:
-        """Show what is inside."""
+    def _see_through(self, on: bool) -> None:
         if self._actor is not None:
             self._actor.prop.opacity = 0.45 if on else 1.0
             # what is seen through is its front alone, whatever the order of its triangles
             self._actor.prop.culling = "back" if on else "none"
 
     def show_inclusion(self, region: Region | None) -> None:
-        """A ball where the inclusion is, or nothing."""
+        """A ball where the inclusion is, seen through the object, or nothing."""
+        if region == self._inside:
+            return
+        self._inside = region
         self._ball.SetVisibility(region is not None)
-        self.see_through(region is not None)
+        self._see_through(region is not None)
         if region is not None:
             self._ball.SetPosition(*region.centre_m)
             self._ball.SetScale(region.radius_m)

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.errors import OptionError
+from mechanics.key_values import number, pairs
 from mechanics.model import Model
 from mechanics.refine import refined_around
 from mechanics.tetmesh import TetMesh
@@ -84,17 +85,13 @@ class Adapter(ABC):
 def changed(settings: Any, text: str) -> Any:
     """The settings with KEY=VALUE words over them; raises OptionError for what is not there or no number."""
     known = {f.name for f in dataclasses.fields(settings)}
-    values = {}
-    for word in filter(None, (w.strip() for w in text.split(","))):
-        key, _, value = word.partition("=")
+    flag, values = "--simulator-set", {}
+    for key, value in pairs(filter(None, (w.strip() for w in text.split(","))), flag, "edge_radii=0.5"):
         if key not in known:
-            raise OptionError(f"--simulator-set {word}: allowed are {', '.join(sorted(known))}")
-        try:
-            values[key] = float(value)
-        except ValueError as error:
-            raise OptionError(f"--simulator-set {word}: it must be KEY=NUMBER") from error
+            raise OptionError(f"{flag} {key}={value}: allowed are {', '.join(sorted(known))}")
+        values[key] = number(flag, key, value)
         if not values[key] > 0:
-            raise OptionError(f"--simulator-set {word}: it must be greater than 0")
+            raise OptionError(f"{flag} {key}={value}: it must be greater than 0")
     return dataclasses.replace(settings, **values)
 
 

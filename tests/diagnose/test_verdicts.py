@@ -195,7 +195,7 @@ def test_json_has_the_contract(delayed):
         "effects", "young_modulus_pa", "next_touch",
     } <= set(data)  # fmt: skip
     assert data["constant_rmse_n"] > data["gap_before_n"] > data["noise_n"] and data["at_bound"] == []
-    assert any("ceiling: a constant push" in line for line in delayed[2].lines())
+    assert any("a constant push instead of a model" in line for line in delayed[2].lines())
     assert [a["axis"] for a in data["where"]["axes"]] == [
         "depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air",
     ]  # fmt: skip

@@ -48,6 +48,13 @@ def test_a_softer_penalty_is_a_softer_contact(model):
     assert soft.peak_force_n < 0.8 * pressed(model, "scikit-fem").peak_force_n
 
 
+def test_a_contact_without_balance_is_an_error_and_no_force(model, monkeypatch):
+    pytest.importorskip("skfem")
+    monkeypatch.setattr("render.simulators.scikit_fem.ITERATIONS", 1)
+    with pytest.raises(OptionError, match="finds no balance .* lower --simulator-set penalty=10"):
+        pressed(model, "scikit-fem")
+
+
 def test_mujoco_pushes_back_and_a_harder_contact_more(model, tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs

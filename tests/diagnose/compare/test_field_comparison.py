@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from diagnose.compare.comparison import CompareOptions, compare_presses
+from diagnose.compare.comparison import Along, CompareOptions, compare_presses
 from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
 from mechanics import solved_fields
 from mechanics.press_making import PathErrors, of_paths
@@ -61,6 +61,18 @@ def test_a_first_touch_that_is_sure_stays():
     )
 
 
+def test_a_simulator_beside_the_models_has_its_modulus_fitted_to_the_others_folds():
+    """Half the measured force is as good as all of it, and a constant push is not."""
+    slab = tissue(1, raster=3)
+    presses = slab.presses
+    halved = Along(presses.t, 0.5 * presses.net.force)
+    constant = Along(presses.t, np.ones_like(presses.force))
+    options = CompareOptions(folds=3, field="homogeneous")
+    result = compare_presses(presses, slab.model, options, simulated={"mujoco": halved, "constant": constant})
+    assert result.rmse_n["mujoco"] < 0.2 * result.rmse_n["fem"] < result.rmse_n["constant"]
+    assert all("mujoco" in region.bias for region in result.regions)
+
+
 @pytest.fixture(scope="module")
 def compared():
     """(comparison, fields solved) with factorisations that folds share, then with each fold's own."""
@@ -96,11 +108,14 @@ def test_a_1d_model_that_wins_is_in_the_first_line_with_floor_and_ceiling_below(
     won = compared[0][0]
     half = {**won.rmse_n, "hunt-crossley": 0.5 * won.rmse_n["fem"]}
     lost = dataclasses.replace(won, rmse_n=half)
-    assert lines(lost)[0].startswith("hunt-crossley predicts held-out presses better: ")
-    assert "better" not in lines(won)[0]
+    assert (
+        lines(lost)[0] == "A 1D model (Hunt–Crossley) predicts the next touch 2.0 times better than the FEM."
+    )
+    assert not lines(won)[0].startswith("A 1D model")
     for result in (won, lost):
-        assert f"floor: the sensor noise {result.noise_n:.3f} N" in lines(result)[-1]
-        assert f"ceiling: a constant push {result.constant_n:.3f} N" in lines(result)[-1]
+        noise, constant = 1e3 * result.noise_n, 1e3 * result.constant_n
+        assert f"the sensor's noise {noise:.0f} mN, a constant push" in lines(result)[-2]
+        assert lines(result)[-2].endswith(f" {constant:.0f} mN")
     assert result.noise_n < won.rmse_n["fem"] < won.constant_n
 
 

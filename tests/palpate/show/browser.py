@@ -76,14 +76,20 @@ class Tab:
             if not url.startswith(("file:", "data:", "blob:")):
                 self.complaints.append(f"fetched {url[:120]}")
 
-    def open(self, page: Path, width: int = 1280, height: int = 900, *, dark: bool = False) -> None:
-        """Load a page at a size in CSS pixels."""
+    def open(
+        self, page: Path, width: int = 1280, height: int = 900, *, dark: bool = False, lively: bool = False
+    ) -> None:
+        """Load a page at a size in CSS pixels; lively: things may move by themselves."""
         self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
             mobile=width < 500,
         )  # fmt: skip
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.call("Emulation.setEmulatedMedia", features=[scheme])
+        liked = {
+            "prefers-color-scheme": "dark" if dark else "light",
+            "prefers-reduced-motion": "no-preference" if lively else "reduce",
+        }
+        features = [{"name": name, "value": value} for name, value in liked.items()]
+        self.call("Emulation.setEmulatedMedia", features=features)
         self.call("Page.navigate", url=page.resolve().as_uri())
         self.wait("document.readyState === 'complete'")
 
