@@ -1,9 +1,9 @@
-"""The sim-to-real gap: where the simulated force leaves the measured one, which effect was left out, how far
-the gap shrinks.
+"""What is wrong with a simulation: where its force leaves the measured one, which effect was left out, and
+how far the gap between them shrinks with it.
 
 REC is a recording's .csv, .csv.gz or .toml. Without --model the recording is reconstructed first. The answer
 may be one effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown".
-Forces in N (rms of the 3-vector over contact samples of held-out places), lengths in m, moduli in Pa.
+Forces in N (root mean square in contact, at places that the fit had not seen), lengths in m, moduli in Pa.
 With --simulated FORCES.csv (t,fx,fy,fz: s, and N on the tool, along the recorded path) it is the gap of that
 simulator, in three parts: its numerics, the parameters that it was given, and what every ideal elastic
 simulation lacks.

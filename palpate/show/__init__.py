@@ -103,8 +103,12 @@ def next_lines(result: Result) -> list[str]:
 
 
 def steps_of(result: Result) -> list[str]:
-    """What to do with a result, commands between backticks."""
-    return getattr(_module_of(result), "next_steps", lambda _: [])(result)
+    """What to do with a result, commands between backticks; none of one that says its own lines."""
+    try:
+        module = _module_of(result)
+    except OptionError:
+        return []
+    return getattr(module, "next_steps", lambda _: [])(result)
 
 
 class _Presenter:

@@ -139,8 +139,12 @@ def report(result: Changes, path: Path | str) -> Path:
     page.table(heads, rows)
     for reason in result.reasons:
         page.paragraph(reason[:1].upper() + reason[1:] + ".")
-    if result.places:
-        page.figure(figure, "The ratio at every place that both pressed, 95 % sure within the bars.")
+    page.figure(
+        figure,
+        "The ratio at every place that both pressed, 95 % sure within the bars."
+        if result.places
+        else "Both moduli, 95 % sure within the bars.",
+    )
     page.result(as_json(result))
     return page.write(path)
 

@@ -17,7 +17,7 @@ from palpate.show.diagnosis import place as place_gap
 from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_pictures
 from palpate.show.diagnosis.figures import view as view_of_gap
 from palpate.show.diagnosis.parameters import number, plain_key
-from palpate.show.diagnosis.words import AXIS_WORDS, force_words, percent, share_words, spoken
+from palpate.show.diagnosis.words import AXIS_WORDS, chance_words, force_words, percent, share_words, spoken
 from palpate.show.page import Page, new_figure
 
 if TYPE_CHECKING:
@@ -89,9 +89,9 @@ def draw(result: SimulatedGap, ax: Axes) -> None:
         width = max(share, 0.0)
         ax.barh([0], [width], left=left, color=COLOURS[name], label=f"{name} {percent(share)}", height=0.6)
         left += width
-    ax.set(yticks=[], xlim=(0, max(left, 1.0)), xlabel="share of the mean square of the gap")
-    ax.set_title(f"{result.simulator.name}: a gap of {force_words(result.gap_before_n)}", fontsize=11)
-    ax.legend(ncols=4, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.35), fontsize=9)
+    words = f"share of the mean square of the gap of {force_words(result.gap_before_n)}"
+    ax.set(yticks=[], xlim=(0, max(left, 1.0)), xlabel=words)
+    ax.legend(ncols=4, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=9)
     ax.spines[["top", "right", "left"]].set_visible(False)
 
 
@@ -149,6 +149,7 @@ def lines(result: SimulatedGap) -> list[str]:
         f"verdict: {verdict(result)}",
         f"gap: simulated and measured force differ by {force_words(result.gap_before_n)} (the sensor's "
         f"noise: {force_words(result.noise_n)}); {after}",
+        "  its parts, and their shares of its mean square:",
     ]
     for name in PARTS:
         part = result.parts[name]
@@ -238,8 +239,8 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     assert result.reality.model is not None and result.reality.recording is not None
     page = Page(f"{result.simulator.name} against measured touch: {result.reality.recording.name}")
     page.lead(_lead(result))
-    page.cards(_cards(result))
     page.next_steps(result.advice)
+    page.cards(_cards(result))
     if result.mended is not None:
         page.paragraph(f"Run again with {result.mended.settings}: {mended_words(result)}.")
     for note in result.notes:
@@ -262,13 +263,17 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     _tried(page, result)
     page.heading("What the difference depends on")
     page.table(
-        ["the difference depends on", "share of it", "probability that this is chance"],
-        [[AXIS_WORDS[a.axis], percent(a.share), f"{a.p:.2g}"] for a in result.where.axes],
+        ["the difference depends on", "share of it", "how often chance does this"],
+        [
+            [AXIS_WORDS[a.axis], percent(a.share), chance_words(a.p)]
+            for a in sorted(result.where.axes, key=lambda a: -a.share)
+        ],
     )
     page.figures(curve_pictures(shown))
     page.figures(press_pictures(shown))
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
+    page.result(result.as_json())
     return page.write(path)
 
 

@@ -176,4 +176,4 @@ def test_the_device_of_its_page_gives_a_position_and_takes_a_force(monkeypatch):
         assert eventually(lambda: device.read().calibrated)
         device.enable_force()
         device.send_force(np.array([0.0, 0.0, 1.0]))
-        assert np.isfinite(device.read().position).all()
+        assert np.isfinite(device.read().position_m).all()

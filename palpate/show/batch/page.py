@@ -46,7 +46,9 @@ def report(result: Batch, path: Path | str) -> Path:
     page.part(_recordings(result))
     if "compare" in result.steps:
         page.paragraph("Errors of FEM and of the best 1D model: rms force at touches that no fit has seen.")
+    page.part('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
     _cost(page, result)
+    page.result(result.as_json())
     page.part(f"<script>\n{_file('batch.js')}</script>")
     return page.write(path)
 

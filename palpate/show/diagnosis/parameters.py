@@ -22,6 +22,7 @@ WORDS = {
     "m_rel": "width of the softening (m, of the greatest load)",
     "matrix": "reading per true force, 3 x 3",
     "tip_radius_m": "radius of the tip",
+    "young_modulus_pa": "Young's modulus",
     "poisson_ratio": "Poisson's ratio",
     "centre_m": "middle at",
     "radius_m": "radius",

@@ -108,11 +108,14 @@ def test_a_1d_model_that_wins_is_in_the_first_line_with_floor_and_ceiling_below(
     won = compared[0][0]
     half = {**won.rmse_n, "hunt-crossley": 0.5 * won.rmse_n["fem"]}
     lost = dataclasses.replace(won, rmse_n=half)
-    assert lines(lost)[0].startswith("hunt-crossley predicts held-out presses better: ")
-    assert "better" not in lines(won)[0]
+    assert (
+        lines(lost)[0] == "A 1D model (Hunt–Crossley) predicts the next touch 2.0 times better than the FEM."
+    )
+    assert not lines(won)[0].startswith("A 1D model")
     for result in (won, lost):
-        assert f"floor: the sensor noise {result.noise_n:.3f} N" in lines(result)[-1]
-        assert f"ceiling: a constant push {result.constant_n:.3f} N" in lines(result)[-1]
+        noise, constant = 1e3 * result.noise_n, 1e3 * result.constant_n
+        assert f"the sensor's noise {noise:.0f} mN, a constant push" in lines(result)[-2]
+        assert lines(result)[-2].endswith(f" {constant:.0f} mN")
     assert result.noise_n < won.rmse_n["fem"] < won.constant_n
 
 

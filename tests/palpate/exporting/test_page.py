@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 import palpate as pp
 from devices.codecs import spacemouse
 from mechanics.effects.registry import effect
+from mechanics.model import Model
 from mechanics.model_files import read_model, write_model
 from palpate.exporting.page.band import force_band
 from palpate.exporting.page.button import button
@@ -24,7 +26,6 @@ from render.press import Stroke, press, read_curve
 from render.scene import in_the_air
 
 from ..show import browser
-from ..window.small import block_model
 
 needs_browser = pytest.mark.skipif(
     browser.browser_found() is None, reason="needs a browser: chromium or google-chrome on the PATH"
@@ -35,12 +36,13 @@ SHARE, AT_LEAST_N = 0.02, 0.005
 
 
 @pytest.fixture(scope="module")
-def renderer(tmp_path_factory: pytest.TempPathFactory) -> FemRenderer:
+def renderer(tmp_path_factory: pytest.TempPathFactory, block: Model) -> FemRenderer:
     """A block that was pressed at 16 places, on which a tip slides early."""
-    folder = tmp_path_factory.mktemp("page")
-    plain = block_model(folder)
-    slippery = plain.replaced(path=None, effects={**plain.effects, "friction_slip": {"mu": MU}})
-    return FemRenderer(read_model(write_model(folder / "MODEL", slippery)))
+    slippery = block.replaced(path=None, effects={**block.effects, "friction_slip": {"mu": MU}})
+    model = read_model(write_model(tmp_path_factory.mktemp("page") / "MODEL", slippery))
+    for condensed in block.path.glob("compliance-*.bin"):  # friction changes none of it
+        shutil.copy(condensed, model.path)
+    return FemRenderer(model)
 
 
 @pytest.fixture(scope="module")
