@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.recording import Recording
-from palpate.show.page import Page, file_words, save_figures, subplots
+from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
@@ -83,8 +83,8 @@ def report(result: Checkup, path: Path | str) -> Path:
     whole, ax = subplots(1, 1, figsize=(10, 3))
     draw(result, ax)
     figures["whole"] = whole
-    save_figures(path.with_suffix(""), figures)
     page = Page(f"Check-up of {result.recording.name}")
+    page.save(path.with_suffix(""), figures)
     page.lead(lines(result)[0] + ".")
     page.paragraph(_meaning(result))
     page.next_step(_what_next(result))
