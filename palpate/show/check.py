@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.recording import Recording
-from palpate.show.page import Page, file_words, save_figures, subplots
+from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
@@ -80,7 +80,7 @@ def report(result: Checkup, path: Path | str) -> Path:
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
     page = Page(f"Check-up of {result.recording.name}")
-    save_figures(path.with_suffix(""), tell(result, page))
+    page.save(path.with_suffix(""), tell(result, page))
     page.result(as_json(result))
     return page.write(path)
 

@@ -44,6 +44,7 @@ class Page:
         self._live = False
         self._terms = Terms()
         self._result = ""
+        self._drawn: list[tuple[Any, bytes]] = []
 
     def heading(self, text: str) -> None:
         """A section's heading."""
@@ -130,6 +131,16 @@ class Page:
             + f"</footer>{self._scripts()}</body></html>"
         )
 
+    def save(self, folder: Path | str, figures: Mapping[str, Any]) -> dict[str, Path]:
+        """Write each picture as `folder/NAME.png`, drawn once for the page as well; returns the paths."""
+        paths = {}
+        for name, picture in figures.items():
+            data = self._png(picture)
+            paths[name] = Path(folder) / f"{name}.png"
+            with atomic_file(paths[name], PNG) as temporary:
+                temporary.write_bytes(data)
+        return paths
+
     def write(self, path: Path | str) -> Path:
         """Write the page whole; returns its path."""
         with atomic_file(path, PAGE) as temporary:
@@ -147,8 +158,16 @@ class Page:
     def _words(self, text: str) -> str:
         return self._terms.linked(_words(text))
 
+    def _png(self, picture: Any) -> bytes:
+        """A picture's PNG, drawn once."""
+        found = next((data for each, data in self._drawn if each is picture), None)
+        if found is None:
+            found = png_bytes(picture)
+            self._drawn.append((picture, found))
+        return found
+
     def _figure(self, picture: Any, caption: str) -> str:
-        data, said = png_bytes(picture), html.escape(caption)
+        data, said = self._png(picture), html.escape(caption)
         drawn = (
             f'<img alt="{said}" style="--legible:{_LEGIBLE * _width(data):.0f}px" '
             f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
@@ -237,16 +256,6 @@ def png_bytes(picture: Any) -> bytes:
 
         imsave(buffer, picture, format="png")
     return buffer.getvalue()
-
-
-def save_figures(folder: Path | str, figures: dict[str, Any]) -> dict[str, Path]:
-    """Write each picture as `folder/NAME.png`; returns the paths by name."""
-    paths = {}
-    for name, picture in figures.items():
-        paths[name] = Path(folder) / f"{name}.png"
-        with atomic_file(paths[name], PNG) as temporary:
-            temporary.write_bytes(png_bytes(picture))
-    return paths
 
 
 def _is_words(value: Any) -> bool:

@@ -67,13 +67,14 @@ class _Words:
 class Board:
     """In a renderer; `place` says where, `show` what; press, hover, drag and release take the mouse's pixels.
 
-    fill: behind everything, '' for nothing.
+    fill: behind everything, '' for nothing. changed: whether it looks otherwise than it was drawn last.
     """
 
     def __init__(self, renderer: vtk.vtkRenderer, *, fill: str = "") -> None:
         self._renderer = renderer
         self.fill = fill
         self.scale = 1.0
+        self.changed = True
         self._rectangle: Rectangle = (0.0, 0.0, 1.0, 1.0)
         self._rows: list[Row] = []
         self._shown: object = None
@@ -86,6 +87,10 @@ class Board:
         # of a tip: drawn after all others
         self._last = [over, _text_actor()]
         renderer.AddViewProp(under)
+        renderer.AddObserver("EndEvent", lambda *_: self._drawn())
+
+    def _drawn(self) -> None:
+        self.changed = self.changed and not self._renderer.GetDraw()
 
     def place(self, left: float, bottom: float, right: float, top: float, scale: float) -> None:
         """Cover this rectangle; scale: of type and gaps."""
@@ -107,6 +112,7 @@ class Board:
         self._draw()
 
     def _draw(self) -> None:
+        self.changed = True
         scale, gap = self.scale, GAP * self.scale
         left, bottom, right, top = self._rectangle
         boxes: list[tuple[Rectangle, str]] = [(self._rectangle, self.fill)] if self.fill else []

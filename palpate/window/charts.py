@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista
-import vtk
 
 from palpate.window.board import ACCENT, GREY, SECOND, set_type
 from palpate.window.trace import Trace
@@ -26,12 +25,7 @@ class LiveCharts:
             for colour, style in ((ACCENT, "-"), (SECOND, "--"))
         ]
         self._deep = self._depth.line(*nothing, color=DEPTH_COLOUR, width=2.0)
-        legend = self._force.GetLegend()
-        # the newest values are on the right
-        legend.SetHorizontalAlignment(vtk.vtkChartLegend.LEFT)
-        set_type(legend.GetLabelProperties(), 11, False, GREY)
-        legend.GetPen().SetColorF(1.0, 1.0, 1.0)
-        self.name(())
+        self.tell(1)
 
     @staticmethod
     def _chart(
@@ -46,11 +40,11 @@ class LiveCharts:
         plotter.add_chart(chart)
         return chart
 
-    def name(self, names: tuple[str, ...]) -> None:
-        """Whose forces are drawn, the one that is felt first."""
-        for line, name in zip(self._lines, (*names, "", "")[:2], strict=True):
-            line.label, line.visible = name or "-", bool(name)
-        self._force.legend_visible = len(names) > 1
+    def tell(self, count: int) -> None:
+        """How many forces are drawn, in the colours in which the panel says them."""
+        self._told = count
+        for line in self._lines[count:]:
+            line.visible = False
 
     def update(self, trace: Trace) -> None:
         """Redraw from the trace; the range grows with the greatest value shown."""
@@ -58,7 +52,7 @@ class LiveCharts:
         if len(curves) < 2:
             return
         time_s = curves[:, 0]
-        for line, column in zip(self._lines, (1, 3), strict=False):
+        for line, column in zip(self._lines[: self._told], (1, 3), strict=False):
             line.update(time_s, curves[:, column])
         self._deep.update(time_s, 1000.0 * curves[:, 2])
         self._force.y_range = [0.0, max(LEAST_N, 1.15 * curves[:, (1, 3)].max())]

@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 import pyvista
+import scipy.sparse as sp
 
 from mechanics.frames import tangents
 from mechanics.model import Model
@@ -25,6 +26,7 @@ LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 STIFFNESS = f"secant stiffness at {1000 * DEPTH_M:.0f} mm (N/m)"
+SPREAD = 2
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
 Colours = Literal["viridis", "YlOrRd"]
@@ -53,7 +55,8 @@ class ObjectPicture:
         self._surface["displacement (mm)"] = np.zeros(len(points))
         self._bent = False
         self._flat = vertex_normals(self._rest, np.asarray(triangles))
-        self._smooth = renderer.contact.arrays.normals
+        felt = renderer.contact.arrays
+        self._smooth = _spread(felt.normals, felt.triangles[felt.free > 0])
         self._shade()
         self._actor: pyvista.Actor | None = None
         self._bar = ""
@@ -61,6 +64,7 @@ class ObjectPicture:
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
+            smooth_shading=True,
             color=TIP_COLOUR,
             ambient=0.35,
             specular=0.4,
@@ -69,7 +73,9 @@ class ObjectPicture:
             pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
         )
         self._ball = plotter.add_mesh(
-            pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20), color=INCLUSION_COLOUR
+            pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20),
+            smooth_shading=True,
+            color=INCLUSION_COLOUR,
         )
         self._ball.SetVisibility(False)
         self._inside: Region | None = None
@@ -172,6 +178,18 @@ class ObjectPicture:
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
             self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
+
+
+def _spread(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(v, 3) normals, each twice over the mean of its own and its neighbours' by these triangles: a narrow
+    rim turns over several of them, not in one, and shows none."""
+    v = len(normals)
+    i, j = triangles[:, [0, 1, 2, 1, 2, 0]].ravel(), triangles[:, [1, 2, 0, 0, 1, 2]].ravel()
+    near = sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(v, v)) + sp.eye(v)
+    for _ in range(SPREAD):
+        normals = near @ normals
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals
 
 
 def _placed(point: np.ndarray, normal: np.ndarray) -> object:

@@ -114,7 +114,7 @@ class WaitingWindow:
             x0, x1 = (left + inset) / width, (left + wide - inset) / width
             view.viewport = (x0, low / height, x1, (top - inset) / height)
             view.reset_camera()
-            view.camera.zoom(1.4)
+            view.camera.zoom(1.2)
         self._hover()
 
     def _hover(self) -> None:

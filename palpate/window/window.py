@@ -165,7 +165,7 @@ class TouchWindow:
         if self.coloured:
             self._map.forget()
         self._names = names
-        self._charts.name(names)
+        self._charts.tell(len(names))
 
     def _lay_out(self) -> None:
         """Everything in its place, where the window, or what is open in it, has changed."""
@@ -187,7 +187,8 @@ class TouchWindow:
             (self._aside, (right, 0.0, 1.0, 1.0) if self.aside else (0.0, 0.0, 0.01, 0.01)),
         ):
             renderer.viewport = viewport
-        self._aside.SetDraw(bool(self.aside))
+        for board in self.boards:
+            board.changed = True
         column, aside = self.boards
         column.place(0, 0, left * width, height, scale)
         aside.place(right * width, 0, width if self.aside else right * width - 1, height, scale)
@@ -268,9 +269,10 @@ class TouchWindow:
         if words:
             self._write(frame)
         self._second.SetDraw(beside and self.sides == 2)
-        for renderer in (self._plots, self._column):
-            renderer.SetDraw(words)
-        self._aside.SetDraw(words and bool(self.aside))
+        self._plots.SetDraw(words)
+        column, aside = self.boards
+        self._column.SetDraw(column.changed)  # else it stands there as it is
+        self._aside.SetDraw(aside.changed and bool(self.aside))
         self.frames += 1
 
     def _write(self, frame: Frame) -> None:

@@ -14,7 +14,7 @@ from palpate.show import model as made
 from palpate.show.demo.figures import figures, view
 from palpate.show.diagnosis.gaps import known
 from palpate.show.diagnosis.words import force_words, spoken, verdict
-from palpate.show.page import Page, file_words, save_figures
+from palpate.show.page import Page, file_words
 from palpate.show.reconstruction.exploration import force_over_time
 
 if TYPE_CHECKING:
@@ -89,7 +89,7 @@ def report(result: DemoResult, path: Path | str) -> Path:
     )
     page.next_steps(next_steps(result))
     drawn = figures(result)
-    saved = save_figures(folder, drawn)
+    saved = page.save(folder, drawn)
     page.view(
         view(result),
         saved["object"],

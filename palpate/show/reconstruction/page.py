@@ -12,7 +12,7 @@ from mechanics.model import Model
 from mechanics.touch import forces_at
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
-from palpate.show.page import Page, file_words, save_figures, subplots
+from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import ERROR, MODULUS, softness
 from palpate.show.reconstruction.differences import differences
 from palpate.show.reconstruction.exploration import exploration_figures
@@ -51,8 +51,8 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
     figures = _figures(result, beside or {})
-    save_figures(path.with_suffix(""), figures)
     page = Page(f"Reconstruction of {result.exploration.recording.name}")
+    page.save(path.with_suffix(""), figures)
     tell(result, page, figures["object"])
     page.heading("Exploration and geometry")
     page.paragraph("From here on: the figures and tables of the paper, remade from this recording.")

@@ -9,6 +9,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import pyvista
 
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
@@ -16,14 +17,17 @@ from mechanics.errors import ModelError
 from mechanics.material import Ball
 from mechanics.model import Model
 from mechanics.recording import read_recording
+from palpate.operations.touch import Touched
+from palpate.window.axes import ROOM
 from palpate.window.board import BODY
+from palpate.window.charts import LEAST_MM, LEAST_N, LiveCharts
 from palpate.window.game import Game
 from palpate.window.panel import DEPTH
 from palpate.window.picture import STIFFNESS
 from palpate.window.session import SessionOptions, TouchSession
 from palpate.window.window import COLUMN, TouchWindow
 from scenes.phantoms import Region
-from scenes.scene import Scene
+from scenes.scene import Scene, load_scene
 
 from ...support.waiting import eventually
 from .driven import Driven
@@ -327,6 +331,57 @@ def test_the_force_is_large_and_the_next_step_is_said(driven: Driven) -> None:
     column = driven.window.boards[0]
     driven.says(f"{sizes(press(driven))[0]:.2f} N")
     assert max(item.size for item, _ in column.placed if item.text.endswith(" N")) > 3 * BODY
+    release(driven)
+
+
+def test_an_empty_plot_shows_newtons_and_millimetres() -> None:
+    plotter = pyvista.Plotter(off_screen=True)
+    charts = LiveCharts(plotter, 6.0)
+    ranges = [list(chart.y_range) for chart in (charts._force, charts._depth)]
+    plotter.close()
+    assert ranges == [[0.0, LEAST_N], [0.0, LEAST_MM]] and LEAST_N > 0.1
+
+
+def test_no_letter_of_the_axes_lies_on_another(driven: Driven) -> None:
+    axes, orbit = driven.window._axes, driven.window.orbit
+    seen = set()
+    for _ in range(12):
+        orbit.turn(0.17, 0.03)
+        axes.update(1.0)
+        shown = [letter for letter in axes.letters if letter.GetVisibility()]
+        places = np.array([letter.GetPosition() for letter in shown])
+        gaps = np.linalg.norm(places[:, None] - places[None], axis=2) + 100.0 * np.eye(len(places))
+        assert gaps.min() > ROOM
+        seen.add(len(shown))
+    assert seen == {2, 3}, "and all are shown where there is room"
+    orbit.reset()
+
+
+def test_a_rim_shows_no_triangles(driven: Driven) -> None:
+    """Over a drawn triangle the light turns by little, also on the block's rims."""
+    felt, picture = driven.session.drawing("fem").contact.arrays, driven.window.pictures[0]
+    corners = picture._smooth[felt.triangles[felt.free > 0]]
+    turn = np.einsum("kcx,kcx->kc", corners, np.roll(corners, 1, axis=1)).min()
+    assert np.degrees(np.arccos(turn)) < 35.0
+
+
+def test_the_window_is_called_by_its_object(driven: Driven, tmp_path: Path) -> None:
+    assert driven.window.plotter.title.startswith("Block")
+    folder = tmp_path / "model"
+    folder.mkdir()
+    (folder / "model.toml").write_text('[provenance]\nrecording = "liver"\n')
+    assert load_scene(folder).title == "liver (model)"
+
+
+def test_a_mouse_is_not_told_of_forces_sent_to_it(driven: Driven) -> None:
+    press(driven)
+    report = driven.session.report()
+    lines = {
+        device: "\n".join(Touched(driven.window.scene, device, "fem", report, None, "").lines())
+        for device in ("mouse", "simulated")
+    }
+    assert "N rendered" in lines["mouse"] and "sent" not in lines["mouse"]
+    assert "N sent" in lines["simulated"]
     release(driven)
 
 
