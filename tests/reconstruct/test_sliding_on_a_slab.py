@@ -45,7 +45,9 @@ def test_a_continuous_log_of_sliding_gives_the_modulus(friction, leaves):
     made = reconstruct_fully(sliding(friction, leaves=leaves), ReconstructOptions(geometry=geometry))
     assert len(made.model.presses) >= 0.9 * PRESSES
     assert set(made.model.presses.kinds) == {"press" if leaves else "cycle"}
-    assert made.young_modulus_pa == pytest.approx(MODULUS_PA, rel=0.15)
+    assert made.young_modulus_pa == pytest.approx(MODULUS_PA, rel=0.05)
+    low, high = made.model.material.young_modulus_ci95_pa
+    assert low < MODULUS_PA < high
     assert not made.doubt and not any(f.grave for f in made.findings)
 
 
