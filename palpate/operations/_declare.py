@@ -289,6 +289,8 @@ def check_options(name: str, given: Mapping[str, Any]) -> None:
     known(name, given, this.fields)
     for each, value in given.items():
         check(each, value, this.fields[each])
+    for kind in this.kinds:
+        Call(given).of(kind)  # which refuses names that it does not know
 
 
 _KINDS: dict[str, tuple[Callable[[Any], bool], str]] = {

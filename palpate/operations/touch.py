@@ -32,6 +32,7 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
 from palpate.output import Output, progress_bar
 from palpate.servo import SafetyOptions, ServoOptions, ServoReport
+from palpate.warm_up import warming_up
 from palpate.window.session import SessionOptions, TouchSession
 from render.options import RenderOptions
 from render.registry import names
@@ -135,9 +136,14 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
     )
     for word in servo_options.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
-    opening = _Opening(asked, call, name, servo_options)
-    if not asked.headless:
-        return _in_window(opening)
+    with warming_up() as compiling:  # while a person chooses, too
+        opening = _Opening(asked, call, name, servo_options, compiling)
+        return _in_window(opening) if not asked.headless else _without(opening)
+
+
+def _without(opening: _Opening) -> Touched:
+    """Touch without a window."""
+    asked = opening.asked
     scene = opening.scene(asked.scene or DEFAULT)
     with ExitStack() as stack:
         with progress_bar("touch") as bar:
@@ -149,12 +155,13 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
 
 @dataclass(frozen=True)
 class _Opening:
-    """What was asked for, of whichever scene."""
+    """What was asked for, of whichever scene. compiling: waits for the loop's kernels."""
 
     asked: TouchOperands
     call: Call
     device: str
     servo: ServoOptions
+    compiling: Callable[[], object]
 
     def scene(self, name: str) -> Scene:
         return given_scene(name, self.call)
@@ -164,7 +171,7 @@ class _Opening:
     ) -> tuple[TouchSession, float | None]:
         """A started session, which the stack closes, and when its device will have done (s)."""
         asked, call = self.asked, self.call
-        model = model_of(scene, lambda stage, share: tell(stage, 0.5 * share))
+        model = model_of(scene, lambda stage, share: tell(stage, 0.4 * share))
         if channel is not None:
             channel.write(time.perf_counter(), tuple(_above(model)))
         device, until = device_choice(asked, call, self.device, model, channel)
@@ -177,6 +184,9 @@ class _Opening:
             pictures=not asked.headless,
         )
         mapping = _mapping(call, self.device, scene, model)
+        if options.renderer == "fem":
+            tell("compiling, once after an installation", 0.4)
+            self.compiling()
         session = TouchSession(model, title=scene.title, device=device, mapping=mapping, options=options)
         stack.enter_context(session).start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
         return session, until

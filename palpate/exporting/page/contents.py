@@ -59,7 +59,7 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Block,
     return block, {
         **about(renderer, depths),
         "one_d": None if beside is None else ONE_D,
-        "presses": presses,
+        "presses": {**presses, "word": press_word(model)},
         "arrays": block.index,
     }
 
@@ -76,6 +76,11 @@ def one_d_renderer(model: Model) -> Renderer | None:
         return create(ONE_D, model)
     except ModelError:
         return None
+
+
+def press_word(model: Model) -> str:
+    """What the model's presses are: measured, or virtual where nobody touched the object of a scene."""
+    return "virtual" if model.provenance.get("method") == "scene" else "measured"
 
 
 def about(renderer: FemRenderer, depths_m: np.ndarray) -> dict[str, Any]:

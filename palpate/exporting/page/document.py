@@ -17,7 +17,7 @@ from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from palpate.exporting.page.contents import contents, one_d_renderer
+from palpate.exporting.page.contents import contents, one_d_renderer, press_word
 from palpate.exporting.subject import Subject
 from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 from render.fem import FemRenderer
@@ -28,6 +28,10 @@ SCRIPTS = ("data.js", "surface.js", "press.js", "shape.js", "draw.js", "chart.js
 CORE = SCRIPTS[:3]
 """What the numbers come from; it needs no page around it."""
 _ROWS = 12
+_VIRTUAL = (
+    " This object is a known shape of a known modulus that nobody touched: its presses are virtual, computed "
+    "by the same law."
+)
 
 
 def write(
@@ -56,6 +60,7 @@ def page_of(renderer: FemRenderer, opens: list[float] | None = None, progress: P
         "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
         "table_title": title,
         "table": table,
+        "word": press_word(model),
         "words": _words(renderer),
         "left_out": html.escape("; ".join(left_out(model))),
         "about": json.dumps(about, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
@@ -104,6 +109,7 @@ def _words(renderer: FemRenderer) -> str:
         f"interpolates; the tip sticks, and {slides}. The band holds the 95 % interval of the modulus and "
         "the error of the law. The shape that is drawn moves by the strongest modes of the compliance; "
         "the dent right under the tip is drawn so that it clears the ball."
+        + (_VIRTUAL if press_word(renderer.model) == "virtual" else "")
     )
 
 
@@ -118,38 +124,34 @@ def _picture(model: Model) -> str:
 
 
 def _table(renderer: FemRenderer) -> tuple[str, str]:
-    """Title and rows: presses at places that were measured, as measured, by finite elements and in 1D."""
+    """Title and rows: some of the model's own presses, as they were, by finite elements and in 1D."""
     model = renderer.model
     presses, beside = model.presses, one_d_renderer(model)
     chosen = np.unique(np.linspace(0, len(presses) - 1, min(len(presses), _ROWS)).round().astype(int))
-    head = [
+    word = press_word(model)
+    head = (
         "press",
-        "at x, y, z [mm]",
+        "",
         "depth [mm]",
-        "measured [N]",
+        f"{word} [N]",
         "finite elements [N]",
         "1D model [N]",
-        "",
-    ]
+        "at x, y, z [mm]",
+    )
     rows = []
     for i in chosen:
         at, normal, depth = presses.point[i], presses.normal[i], float(presses.depth_m[i])
         forces = [_pressed(each, at, normal, depth) for each in (renderer, beside)]
-        cells = [str(i + 1), ", ".join(f"{v:.0f}" for v in (1e3 * at).round() + 0.0), f"{1e3 * depth:.1f}"]
-        cells += [_number(v) for v in (_peak(model, int(i)), *forces)]
         place = ",".join(f"{v:.6f}" for v in at)
-        rows.append((cells, f'<td><button data-at="{place}">press it</button></td>'))
+        cells = [str(i + 1), f'<button data-at="{place}">press it</button>', f"{1e3 * depth:.1f}"]
+        cells += [_number(v) for v in (_peak(model, int(i)), *forces)]
+        rows.append([*cells, ", ".join(f"{v:.0f}" for v in (1e3 * at).round() + 0.0)])
     if not rows:
         return "Measured presses: none", "<p>This model was not made from presses.</p>"
-    top = "".join(f'<th scope="col">{html.escape(text)}</th>' for text in head)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + b + "</tr>" for cells, b in rows
-    )
-    title = (
-        f"{len(rows)} of {len(presses)} measured presses"
-        if len(rows) < len(presses)
-        else "The measured presses"
-    )
+    top = "".join(f'<th scope="col">{text}</th>' for text in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
+    fewer = len(rows) < len(presses)
+    title = f"{len(rows)} of {len(presses)} {word} presses" if fewer else f"The {word} presses"
     return title, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 

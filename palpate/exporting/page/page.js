@@ -17,7 +17,7 @@ class PressPage {
     this.shape = new Shape(this.surface, read, about);
     this.touch = new Touch(this.surface, this.tables, about.tip_radius_m, about.friction);
     this.mouse = new SpaceMouse(about.spacemouse);
-    Object.assign(this, { place: null, goal: 0, depth: 0, held: false, pointers: new Map(), trail: [], peak: null, dirty: true, spent: [], asked: [] });
+    Object.assign(this, { place: null, goal: 0, depth: 0, held: false, greeting: null, pointers: new Map(), trail: [], peak: null, dirty: true, spent: [], asked: [] });
     this.wanted = Math.min(0.6 * this.tables.most, about.tip_radius_m);
     this.camera = new Camera(this.surface.vertices, about.support_normal, about.support_point, about.view);
     this.chart = new Chart($("chart"), this.colours());
@@ -26,6 +26,7 @@ class PressPage {
     window.addEventListener("hashchange", () => this.followLink());
     this.followLink();
     if (!this.curve) this.lookAt(this.topPlace());
+    this.greet();
     requestAnimationFrame((now) => this.frame(now));
   }
 
@@ -43,7 +44,7 @@ class PressPage {
     } catch (problem) {
       this.drawing = null;
       document.documentElement.dataset.state = "flat";
-      this.say(`${problem.message}, so the object cannot be turned here: press a measured place in the table below instead.`);
+      this.say(`${problem.message}, so the object cannot be turned here: press a place in the table below instead.`);
     }
     const scheme = window.matchMedia("(prefers-color-scheme: dark)");
     scheme.addEventListener("change", () => {
@@ -76,8 +77,32 @@ class PressPage {
     Object.assign(this, { goal: 0, held: false });
   }
 
+  // Where nobody asked for a press, the tip shows by itself, once, what it does; the first thing that a person does
+  // ends that.
+  greet() {
+    if (!this.drawing || this.place || window.matchMedia("(prefers-reduced-motion: reduce)").matches) return;
+    this.begin(this.topPlace(), false);
+    this.greeting = "down";
+  }
+
+  // The greeting's course: down, a moment at rest, up, and away as if nothing had been.
+  goOnGreeting() {
+    if (this.greeting === "down" && this.depth === this.goal) [this.greeting, this.rested] = ["rest", performance.now()];
+    else if (this.greeting === "rest" && performance.now() - this.rested > 500) [this.greeting, this.goal] = ["up", 0];
+    else if (this.greeting === "up" && !this.touch.touching) this.endGreeting();
+  }
+
+  endGreeting() {
+    if (!this.greeting) return;
+    Object.assign(this, { greeting: null, place: null, depth: 0, goal: 0, trail: [], peak: null, dirty: true });
+    this.touch.release();
+    for (const [name, words] of [["force", "– N"], ["band", ""]]) $(name).textContent = words;
+    this.parts(["not pressed yet"]);
+  }
+
   // A straight press at once, as a link, the table or a script asks for it.
   pressAt(at, depth) {
+    this.endGreeting();
     const { touch } = this.presser.press(at, depth);
     this.touch = touch;
     this.place = touch.touching ? touch.place : null;
@@ -91,6 +116,7 @@ class PressPage {
   advance(seconds) {
     const [right, away, high] = this.mouse.deflection;
     if (right || away || high) this.byMouse(right, away, high, seconds);
+    if (this.greeting) this.goOnGreeting();
     if (!this.place || (this.depth === this.goal && !this.moved)) return;
     this.moved = false;
     this.straight = null;
@@ -118,6 +144,7 @@ class PressPage {
   }
 
   byMouse(right, away, high, seconds) {
+    this.endGreeting();
     this.tipStays = true;
     if (!this.place) this.begin(this.topPlace(), true);
     const far = MOUSE_M_PER_S * seconds, level = unit(across(times(this.camera.back, -1), about.support_normal));
@@ -219,22 +246,31 @@ class PressPage {
       measured = { depth: this.presses.depth.subarray(a, b), force: this.presses.force.subarray(a, b) };
     }
     this.chart.draw(this.curve, measured, shown && [touch.depth, touch.normalForce], tables.most);
-    $("measured-name").textContent = this.beside ? `measured, press ${this.beside.index + 1}, ${mm(this.beside.far)} mm away` : "measured press nearest by";
+    $("measured-name").textContent = this.beside ? `${about.presses.word}, press ${this.beside.index + 1}, ${mm(this.beside.far)} mm away` : `${about.presses.word} press nearest by`;
     if (shown) {
       const sideways = size(across(touch.force, touch.normal));
       $("force").textContent = `${newtons(size(touch.force))} N`;
       $("band").textContent = `± ${newtons(Math.max(bandOf(tables, touch), 0.005))} N`;
-      const parts = [`${mm(touch.depth)} mm deep`, `${newtons(touch.normalForce)} N in`, `${newtons(sideways)} N sideways${touch.slipping ? ", sliding" : ""}`];
-      if (tables.oneD) parts.push(`1D model ${newtons(tables.oneDForce(touch.corners, touch.place.weights, touch.depth))} N`);
-      $("parts").textContent = parts.join(" · ");
+      const parts = [`${mm(touch.depth)} mm deep`, `${newtons(touch.normalForce)} N inwards`, `${newtons(sideways)} N sideways${touch.slipping ? ", sliding" : ""}`];
+      if (tables.oneD) parts.push(`1D model: ${newtons(tables.oneDForce(touch.corners, touch.place.weights, touch.depth))} N`);
+      this.parts(parts);
     } else if (this.peak) {
       $("force").textContent = `${newtons(this.peak.pull)} N`;
       $("band").textContent = `± ${newtons(Math.max(this.peak.band, 0.005))} N`;
-      $("parts").textContent = `greatest of the last press, ${mm(this.peak.depth)} mm deep`;
+      this.parts(["greatest of the last press,", `${mm(this.peak.depth)} mm deep`]);
     }
     for (const name of ["copy", "save"]) $(name).disabled = !this.trail.length;
     $("let-go").disabled = !shown;
     this.tell(shown);
+  }
+
+  // A line or part of one for each.
+  parts(words) {
+    $("parts").replaceChildren(...words.flatMap((text, i) => {
+      const part = document.createElement("span");
+      part.textContent = text;
+      return i ? [" ", part] : [part];
+    }));
   }
 
   // For screen readers: once a press has come to rest.
@@ -292,6 +328,7 @@ class PressPage {
 
   down(event) {
     if (!this.drawing) return;
+    this.endGreeting();
     const stage = $("stage");
     stage.focus({ preventScroll: true });
     stage.setPointerCapture(event.pointerId);
@@ -386,6 +423,7 @@ class PressPage {
   key(event) {
     const steps = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key];
     if (event.altKey || event.ctrlKey || event.metaKey) return;
+    this.endGreeting();
     if (steps && event.shiftKey) this.camera.turn(-0.12 * steps[0], 0.12 * steps[1]);
     else if (steps) this.stepTip(steps);
     else if (event.key === " " || event.key === "Enter") this.toggle();
@@ -531,6 +569,7 @@ class PressPage {
   const page = new PressPage(bytes);
   window.palpate = {
     page,
+    ready_ms: performance.now(), // since the page began to load
     press(at, depth_m, direction = null) {
       const { force_n, error_n } = page.presser.press(at, depth_m, direction);
       return { force_n: [...force_n], error_n };
