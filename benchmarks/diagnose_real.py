@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 import palpate as pp
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
 from diagnose.specimen.result import FLOORS, Material
@@ -55,10 +56,20 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         medians[name] = {key: float(np.median([row[key] for row in own])) for key in _SHARES}
         shares = ", ".join(f"{key} {100 * value:.2g} %" for key, value in medians[name].items())
         print(f"{name}, medians of {len(own)}: {shares}")
-    figures: dict[str, Any] = {"rows": rows, "medians": medians}
+    figures: dict[str, Any] = {"rows": rows, "medians": medians, "figures": _over_floor(rows, names)}
     if "beef" in names:
         # what no diagnosis of other pieces can tell: a hold from its own ramp
         figures["unseen_holds"] = holds_table(root / BEEF, arguments.session, arguments.pieces)
+    return figures
+
+
+def _over_floor(rows: list[dict[str, Any]], names: list[str]) -> list[Figure]:
+    """Of each set the held-out error over that of the best 1D model, median, least and greatest."""
+    figures = []
+    for name in names:
+        ratios = [row["error"] / row["floor"] for row in rows if row["set"] == name]
+        what = f"{name}: held-out error over the best 1D model's, median of {len(ratios)}"
+        figures.append(Figure(what, float(np.median(ratios)), (min(ratios), max(ratios))).at_most(1.0))
     return figures
 
 

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import argparse
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -69,7 +69,16 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     return report(found, [SHAPES[name]() for name in arguments.shapes], arguments.places)
 
 
-def meshed(shape: KnownShape, size_m: float) -> TetMesh:
+class Given(Protocol):
+    """A closed surface: vertices (n, 3) m, triangles (m, 3) outward."""
+
+    @property
+    def vertices(self) -> np.ndarray: ...
+    @property
+    def triangles(self) -> np.ndarray: ...
+
+
+def meshed(shape: Given, size_m: float) -> TetMesh:
     """A mesh of the shape's file."""
     stood = Standing(shape.vertices, shape.triangles, np.zeros(3), _UP)
     surface = Surface(

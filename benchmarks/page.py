@@ -31,7 +31,6 @@ from palpate.exporting.page.tables import greatest_depth
 from palpate.operations.load import load
 from palpate.output import progress_bar
 from render.fem import FemRenderer
-from render.options import RenderOptions
 from render.press import Stroke, press
 from render.scene import in_the_air
 from tests.palpate.show.browser import Tab, a_tab, browser_found
@@ -115,18 +114,21 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 def _measured(name: str, arguments: argparse.Namespace, tab: Tab, folder: Path) -> dict[str, Any]:
     own = FemRenderer(load(name))
-    slippery = FemRenderer(own.model, RenderOptions(friction=arguments.friction))
     rng = np.random.default_rng(arguments.seed)
     misses: dict[str, list[float]] = {"straight": [], "aslant": [], "own": []}
     relative: dict[str, list[float]] = {kind: [] for kind in misses}
     of: dict[str, Any] = {"misses": misses, "relative": relative}
     half = arguments.presses // 2
-    for renderer, count in ((slippery, arguments.presses - half), (own, half)):
-        page = folder / "touch.html"
-        page.write_text(page_of(renderer), encoding="utf-8")
-        of["bytes"] = page.stat().st_size
-        tab.open(page, *VIEWS["desktop, 1280 x 800"])
-        tab.wait("window.palpate !== undefined")
+    page = folder / "touch.html"
+    page.write_text(page_of(own), encoding="utf-8")
+    of["bytes"] = page.stat().st_size
+    tab.open(page, *VIEWS["desktop, 1280 x 800"])
+    tab.wait("window.palpate !== undefined")
+    # its tables stick: of friction the page has one number
+    slippery = own.with_friction(arguments.friction)
+    for renderer, count in ((own, half), (slippery, arguments.presses - half)):
+        if renderer is slippery:
+            tab.evaluate(f"palpate.page.presser.about.friction = {arguments.friction}")
         asked = drawn(renderer, count, rng)
         answers = [np.array(force) for force in _answers(tab, asked)]
         if renderer is own:

@@ -11,6 +11,7 @@ README and all pages and fails where a number differs or its file or figure is m
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import subprocess
@@ -87,6 +88,8 @@ def filled(text: str, folder: Path = EVIDENCE) -> str:
 def page(evidence: Evidence) -> str:
     """A table of all figures, missed targets beside met ones."""
     lines = [f"# {evidence.name.replace('_', ' ').replace('-', ' ').capitalize()}", ""]
+    if words := about(evidence.name):
+        lines += [_cell(words), ""]
     met = [figure["met"] for figure in evidence.figures if figure["target"]]
     if met:
         lines += [f"{sum(map(bool, met))} of {len(met)} targets met.", ""]
@@ -110,9 +113,19 @@ def page(evidence: Evidence) -> str:
     return "\n".join(lines)
 
 
+def about(name: str, root: Path = ROOT) -> str:
+    """What a benchmark measures, as the first paragraph of its own docstring says; '' where it is gone."""
+    path = root / "benchmarks" / f"{name.replace('-', '_')}.py"
+    if not path.is_file():
+        return ""
+    said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return " ".join(said.partition("\n\n")[0].split())
+
+
 def _cell(words: str) -> str:
-    """Words as they stand, in a table."""
-    return re.sub(r"([*<|]|-(?=-))", r"\\\1", words)
+    """Words as they stand, in a table; code is code."""
+    parts = re.split(r"(`[^`]*`)", words)
+    return "".join(p if k % 2 else re.sub(r"([*<|]|-(?=-))", r"\\\1", p) for k, p in enumerate(parts))
 
 
 def age(evidence: Evidence, root: Path = ROOT) -> str:

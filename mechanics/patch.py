@@ -16,6 +16,7 @@ from mechanics.nearest import triangle_areas
 from mechanics.tetmesh import TetMesh
 
 REACH = 4.0  # patch widths beyond which the Gaussian (3e-4) is left out
+PATCH_WIDTH_M, PATCH_SHARE = 0.004, 1 / 30
 
 # Dunavant's 7 points of degree 5
 _A1, _A2 = 0.797426985353087, 0.059715871789770
@@ -38,6 +39,12 @@ def triangle_shapes(order: int, barycentric: np.ndarray) -> np.ndarray:
         [l0 * (2 * l0 - 1), l1 * (2 * l1 - 1), l2 * (2 * l2 - 1), 4 * l0 * l1, 4 * l1 * l2, 4 * l2 * l0],
         axis=1,
     )
+
+
+def usual_width(mesh: TetMesh) -> float:
+    """The width, m, of the patch of a touch where the elements are fine enough for it: PATCH_WIDTH_M, on a
+    small object PATCH_SHARE of its diagonal."""
+    return min(PATCH_WIDTH_M, PATCH_SHARE * float(np.linalg.norm(np.ptp(mesh.points, axis=0))))
 
 
 class PatchSampler:

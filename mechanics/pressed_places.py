@@ -15,7 +15,7 @@ from mechanics.patch import PatchSampler
 from mechanics.sites import touch_sites, touch_solver
 from mechanics.store import content_key, load_or_build
 
-VERSION = 4
+VERSION = 5
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
 GRAIN_M = 0.0008

@@ -8,12 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.compression import own_blocks
+from mechanics.edges import edge_correction
 from mechanics.errors import MeshError
 from mechanics.frames import tangents
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
 from mechanics.near_field import contact_width, sharpening
-from mechanics.patch import half_space_compliance
+from mechanics.patch import half_space_compliance, usual_width
 from mechanics.progress import Progress, silent
 from mechanics.quantities import USUAL_TIP_RADIUS_M
 from mechanics.refine import refined_around, refined_near_surface, typical_edge
@@ -22,7 +23,6 @@ from mechanics.support import BaseHold
 from mechanics.tetmesh import TetMesh, vertex_normals
 
 PATCH_WIDTH_IN_EDGES = 0.8
-PATCH_WIDTH_M, PATCH_SHARE = 0.004, 1 / 30
 SURFACE_EDGE_M = 0.006
 
 
@@ -100,11 +100,9 @@ def touch_solver(
 def patch_width(mesh: TetMesh) -> float:
     """The width, m, of the patch of a touch on a quadratic mesh: the same for every mesh of an object.
 
-    PATCH_WIDTH_M, on a small object PATCH_SHARE of its diagonal; but at least the 0.8 edges of the surface
-    that the elements resolve.
+    The usual one, but at least the 0.8 edges of the surface that the elements resolve.
     """
-    diagonal = float(np.linalg.norm(np.ptp(mesh.points, axis=0)))
-    return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), min(PATCH_WIDTH_M, PATCH_SHARE * diagonal))
+    return max(PATCH_WIDTH_IN_EDGES * typical_edge(mesh), usual_width(mesh))
 
 
 def load_width(solver: Solver) -> float:
@@ -166,6 +164,7 @@ def touch_sites(
     far -= half_space_compliance(normals, poisson_ratio, width)
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
+        far += edge_correction(mesh, points, normals)
     if curvature is None:
         curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))

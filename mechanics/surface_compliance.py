@@ -89,7 +89,8 @@ class SurfaceCompliance:
     def far_at(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
         """(k, 3, 3) far-field compliance, 1/m, at surface points (k, 3) with normals (k, 3).
 
-        Interpolated quadratically in the nearest fine triangle; what TouchSites.far holds for a site there.
+        Interpolated quadratically in the nearest fine triangle; what TouchSites.far holds for a site there,
+        but for rims and base (mechanics.edges).
         """
         points, normals = np.atleast_2d(points), np.atleast_2d(normals)
         _, triangle, weights = closest(self.own_points, self.own_triangles, points)

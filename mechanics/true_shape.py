@@ -80,6 +80,22 @@ class TrueShape:
         weights[np.arange(len(row)), (edge[row] + 1) % 3] += share
         return self.on(triangle[row], weights)[0]
 
+    def creases_cut(self, longest_m: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Creases in straight pieces of at most `longest_m`: middles (k, 3) m, lengths (k,) m, and by what
+        angle (k,) rad the surface turns there, positive where it is convex."""
+        facets = self._facets
+        triangle, edge = np.nonzero(facets.crease & (np.arange(len(self.triangles))[:, None] < facets.across))
+        start, end = (self.vertices[self.triangles[triangle, (edge + k) % 3]] for k in (0, 1))
+        own, other = facets.unit[triangle], facets.unit[facets.across[triangle, edge]]
+        convex = np.einsum("kx,kx->k", np.cross(own, other), end - start)
+        length = np.linalg.norm(end - start, axis=1)
+        count = np.maximum(np.ceil(length / longest_m).astype(int), 1)
+        row = np.repeat(np.arange(len(triangle)), count)
+        share = (np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count) + 0.5) / count[row]
+        middles = start[row] + share[:, None] * (end - start)[row]
+        turn = np.copysign(_angle(own, other), convex)
+        return middles, (length / count)[row], turn[row]
+
     def on(self, triangle: np.ndarray, weights: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Points (k, 3) m of the curved shape and unit normals (k, 3) at weights (k, 3) of triangles (k,)."""
         points = np.einsum("kb,kbx->kx", _bernstein(weights), self._control[triangle])

@@ -7,6 +7,7 @@ done once. Run as `python -m palpate.warm_up STAGE...`; a failure costs only tim
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -62,10 +63,12 @@ def block_renderer(name: str = "fem") -> Any:
 
     mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3).quadratic()
     up = np.array([0.0, 0.0, 1.0])
-    fits = {name: np.ones(1) for name in FITS}
-    pressed = of_places(_SIZE_M * up[None], up[None], _TIP_RADIUS_M, depth_m=1e-3, fits=fits)
-    support, tool = Support(np.zeros(3), up), Tool(_TIP_RADIUS_M)
-    return render.create(name, Model(mesh, Material(20e3, 0.49), support, tool, _SIZE_M / 2, presses=pressed))
+    block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(_TIP_RADIUS_M), _SIZE_M / 2)
+    if name != "fem":  # what a press fitted is all that such a model knows
+        fits = {name: np.ones(1) for name in FITS}
+        place = _SIZE_M * up[None], up[None]
+        block = block.replaced(presses=of_places(*place, _TIP_RADIUS_M, depth_m=1e-3, fits=fits))
+    return render.create(name, block)
 
 
 def stages(renderer: Any) -> dict[str, Callable[[], object]]:
@@ -92,7 +95,7 @@ def _tick(renderer: Any) -> None:
     from devices.simulated import SPEC
     from palpate.servo.layout import total_bytes, views
     from palpate.servo.loop import compile_loop
-    from palpate.servo.tick import TickParameters, put_pose, tick_arrays
+    from palpate.servo.tick import OUT_WIDTH, TickParameters, put_pose, take_command, tick_arrays
     from render.passivity import PassivityOptions, passivity_parameters
     from render.scene import scene_of
 
@@ -106,11 +109,12 @@ def _tick(renderer: Any) -> None:
     )
     compile_loop(scene_of(renderer), renderer.start(), arrays, parameters)
     put_pose(arrays, arrays.pose)
+    take_command(arrays, np.zeros(OUT_WIDTH))
 
 
 def _mark(stage: str) -> Path | None:
-    folder = choose_folder()
-    return None if folder is None else folder / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}"
+    named = choose_folder() or os.environ.get("NUMBA_CACHE_DIR")  # the user's own folder
+    return Path(named) / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}" if named else None
 
 
 def _done(names: Sequence[str]) -> bool:

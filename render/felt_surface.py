@@ -159,7 +159,7 @@ def _shape_key(model: Model) -> str:
     mesh = model.mesh
     sd = model.shape_uncertainty_m
     return content_key(
-        "felt surface 2",
+        "felt surface 3",
         mesh.points,
         mesh.tetrahedra,
         mesh.fixed,
@@ -172,7 +172,7 @@ def _shape_key(model: Model) -> str:
 
 def _material_key(model: Model) -> str:
     return content_key(
-        "own stiffness 1",
+        "own stiffness 2",
         OWN_DEPTH_M,
         float(model.material.young_modulus_pa),
         float(model.material.poisson_ratio),

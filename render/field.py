@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from mechanics.edges import edge_correction
 from mechanics.model import Model
 from mechanics.near_field import surface_softness
 from mechanics.patch import half_space_compliance
@@ -43,7 +44,7 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
     touched = np.unique(arrays.triangles[arrays.free > 0])
     points, normals = arrays.vertices[touched], arrays.normals[touched]
     far = np.zeros((len(arrays.vertices), 3, 3))
-    far[touched] = compliance.far_at(points, normals)
+    far[touched] = compliance.far_at(points, normals) + edge_correction(mesh, points, normals)
     softness = np.ones(len(arrays.vertices))
     softness[touched] = surface_softness(mesh, model.surface_ratio, points, model.tool.tip_radius_m)
     width = float(compliance.own_width_m[0])

@@ -25,6 +25,8 @@ _RENDERERS = {
 _SIMULATORS = {
     "scikit-fem": "render.simulators.scikit_fem",
     "mujoco": "render.simulators.mujoco",
+    "drake": "render.simulators.drake",
+    "newton": "render.simulators.newton",
 }
 """Other simulators, which need packages of their own and take their time."""
 

@@ -15,9 +15,9 @@ from mechanics.true_shape import TrueShape
 
 SAG_M = 8e-6
 """Between the middle of a fine edge and the shape: what is more is halved."""
-EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 2.2e-3, 2.5e-3
-"""Widths of the Gaussians by which a crease is rounded, and its contact normal turned. With 1.5 mm a tip that
-friction holds, 4 mm deep, snapped over a sharp rim by a seventh of its force."""
+EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 1.5e-3, 2.5e-3
+"""Widths of the Gaussians by which a crease is rounded, and its contact normal turned. Each tenth of a
+millimetre more makes places beside a sharp rim some per cent softer than they are."""
 EASED_AGREEMENT = (0.99, 0.93)
 """Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
 _CREASE_SPACING_M = 1e-4

@@ -27,10 +27,6 @@ from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from mechanics.recording import read_recording, recording_files
 from mechanics.surface_files import surface_of
 from mechanics.true_shape import TrueShape
-from reconstruct.pipeline import reconstruct
-from reconstruct.shapes.coarse_drawing import decimated
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene, ball_of
@@ -174,6 +170,11 @@ def _built(
     scene: Scene, stood: Standing, own: Material, provenance: dict[str, str], progress: Progress
 ) -> Model:
     """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
+    # here, and below: a model that is kept or shipped is opened without loading what makes one
+    from reconstruct.shapes.coarse_drawing import decimated
+    from reconstruct.steps.s4_surface.surface import Surface
+    from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
+
     surface = Surface(
         vertices=stood.vertices,
         triangles=stood.triangles,
@@ -215,6 +216,8 @@ def _balls(regions: Collection[Region]) -> dict[str, Ball]:
 
 
 def _from_recording(scene: Scene, progress: Progress) -> Model:
+    from reconstruct.pipeline import reconstruct
+
     return _changed(scene, reconstruct(read_recording(_recording_path(scene)), progress=progress))
 
 

@@ -15,6 +15,7 @@ import io
 import re
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -68,7 +69,7 @@ def pack(folder: Path, archive: Path, compliance: SurfaceCompliance, key: str) -
 
 
 def _halved(compliance: SurfaceCompliance) -> bytes:
-    arrays = dict(compliance.arrays())
+    arrays: dict[str, Any] = dict(compliance.arrays())
     blocks = arrays.pop("blocks")
     del arrays["own_middles"]
     half = blocks[np.triu_indices(len(blocks))].astype("<f2").reshape(-1, 9)

@@ -104,83 +104,9 @@ class SimulatedGap(Result):
     mended: Mended | None = None
 
     @property
-    def summary(self) -> str:
-        """The answer in one sentence."""
-        first = max(PARTS, key=lambda name: self.parts[name].share)
-        if not self.effects:
-            return (
-                "nothing is named: neither numerics nor parameters nor what an ideal simulation lacks stands "
-                "out of this gap"
-            )
-        words = {
-            "numerics": "most of the gap is numerics",
-            "parameters": "most of the gap is parameters",
-            "reality": "most of the gap is what every ideal elastic simulation lacks",
-        }[first]
-        if self.unexplained > self.parts[first].share:
-            words = "most of the gap is not explained"
-        named = ", ".join(n.replace("_", " ") for n in self.effects)
-        rest = ", ".join(n.replace("_", " ") for n in self.candidates)
-        return f"{words}; named: {named}" + (f" (not ruled out: {rest})" if rest else "")
-
-    @property
     def without_numerics_n(self) -> float:
         """N, the gap that is left once the numerics alone are mended, as it is said before that is run."""
         return self.gap_before_n * math.sqrt(max(1 - self.parts["numerics"].share, 0.0))
-
-    @property
-    def mended_in_words(self) -> str:
-        """What the run with mended settings measured, beside what was said of it; "" where there is none."""
-        if self.mended is None:
-            return ""
-        still = ", ".join(n.replace("_", " ") for n in self.mended.effects) or "nothing"
-        return (
-            f"gap {self.gap_before_n:.4f} N -> {self.mended.gap_n:.4f} N measured "
-            f"({self.without_numerics_n:.4f} N was said once its numerics are mended); still named: {still}"
-        )
-
-    def lines(self) -> list[str]:
-        """The three parts, a line each, with units."""
-        given = self.simulator.stated
-        said = ", ".join(
-            f"{name} {_value(value)}{'' if name in given.given else ' (of the model)'}"
-            for name, value in given.as_json().items()
-        )
-        version = f" {self.simulator.version}" if self.simulator.version else ""
-        lines = [
-            f"simulator: {self.simulator.name}{version}; stated: {said}",
-            *(f"  note: {note}" for note in self.notes),
-            f"verdict: {self.summary}",
-            f"gap: {self.gap_before_n:.4f} N from simulated to measured force (noise {self.noise_n:.4f} N)",
-        ]
-        for name in PARTS:
-            part = self.parts[name]
-            lines.append(
-                f"  {name}: {part.gap_n:.4f} N, {part.share:.0%} of the gap's square{self._of(part)}"
-            )
-        lines.append(
-            f"  unexplained: {self.unexplained_n:.4f} N, {self.unexplained:.0%} "
-            f"(noise {self.noise_share:.0%}, first touches {self.touch_share:.0%})"
-        )
-        lines.append(
-            f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N once all of it is mended, "
-            "on places not fitted"
-        )
-        if self.mended is not None:
-            lines.append(f"run again, {self.mended.settings}: {self.mended_in_words}")
-        lines += [f"  {reason}" for reason in self.reasons]
-        lines += [f"advice: {each}" for each in self.advice]
-        return lines
-
-    def _of(self, part: Part) -> str:
-        if not part.names:
-            return ""
-        words = {e.name: e for e in self.entries}
-        said = [
-            n.replace("_", " ") + (f" {words[n].parameters}" if n in words and words[n].parameters else "")
-            for n in part.names
-        ]
-        return ": " + "; ".join(said)
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
@@ -217,7 +143,3 @@ class SimulatedGap(Result):
             "mended": None if self.mended is None else self.mended.as_json(),
             "ideal": self.reality.as_json(),
         }
-
-
-def _value(value: float | None) -> str:
-    return "sticks" if value is None or not math.isfinite(value) else f"{value:g}"

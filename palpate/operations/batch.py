@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 from mechanics.errors import OptionError
 from mechanics.key_values import pairs
 from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._run import say_next
 from palpate.operations._shared import seed_operand
 from palpate.output import Output
 
@@ -62,6 +63,7 @@ class BatchOperands:
 def _answer(result: Batch, asked: BatchOperands, out: Output) -> int:
     """2 where not one recording came through, 1 where a model is not to be believed."""
     out.say(*result.lines())
+    say_next(result, out)
     out.json(result.as_json())
     if result.failed:
         words = (

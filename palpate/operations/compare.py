@@ -1,10 +1,10 @@
-"""FEM against the interpolated 1D models on held-out palpations and held-out regions of one recording; or,
-with REC2, two recordings of one object (before and after, two tools): their moduli, the difference, what
-explains it.
+"""Which model predicts a touch that it has not seen: finite elements (FEM), or springs and dampers that are
+interpolated between presses (1D). Or, with REC2, two recordings of one object (before and after, two tools):
+their moduli, the difference, what explains it.
 
-Of --model only the geometry is used; every parameter is refitted in each fold. Errors are rms force vectors
-over contact samples that the fit has not seen, N; bias is the share by which the predicted force is too
-large.
+Single places are left out of the fits, then whole regions. Of --model only the geometry is used; all else is
+fitted anew each time. Errors are root mean squares of the force vector in contact, N; bias is the share by
+which the predicted force is too large.
 """
 
 from __future__ import annotations

@@ -21,6 +21,7 @@ from mechanics.key_values import number, pairs
 from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._flags import natural
+from palpate.operations._run import say_next
 from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand
 from palpate.output import Output, emit_json
 from scenes.laboratory.effects import REGISTRY
@@ -116,6 +117,7 @@ def _answer(result: Simulation, asked: SimulateOperands, out: Output) -> int:
         del summary["truth"]
     words = result.lines()
     out.say(*(words[:1] if asked.seal else words), f"written to {path}")
+    say_next(result, out)
     out.json(summary)
     return 0
 

@@ -37,6 +37,36 @@ class World(Protocol):
         """(3,) N on the tool once the tip's centre, (3,) m, is there, dt_s after the last step."""
 
 
+class SteppedWorld(ABC):
+    """One touch in a simulator that has a time step of its own: the tip is led along straight lines from
+    sample to sample, in whole steps; what is left of a sample goes to the next."""
+
+    def __init__(self, tip: np.ndarray, timestep_s: float) -> None:
+        self._tip, self._left, self._force = np.array(tip, dtype=float), 0.0, np.zeros(3)
+        self._timestep_s = timestep_s
+
+    @abstractmethod
+    def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
+        """One step of the simulator's own, at whose end the tip's centre is there; (3,) m, (3,) m/s."""
+
+    @abstractmethod
+    def force(self) -> np.ndarray:
+        """(3,) N on the tool after the last step."""
+
+    def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
+        """As `World.step`."""
+        self._left += dt_s
+        count = int(self._left / self._timestep_s + 1e-9)
+        self._left -= count * self._timestep_s
+        way = (np.asarray(tip, dtype=float) - self._tip) / max(count, 1)
+        for _ in range(count):
+            self._tip = self._tip + way
+            self.advance(self._tip, way / self._timestep_s)
+        if count:
+            self._force = self.force()
+        return self._force
+
+
 class Adapter(ABC):
     """One simulator. units: what it computes in. cannot: what it cannot say, a line each. advice: by
     numerical effect, in its own words. extra: the package's extra that installs it."""
@@ -76,10 +106,14 @@ class Adapter(ABC):
         centre = touchable[np.argmin(np.linalg.norm(touchable - tip, axis=1))]
         away = max(float(np.linalg.norm(centre - tip)), 1e-9)
         foot = tip + (centre - tip) * min(1.0, radius_m / away)
-        fine = self.mesh
-        for share in (2.0, 1.5, 1.0, 1.0):
-            fine, _ = refined_around(fine, foot, share * reach_m, edge_m)
-        return fine
+        return graded(self.mesh, foot, edge_m, reach_m)
+
+
+def graded(mesh: TetMesh, place: np.ndarray, edge_m: float, reach_m: float) -> TetMesh:
+    """A linear mesh with edges of at most about `edge_m` within `reach_m` of a place (3,) m."""
+    for share in (2.0, 1.5, 1.0, 1.0):
+        mesh, _ = refined_around(mesh, place, share * reach_m, edge_m)
+    return mesh
 
 
 def changed(settings: Any, text: str) -> Any:

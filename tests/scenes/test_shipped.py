@@ -1,6 +1,6 @@
 """Models that come with the program: packed and unpacked without harm, and those of today's law.
 
-Where one of the tests of what is shipped fails, run `python -m tools.shipped_models` and commit what it writes.
+Where a test of what is shipped fails, run `python -m tools.shipped_models` and commit what it writes.
 """
 
 from __future__ import annotations

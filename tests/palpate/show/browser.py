@@ -153,7 +153,8 @@ def a_tab(folder: Path) -> Iterator[Tab]:
         port = _port(folder / "DevToolsActivePort", process)
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=_PATIENCE_S) as answer:
             address = next(t for t in json.load(answer) if t["type"] == "page")["webSocketDebuggerUrl"]
-        with connect(address, max_size=None, open_timeout=_PATIENCE_S) as socket:
+        # without pings: a busy machine answers them late
+        with connect(address, max_size=None, open_timeout=_PATIENCE_S, ping_interval=None) as socket:
             yield Tab(socket)
     finally:
         os.killpg(process.pid, signal.SIGKILL)

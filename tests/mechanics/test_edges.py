@@ -1,0 +1,97 @@
+"""What the load patch misses beside rims and above the base: where it counts, and that presses confirm it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from mechanics.edges import edge_correction
+from mechanics.press_solver.press import PressOptions, PressSolver
+from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.tetmesh import TetMesh
+from mechanics.touch import forces_at
+from mechanics.true_shape import TrueShape
+
+SIZE_M = (0.08, 0.08, 0.04)
+UP, OUT = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
+HALF_SPACE = (1 - 0.49**2) / (2 * np.sqrt(np.pi) * 0.004)
+"""1/m, under the patch: what corrections are measured by."""
+
+
+@pytest.fixture(scope="module")
+def block() -> TetMesh:
+    """A block whose shape is known, standing on its fixed base."""
+    from mechanics.box_mesh import box_mesh
+
+    mesh = box_mesh((8, 8, 4), SIZE_M)
+    shell = trimesh.creation.box(SIZE_M)
+    shape = TrueShape(shell.vertices + [0, 0, SIZE_M[2] / 2], shell.faces)
+    return TetMesh(mesh.points, mesh.tetrahedra, mesh.fixed, mesh.touchable, shape)
+
+
+def top(*from_rim_m: float) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([[SIZE_M[0] / 2 - away, 0.003, SIZE_M[2]] for away in from_rim_m])
+    return points, np.tile(UP, (len(points), 1))
+
+
+def wall(*height_m: float) -> tuple[np.ndarray, np.ndarray]:
+    points = np.array([[SIZE_M[0] / 2, 0.003, height] for height in height_m])
+    return points, np.tile(OUT, (len(points), 1))
+
+
+def test_a_rim_is_soft_at_its_edge_stiffer_beside_it_and_nothing_further_in(block):
+    at_edge, beside, far = edge_correction(block, *top(0.0, 0.005, 0.03))
+    assert at_edge[2, 2] > 0.1 * HALF_SPACE
+    assert -0.25 * HALF_SPACE < beside[2, 2] < -0.05 * HALF_SPACE
+    assert not far.any()
+    assert np.count_nonzero(beside) == 1  # along the normal alone
+
+
+def test_the_base_holds_what_lies_close_above_it(block):
+    near, higher, far = edge_correction(block, *wall(0.006, 0.009, 0.022))[:, 0, 0]
+    assert near < higher < 0
+    assert near < -0.05 * HALF_SPACE
+    assert far == 0
+
+
+def test_the_correction_is_smooth_from_place_to_place(block):
+    along = edge_correction(block, *top(*np.arange(0, 0.02, 2e-4)))[:, 2, 2]
+    assert np.abs(np.diff(along)).max() < 0.12 * np.ptp(along)
+    assert np.abs(np.diff(along, 2)).max() < 0.3 * np.abs(np.diff(along)).max()
+
+
+def test_a_corner_has_of_each_of_its_rims(block):
+    points, normals = top(0.005)
+    corner = points + [0, SIZE_M[1] / 2 - 0.005 - points[0, 1], 0]
+    one, two = (edge_correction(block, at, normals)[0, 2, 2] for at in (points, corner))
+    assert 1.5 * one > two > 2.2 * one
+
+
+def test_neither_a_concave_edge_nor_the_outline_of_the_base_is_a_rim(block):
+    points, normals = wall(0.006)
+    inside_out = TrueShape(block.shape.vertices, block.shape.triangles[:, ::-1])
+    hollow = TetMesh(block.points, block.tetrahedra, block.fixed, block.touchable, inside_out)
+    shapeless = TetMesh(block.points, block.tetrahedra, block.fixed, block.touchable)
+    assert not edge_correction(hollow, *top(0.004)).any()
+    assert edge_correction(block, points, normals) == pytest.approx(
+        edge_correction(shapeless, points, normals)
+    )
+
+
+@pytest.mark.slow
+def test_a_press_beside_a_rim_is_that_of_a_solved_body(block):
+    points, normals = top(0.005)
+    depths, law = np.array([0.002, 0.004]), {"young_modulus_pa": 1.0, "tip_radius_m": 0.005}
+    options = PressOptions(coupled=True)
+    solver = PressSolver(block, None, poisson_ratio=0.49, options=options, **law)
+    truth = solver.press(points[0], UP, depths).force[:, 2]
+    fine = touch_solver(block, 0.49)
+    way = np.concatenate([depths[:1] * np.linspace(0.1, 1, 20), [0.003, 0.004]])[:, None] * -UP
+    error = []
+    for patch in (LoadPatch(), LoadPatch(patch_width(fine.mesh))):
+        sites = touch_sites(block, points, normals, 0.49, solver=fine, curvature=0.0, patch=patch)
+        force = forces_at(sites, way, np.array([0, len(way)]), law="neo-hookean", **law)[[19, 21], 2]
+        error.append(np.abs(force / truth - 1).max())
+    assert error[0] < 0.025
+    assert error[1] > 0.04
