@@ -41,6 +41,14 @@ def simulator_names() -> tuple[str, ...]:
     return tuple(_SIMULATORS)
 
 
+def check_settings(name: str, settings: str, numbers: str) -> None:
+    """Raise OptionError for numbers (KEY=VALUE, comma separated) that a simulator's settings do not have,
+    before any work."""
+    from render.simulators.base import changed
+
+    changed(importlib.import_module(_SIMULATORS[name]).SETTINGS[settings], numbers)
+
+
 def create(
     name: str, model: Model, options: RenderOptions | None = None, progress: Progress = silent
 ) -> Renderer:
