@@ -95,8 +95,9 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
         for case in (CASES[name]() for name in arguments.cases):
             rows += _pressed(case, arguments.only, arguments.settings)
-        if resolved["recording"] is not None:
-            rows += list(_recorded(resolved["recording"], resolved["model"], arguments))
+        recording, model = resolved["recording"], resolved["model"]
+        if recording is not None and model is not None:
+            rows += list(_recorded(recording, model, arguments))
     header = ["case", "simulator", "settings", "newtons over truth", "cost [CPU s]"]
     print(table(header, [_said(row) for row in rows]))
     if resolved["page"] is not None:
