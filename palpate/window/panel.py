@@ -80,10 +80,9 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
         (Item(about, size=12, colour=GREY),),
         (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=ACCENT),),
     ]
-    rows += [
-        (Item(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}", size=17, bold=True, colour=SECOND),)
-        for v in others
-    ]
+    # its row is there without it too: no button moves away from under the mouse
+    second = "".join(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}" for v in others)
+    rows.append((Item(second, size=17, bold=True, colour=SECOND),))
     rows += [
         (Item(_where(frame), size=12, colour=GREY),),
         (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
@@ -144,7 +143,8 @@ def _status(window: TouchWindow, frame: Frame) -> list[Row]:
     rows: list[Row] = []
     if worker.busy:
         rows.append((Item(f"{worker.busy[0].upper()}{worker.busy[1:]}", size=12),))
-        rows.append((Item("busy", share=worker.share),))
+        if worker.share > 0.0:
+            rows.append((Item("busy", share=worker.share),))
     elif worker.failure:
         rows.append((Item(worker.failure, size=12, colour=WARNING),))
     if session.recording is not None:
