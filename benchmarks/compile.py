@@ -83,11 +83,10 @@ def _main() -> None:
     from palpate.warm_up import block_renderer, stages
 
     seconds = {}
-    with block_renderer() as renderer:
-        for name, work in stages(renderer):
-            began = time.process_time()
-            work()
-            seconds[name] = time.process_time() - began
+    for name, work in stages(block_renderer()).items():
+        began = time.process_time()
+        work()
+        seconds[name] = time.process_time() - began
     json.dump({"stages": seconds, "kernels": kernels}, sys.stdout)
 
 

@@ -82,8 +82,9 @@ class _Case:
 
     @property
     def named(self) -> list[str]:
-        """Numerics and parameters that the verdict names, strongest first."""
-        return [*self.verdict.parts["numerics"].names, *self.verdict.parts["parameters"].names]
+        """Numerics and parameters that the verdict names, as it orders them."""
+        own = {n for part in ("numerics", "parameters") for n in self.verdict.parts[part].names}
+        return [n for n in self.verdict.effects if n in own]
 
     @property
     def visible(self) -> float:

@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks.evidence import Figure
 from benchmarks.timing import table
 
 WANTED_HZ = 30.0
@@ -80,25 +81,34 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
               "on a free core", "at most, drawn for nothing"]  # fmt: skip
     print(table(header, rows))
     print(table(["drawn alone", "CPU [ms]"], [[name, 1e3 * cpu] for name, cpu in found["parts"].items()]))
-    return found
+    figures = []
+    for name in ("in air", "in a press"):
+        cpu, (least, most) = found[name]["cpu_s"], found[name]["cpu_spread_s"]
+        what = f"pictures a second {name}, drawn by {found['drawn by']}, {window.sides} pictures, {size}"
+        by_clock = 1.0 / (found[name]["tick_s"] + found[name]["draw_s"])
+        figures += [
+            Figure(f"{what}, by processor time", 1 / cpu, (1 / most, 1 / least), "Hz").at_least(WANTED_HZ),
+            Figure(f"{what}, by the clock", by_clock, unit="Hz"),
+        ]
+    return {**found, "figures": figures}
 
 
 def _parts(window: Any, count: int) -> dict[str, float]:
     """Median processor time, s, of drawing each part of the window by itself, and all of them."""
-    *pictures, panel = window.plotter.renderers
-    parts = {"what is felt": pictures[:1], "second picture": pictures[1:], "words and plots": [panel],
-             "all": [*pictures, panel]}  # fmt: skip
+    first, second, *others = window.plotter.renderers
+    shown = [renderer for renderer in (first, second, *others) if renderer.GetDraw()]
+    parts = {"what is felt": [first], "second picture": [second], "words and plots": others, "all": shown}
     found = {}
     for name, drawn in parts.items():
         for renderer in window.plotter.renderers:
-            renderer.SetDraw(renderer in drawn)
+            renderer.SetDraw(renderer in drawn and renderer in shown)
         found[name] = _frames(window, count, move=False)["cpu_s"]
     return found
 
 
-def _frames(window: Any, count: int, *, move: bool = True) -> dict[str, float]:
-    """Medians over `count` pictures, s, by the clock; cpu_s: of this process, both together. move: tick
-    before each."""
+def _frames(window: Any, count: int, *, move: bool = True) -> dict[str, Any]:
+    """Medians over `count` pictures, s, by the clock; cpu_s: of this process, both together, and its
+    quartiles. move: tick before each."""
     ticks, draws, cpu = [], [], []
     for _ in range(count):
         used, began = time.process_time(), time.perf_counter()
@@ -111,7 +121,8 @@ def _frames(window: Any, count: int, *, move: bool = True) -> dict[str, float]:
         cpu.append(time.process_time() - used)
     both = np.add(ticks, draws)
     return {"tick_s": float(np.median(ticks)), "draw_s": float(np.median(draws)),
-            "p95_s": float(np.percentile(both, 95)), "cpu_s": float(np.median(cpu))}  # fmt: skip
+            "p95_s": float(np.percentile(both, 95)), "cpu_s": float(np.median(cpu)),
+            "cpu_spread_s": tuple(float(v) for v in np.percentile(cpu, [25, 75]))}  # fmt: skip
 
 
 def _card(window: Any) -> str:

@@ -10,12 +10,13 @@ from dataclasses import dataclass
 
 from scipy.special import logit
 
+from mechanics.effects.registry import known
 from mechanics.options import option
 
 
 @dataclass(frozen=True)
 class DiagnoseOptions:
-    """How much a diagnosis tries, and its seed."""
+    """How much a diagnosis tries, and its seed. Raises OptionError for an effect that is not there."""
 
     fast: bool = option(
         False, "half a minute instead of three: fewer effects, one in an answer, less sampling"
@@ -23,6 +24,15 @@ class DiagnoseOptions:
     without: str = option("", "effects to leave out of the library, comma separated (for tests of 'unknown')")
     bootstrap: int = option(400, "resamplings of sites for intervals")
     seed: int = option(0, "seed of flips and resamplings")
+
+    def __post_init__(self) -> None:
+        for name in self.left_out:  # before any work
+            known(name)
+
+    @property
+    def left_out(self) -> frozenset[str]:
+        """The names in `without`."""
+        return frozenset(name.strip() for name in self.without.split(",") if name.strip())
 
 
 @dataclass(frozen=True)

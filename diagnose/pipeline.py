@@ -58,7 +58,7 @@ def diagnose(
     clock.lap("sites")
 
     unobservable = unobservable_effects(presses)
-    excluded = {n.strip() for n in options.without.split(",") if n.strip()} | unobservable
+    excluded = {*options.left_out, *unobservable}
     free = free_air_of(recording, presses)
     rigid = rigid_of(recording, presses, model.support.normal)
     offsets = find_instrument_offsets(forward, free, rigid, excluded, rules)

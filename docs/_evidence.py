@@ -5,12 +5,14 @@ the files' numbers between the markers of a page:
 
     <!-- evidence: NAME what -->28.9<!-- end -->
 
-`what` is a figure's own; the number keeps the decimals with which it is written. A test runs `filled` over
-README and all pages and fails where a number differs or its file or figure is missing.
+`what` is a figure's own; the number keeps the decimals with which it is written. Where `what` is "processor",
+"date" or "commit" it is that word of the file. A test runs `filled` over README and all pages and fails where
+one differs or its file or figure is missing.
 """
 
 from __future__ import annotations
 
+import ast
 import json
 import re
 import subprocess
@@ -24,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 EVIDENCE = ROOT / "docs" / "evidence"
 KEYS = {"command", "commit", "date", "processor", "figures"}
 FIGURE_KEYS = {"what", "value", "spread", "unit", "target", "met"}
+WORDS = ("processor", "date", "commit")
 MARKED = re.compile(r"(<!-- evidence: (\S+) (.+?) -->)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -78,6 +81,8 @@ def filled(text: str, folder: Path = EVIDENCE) -> str:
             raise EvidenceError(
                 f"'{stood}' is marked as '{what}' of {name}, but docs/evidence/{name}.json is missing"
             )
+        if what in WORDS:
+            return f"{begin}{getattr(read(path), what)}{end}"
         decimals = len(stood.strip().partition(".")[2])
         return f"{begin}{read(path).value(what):,.{decimals}f}{end}"
 
@@ -87,6 +92,8 @@ def filled(text: str, folder: Path = EVIDENCE) -> str:
 def page(evidence: Evidence) -> str:
     """A table of all figures, missed targets beside met ones."""
     lines = [f"# {evidence.name.replace('_', ' ').replace('-', ' ').capitalize()}", ""]
+    if words := about(evidence.name):
+        lines += [_cell(words), ""]
     met = [figure["met"] for figure in evidence.figures if figure["target"]]
     if met:
         lines += [f"{sum(map(bool, met))} of {len(met)} targets met.", ""]
@@ -110,9 +117,19 @@ def page(evidence: Evidence) -> str:
     return "\n".join(lines)
 
 
+def about(name: str, root: Path = ROOT) -> str:
+    """What a benchmark measures, as the first paragraph of its own docstring says; '' where it is gone."""
+    path = root / "benchmarks" / f"{name.replace('-', '_')}.py"
+    if not path.is_file():
+        return ""
+    said = ast.get_docstring(ast.parse(path.read_text(encoding="utf-8"))) or ""
+    return " ".join(said.partition("\n\n")[0].split())
+
+
 def _cell(words: str) -> str:
-    """Words as they stand, in a table."""
-    return re.sub(r"([*<|]|-(?=-))", r"\\\1", words)
+    """Words as they stand, in a table; code is code."""
+    parts = re.split(r"(`[^`]*`)", words)
+    return "".join(p if k % 2 else re.sub(r"([*<|]|-(?=-))", r"\\\1", p) for k, p in enumerate(parts))
 
 
 def age(evidence: Evidence, root: Path = ROOT) -> str:

@@ -17,6 +17,7 @@ from mechanics.model import Model
 from mechanics.options import option
 from mechanics.progress import Progress, silent
 from mechanics.store import content_key, load_or_build
+from mechanics.support import BaseHold
 from mechanics.surface_compliance import SurfaceCompliance, surface_compliance
 from mechanics.tetmesh import TetMesh
 
@@ -45,6 +46,36 @@ class ComplianceOptions:
         return None if dense else self.low_rank_error
 
 
+def compliance_key(model: Model, options: ComplianceOptions | None = None) -> str:
+    """64 hexadecimal digits over everything that the numbers of `load_or_condense` depend on."""
+    material, hold = model.material, _hold(model)
+    balls = tuple(material.inclusions.values())
+    error = (options or ComplianceOptions()).error_of(model.mesh)
+    return content_key(
+        "surface compliance 7",
+        model.mesh.points,
+        model.mesh.tetrahedra,
+        model.mesh.fixed,
+        model.mesh.touchable,
+        "" if model.mesh.shape is None else model.mesh.shape.key,
+        material.poisson_ratio,
+        model.ratio_without_balls,
+        *(() if hold is None else dataclasses.astuple(hold)),
+        *(() if error is None else ("low-rank", error)),
+        *([model.tool.tip_radius_m] if balls else []),
+        *(value for ball in balls for value in dataclasses.astuple(ball)),
+    )
+
+
+def compliance_file(key: str) -> str:
+    """Name of the cached file of that key, in the model's folder."""
+    return f"compliance-{key[:16]}.bin"
+
+
+def _hold(model: Model) -> BaseHold | None:
+    return base_hold(model.effects, model.support.normal, model.material.young_modulus_pa)
+
+
 def load_or_condense(
     model: Model, progress: Progress = silent, *, options: ComplianceOptions | None = None
 ) -> SurfaceCompliance:
@@ -56,32 +87,16 @@ def load_or_condense(
     folder that cannot be written keeps nothing. A large surface is compressed (ComplianceOptions).
     """
     material = model.material
-    hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)
-    held = () if hold is None else dataclasses.astuple(hold)
-    balls = tuple(material.inclusions.values())
+    hold = _hold(model)
     error = (options or ComplianceOptions()).error_of(model.mesh)
-    form = () if error is None else ("low-rank", error)
-    key = content_key(
-        "surface compliance 7",
-        model.mesh.points,
-        model.mesh.tetrahedra,
-        model.mesh.fixed,
-        model.mesh.touchable,
-        "" if model.mesh.shape is None else model.mesh.shape.key,
-        material.poisson_ratio,
-        model.ratio_without_balls,
-        *held,
-        *form,
-        *([model.tool.tip_radius_m] if balls else []),
-        *(value for ball in balls for value in dataclasses.astuple(ball)),
-    )
+    key = compliance_key(model, options)
 
     def build() -> dict[str, np.ndarray]:
         made = surface_compliance(
             model.mesh,
             material.poisson_ratio,
             model.ratio_without_balls,
-            balls=balls,
+            balls=tuple(material.inclusions.values()),
             hold=hold,
             low_rank_error=error,
             tip_radius_m=model.tool.tip_radius_m,
@@ -90,7 +105,7 @@ def load_or_condense(
         return made.arrays()
 
     if model.path is not None:
-        arrays = load_or_build(model.path / f"compliance-{key[:16]}.bin", key, build)
+        arrays = load_or_build(model.path / compliance_file(key), key, build)
         return SurfaceCompliance.from_arrays(arrays)
     if key not in _unwritten:
         arrays = load_or_build(None, key, build)

@@ -63,6 +63,11 @@ def pointer(step: Any, *arguments: Any) -> Any:
     return _pointer(step, types.void(*map(typeof, arguments)))
 
 
+def step_type(*arguments: Any) -> Any:
+    """Of the `pointer` to a kernel for arguments of these types."""
+    return types.FunctionType(types.void(*map(typeof, arguments)))
+
+
 @cache
 def _pointer(step: Any, signature: Any) -> Any:
     """Once a process for each kind of arguments."""

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from scipy.signal import savgol_filter
 
 WIDTH_S = 0.05
 """Width of the fits: a hand's movement up to 15 Hz is passed, an encoder's steps are not."""
@@ -24,6 +23,8 @@ def acceleration(t: np.ndarray, path: np.ndarray, *, width_s: float = WIDTH_S) -
 
 
 def _derivative(t: np.ndarray, path: np.ndarray, order: int, width_s: float) -> np.ndarray:
+    from scipy.signal import savgol_filter  # here: it brings scipy.stats, and a touch needs neither
+
     t, path = np.asarray(t, dtype=float), np.asarray(path, dtype=float)
     count = len(t)
     if count < 3:

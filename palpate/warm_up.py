@@ -1,15 +1,16 @@
-"""Compile what the demo needs on a small block, in a process beside the reconstruction.
+"""Compile what a first touch and the demo need on a small block, in processes beside what else is to be done.
 
-A fresh installation has no compiled kernels on disk; compiling them takes some tens of seconds of one core,
-which the second core can do while the first reconstructs. It leaves a mark beside the kernels, so that it is
-done once. Run as `python -m palpate.warm_up`; a failure costs only time.
+A fresh installation has no compiled kernels on disk; compiling them takes some tens of seconds of a core.
+Each process compiles a part of them, so that two cores share it, and leaves a mark beside the kernels: it is
+done once. Run as `python -m palpate.warm_up STAGE...`; a failure costs only time.
 """
 
 from __future__ import annotations
 
+import os
 import subprocess
-import tempfile
-from collections.abc import Callable, Iterator
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from importlib.metadata import version
 from pathlib import Path
@@ -20,68 +21,81 @@ import numpy as np
 from mechanics.kernel_cache import choose_folder
 from palpate.child import end_with_parent, module_command, module_environment
 
+BESIDE_ONE_ANOTHER = (("renderer", "replay"), ("tick", "spring-damper model"))
+"""Stages by process: about the same work for each."""
+_SIZE_M, _TIP_RADIUS_M = 0.012, 0.005
+
 
 @contextmanager
 def warming_up() -> Iterator[Callable[[], object]]:
-    """What waits for the compiling process, which is started at once and ended with the block where it still
-    runs then; nothing is started where these kernels are compiled."""
-    mark = _mark()
-    if mark is not None and mark.is_file():
-        yield lambda: None
-        return
-    process = subprocess.Popen(
-        module_command("palpate.warm_up"),
-        stdin=subprocess.PIPE,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
-        env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
-    )
+    """What waits for the compiling processes, which are started at once and ended with the block where they
+    still run then; nothing is started where these kernels are compiled."""
+    processes = [
+        subprocess.Popen(
+            module_command("palpate.warm_up", *stages),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.DEVNULL,
+            env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
+        )
+        for stages in BESIDE_ONE_ANOTHER
+        if not _done(stages)
+    ]
     try:
-        yield process.wait
+        yield lambda: [process.wait() for process in processes]
     finally:
-        if process.poll() is None:
-            process.terminate()
-        process.wait()
-        if process.stdin is not None:
-            process.stdin.close()
+        for process in processes:
+            if process.poll() is None:
+                process.terminate()
+            process.wait()
+            if process.stdin is not None:
+                process.stdin.close()
 
 
-@contextmanager
-def block_renderer() -> Iterator[Any]:
-    """The finite-element renderer of a block of 40 mm, whose folder goes with the context."""
+def block_renderer(name: str = "fem") -> Any:
+    """A renderer of a block that is condensed at once."""
     import render
     from mechanics.box_mesh import box_mesh
     from mechanics.material import Material
     from mechanics.model import Model, Support, Tool
-    from mechanics.model_files import write_model
+    from mechanics.press_making import of_places
+    from mechanics.presses import FITS
 
-    mesh = box_mesh((3, 3, 3), (0.04, 0.04, 0.04)).quadratic()
+    mesh = box_mesh((2, 2, 2), (_SIZE_M,) * 3).quadratic()
     up = np.array([0.0, 0.0, 1.0])
-    with tempfile.TemporaryDirectory() as folder:
-        block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(0.005), 0.0133)
-        block = block.replaced(path=write_model(Path(folder) / "block", block))
-        yield render.create("fem", block)
+    block = Model(mesh, Material(20e3, 0.49), Support(np.zeros(3), up), Tool(_TIP_RADIUS_M), _SIZE_M / 2)
+    if name != "fem":  # what a press fitted is all that such a model knows
+        fits = {name: np.ones(1) for name in FITS}
+        place = _SIZE_M * up[None], up[None]
+        block = block.replaced(presses=of_places(*place, _TIP_RADIUS_M, depth_m=1e-3, fits=fits))
+    return render.create(name, block)
 
 
-def stages(renderer: Any) -> tuple[tuple[str, Callable[[], object]], ...]:
-    """(name, work) in order: a replay on the block, and the servo's tick."""
-    return ("renderer", lambda: _replay(renderer)), ("tick", lambda: _tick(renderer))
+def stages(renderer: Any) -> dict[str, Callable[[], object]]:
+    """Work by name: the renderer's step, a replay, the servo's tick round a step, and the model that is felt
+    beside it."""
+    return {
+        "renderer": lambda: renderer.step(renderer.start(), np.array([[0.0, 0.0, _SIZE_M]])),
+        "replay": lambda: _replay(renderer),
+        "tick": lambda: _tick(renderer),
+        "spring-damper model": lambda: _replay(block_renderer("hunt-crossley")),
+    }
 
 
 def _replay(renderer: Any) -> None:
     from render.replay import replay
 
-    path = np.outer(np.linspace(0.05, 0.043, 50), np.array([0.0, 0.0, 1.0]))
-    replay(renderer, np.arange(50) * 1e-3, path)
+    height = _SIZE_M + _TIP_RADIUS_M + np.linspace(5e-3, -1e-3, 50)
+    replay(renderer, np.arange(50) * 1e-3, np.outer(height, [0.0, 0.0, 1.0]))
 
 
 def _tick(renderer: Any) -> None:
-    """Make the servo's loop ready for this renderer."""
+    """Compile the servo's loop for this renderer's kind, without its step."""
     from devices.safety import SafetyOptions, safety_parameters
     from devices.simulated import SPEC
     from palpate.servo.layout import total_bytes, views
-    from palpate.servo.loop import make_program
-    from palpate.servo.tick import TickParameters, put_pose, tick_arrays
+    from palpate.servo.loop import compile_loop
+    from palpate.servo.tick import OUT_WIDTH, TickParameters, put_pose, take_command, tick_arrays
     from render.passivity import PassivityOptions, passivity_parameters
     from render.scene import scene_of
 
@@ -93,25 +107,32 @@ def _tick(renderer: Any) -> None:
         safety_parameters(SafetyOptions(), SPEC),
         passivity_parameters(PassivityOptions(), max_damping_n_s_per_m=damping),
     )
-    make_program(scene_of(renderer), arrays, parameters)
+    compile_loop(scene_of(renderer), renderer.start(), arrays, parameters)
     put_pose(arrays, arrays.pose)
+    take_command(arrays, np.zeros(OUT_WIDTH))
 
 
-def warm_up() -> None:
-    """Compile it all, and leave the mark."""
-    with block_renderer() as renderer:
-        for _, work in stages(renderer):
-            work()
-    mark = _mark()
-    if mark is not None:
-        mark.touch()
+def mark_of(stage: str) -> Path | None:
+    """The file that says that a stage is compiled; None where nothing is kept."""
+    named = choose_folder() or os.environ.get("NUMBA_CACHE_DIR")  # the user's own folder
+    return Path(named) / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}" if named else None
 
 
-def _mark() -> Path | None:
-    folder = choose_folder()
-    return None if folder is None else folder / f"compiled-for-the-demo-by-{version('numba')}"
+def _done(names: Sequence[str]) -> bool:
+    marks = [mark_of(name) for name in names]
+    return all(mark is not None and mark.is_file() for mark in marks)
+
+
+def warm_up(names: Sequence[str]) -> None:
+    """Compile these stages, and leave a mark for each."""
+    work = stages(block_renderer())
+    for name in names:
+        work[name]()
+        mark = mark_of(name)
+        if mark is not None:
+            mark.touch()
 
 
 if __name__ == "__main__":
     end_with_parent()
-    warm_up()
+    warm_up(sys.argv[1:])

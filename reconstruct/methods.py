@@ -34,7 +34,7 @@ class ReconstructOptions:
     """What holds for the whole reconstruction; each step has options of its own."""
 
     method: str = option(
-        "finite-tip", "finite-tip; paper: tau = 1 N, hull, point load on linear tetrahedra", choices=METHODS
+        "finite-tip", "finite-tip, or the paper's own, whose answer depends on the mesh", choices=METHODS
     )
     poisson_ratio: float | None = option(
         None, "Poisson's ratio; None: the recording's, else 0.49", flag="--poisson-ratio"

@@ -10,6 +10,7 @@ as modelled) and move the surface along its normals.
 from __future__ import annotations
 
 import dataclasses
+from functools import lru_cache
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -29,9 +30,14 @@ LARGEST_M = 4e-3  # a palpation further off than this is no witness of the surfa
 
 def touched_surface(model: Model, options: RenderOptions) -> ContactSurface:
     """The model's contact surface: its shape where that is known; else the mesh's, through its palpations'
-    first touches where the options ask for it."""
-    surface = contact_surface(model.mesh, edge_m=options.surface_edge_m)
-    if model.mesh.shape is not None or not options.snap_to_touches or not len(model.presses):
+    first touches where the options ask for it. Made once for the last model: all its renderers share it."""
+    return _touched_surface(model, options.surface_edge_m, options.snap_to_touches)
+
+
+@lru_cache(maxsize=1)
+def _touched_surface(model: Model, edge_m: float, snap: bool) -> ContactSurface:
+    surface = contact_surface(model.mesh, edge_m=edge_m)
+    if model.mesh.shape is not None or not snap or not len(model.presses):
         return surface
     feet, normals, gaps = touch_gaps(surface.arrays, model)
     if not len(gaps):

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import ModelError, SceneError
+from mechanics.errors import FileError, ModelError, SceneError
 from mechanics.files import atomic_folder, cache_folder, reading
 from mechanics.flat_foot import Standing, standing
 from mechanics.material import Ball, Material
@@ -27,13 +27,10 @@ from mechanics.quantities import USUAL_POISSON_RATIO, USUAL_TIP_RADIUS_M
 from mechanics.recording import read_recording, recording_files
 from mechanics.surface_files import surface_of
 from mechanics.true_shape import TrueShape
-from reconstruct.pipeline import reconstruct
-from reconstruct.shapes.coarse_drawing import decimated
-from reconstruct.steps.s4_surface.surface import Surface
-from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene, ball_of
+from scenes.shipped import shipped_model, unpack
 from scenes.virtual_presses import palpate_model
 
 VERSION = 7
@@ -41,16 +38,24 @@ MESH_SIZE_M, LEAST_EDGES = 0.010, 8
 """Edge length of the tetrahedra, and the least number of edges along an object."""
 
 
-def model_of(scene: Scene, progress: Progress = silent, *, cache: Path | None = None) -> Model:
-    """The scene's model, with a path; a MODEL folder about which the scene changes nothing is used itself."""
+def model_of(
+    scene: Scene, progress: Progress = silent, *, cache: Path | None = None, shipped: bool = True
+) -> Model:
+    """The scene's model, with a path; a MODEL folder about which the scene changes nothing is used itself.
+
+    shipped: whether one that comes with the program is taken, where the cache has none.
+    """
     if scene.kind == "model" and _own(scene):
         return read_model(scene.source)
     path = _folder(scene, cache)
-    if (path / "model.toml").is_file():
-        try:
+    archive = shipped_model(path.name) if shipped else None
+    try:
+        if archive is not None and not (path / "model.toml").is_file():
+            unpack(archive, path)
+        if (path / "model.toml").is_file():
             return read_model(path)
-        except ModelError:
-            pass  # damaged: built again below
+    except (ModelError, FileError):
+        pass  # damaged, or a folder that refuses: built again below, which says why
     model = _MAKERS[scene.kind](scene, progress)
     _check_inside(model)
     try:
@@ -77,8 +82,12 @@ def keep(scene: Scene, model: Path, *, cache: Path | None = None) -> None:
 
 
 def _folder(scene: Scene, cache: Path | None) -> Path:
-    """Scenes of one object share a folder: its name is the object's, not the scene's."""
-    return (cache or cache_folder()) / "scenes" / f"{Path(scene.source).name.split('.')[0]}-{_key(scene)}"
+    return (cache or cache_folder()) / "scenes" / folder_name(scene)
+
+
+def folder_name(scene: Scene) -> str:
+    """Scenes of one object share a folder: its name is the object's and its content's, not the scene's."""
+    return f"{Path(scene.source).name.split('.')[0]}-{_key(scene)}"
 
 
 def _own(scene: Scene) -> bool:
@@ -161,6 +170,11 @@ def _built(
     scene: Scene, stood: Standing, own: Material, provenance: dict[str, str], progress: Progress
 ) -> Model:
     """The model of a shape that stands in its own frame; own: its material where the scene says nothing."""
+    # here, and below: a model that is kept or shipped is opened without loading what makes one
+    from reconstruct.shapes.coarse_drawing import decimated
+    from reconstruct.steps.s4_surface.surface import Surface
+    from reconstruct.steps.s5_mesh.meshing import MeshingOptions, mesh_surface
+
     surface = Surface(
         vertices=stood.vertices,
         triangles=stood.triangles,
@@ -202,6 +216,8 @@ def _balls(regions: Collection[Region]) -> dict[str, Ball]:
 
 
 def _from_recording(scene: Scene, progress: Progress) -> Model:
+    from reconstruct.pipeline import reconstruct
+
     return _changed(scene, reconstruct(read_recording(_recording_path(scene)), progress=progress))
 
 

@@ -120,7 +120,7 @@ def load_scene(name: str | Path) -> Scene:
     path, embedded = Path(name), FOLDER / f"{name}.toml"
     # a MODEL goes before a scene of its name; any other folder does not
     if path.is_dir() and ((path / "model.toml").is_file() or not embedded.is_file()):
-        return Scene(path.name, "model", str(path.resolve()), title=path.name)
+        return Scene(path.name, "model", str(path.resolve()), title=_title_of(path))
     if embedded.is_file():
         return read_scene(embedded)
     if path.name.endswith((".csv", ".csv.gz")) and path.is_file():
@@ -146,6 +146,16 @@ def load_scene(name: str | Path) -> Scene:
             others=(*embedded_names(), *PHANTOMS),
         )
     )
+
+
+def _title_of(folder: Path) -> str:
+    """A MODEL's: what it was made from, where it says so, before the folder's name."""
+    try:
+        about = _toml(folder / "model.toml").get("provenance", {})
+        made_from = next(str(about[key]) for key in ("recording", "phantom", "mesh") if about.get(key))
+    except (SceneError, AttributeError, TypeError, StopIteration):
+        return folder.name  # reading the model says what is wrong with it
+    return f"{made_from} ({folder.name})"
 
 
 def read_scene(path: Path | str) -> Scene:

@@ -16,7 +16,6 @@ from mechanics.press_making import of_paths
 from mechanics.progress import Progress, silent
 from mechanics.sites import LoadPatch, touch_sites, touch_solver
 from mechanics.touch import forces_at
-from reconstruct.steps.s6_one_d.one_d import columns, fit_robust
 
 SITES = 32
 DEPTH_M = 0.005
@@ -32,6 +31,8 @@ def palpate_model(
     model: Model, progress: Progress = silent, *, sites: int = SITES, depth_m: float = DEPTH_M
 ) -> Model:
     """The model with a table of presses: one to `depth_m` at each of `sites` places."""
+    from reconstruct.steps.s6_one_d.one_d import columns, fit_robust  # here: a touch spreads places alone
+
     chosen = spread_places(model, sites)
     points, normals = model.mesh.points[chosen], model.normals[chosen]
     if model.mesh.shape is not None:

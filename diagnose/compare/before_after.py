@@ -104,10 +104,10 @@ class Changes(Result):
     def summary(self) -> str:
         """The answer in one sentence."""
         low, high = (100 * (r - 1) for r in self.ratio_ci95)
-        size = f"{100 * (self.ratio - 1):+.0f} % (95 % interval {low:+.0f} to {high:+.0f} %)"
+        size = f"the second modulus is {_more(self.ratio)} (95 % sure: {low:+.0f} to {high:+.0f} %)"
         if not self.differs and not self.explained_by:
-            return f"no difference that these recordings can show: modulus {size}"
-        return f"modulus {size}; {self.cause}"
+            return f"no difference that these recordings can show: {size}"
+        return size if self.before.diagnosis is None and self.differs else f"{size}; {self.cause}"
 
     @property
     def cause(self) -> str:
@@ -118,6 +118,11 @@ class Changes(Result):
         if _OBJECT not in self.explained_by:
             return f"explained by {effects}" if effects else "nothing explains it"
         return "the object itself differs" + (f", beside {effects}" if effects else "")
+
+
+def _more(ratio: float) -> str:
+    share = 100 * abs(ratio - 1)
+    return f"{share:.0f} % {'higher' if ratio > 1 else 'lower'} than the first"
 
 
 def changes(before: Side, after: Side) -> Changes:

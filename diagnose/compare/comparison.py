@@ -1,19 +1,20 @@
 """FEM against the interpolated 1D models on presses that none of them has seen: folds over sites, whole
 regions.
 
-Every model (diagnose.compare.models) is fitted to the same training presses and predicts the same held-out
-paths, measured from the same first touches, at the same places with the same normals; of the model only the
-geometry is used.
+Every model (diagnose.compare.models), and a simulator that is set beside them, is fitted to the same
+training presses and predicts the same held-out paths, measured from the same first touches, at the same
+places with the same normals; of the model only the geometry is used. Of a simulator the modulus is fitted:
+its force, run along the path once, goes with it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from diagnose.compare.models import MODELS, RIVALS, Fem, Prepared, predicted, prepare, rms
+from diagnose.compare.models import RIVALS, Fem, Prepared, predicted, prepare, rms
 from diagnose.compare.regions import Region, regions
 from mechanics.errors import ContactError
 from mechanics.model import Model
@@ -49,6 +50,18 @@ class CompareOptions:
         "of held-out presses: as read, or moved by what its stated error allows, for every model alike",
         choices=("read", "moved"),
     )
+
+
+@dataclass(frozen=True)
+class Along:
+    """Another simulator's force on the tool, (n, 3) N, at times t (n,) s of the recording."""
+
+    t: np.ndarray
+    force: np.ndarray
+
+    def at(self, t: np.ndarray) -> np.ndarray:
+        """(m, 3) N, straight lines between samples."""
+        return np.column_stack([np.interp(t, self.t, f) for f in self.force.T])
 
 
 @dataclass(frozen=True)
@@ -115,16 +128,19 @@ def compare(
     model: Model | None = None,
     options: CompareOptions | None = None,
     *,
+    simulated: Mapping[str, Along] | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Comparison:
-    """Compare on one recording; without a model its geometry is reconstructed. Raises ContactError for fewer
-    sites than two."""
+    """Compare on one recording; without a model its geometry is reconstructed. simulated: other simulators'
+    forces along the recorded path, by name. Raises ContactError for fewer sites than two."""
     options = options or CompareOptions()
     if model is None:
         made = reconstruct_fully(recording, ReconstructOptions(seed=seed), part(progress, 0.0, 0.4))
         model, progress = made.model, part(progress, 0.4, 1.0)
-    found = compare_presses(presses_on(recording, model), model, options, seed=seed, progress=progress)
+    found = compare_presses(
+        presses_on(recording, model), model, options, simulated=simulated, seed=seed, progress=progress
+    )
     return replace(found, recording=recording)
 
 
@@ -133,6 +149,7 @@ def compare_presses(
     model: Model,
     options: CompareOptions | None = None,
     *,
+    simulated: Mapping[str, Along] | None = None,
     seed: int = 0,
     progress: Progress = silent,
 ) -> Comparison:
@@ -141,21 +158,26 @@ def compare_presses(
     prepared = prepare(table, model, options.site_m, part(progress, 0.0, 0.3), field=options.field)
     presses = prepared.presses
 
+    others = {name: given.at(presses.t) for name, given in (simulated or {}).items()}
+
     def predict(train: np.ndarray, test: np.ndarray) -> tuple[dict[str, np.ndarray], Fem]:
-        return predicted(prepared, train, test, options.interpolation, options.first_touch)
+        forces, fem = predicted(prepared, train, test, options.interpolation, options.first_touch)
+        for name, own in others.items():
+            forces[name] = own[presses.rows(test)] * _scale(own, presses, train)
+        return forces, fem
 
     fold = _folds(presses.site, options.folds, seed)
     forces, fitted = _by_fold(presses, fold, predict, part(progress, 0.3, 0.7))
     held_out = tuple(_by_region(presses, model, predict, part(progress, 0.7, 1.0)))
-    error = {m: forces[m] - presses.force for m in MODELS}
+    error = {m: forces[m] - presses.force for m in forces}
     each = {
-        m: np.array([rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))]) for m in MODELS
+        m: np.array([rms(error[m][presses.rows(np.array([i]))]) for i in range(len(presses))]) for m in error
     }
     return Comparison(
         prepared=prepared,
         model=model,
-        rmse_n={m: rms(error[m]) for m in MODELS},
-        relative_rmse={m: rms(error[m]) / rms(presses.force) for m in MODELS},
+        rmse_n={m: rms(error[m]) for m in error},
+        relative_rmse={m: rms(error[m]) / rms(presses.force) for m in error},
         press_rmse_n=each,
         fold=fold,
         moduli_pa=np.array([fem.modulus_pa for fem in fitted]),
@@ -164,6 +186,13 @@ def compare_presses(
         predicted=forces,
         regions=held_out,
     )
+
+
+def _scale(force: np.ndarray, presses: Presses, train: np.ndarray) -> float:
+    """What a simulator's modulus is multiplied by, to fit the training presses: its force goes with it."""
+    rows = presses.rows(train)
+    square = float((force[rows] ** 2).sum())
+    return float((force[rows] * presses.force[rows]).sum()) / square if square > 0 else 0.0
 
 
 def _folds(site: np.ndarray, most: int, seed: int) -> np.ndarray:
@@ -182,7 +211,7 @@ def _by_fold(
     presses: Presses, fold: np.ndarray, predict: Predict, progress: Progress
 ) -> tuple[dict[str, np.ndarray], list[Fem]]:
     """({model: (n, 3) N, every press predicted when its fold was held out}, the FEM of each fold)."""
-    forces = {name: np.zeros_like(presses.force) for name in MODELS}
+    forces: dict[str, np.ndarray] = {}
     fitted = []
     folds = int(fold.max()) + 1
     for k in range(folds):
@@ -190,8 +219,8 @@ def _by_fold(
         held = np.flatnonzero(fold == k)
         found, fem = predict(np.flatnonzero(fold != k), held)
         fitted.append(fem)
-        for name in MODELS:
-            forces[name][presses.rows(held)] = found[name]
+        for name, own in found.items():
+            forces.setdefault(name, np.zeros_like(presses.force))[presses.rows(held)] = own
     return forces, fitted
 
 

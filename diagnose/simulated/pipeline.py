@@ -45,13 +45,15 @@ OWN_MODULUS = "stated_modulus"
 
 @dataclasses.dataclass(frozen=True)
 class Asked:
-    """What is asked of a simulation: its forces, what it was given, how the file is meant, its version."""
+    """What is asked of a simulation: its forces, what it was given, how the file is meant; of one run
+    here its version, advice by numerical effect, and settings in words."""
 
     forces: Forces
     stated: Stated
     options: ForcesOptions = dataclasses.field(default_factory=ForcesOptions)
     version: str = ""
     advice: dict[str, str] = dataclasses.field(default_factory=dict)
+    run_as: str = ""
 
 
 @dataclasses.dataclass
@@ -259,8 +261,7 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         weighing.squares(w.gaps["simulated"]), after, counts, reality.noise_n, weighing.added,
         np.random.default_rng(w.seed), w.resamples,
     )  # fmt: skip
-    order = sorted(parts, key=lambda name: -parts[name].share)
-    names = [n for name in order for n in parts[name].names]
+    names = _by_size(w)
     candidates = [*numerics.candidates, *_unstated(w.asked.stated, numerics), *reality.candidates]
     reasons = [*numerics.reasons, *(f"of our own model: {r}" for r in reality.reasons)]
     answer = Answer(names, candidates, reasons, numerics.remainder or "unknown" in reality.kind)
@@ -296,6 +297,17 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         gaps=w.gaps,
         simulated=w.sides.raw,
     )  # fmt: skip
+
+
+def _by_size(w: _Weighed) -> list[str]:
+    """All that is named, what changes the force most first, whatever part it is in. What reality adds is one
+    force, so its effects stand together."""
+    weighing, numerics = w.weighing, w.numerics
+    sizes = {name: weighing.gap_n(numerics.force[name]) for name in numerics.named}
+    sizes |= {p.name: weighing.gap_n(p.force) for p in w.wrong}
+    real = weighing.gap_n(w.gaps["touches"] - w.gaps["reality"])
+    sizes |= {name: real for name in w.real.names}
+    return sorted(sizes, key=lambda name: -sizes[name])
 
 
 def _after(w: _Weighed) -> np.ndarray:

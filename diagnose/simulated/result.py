@@ -51,16 +51,30 @@ class Part:
         return {"gap_n": self.gap_n, "share": self.share, "effects": list(self.names)}
 
 
+@dataclass(frozen=True)
+class Mended:
+    """The same simulator, run once more. settings: in words. gap_n: N rms, to the measured force. effects:
+    what is named of it still."""
+
+    settings: str
+    gap_n: float
+    effects: tuple[str, ...]
+
+    def as_json(self) -> dict[str, Any]:
+        """Its fields."""
+        return {"settings": self.settings, "gap_n": self.gap_n, "effects": list(self.effects)}
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class SimulatedGap(Result):
     """Where, why and how far another simulator's force leaves the measured one. Gaps: N, rms of the 3-vector
     over contact samples, the parts at places that their fits have not seen.
 
     parts: by name of PARTS; unexplained: the share that is left, unexplained_n in N; of it noise_share is the
-    sensor's noise and touch_share what the object's own first touches take. reality: today's diagnosis of our
-    ideal model. gaps: (n, 3) N, local frames of `touches`, as the parts are taken off, "simulated" first.
-    notes: what was told of the forces. `plot`: the parts as shares. `show`: the object coloured by
-    the gap.
+    sensor's noise and touch_share what the object's own first touches take. effects: what changes the force
+    most first. reality: today's diagnosis of our ideal model. gaps: (n, 3) N, local frames of `touches`, as
+    the parts are taken off, "simulated" first. notes: what was told of the forces. mended: where it was run
+    again. `plot`: the parts as shares. `show`: the object coloured by the gap.
     """
 
     simulator: Simulator
@@ -87,70 +101,12 @@ class SimulatedGap(Result):
     touches: Presses
     gaps: Mapping[str, np.ndarray] = field(default_factory=dict)
     simulated: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
-    gap_after_measured_n: float | None = None
+    mended: Mended | None = None
 
     @property
-    def summary(self) -> str:
-        """The answer in one sentence."""
-        first = max(PARTS, key=lambda name: self.parts[name].share)
-        if not self.effects:
-            return (
-                "nothing is named: neither numerics nor parameters nor what an ideal simulation lacks stands "
-                "out of this gap"
-            )
-        words = {
-            "numerics": "most of the gap is numerics",
-            "parameters": "most of the gap is parameters",
-            "reality": "most of the gap is what every ideal elastic simulation lacks",
-        }[first]
-        if self.unexplained > self.parts[first].share:
-            words = "most of the gap is not explained"
-        named = ", ".join(n.replace("_", " ") for n in self.effects)
-        rest = ", ".join(n.replace("_", " ") for n in self.candidates)
-        return f"{words}; named: {named}" + (f" (not ruled out: {rest})" if rest else "")
-
-    def lines(self) -> list[str]:
-        """The three parts, a line each, with units."""
-        given = self.simulator.stated
-        said = ", ".join(
-            f"{name} {_value(value)}{'' if name in given.given else ' (of the model)'}"
-            for name, value in given.as_json().items()
-        )
-        version = f" {self.simulator.version}" if self.simulator.version else ""
-        lines = [
-            f"simulator: {self.simulator.name}{version}; stated: {said}",
-            *(f"  note: {note}" for note in self.notes),
-            f"verdict: {self.summary}",
-            f"gap: {self.gap_before_n:.4f} N from simulated to measured force (noise {self.noise_n:.4f} N)",
-        ]
-        for name in PARTS:
-            part = self.parts[name]
-            lines.append(
-                f"  {name}: {part.gap_n:.4f} N, {part.share:.0%} of the gap's square{self._of(part)}"
-            )
-        lines.append(
-            f"  unexplained: {self.unexplained_n:.4f} N, {self.unexplained:.0%} "
-            f"(noise {self.noise_share:.0%}, first touches {self.touch_share:.0%})"
-        )
-        lines.append(
-            f"how far: gap {self.gap_before_n:.4f} N -> {self.gap_after_n:.4f} N once all of it is mended, "
-            "on places not fitted"
-        )
-        if self.gap_after_measured_n is not None:
-            lines.append(f"measured with the mended settings: {self.gap_after_measured_n:.4f} N")
-        lines += [f"  {reason}" for reason in self.reasons]
-        lines += [f"advice: {each}" for each in self.advice]
-        return lines
-
-    def _of(self, part: Part) -> str:
-        if not part.names:
-            return ""
-        words = {e.name: e for e in self.entries}
-        said = [
-            n.replace("_", " ") + (f" {words[n].parameters}" if n in words and words[n].parameters else "")
-            for n in part.names
-        ]
-        return ": " + "; ".join(said)
+    def without_numerics_n(self) -> float:
+        """N, the gap that is left once the numerics alone are mended, as it is said before that is run."""
+        return self.gap_before_n * math.sqrt(max(1 - self.parts["numerics"].share, 0.0))
 
     def as_json(self) -> dict[str, Any]:
         """The contract's keys, and some more."""
@@ -182,10 +138,8 @@ class SimulatedGap(Result):
             "advice": list(self.advice),
             "notes": list(self.notes),
             "reasons": list(self.reasons),
-            "gap_after_measured_n": self.gap_after_measured_n,
+            "gap_after_measured_n": None if self.mended is None else self.mended.gap_n,
+            "gap_without_numerics_n": self.without_numerics_n,
+            "mended": None if self.mended is None else self.mended.as_json(),
             "ideal": self.reality.as_json(),
         }
-
-
-def _value(value: float | None) -> str:
-    return "sticks" if value is None or not math.isfinite(value) else f"{value:g}"

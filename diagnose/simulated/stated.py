@@ -14,6 +14,7 @@ from mechanics.effects.settings import STICKS, Settings
 from mechanics.effects.tip_radius import EFFECT as TIP
 from mechanics.errors import OptionError
 from mechanics.far_field import far_at_poisson
+from mechanics.key_values import number, pairs
 from mechanics.model import Model
 from mechanics.quantities import POISSON_RATIO, TIP_RADIUS, YOUNG_MODULUS
 from mechanics.schema import Key
@@ -59,22 +60,25 @@ class Stated:
         return {name: value if math.isfinite(value) else None for name, value in values.items()}
 
 
-def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> Stated:
-    """KEY=VALUE words, or a mapping, over the model's values. Raises OptionError for what is not known."""
-    pairs = said.items() if isinstance(said, Mapping) else (_pair(word) for word in said or ())
-    values: dict[str, Any] = {}
-    for key, value in pairs:
-        name = ALIASES.get(key.strip().lower(), key.strip().lower())
+def stated_values(said: Iterable[str] | Mapping[str, Any] | None) -> dict[str, float]:
+    """{field of Stated: value} of KEY=VALUE words, or a mapping. Raises OptionError for what is not known."""
+    flag = "--stated"
+    values: dict[str, float] = {}
+    for key, value in pairs(said, flag, "modulus=30000"):
+        name = ALIASES.get(key.lower(), key.lower())
         if name not in KEYS:
             raise OptionError(f"--stated {key}: not known; allowed are {', '.join(KEYS)}")
         if name in values:
             raise OptionError(f"--stated says {name} twice: say it once")
-        try:
-            values[name] = float(value)
-        except (TypeError, ValueError) as error:
-            raise OptionError(f"--stated {key}={value}: it must be a number") from error
+        values[name] = number(flag, key, value)
         if math.isnan(values[name]) or not KEYS[name].takes(values[name]):
             raise OptionError(f"--stated {key}={value}: it must be {KEYS[name].words}")
+    return values
+
+
+def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> Stated:
+    """`stated_values` over the model's. Raises OptionError for what is not known."""
+    values: dict[str, Any] = stated_values(said)
     slip = model.effects.get(SLIP.name, {})
     usual = Stated(
         model.material.young_modulus_pa,
@@ -83,13 +87,6 @@ def stated_of(said: Iterable[str] | Mapping[str, Any] | None, model: Model) -> S
         model.tool.tip_radius_m,
     )
     return dataclasses.replace(usual, **values, given=frozenset(values))
-
-
-def _pair(word: str) -> tuple[str, str]:
-    key, equals, value = word.partition("=")
-    if not equals or not value.strip():
-        raise OptionError(f"--stated '{word}' must be KEY=VALUE, as modulus=30000")
-    return key, value.strip()
 
 
 @dataclass

@@ -276,7 +276,7 @@ def _few(
         gone = f"{round(100 * approach.hysteresis)} % of the work does not come back"
     pull = float(approach.pull_n.max())
     if pull > 0:
-        gone += f", and it pulls by up to {pull:.2g} N on the way out"
+        gone += f", and it pulls by up to {_force(pull)} on the way out"
     assert tests.tip_radius_m is not None
     ways = _ways(tests, bench)
     slopes = [w.slope_n_per_m for w in ways if w.slope_n_per_m]
@@ -323,3 +323,11 @@ def _few(
         parameters={**onset, TOOL.name: {"stiffness_n_per_m": machine.stiffness_n_per_m}},
         notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
     )
+
+
+def _force(newtons: float) -> str:
+    """A force as people write it, down to nanonewtons."""
+    for unit, scale in (("N", 1.0), ("mN", 1e3), ("µN", 1e6)):
+        if newtons * scale >= 0.1:
+            return f"{newtons * scale:.2g} {unit}"
+    return f"{newtons * 1e9:.2g} nN"

@@ -169,6 +169,6 @@ def _why(plan: Plan, first: str, second: str, size: float, sigmas: float) -> str
     held = f", held {plan.hold:.1f} s" if plan.hold > 1 else ""
     return (
         f"of all presses compared, a {pace}, {depth} one{extra}{held} at this place parts "
-        f"{first.replace('_', ' ')} from {second.replace('_', ' ')} most: {size * 1e3:.0f} mN rms, "
+        f"{first.replace('_', ' ')} from {second.replace('_', ' ')} most: typically {size * 1e3:.0f} mN, "
         f"{sigmas:.0f} times what noise and our own errors would do"
     )

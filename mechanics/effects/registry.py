@@ -39,17 +39,22 @@ NAMES = (
 )
 
 
-def effect(name: str) -> Effect:
-    """The effect of that name; raises OptionError for an unknown one."""
+def known(name: str) -> None:
+    """Raise OptionError for a name that no effect has."""
     if name not in NAMES:
         raise OptionError(unknown(name, "effect", NAMES))
+
+
+def effect(name: str) -> Effect:
+    """The effect of that name; raises OptionError for an unknown one."""
+    known(name)
     return importlib.import_module(f"mechanics.effects.{name}").EFFECT
 
 
 def effects(*, without: frozenset[str] | set[str] = frozenset()) -> tuple[Effect, ...]:
     """All effects but those named; raises OptionError where one of these is unknown."""
     for name in without:
-        effect(name)
+        known(name)
     return tuple(effect(name) for name in NAMES if name not in without)
 
 

@@ -14,7 +14,7 @@ from mechanics.files import Kind, atomic_file
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from mechanics.surface_files import UNITS
-from palpate.exporting import abaqus, gmsh, mujoco, sofa, stl
+from palpate.exporting import abaqus, gmsh, mujoco, scripts, sofa, stl, usd
 from palpate.exporting.subject import Subject, subject_of
 
 Writer = Callable[[Path, Subject], tuple[str, ...]]
@@ -27,6 +27,7 @@ def _page(path: Path, subject: Subject, **more: Any) -> tuple[str, ...]:
     return document.write(path, subject, **more)
 
 
+SCRIPT = Kind("a script of palpate export", (b"# Palpate model",))
 FORMATS: dict[str, tuple[str, Writer, Kind]] = {
     "mujoco": (".xml", mujoco.write, Kind("a scene of palpate export", (b"<!-- Palpate model",))),
     "sofa": (".scn", sofa.write, Kind("a scene of palpate export", (b"<?xml",), holds=b"<!-- Palpate model")),
@@ -41,6 +42,9 @@ FORMATS: dict[str, tuple[str, Writer, Kind]] = {
         _page,
         Kind("a page of palpate export", (b"<!doctype html>",), holds=b"Made by palpate"),
     ),
+    "usd": (".usda", usd.write, Kind("a stage of palpate export", (b"#usda 1.0",), holds=b"Palpate model")),
+    "newton": (".py", scripts.write_newton, SCRIPT),
+    "drake": (".py", scripts.write_drake, SCRIPT),
     "stl": (".stl", stl.write, Kind("an STL of palpate export", (stl.HEADER,))),
 }
 """Name -> the file's suffix, its writer, which returns what the format cannot say, and how such a file

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
 
+from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
 from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.nearest import closest
 from mechanics.tetmesh import TetMesh
+from render.simulators.base import graded
 
+USUAL_FRICTION = 0.5
 DENSITY_KG_M3 = 1000.0
 """Of soft tissue and silicone; a model states none, and a quasi-static press does not ask."""
 
@@ -39,6 +43,27 @@ class Subject:
     def element_modulus_pa(self) -> np.ndarray:
         """(m,) Pa."""
         return self.model.material.young_modulus_pa * self.model.element_ratio
+
+    @property
+    def mean_modulus_pa(self) -> float:
+        """Pa, by volume, for a program that knows one modulus."""
+        return float(np.average(self.element_modulus_pa, weights=self.mesh.volumes))
+
+    @property
+    def friction(self) -> float:
+        """Coulomb's coefficient: the model's, else a usual one."""
+        mu = self.model.effects.get(SLIP.name, {}).get("mu")
+        return USUAL_FRICTION if mu is None or not math.isfinite(mu) else float(mu)
+
+    @property
+    def friction_note(self) -> str:
+        """Where the friction comes from, in words."""
+        own = self.friction != USUAL_FRICTION
+        return f"friction {self.friction:g}, " + ("of the model" if own else "as the model names none")
+
+    def graded(self) -> TetMesh:
+        """The linear mesh with edges of half the tip's radius under it, where the model's are longer."""
+        return graded(self.mesh.linear(), self.top, 0.5 * self.radius_m, 1.2 * self.radius_m)
 
     @property
     def radius_m(self) -> float:

@@ -8,6 +8,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, TypeVar
 
+from mechanics.key_values import pairs
 from palpate.importing.meaning import Unclear
 from palpate.operations._declare import Call
 
@@ -28,17 +29,9 @@ def with_answers(work: Callable[[Any, Call], T], asked: Any, call: Call) -> T:
             answer = _answer(unclear)
             if unclear.option == "units":
                 kind, _, unit = answer.partition("=")
-                answer = {**dict(_pairs(call.given.get("units"))), kind: unit}
+                answer = {**dict(pairs(call.given.get("units"), "--units", "position=mm")), kind: unit}
             asked = dataclasses.replace(asked, **{unclear.option: answer})
             call = dataclasses.replace(call, given={**call.given, unclear.option: answer})
-
-
-def _pairs(given: Any) -> list[tuple[str, str]]:
-    if given is None:
-        return []
-    if hasattr(given, "items"):
-        return list(given.items())
-    return [(word.partition("=")[0], word.partition("=")[2]) for word in given]
 
 
 def _answer(unclear: Unclear) -> Any:

@@ -65,8 +65,16 @@ def answer(
         out.say(f"written: {output}")
     if page is not None:
         out.say(f"report: {result.report(page)}")
+    say_next(result, out)
     out.json({**(figures or {}), **result.as_json()})
     return 0
+
+
+def say_next(result: Any, out: Output) -> None:
+    """Say what to do with a result."""
+    from palpate.show import next_lines
+
+    out.say(*next_lines(result))
 
 
 def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:

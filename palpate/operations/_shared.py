@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
+from mechanics.key_values import pairs
 from mechanics.surface_files import UNITS, is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand
 from palpate.operations._flags import natural
@@ -164,15 +164,5 @@ def _split(text: str) -> list[str]:
 
 def named(given: Any, flag: str) -> dict[str, str]:
     """{name: value} of NAME=VALUE words, or of what is such a mapping already; raises OptionError."""
-    if isinstance(given, Mapping):
-        return dict(given)
     example = {"columns": "t=Time", "units": "position=mm"}[flag]
-    found: dict[str, str] = {}
-    for text in given or ():
-        name, equals, value = text.partition("=")
-        if not equals or not value:
-            raise OptionError(f"--{_FLAGS.get(flag, flag)} '{text}' must be two words like {example}")
-        if name.strip() in found:
-            raise OptionError(f"--{_FLAGS.get(flag, flag)} says '{name.strip()}' twice: say it once")
-        found[name.strip()] = value.strip()
-    return found
+    return dict(pairs(given, f"--{_FLAGS.get(flag, flag)}", example))

@@ -16,7 +16,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
+from mechanics.key_values import pairs
 from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._run import say_next
 from palpate.operations._shared import seed_operand
 from palpate.output import Output
 
@@ -61,6 +63,7 @@ class BatchOperands:
 def _answer(result: Batch, asked: BatchOperands, out: Output) -> int:
     """2 where not one recording came through, 1 where a model is not to be believed."""
     out.say(*result.lines())
+    say_next(result, out)
     out.json(result.as_json())
     if result.failed:
         words = (
@@ -104,11 +107,11 @@ def options_of(
     if values is None or isinstance(values, Mapping):
         return values
     found: dict[str, dict[str, Any]] = {}
-    for text in values:
-        name, equals, value = text.partition("=")
+    example = "diagnose.fast=true"
+    for name, value in pairs(values, "--set", example):
         step, dot, option = name.partition(".")
-        if not (equals and dot and step and option):
-            raise OptionError(f"--set '{text}' must be STEP.OPTION=VALUE, such as diagnose.fast=true")
+        if not (dot and step and option):
+            raise OptionError(f"--set '{name}={value}' must be STEP.OPTION=VALUE, such as {example}")
         try:
             read: Any = tomllib.loads(f"x = {value}")["x"]
         except (tomllib.TOMLDecodeError, RecursionError):

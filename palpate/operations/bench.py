@@ -71,17 +71,17 @@ def _keep(path: str, asked: BenchOperands, figures: Any) -> None:
     print(f"kept: {kept}", file=sys.stderr)
 
 
-_WHERE_KEPT = ("--evidence", "--json", "--work")
+_PLACES = ("--evidence", "--json", "--work", "--data", "--python")
 
 
 def _deciding(words: list[str]) -> list[str]:
-    """The options that decide what was measured, without those that say where results are kept."""
+    """The options that decide what was measured, without those that say where on a machine things lie."""
     kept: list[str] = []
     left_out = False
     for word in words:
         if word.startswith("-") and word != "-":
-            left_out = word in _WHERE_KEPT
-            if left_out or word.startswith(tuple(f"{name}=" for name in _WHERE_KEPT)):
+            left_out = word in _PLACES
+            if left_out or word.startswith(tuple(f"{name}=" for name in _PLACES)):
                 continue
         elif left_out:
             left_out = False

@@ -1,10 +1,10 @@
-"""FEM against the interpolated 1D models on held-out palpations and held-out regions of one recording; or,
-with REC2, two recordings of one object (before and after, two tools): their moduli, the difference, what
-explains it.
+"""Which model predicts a touch that it has not seen: finite elements (FEM), or springs and dampers that are
+interpolated between presses (1D). Or, with REC2, two recordings of one object (before and after, two tools):
+their moduli, the difference, what explains it.
 
-Of --model only the geometry is used; every parameter is refitted in each fold. Errors are rms force vectors
-over contact samples that the fit has not seen, N; bias is the share by which the predicted force is too
-large.
+Single places are left out of the fits, then whole regions. Of --model only the geometry is used; all else is
+fitted anew each time. Errors are root mean squares of the force vector in contact, N; bias is the share by
+which the predicted force is too large.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from diagnose.compare.comparison import CompareOptions
 from mechanics.errors import OptionError
+from mechanics.progress import part
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import (
     MeshFileOptions,
@@ -22,6 +23,12 @@ from palpate.operations._shared import (
     recording_operand,
     report_operand,
     seed_operand,
+)
+from palpate.operations._simulators import (
+    numbers_operand,
+    run_along,
+    settings_operand,
+    simulator_operand,
 )
 from palpate.operations.diagnose import diagnose
 from palpate.operations.load import load
@@ -42,6 +49,9 @@ class CompareOperands:
     recording: RecordingLike = recording_operand()
     model: ModelLike | None = model_flag("take the geometry from it; default: reconstruct")
     _: KW_ONLY
+    renderer: str | None = simulator_operand("another simulator beside them, run along the path")
+    simulator_settings: str = settings_operand()
+    simulator_set: str = numbers_operand()
     other: str | None = operand(
         None,
         "a second recording of the object: say what differs instead (--no-diagnosis: moduli alone)",
@@ -65,9 +75,12 @@ def compare(asked: CompareOperands, call: Call) -> Comparison:
     model: only its geometry is used, every parameter is refitted in each fold; without one the recording is
     reconstructed. Raises ContactError for fewer sites than two.
     """
+    from diagnose.compare.comparison import Along
     from diagnose.compare.comparison import compare as compared
 
     if asked.other is not None:
+        if asked.renderer is not None:
+            raise OptionError("--renderer goes with one recording: it is set beside the models of it")
         if asked.model:
             raise OptionError("--model goes with one recording: two are reconstructed each by itself")
         two: Any = changes(
@@ -78,7 +91,16 @@ def compare(asked: CompareOperands, call: Call) -> Comparison:
     chosen, measured = call.of(CompareOptions), read_recording(asked.recording)
     with call.progress("compare") as tell:
         plain = None if source is None else load(source, progress=tell)
-        return compared(measured, plain, chosen, seed=asked.seed, progress=tell)
+        if asked.renderer is None:
+            return compared(measured, plain, chosen, seed=asked.seed, progress=tell)
+        if plain is None:
+            plain = reconstruct(measured, seed=asked.seed, progress=part(tell, 0.0, 0.3)).model
+        settings, numbers = asked.simulator_settings, asked.simulator_set
+        ran = run_along(asked.renderer, settings, numbers, plain, measured, part(tell, 0.3, 0.7))
+        simulated = {asked.renderer: Along(measured.t, ran.force)}
+        return compared(
+            measured, plain, chosen, simulated=simulated, seed=asked.seed, progress=part(tell, 0.7, 1.0)
+        )
 
 
 @dataclass(frozen=True)

@@ -19,6 +19,8 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import recording_operand, seed_operand
 from palpate.output import Output
 
+MEANWHILE = "what this makes is there to be touched already: 'palpate touch' in another terminal"
+
 
 @dataclass(frozen=True)
 class DemoOperands:
@@ -38,12 +40,14 @@ class DemoOperands:
 
 
 def _answer(found: tuple[DemoResult, Path], asked: DemoOperands, out: Output) -> int:
+    from palpate.show import next_lines
+
     result, report = found
     at = Path(asked.folder) / "model"
     out.say(
         *result.lines(),
         f"report: {report.resolve()}",
-        f"to feel it: palpate touch {at if asked.recording else ''}".rstrip(),
+        *next_lines(result),
     )
     out.json({**result.as_json(), "report": str(report.resolve())})
     if asked.window or (asked.window is None and _has_screen()):
@@ -62,6 +66,8 @@ def demo(asked: DemoOperands, call: Call) -> tuple[DemoResult, Path]:
 
     folder = Path(asked.folder)
     check_target(folder / "model", MODEL)
+    if not asked.recording and sys.stderr.isatty():  # as a bar is shown: elsewhere errors alone stand there
+        print(MEANWHILE, file=sys.stderr)
     with sole_writer(folder):
         source = asked.recording or embedded_recording()
         result = run_demo(source, folder, call.of(DemoOptions), asked.seed)

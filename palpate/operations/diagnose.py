@@ -1,9 +1,9 @@
-"""The sim-to-real gap: where the simulated force leaves the measured one, which effect was left out, how far
-the gap shrinks.
+"""What is wrong with a simulation: where its force leaves the measured one, which effect was left out, and
+how far the gap between them shrinks with it.
 
 REC is a recording's .csv, .csv.gz or .toml. Without --model the recording is reconstructed first. The answer
 may be one effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown".
-Forces in N (rms of the 3-vector over contact samples of held-out places), lengths in m, moduli in Pa.
+Forces in N (root mean square in contact, at places that the fit had not seen), lengths in m, moduli in Pa.
 With --simulated FORCES.csv (t,fx,fy,fz: s, and N on the tool, along the recorded path) it is the gap of that
 simulator, in three parts: its numerics, the parameters that it was given, and what every ideal elastic
 simulation lacks.
@@ -17,7 +17,9 @@ from typing import TYPE_CHECKING, Any
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from diagnose.simulated.forces import ForcesOptions
 from mechanics.errors import OptionError
+from mechanics.progress import part
 from palpate.operations._declare import Call, operand, operation
+from palpate.operations._run import say_next
 from palpate.operations._shared import (
     MODEL,
     SAMPLES,
@@ -28,11 +30,18 @@ from palpate.operations._shared import (
     report_operand,
     seed_operand,
 )
+from palpate.operations._simulators import (
+    mended,
+    numbers_operand,
+    run_along,
+    settings_operand,
+    simulator_operand,
+)
 from palpate.operations.load import load
 from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.output import Output
-from render.registry import simulator_names
+from render.registry import check_settings
 
 if TYPE_CHECKING:
     from diagnose.simulated.result import SimulatedGap
@@ -58,28 +67,16 @@ class DiagnoseOperands:
         metavar="FORCES.csv",
         reads=True,
     )
-    renderer: str | None = operand(
-        None,
-        "a simulator that is run along the recorded path, instead of --simulated",
-        choices=simulator_names(),
+    renderer: str | None = simulator_operand(
+        "a simulator that is run along the recorded path, instead of --simulated"
     )
-    simulator_settings: str = operand(
-        "documented",
-        "of --renderer: as its own documentation says, or as good as it gets",
-        choices=("documented", "best"),
-        rare=True,
-    )
-    simulator_set: str = operand(
-        "",
-        "numbers of these settings to change: KEY=VALUE, comma separated",
-        metavar="KEY=VALUE,...",
-        rare=True,
-    )
+    simulator_settings: str = settings_operand()
+    simulator_set: str = numbers_operand()
     mended: str | None = operand(
         None,
-        "run --renderer once more with these numbers, and measure the gap that is left",
-        metavar="KEY=VALUE,...",
-        rare=True,
+        "run --renderer once more as the advice says, and measure the gap that is left: best, or numbers of "
+        "its settings (KEY=VALUE, comma separated)",
+        metavar="SETTINGS",
     )
     stated: Any = operand(
         None,
@@ -122,6 +119,10 @@ def _answer(result: Any, asked: DiagnoseOperands, out: Output) -> int:
         out.say(f"corrected recording: {asked.corrected}")
     if asked.report:
         out.say(f"report: {result.report(asked.report)}")
+    if asked.apply:
+        out.say(f"next: feel it: palpate touch {asked.apply}")
+    else:
+        say_next(result, out)
     out.json(result.as_json())
     return 0
 
@@ -172,43 +173,55 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
         if asked.renderer is None and forces is None:
             return diagnosed(measured, made, options, rest, **rules)
         from diagnose.simulated.pipeline import Asked, diagnose_simulated
+        from diagnose.simulated.result import Mended
         from diagnose.simulated.stated import stated_of
 
         if forces is not None:
             simulation = Asked(forces, stated_of(asked.stated, made), call.of(ForcesOptions))
             return diagnose_simulated(measured, made, simulation, options, rest, **rules)
-        simulation = _simulation(asked, measured, made, asked.simulator_set, tell)
-        found = diagnose_simulated(measured, made, simulation, options, rest, **rules)
+        settings, numbers = asked.simulator_settings, asked.simulator_set
+
+        def simulation_of(settings: str, numbers: str, tell: Progress) -> Any:
+            return _simulation(asked, call, measured, made, settings, numbers, tell)
+
+        told = part(tell, begun, 1.0)
+        simulation = simulation_of(settings, numbers, part(told, 0.0, 0.4))
+        found = diagnose_simulated(measured, made, simulation, options, part(told, 0.4, 0.8), **rules)
         if asked.mended is None:
             return found
-        again = _simulation(asked, measured, made, asked.mended, tell)
-        left = diagnose_simulated(measured, made, again, options, rest, reality=found.reality, **rules)
-        return replace(found, gap_after_measured_n=left.gap_before_n)
+        after = mended(settings, numbers, asked.mended)
+        again = simulation_of(*after, part(told, 0.8, 0.95))
+        left = diagnose_simulated(
+            measured, made, again, options, part(told, 0.95, 1.0), reality=found.reality, **rules
+        )
+        return replace(found, mended=Mended(again.run_as, left.gap_before_n, left.effects))
 
 
 def _simulation(
-    asked: DiagnoseOperands, measured: Recording, model: Model, numbers: str, tell: Progress
+    asked: DiagnoseOperands,
+    call: Call,
+    measured: Recording,
+    model: Model,
+    settings: str,
+    numbers: str,
+    tell: Progress,
 ) -> Any:
     """A simulator that is run along the recorded path; and what it says of itself."""
-    from diagnose.simulated.forces import Forces, ForcesOptions
+    from diagnose.simulated.forces import Forces
     from diagnose.simulated.pipeline import Asked
-    from diagnose.simulated.stated import stated_of
-    from render.options import RenderOptions
-    from render.registry import create
-    from render.replay import replay_recording
+    from diagnose.simulated.stated import stated_of, stated_values
 
     assert asked.renderer is not None
-    settings = RenderOptions(simulator_settings=asked.simulator_settings, simulator_set=numbers)
-    made: Any = create(asked.renderer, model, settings, tell)
-    force = replay_recording(made, measured, tell)
-    said = f"settings {asked.simulator_settings}" + (f", {numbers}" if numbers else "")
+    ran = run_along(asked.renderer, settings, numbers, model, measured, tell)
     notes = (
-        f"run here along the recorded path: {said}",
-        *(f"it cannot say: {x}" for x in made.adapter.cannot),
+        f"run here along the recorded path: {ran.said}",
+        *(f"it cannot say: {x}" for x in ran.adapter.cannot),
     )
-    forces = Forces(measured.t, force, asked.renderer, notes)
-    stated = stated_of(asked.stated or made.adapter.stated, model)
-    return Asked(forces, stated, ForcesOptions(clock_offset_s=0.0), made.adapter.version, made.adapter.advice)
+    forces = Forces(measured.t, ran.force, asked.renderer, notes)
+    # what the adapter gave it, but for what is said
+    stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
+    own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
+    return Asked(forces, stated, own_clock, ran.adapter.version, ran.adapter.advice, ran.said)
 
 
 def _forces(asked: DiagnoseOperands) -> Any:
@@ -217,10 +230,19 @@ def _forces(asked: DiagnoseOperands) -> Any:
         raise OptionError("--simulated and --renderer both name a simulator: name one")
     if asked.mended is not None and asked.renderer is None:
         raise OptionError("--mended runs a simulator once more: name it by --renderer")
+    if asked.renderer is not None:
+        settings, numbers = asked.simulator_settings, asked.simulator_set
+        for each in ((settings, numbers), mended(settings, numbers, asked.mended or "")):
+            check_settings(asked.renderer, *each)
     if asked.simulated is None:
         if asked.stated and asked.renderer is None:
             words = "name its forces by --simulated, or the simulator by --renderer"
             raise OptionError(f"--stated says what a simulator was given: {words}")
+    if asked.stated:
+        from diagnose.simulated.stated import stated_values
+
+        stated_values(asked.stated)
+    if asked.simulated is None:
         return None
     from diagnose.simulated.forces import read_forces, sorted_forces
 

@@ -85,6 +85,8 @@ class ExploreOperands:
 
 
 def _answer(figures: dict[str, Any], asked: ExploreOperands, out: Output) -> int:
+    if not asked.robot:  # whose lines are all JSON
+        out.say(f"next: make a model of it: palpate reconstruct {asked.output} -o MODEL")
     out.json({"recording": asked.output, **figures})
     return 0
 
@@ -202,7 +204,7 @@ def _on_phantom(
             state = explorer.add(robot.carry_out(suggestion))
             explorer.save(asked.output)
             steps.append({"suggest": suggestion.table(), "state": state.table()})
-    call.out.say(f"written to {asked.output}: palpate reconstruct {asked.output} -o MODEL makes the model")
+    call.out.say(f"written to {asked.output}")
     figures = {"steps": steps, **explorer.state.table()}
     if robot.last is not None:
         figures["truth"] = dict(robot.last.truth)

@@ -128,6 +128,8 @@ def _answer(result: Imported, asked: ImportOperands, out: Output) -> int:
     out.say(*result.lines())
     if not asked.dry_run:
         out.say(f"written: {result.save(str(asked.output))}")
+        look = "" if where == "none" else f"look at {where}, then "
+        out.say(f"next: {look}check it: palpate check {asked.output}")
     out.json({"recording": asked.output, **result.as_json()})
     return 0
 

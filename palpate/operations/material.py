@@ -20,6 +20,7 @@ from palpate.operations._shared import (
     columns_operand,
     named,
     poisson_operand,
+    report_operand,
     seed_operand,
     tip_radius_operand,
     units_operand,
@@ -60,6 +61,7 @@ class MaterialOperands:
         None, "where time goes back: one clock, or blocks with their own", choices=("one", "blocks")
     )
     fast: bool = operand(False, "fewer effects are tried", rare=True)
+    report: str | None = report_operand("write the answer with its curves as a page")
     seed: int = seed_operand()
 
 

@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
 from palpate.operations._declare import Call, operand, operation
+from palpate.operations._run import say_next
 from palpate.operations._shared import (
     MODEL,
     columns_operand,
@@ -74,7 +75,8 @@ def _answer(result: Opened, asked: OpenOperands, out: Output) -> int:
         first = Path(asked.files[0])
         page = f"{first.name.split('.')[0] or 'opened'}-palpate.html"
     if page != "none":
-        out.say(f"page: {result.report(page)}")
+        out.say(f"report: {result.report(page)}")
+    say_next(result, out)
     out.json(result.as_json())
     return 0 if result.good else 1
 

@@ -69,7 +69,7 @@ def _answer(curve: Curve, asked: PressOperands, out: Output) -> int:
     expected = read_curve(asked.expect) if asked.expect else None
     if asked.output:
         curve.save(asked.output)
-    out.say(*curve.lines())
+    out.say(*curve.lines(), *([f"written: {asked.output}"] if asked.output else []))
     figures, code = curve.as_json(), 0
     if expected is not None:
         worst, when = greatest_difference(curve, expected)

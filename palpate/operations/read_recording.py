@@ -30,14 +30,18 @@ def read_recording(asked: ReadOperands, call: Call) -> Recording:
     Raises RecordingError for what is missing or impossible.
     """
     from mechanics.recording import Recording as Plain
+    from mechanics.recording import check_sane
     from mechanics.recording import read_recording as read
     from scenes.embedded import embedded_names, embedded_recording
 
     source = asked.source
-    if isinstance(source, Plain):
-        return source
-    held = getattr(source, "recording", None)
+    held = source if isinstance(source, Plain) else getattr(source, "recording", None)
     if isinstance(held, Plain):
+        try:
+            check_sane(held)  # arrays get what files get
+        except RecordingError as error:
+            words = "pp.recording(t, position, force, tip_radius=..., units=...) takes arrays in other units"
+            raise RecordingError(f"{error}; {words}") from error
         return held
     if str(source) in embedded_names():
         return read(embedded_recording(str(source)))

@@ -17,9 +17,11 @@ from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
 from mechanics.files import JSON, PNG, atomic_file
+from mechanics.key_values import number, pairs
 from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._flags import natural
+from palpate.operations._run import say_next
 from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand
 from palpate.output import Output, emit_json
 from scenes.laboratory.effects import REGISTRY
@@ -86,16 +88,11 @@ def effects_from(given: Mapping[str, float] | Sequence[str] | None) -> dict[str,
     if given is None or isinstance(given, Mapping):
         return None if given is None else dict(given)
     out = {}
-    for text in given:
-        name, _, value = text.partition("=")
+    flag, words = "--effect", [text if "=" in text else f"{text}=1" for text in given]
+    for name, value in pairs(words, flag, "friction_slip=1"):
         if name not in REGISTRY:
-            raise OptionError(f"--effect {text}: {unknown(name, 'effect', REGISTRY)}")
-        try:
-            out[name] = float(value) if value else 1.0
-        except ValueError:
-            raise OptionError(
-                f"--effect {text}: '{value}' is no number; write NAME=STRENGTH, such as {name}=1"
-            ) from None
+            raise OptionError(f"{flag} {name}={value}: {unknown(name, 'effect', REGISTRY)}")
+        out[name] = number(flag, name, value)
     return out
 
 
@@ -120,6 +117,7 @@ def _answer(result: Simulation, asked: SimulateOperands, out: Output) -> int:
         del summary["truth"]
     words = result.lines()
     out.say(*(words[:1] if asked.seal else words), f"written to {path}")
+    say_next(result, out)
     out.json(summary)
     return 0
 

@@ -2,8 +2,8 @@
 
 MODEL_OR_SCENE is a MODEL folder, a scene (demo, silicone-1, silicone-2, silicone-3, bean, nodule,
 your-recording, or a scene's .toml), a recording, a phantom, or the file of a surface (STL, OBJ, PLY, glTF,
-VTP, VTU, MSH, INP) with --unit and --modulus. In the window the mouse hovers over the
-object, the left button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
+VTP, VTU, MSH, INP) with --unit and --modulus. In the window the mouse hovers over the object, the left button
+presses, the wheel sets the depth, the right button turns the view; buttons do the rest.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from dataclasses import KW_ONLY, dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -31,26 +32,33 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
 from palpate.output import Output, progress_bar
 from palpate.servo import SafetyOptions, ServoOptions, ServoReport
+from palpate.warm_up import warming_up
 from palpate.window.session import SessionOptions, TouchSession
 from render.options import RenderOptions
 from render.registry import names
 from render.support import SupportOptions
 from scenes.build import model_of
 from scenes.exploration import ExplorationOptions, explore
-from scenes.scene import Scene
+from scenes.scene import Scene, load_scene, scene_names
 
 if TYPE_CHECKING:
     from palpate.window.guide import Guide
 
 POLL_S = 0.1
+DEFAULT = "demo"
 
 
 @dataclass(frozen=True)
 class TouchOperands:
     """The scene, the device, the window."""
 
-    scene: str = operand(
-        "demo", "what to touch", metavar="MODEL_OR_SCENE", positional=True, count="?", reads=True
+    scene: str | None = operand(
+        None,
+        "what to touch; None: chosen in the window, without one demo",
+        metavar="MODEL_OR_SCENE",
+        positional=True,
+        count="?",
+        reads=True,
     )
     _: KW_ONLY
     device: str | None = operand(
@@ -92,7 +100,8 @@ class Touched:
     def lines(self) -> list[str]:
         """For a person."""
         recorded = [] if self.record is None else [f"recorded {self.record}"]
-        return [f"{self.scene.title}: {self.renderer}, {self.device}", str(self.report), *recorded]
+        report = self.report.text(sent=spec_of(self.device).has_force)
+        return [f"{self.scene.title}: {self.renderer}, {self.device}", report, *recorded]
 
 
 def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
@@ -120,7 +129,6 @@ def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
 )
 def touch(asked: TouchOperands, call: Call) -> Touched | None:
     """Open, touch, close; None where the window was closed before the touch began."""
-    scene = given_scene(asked.scene, call)
     name = asked.device or ("simulated" if asked.headless else "mouse")
     _check(asked, name)
     servo_options = call.of(
@@ -128,73 +136,104 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
     )
     for word in servo_options.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
+    with warming_up() as compiling:  # while a person chooses, too
+        opening = _Opening(asked, call, name, servo_options, compiling)
+        return _in_window(opening) if not asked.headless else _without(opening)
+
+
+def _without(opening: _Opening) -> Touched:
+    """Touch without a window."""
+    asked = opening.asked
+    scene = opening.scene(asked.scene or DEFAULT)
     with ExitStack() as stack:
-        channel = stack.enter_context(closing(PoseChannel.create())) if name == "mouse" else None
-
-        def prepare(tell: Progress) -> tuple[TouchSession, float | None]:
-            model = model_of(scene, lambda stage, share: tell(stage, 0.5 * share))
-            if channel is not None:
-                channel.write(time.perf_counter(), tuple(_above(model)))
-            device, until = device_choice(asked, call, name, model, channel)
-            session = stack.enter_context(
-                TouchSession(
-                    model,
-                    title=scene.title,
-                    device=device,
-                    mapping=_mapping(call, name, scene, model),
-                    options=SessionOptions(
-                        renderer=asked.renderer or scene.renderer,
-                        beside=_beside(asked, scene),
-                        render=with_friction(call.of(RenderOptions), scene),
-                        servo=servo_options,
-                        recording=None if asked.record is None else Path(asked.record),
-                        pictures=not asked.headless,
-                    ),
-                )
-            )
-            session.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
-            return session, until
-
-        if asked.headless:
-            with progress_bar("touch") as bar:
-                session, until = prepare(bar)
-            session.enable()
-            _wait(session, until if asked.seconds is None else asked.seconds)
-        else:
-            shown = _in_window(prepare, scene, channel, asked)
-            if shown is None:
-                return None
-            session = shown
-        report = session.report()
-    return Touched(scene, name, session.renderer_name, report, asked.record, session.servo.failure)
-
-
-def _in_window(
-    prepare: Callable[[Progress], tuple[TouchSession, float | None]],
-    scene: Scene,
-    channel: PoseChannel | None,
-    asked: TouchOperands,
-) -> TouchSession | None:
-    """A window from the first moment on, which shows how the preparation comes along; then the touch. None
-    where a person closes it before."""
-    from palpate.window.waiting import ClosedError, WaitingWindow
-    from palpate.window.window import SIZE, TouchWindow
-
-    waiting = WaitingWindow(f"Palpate: {scene.title}", SIZE)
-    try:
-        session, until = waiting.run(prepare)
+        with progress_bar("touch") as bar:
+            session, until = opening.session(stack, scene, None, bar)
         session.enable()
-        guide = None if asked.guide is None else asked.guide(session)
-        window = TouchWindow(session, scene, channel, guide=guide)
-        seconds = until if asked.seconds is None else asked.seconds
-        picture = None if asked.screenshot is None else Path(asked.screenshot)
-        window.run(seconds, screenshot=picture, shown=waiting.close)
-    except ClosedError as error:
-        print(f"palpate touch: {error}", file=sys.stderr)
-        return None
-    finally:
-        waiting.close()
-    return session
+        _wait(session, until if asked.seconds is None else asked.seconds)
+        return opening.touched(session, scene)
+
+
+@dataclass(frozen=True)
+class _Opening:
+    """What was asked for, of whichever scene. compiling: waits for the loop's kernels."""
+
+    asked: TouchOperands
+    call: Call
+    device: str
+    servo: ServoOptions
+    compiling: Callable[[], object]
+
+    def scene(self, name: str) -> Scene:
+        return given_scene(name, self.call)
+
+    def session(
+        self, stack: ExitStack, scene: Scene, channel: PoseChannel | None, tell: Progress
+    ) -> tuple[TouchSession, float | None]:
+        """A started session, which the stack closes, and when its device will have done (s)."""
+        asked, call = self.asked, self.call
+        model = model_of(scene, lambda stage, share: tell(stage, 0.4 * share))
+        if channel is not None:
+            channel.write(time.perf_counter(), tuple(_above(model)))
+        device, until = device_choice(asked, call, self.device, model, channel)
+        options = SessionOptions(
+            renderer=asked.renderer or scene.renderer,
+            beside=_beside(asked, scene),
+            render=with_friction(call.of(RenderOptions), scene),
+            servo=self.servo,
+            recording=None if asked.record is None else Path(asked.record),
+            pictures=not asked.headless,
+        )
+        mapping = _mapping(call, self.device, scene, model)
+        if options.renderer == "fem":
+            tell("compiling, once after an installation", 0.4)
+            self.compiling()
+        session = TouchSession(model, title=scene.title, device=device, mapping=mapping, options=options)
+        stack.enter_context(session).start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
+        return session, until
+
+    def touched(self, session: TouchSession, scene: Scene) -> Touched:
+        """What was done."""
+        report, failure = session.report(), session.servo.failure
+        return Touched(scene, self.device, session.renderer_name, report, self.asked.record, failure)
+
+
+def _in_window(opening: _Opening) -> Touched | None:
+    """A window from the first moment on, where a scene is chosen and which shows how the preparation comes
+    along; then the touch, of one scene after the other. None where a person closes it before."""
+    from palpate.window.waiting import ClosedError, WaitingWindow
+    from palpate.window.window import TouchWindow
+
+    asked = opening.asked
+    # who says how long is not there to choose
+    name = asked.scene or (None if asked.seconds is None and asked.guide is None else DEFAULT)
+    chosen = None if name is None else opening.scene(name)
+    while True:
+        with ExitStack() as stack:
+            waiting = stack.enter_context(closing(WaitingWindow(_gallery() if chosen is None else ())))
+            mouse = opening.device == "mouse"
+            channel = stack.enter_context(closing(PoseChannel.create())) if mouse else None
+            try:
+                scene = chosen or opening.scene(waiting.choose().name)
+                prepare = partial(opening.session, stack, scene, channel)
+                session, until = waiting.run(scene.title, prepare)
+            except ClosedError as error:
+                print(f"palpate touch: {error}", file=sys.stderr)
+                return None
+            session.enable()
+            guide = None if asked.guide is None else asked.guide(session)
+            window = TouchWindow(session, scene, channel, guide=guide)
+            seconds = until if asked.seconds is None else asked.seconds
+            picture = None if asked.screenshot is None else Path(asked.screenshot)
+            window.run(seconds, screenshot=picture, shown=waiting.close)
+            if not window.another:
+                return opening.touched(session, scene)
+        chosen = None
+
+
+def _gallery() -> list[Scene]:
+    """What there is to choose from, the demo's object first; one is there to be copied, not touched."""
+    there = [name for name in scene_names() if name not in (DEFAULT, "your-recording")]
+    return [load_scene(name) for name in (DEFAULT, *there)]
 
 
 def _check(asked: TouchOperands, name: str) -> None:

@@ -161,11 +161,14 @@ class Servo:
         """Force off, at once."""
         self.arrays.control[ENABLE] = 0
 
-    def set_renderer(self, name: str, progress: Progress = silent) -> None:
-        """Go on with another renderer of the same model, swapped between two ticks once it is ready."""
+    def set_renderer(self, name: str, progress: Progress = silent, *, options: Any = None) -> None:
+        """Go on with another renderer of the same model, swapped between two ticks once it is ready.
+
+        options: the renderer's, None for those of before.
+        """
         if not isinstance(self._source, ModelSource):
             raise PalpateError("only a model's renderer can be switched by name: start with a model")
-        self.set_source(self._source.named(name), progress)
+        self.set_source(self._source.named(name, options), progress)
 
     def set_model(self, model: Model | Path | str, progress: Progress = silent) -> None:
         """Go on with another model through the same renderer, with the same options."""

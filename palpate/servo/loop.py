@@ -12,9 +12,9 @@ import time
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import njit, types
+from numba import njit, typeof, types
 
-from mechanics.kernels import kept, loop_kernel, pointer
+from mechanics.kernels import kept, loop_kernel, pointer, step_type
 from palpate.servo.clock import COMPILED, c_function, compiled_now_ns, compiled_sleep_until, sleep_until
 from palpate.servo.layout import DEADLINE, STATUS, STOP
 from palpate.servo.tick import TickArrays, TickParameters, account, after, before
@@ -95,6 +95,17 @@ def make_program(scene: TouchScene, arrays: TickArrays, parameters: TickParamete
         loop = kept(compiled_loop, renderer.parameters)
         loop(kernel, renderer.parameters, state, scene.support, arrays, parameters, -1, 0)
     return Program(scene, kernel, loop, state, parameters)
+
+
+def compile_loop(scene: TouchScene, state: Any, arrays: TickArrays, parameters: TickParameters) -> None:
+    """Compile the loop for a scene of this kind, which asks for the type of its step alone, not for the step:
+    another process may compile that meanwhile."""
+    renderer = scene.renderer
+    if not COMPILED:
+        return
+    step = step_type(renderer.parameters, state, arrays.tips)
+    given = (renderer.parameters, state, scene.support, arrays, parameters, -1, 0)
+    kept(compiled_loop, renderer.parameters).compile((step, *map(typeof, given)))
 
 
 def warm_up(renderer: Any, state: Any, places: int = 100) -> None:

@@ -62,17 +62,22 @@ class ServoReport:
         return table
 
     def __str__(self) -> str:
+        return self.text()
+
+    def text(self, *, sent: bool = True) -> str:
+        """In lines. sent: whether there was a device to send a force to."""
         c, late = self.compute.summary(), self.lateness.summary()
         lines = [
-            f"{self.ticks} ticks in {self.seconds:.1f} s ({self.rate_hz:.1f} Hz), "
-            f"{self.missed_ticks} missed, {self.late_ticks} late",
-            f"compute  median {c['median']:.1f}  p99 {c['p99']:.1f}  p99.9 {c['p99.9']:.1f}  "
-            f"max {c['max']:.1f} us",
-            f"lateness median {late['median']:.1f}  p99 {late['p99']:.1f}  p99.9 {late['p99.9']:.1f}  "
-            f"max {late['max']:.1f} us",
-            f"in contact {100 * self.contact_share:.0f} % of the time, greatest force "
-            f"{self.peak_rendered_n:.2f} N rendered, {self.peak_force_n:.2f} N sent, "
-            f"energy given back at most {1000 * self.energy_given_back_j:.3f} mJ",
+            f"{self.rate_hz:.0f} forces a second for {self.seconds:.1f} s: of "
+            f"{self.ticks + self.missed_ticks} {self.missed_ticks} were skipped, {self.late_ticks} came late",
+            f"in contact {100 * self.contact_share:.0f} % of the time; greatest force "
+            f"{self.peak_rendered_n:.2f} N rendered"
+            + (f", {self.peak_force_n:.2f} N sent" if sent else "")
+            + f"; energy given to the hand at most {1000 * self.energy_given_back_j:.3f} mJ",
+            f"one force is computed in {c['median']:.0f} µs, 999 of 1000 within {c['p99.9']:.0f}, all within "
+            f"{c['max']:.0f}",
+            f"it begins {late['median']:.0f} µs after its time, 999 of 1000 within {late['p99.9']:.0f}, all "
+            f"within {late['max']:.0f}",
         ]
         return "\n".join([*lines, *self.words])
 

@@ -40,9 +40,10 @@ class ModelSource:
         keywords = {} if self.render_options is None else {"options": self.render_options}
         return render.create(self.name, model, progress=progress, **keywords), model
 
-    def named(self, name: str) -> ModelSource:
-        """The same model through another renderer."""
-        return replace(self, name=name)
+    def named(self, name: str, options: Any = None) -> ModelSource:
+        """The same model through another renderer; options: None for those of before."""
+        kept = self.render_options if options is None else options
+        return replace(self, name=name, render_options=kept)
 
 
 class RendererChange(Protocol):

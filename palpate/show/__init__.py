@@ -8,6 +8,8 @@ A module has those of these functions that its result needs, each with the resul
     place(result, plotter)                 into a 3D scene, device frame, m
     view(result) -> View | None            the object to be turned, in pages and notebooks
     report(result, path, **more) -> Path   the HTML page
+    tell(result, page)                     its part of a page, of a file that was opened
+    next_steps(result) -> list[str]        what to do with it; commands between backticks
     save(result, path)                     what reads it back, where its own class does not write it
 
 `register(TYPE, module)` adds one. Importing this package lets every result know; a module is imported when a
@@ -85,6 +87,28 @@ def _function(result: Result, name: str, words: str) -> Callable[..., Any]:
     if found is None:
         raise OptionError(f"a {type(result).__name__} has no {words}")
     return found
+
+
+def telling(result: Result) -> Callable[..., None] | None:
+    """What puts a result into a page; None where its module has none."""
+    return getattr(_module_of(result), "tell", None)
+
+
+def next_lines(result: Result) -> list[str]:
+    """What a terminal says last: what to do with a result, a step a line; nothing where its module says
+    none."""
+    return [
+        f"{'next:' if k == 0 else '     '} {step.replace('`', '')}" for k, step in enumerate(steps_of(result))
+    ]
+
+
+def steps_of(result: Result) -> list[str]:
+    """What to do with a result, commands between backticks; none of one that says its own lines."""
+    try:
+        module = _module_of(result)
+    except OptionError:
+        return []
+    return getattr(module, "next_steps", lambda _: [])(result)
 
 
 class _Presenter:

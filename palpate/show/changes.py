@@ -31,13 +31,12 @@ def lines(result: Changes) -> list[str]:
         low, high = side.model.material.young_modulus_ci95_pa
         named = f"; {verdict(side.diagnosis)}" if side.diagnosis is not None else ""
         text.append(
-            f"{words}, {side.recording.name}: {side.modulus_pa / 1e3:.2f} kPa (95 % interval "
+            f"{words}, {side.recording.name}: {side.modulus_pa / 1e3:.2f} kPa (95 % sure: "
             f"{low / 1e3:.2f} to {high / 1e3:.2f} kPa){named}"
         )
     low, high = result.difference_ci95_pa
     text.append(
-        f"difference {result.difference_pa / 1e3:+.2f} kPa (95 % interval {low / 1e3:+.2f} to "
-        f"{high / 1e3:+.2f})"
+        f"difference {result.difference_pa / 1e3:+.2f} kPa (95 % sure: {low / 1e3:+.2f} to {high / 1e3:+.2f})"
     )
     if result.places:
         apart = [p for p in result.places if not p.ci95[0] <= 1 <= p.ci95[1]]
@@ -105,26 +104,28 @@ def report(result: Changes, path: Path | str) -> Path:
     page.lead(result.summary[:1].upper() + result.summary[1:] + ".")
     low, high = (100 * (r - 1) for r in result.ratio_ci95)
     named = [n.replace("young_modulus", "Young's modulus").replace("_", " ") for n in result.explained_by]
-    cause = " and ".join(named) or "nothing"
-    beside = "no diagnosis was asked for"
+    cause, beside = "not asked", "a diagnosis of both would tell"
+    if result.before.diagnosis is not None:
+        cause, beside = " and ".join(named) or "nothing", ""
     if result.beside is not None:
-        beside = f"beside the effects of both the second modulus is {100 * (result.beside[0] - 1):+.0f} % off"
+        left = 100 * (result.beside[0] - 1)
+        beside = f"with the effects of both taken in, the moduli differ by {left:+.0f} %"
+    page.next_steps(next_steps(result))
     page.cards([
         ("Do they differ?", "yes" if result.differs else "not beyond their intervals",
-         f"the second modulus is {100 * (result.ratio - 1):+.1f} % off the first "
-         f"({low:+.0f} to {high:+.0f} %)"),
+         f"second modulus less the first: {100 * (result.ratio - 1):+.0f} % (95 % sure: {low:+.0f} to "
+         f"{high:+.0f} %)"),
         ("What explains it?", cause, beside),
         ("Where?", f"{len(result.places)} shared places" if result.places else "no shared places",
          "places within 12 mm of one another, each with its own ratio" if result.places
          else "the two recordings share too few places, or no frame"),
     ])  # fmt: skip
-    page.next_step(_what_next(result))
     figure = new_figure(8, 3.4)
     draw(result, figure.subplots())
     page.view(
         view(result),
         figure,
-        "Moduli with 95 % intervals, or the ratio at every place that both pressed.",
+        "The ratio at every place that both pressed." if result.places else "Moduli, 95 % sure.",
         result.before.model,
     )
     rows = []
@@ -134,11 +135,16 @@ def report(result: Changes, path: Path | str) -> Path:
         kilo = (v / 1e3 for v in (side.modulus_pa, *interval, side.beside_effects_pa))
         rows.append([side.recording.name, *kilo, said])
     page.heading("Both by themselves")
-    page.table(["recording", "modulus [kPa]", "from", "to", "beside effects [kPa]", "verdict"], rows)
+    heads = ["recording", "modulus [kPa]", "95 % sure: from", "to", "with its effects [kPa]", "verdict"]
+    page.table(heads, rows)
     for reason in result.reasons:
         page.paragraph(reason[:1].upper() + reason[1:] + ".")
-    if result.places:
-        page.figure(figure, "The ratio at every place that both pressed, with its 95 % interval.")
+    page.figure(
+        figure,
+        "The ratio at every place that both pressed, 95 % sure within the bars."
+        if result.places
+        else "Both moduli, 95 % sure within the bars.",
+    )
     page.result(as_json(result))
     return page.write(path)
 
@@ -153,16 +159,17 @@ def view(result: Changes) -> View:
     return View(thing_of(model), np.array([place.point for place in result.places]), [ratio])
 
 
-def _what_next(result: Changes) -> str:
+def next_steps(result: Changes) -> list[str]:
+    """What to do with the answer."""
     first = file_words(result.before.recording.path, "REC")
     second = file_words(result.after.recording.path, "REC2")
     if result.before.diagnosis is None:
-        words = f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"
-    elif result.explained_by:
-        words = f"see the evidence: `palpate diagnose {second} --report PAGE.html`"
-    else:
-        words = f"feel either: `palpate touch {first}`, `palpate touch {second}`"
-    return f"What to do next: {words}."
+        return [f"ask what explains it: `palpate compare {first} {second}` without --no-diagnosis"]
+    if result.explained_by:
+        return [f"see the evidence: `palpate diagnose {second} --report PAGE.html`"]
+    return [
+        f"make a model of each, and feel it: `palpate reconstruct {first} -o MODEL`, `palpate touch MODEL`"
+    ]
 
 
 def draw(result: Changes, ax: Axes) -> None:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.recording import Recording
-from palpate.show.page import Page, file_words, save_figures, subplots
+from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import readable
 from palpate.show.recording import FORCE_COLOUR, PEAK_COLOUR, PHASE_COLOUR
 from palpate.show.scenery import add_path, look_around
@@ -79,15 +79,21 @@ def report(result: Checkup, path: Path | str) -> Path:
     """Write the page, and its figures as PNGs into the folder PATH without suffix; returns its path."""
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
+    page = Page(f"Check-up of {result.recording.name}")
+    page.save(path.with_suffix(""), tell(result, page))
+    page.result(as_json(result))
+    return page.write(path)
+
+
+def tell(result: Checkup, page: Page) -> dict[str, Figure]:
+    """The findings, each with its stretch, into a page; returns the pictures by name."""
     figures = {f"finding-{k + 1}": stretch_figure(result.recording, f) for k, f in enumerate(result.findings)}
     whole, ax = subplots(1, 1, figsize=(10, 3))
     draw(result, ax)
     figures["whole"] = whole
-    save_figures(path.with_suffix(""), figures)
-    page = Page(f"Check-up of {result.recording.name}")
     page.lead(lines(result)[0] + ".")
     page.paragraph(_meaning(result))
-    page.next_step(_what_next(result))
+    page.next_steps(next_steps(result))
     if result.findings:
         page.table(
             ["finding", "grave", "adds to the modulus's error", "how sure"],
@@ -102,8 +108,7 @@ def report(result: Checkup, path: Path | str) -> Path:
         page.figure(figures[f"finding-{k + 1}"], _caption(finding))
     page.heading("What was measured")
     page.table(["quantity", "here", "usual"], [_seen(*row) for row in result.seen])
-    page.result(as_json(result))
-    return page.write(path)
+    return figures
 
 
 def _seen(words: str, here: float, usual: float) -> list[object]:
@@ -119,10 +124,11 @@ def _meaning(result: Checkup) -> str:
     return "The modulus's interval is widened by what was found; the model can be made as it is."
 
 
-def _what_next(result: Checkup) -> str:
-    if any(f.grave for f in result.findings):
-        return f"What to do next: {result.findings[0].todo}."
-    return f"What to do next: `palpate reconstruct {file_words(result.recording.path, 'REC')} -o MODEL`."
+def next_steps(result: Checkup) -> list[str]:
+    """What to do with the answer."""
+    if grave := [f.todo for f in result.findings if f.grave]:
+        return grave[:1]
+    return [f"make a model of it: `palpate reconstruct {file_words(result.recording.path, 'REC')} -o MODEL`"]
 
 
 def stretch_figure(recording: Recording, finding: Finding) -> Figure:

@@ -21,11 +21,12 @@ def lines(result: Curve) -> list[str]:
     depth = float(result.depth.max())
     if result.renderer is None:
         return [f"a curve that was read: {result.peak_force_n:.4g} N at most, {depth * 1e3:.3g} mm deep"]
-    normal = ", ".join(f"{float(v) + 0.0:.3g}" for v in np.asarray(result.normal))
+    force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
+    normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
     return [
-        f"{result.renderer.name}: {result.peak_force_n:.4g} N at most; at {depth * 1e3:.3g} mm the force "
-        f"on the tool is {', '.join(f'{f:.4g}' for f in result.force_at(depth))} N",
-        f"  normal there ({normal}); {len(result.t)} samples in {result.t[-1]:.3g} s",
+        f"{result.renderer.name}: {result.peak_force_n:.3g} N at most; {depth * 1e3:.3g} mm deep the force "
+        f"on the tool is ({force}) N",
+        f"  the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s",
         *([f"  {words}"] if (words := said(result.error_figures)) else []),
     ]
 

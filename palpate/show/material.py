@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from diagnose.specimen.result import Material
+from diagnose.specimen.result import FLOORS, Material
 from mechanics.quantities import fitting_unit, quantity_words, split_key
+from palpate.show.page import Page, subplots
+from palpate.show.quantities import readable, softness
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -18,18 +21,19 @@ def lines(result: Material) -> list[str]:
     """What `print` says, with units."""
     text = [f"{result.kind}: {result.curves} curve{'s' * (result.curves != 1)}; {_first(result)}"]
     if np.isfinite(result.young_modulus_pa):
-        low, high = result.young_modulus_ci95_pa
-        unit, factor = fitting_unit("young_modulus_pa", result.young_modulus_pa)
-        between = (
-            f" (95 % sure: {factor * low:.3g} to {factor * high:.3g} {unit})" if np.isfinite(low) else ""
-        )
-        text.append(f"Young's modulus {factor * result.young_modulus_pa:.3g} {unit}{between}")
+        text.append(_modulus(result).replace(" of ", " ", 1))
     ranked = sorted(result.error.items(), key=lambda item: item[1])
-    text.append(f"held out ({result.held_out}): " + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked))
+    text.append(
+        f"error on what no fit has seen ({result.held_out}): "
+        + ", ".join(f"{n} {100 * e:.2g} %" for n, e in ranked)
+    )
     if result.closed is not None and result.closed_ci95 is not None:
         closed, low, high = (min(share, 1.0) for share in (result.closed, *result.closed_ci95))
-        text.append(f"closed {closed:.0%} of the gap (95 % interval {low:.0%} to {high:.0%})")
-    text += [f"  {name.replace('_', ' ')}: {in_words(name, v)}" for name, v in result.parameters.items()]
+        text.append(
+            f"what was found takes away {100 * closed:.0f} % of the gap (95 % sure: {100 * low:.0f} to "
+            f"{100 * high:.0f} %)"
+        )
+    text += [f"  {_called(name)}: {in_words(name, v)}" for name, v in result.parameters.items()]
     text += [f"  {note}" for note in result.notes]
     if result.unknown:
         text.append(f"not told by such a test: {', '.join(result.unknown)}")
@@ -64,6 +68,110 @@ def in_words(name: str, value: Any) -> str:
     return quantity_words(name, value)
 
 
+def report(result: Material, path: Path | str) -> Path:
+    """Write one page; returns its path."""
+    more = f" and {len(result.files) - _NAMED} more" if len(result.files) > _NAMED else ""
+    page = Page(f"Material: {', '.join(Path(name).name for name in result.files[:_NAMED])}{more}")
+    tell(result, page)
+    page.result(as_json(result))
+    return page.write(path)
+
+
+def tell(result: Material, page: Page) -> None:
+    """The answer, what it means, what to do; then how far it is off, and what was found, into a page."""
+    page.lead(lead(result))
+    page.paragraph(meaning(result))
+    page.next_steps(next_steps(result))
+    figure, ax = subplots(1, 1, figsize=(8, 4))
+    draw(result, ax)
+    page.figure(figure, "Measured, and by the law." if result.seen else "Error of the best of each kind.")
+    page.heading("How far it is off")
+    page.paragraph(
+        f"Each way was fitted to the rest and predicts what was left out ({result.held_out}). A spring and "
+        "damper is what one has without a theory of the material; a regression follows the curves without "
+        "any mechanics, so little is left to gain beyond it."
+    )
+    ranked = sorted(result.error.items(), key=lambda item: item[1])
+    page.table(["predicted by", "off by"], [[_way(n), f"{100 * e:.2g} %"] for n, e in ranked])
+    if result.parameters:
+        page.heading("What was found")
+        rows = [[_called(name), in_words(name, v)] for name, v in result.parameters.items()]
+        page.table(["what", "value"], rows)
+    for note in result.notes:
+        page.paragraph(f"{note[:1].upper()}{note[1:]}.")
+    if result.unknown:
+        page.paragraph(f"Such a test cannot tell: {', '.join(result.unknown)}.")
+
+
+def lead(result: Material) -> str:
+    """The answer in a sentence, after what makes it worth less."""
+    first = _first(result)
+    if not np.isfinite(result.young_modulus_pa):
+        return f"{first[:1].upper()}{first[1:]}."
+    said = f"The material has a {_modulus(result)}."
+    if not result.predicts or result.at_bound or result.beaten_by:
+        return f"{first[:1].upper()}{first[1:]}. {said}"
+    return f"{said[:-1]}; {first}."
+
+
+def _modulus(result: Material) -> str:
+    low, high = result.young_modulus_ci95_pa
+    unit, factor = ("Pa", 1.0)
+    if result.young_modulus_pa >= _KILO:
+        unit, factor = fitting_unit("young_modulus_pa", result.young_modulus_pa)
+    sure = f" (95 % sure: {factor * low:.3g} to {factor * high:.3g} {unit})" if np.isfinite(low) else ""
+    return f"Young's modulus of {factor * result.young_modulus_pa:.3g} {unit}{sure}"
+
+
+def meaning(result: Material) -> str:
+    """What the answer means."""
+    if not result.predicts:
+        return "What was left out is not predicted: do not use this answer."
+    words = f"On what the fit had not seen it is {100 * result.missed:.2g} % off."
+    if np.isfinite(result.young_modulus_pa):
+        words = f"About as soft as {softness(result.young_modulus_pa)}. {words}"
+    return words
+
+
+def next_steps(result: Material) -> list[str]:
+    """What to do with the answer."""
+    if not result.predicts:
+        return ["give more curves, or say what the files do not (`--tip-radius`, `--layer`, `--units`)"]
+    if not np.isfinite(result.young_modulus_pa):
+        return []
+    modulus = float(f"{result.young_modulus_pa:.3g}")
+    return [f"feel it in a shape of yours: `palpate touch SHAPE.stl --modulus {modulus:.0f}`"]
+
+
+_NAMED = 3
+_WAYS = {
+    "verdict": "what was found",
+    "regression": "a regression, without mechanics",
+    "constant": "one constant force",
+    "kelvin-voigt": "a spring and damper (Kelvin–Voigt)",
+    "hunt-crossley": "a spring and damper (Hunt–Crossley)",
+    "spring": "a spring alone",
+    "hertz": "Hertz's law of a ball",
+    "sphere": "the law of a true ball",
+    "linear": "a linear law",
+    "neo-hookean": "the neo-Hookean law",
+    "yeoh": "Yeoh's law, two terms",
+    "yeoh-3": "Yeoh's law, three terms",
+    "fung": "Fung's law",
+    "ogden": "Ogden's law",
+}
+_KILO = 1e3
+
+
+def _way(name: str) -> str:
+    return _WAYS.get(name, name)
+
+
+def _called(name: str) -> str:
+    """A parameter's name in words, without its unit."""
+    return "first touch after" if name == "onset_m" else split_key(name)[0].replace("_", " ")
+
+
 def as_json(result: Material) -> dict[str, Any]:
     """The figures of `palpate material --json`."""
     finite = np.isfinite(result.young_modulus_pa)
@@ -94,12 +202,18 @@ def as_json(result: Material) -> dict[str, Any]:
 def draw(result: Material, ax: Axes) -> None:
     """Measured and predicted, else the held-out errors."""
     if result.seen is None:
-        names, values = zip(*sorted(result.error.items(), key=lambda item: item[1]), strict=True)
-        ax.barh(names, [100 * v for v in values])
-        ax.set(xlabel="held-out error [%]")
+        own = "verdict" if "verdict" in result.error else result.law
+        rivals = [n for n in FLOORS.get(result.kind, ()) if n in result.error]
+        best = min(rivals, key=lambda n: result.error[n]) if rivals else own
+        names = [n for n in dict.fromkeys(("constant", "regression", best, own)) if n in result.error]
+        ax.barh([_way(n) for n in names], [100 * result.error[n] for n in names], color="#2a9d8f", height=0.6)
+        ax.set(xlabel="error on what the fit has not seen [%]")
+        ax.spines[["top", "right"]].set_visible(False)
         return
     x, measured, predicted, across, up = result.seen
-    ax.plot(x, measured, ".", ms=2, color="#c1121f", label="measured")
-    ax.plot(x, predicted, "-", lw=1, color="#1d3557", label=result.law)
+    across, along = readable(across, [*x])
+    up, both = readable(up, [*measured, *predicted])
+    ax.plot(along, both[: len(measured)], ".", ms=4, color="#c1121f", label="measured")
+    ax.plot(along, both[len(measured) :], "-", lw=1, color="#1d3557", label=_way(result.law))
     ax.set(xlabel=across, ylabel=up)
     ax.legend(frameon=False)

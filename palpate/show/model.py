@@ -11,7 +11,8 @@ from mechanics.model import Model
 from mechanics.model_files import write_model
 from palpate.show.model_view import thing_of, usual_colourings
 from palpate.show.object3d import draw_touched
-from palpate.show.quantities import KELVIN_VOIGT, MODULUS, with_unit
+from palpate.show.page import Page, file_words, subplots
+from palpate.show.quantities import KELVIN_VOIGT, MODULUS, softness, with_unit
 from palpate.show.scenery import add_dots, add_object
 from palpate.show.view3d import View
 
@@ -77,10 +78,32 @@ def place(result: Model, plotter: Plotter) -> None:
             break
 
 
+def next_steps(result: Model) -> list[str]:
+    """What to do with a model."""
+    where = file_words(result.path, "MODEL")
+    return [
+        f"feel it: `palpate touch {where}`",
+        f"let others press it: `palpate export {where} --to page -o touch.html`",
+    ]
+
+
+def tell(result: Model, page: Page) -> None:
+    """The model's size, and the object to be turned, into a page."""
+    first, *rest = lines(result)
+    page.lead(f"{first}.")
+    page.paragraph(f"About as soft as {softness(result.material.young_modulus_pa)}.")
+    page.next_steps(next_steps(result))
+    figure, ax = subplots(1, 1, figsize=(8, 4))
+    draw(result, ax)
+    page.view(view(result), figure, "The object, and the places touched.", result)
+    for line in rest:
+        page.paragraph(line.strip())
+
+
 def modulus_words(model: Model) -> str:
     """The Young's modulus with its 95 % interval, kPa."""
     low, high = np.array(model.material.young_modulus_ci95_pa) / 1e3
-    interval = f" (95 % interval {low:.1f} to {high:.1f})" if np.isfinite([low, high]).all() else ""
+    interval = f" (95 % sure: {low:.1f} to {high:.1f})" if np.isfinite([low, high]).all() else ""
     return f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa{interval}"
 
 

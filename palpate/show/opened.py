@@ -5,9 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechanics.model import Model
 from palpate.importing.opened import Opened
-from palpate.show.page import Page, subplots
+from palpate.show import steps_of, telling
+from palpate.show.page import Page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -45,26 +45,22 @@ def place(result: Opened, plotter: Plotter) -> None:
     result.result.show(plotter)
 
 
+def next_steps(result: Opened) -> list[str]:
+    """What to do with what came of it."""
+    return steps_of(result.result)
+
+
 def report(result: Opened, path: Path | str) -> Path:
-    """One page: what it was taken for, the answer in lines, its plot and the object to be turned."""
+    """One page: the answer as its own page gives it, then what the file was taken for."""
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
-    page = Page(", ".join(result.sources))
-    answer = result.result.lines()
-    page.lead(answer[0])
-    for line in answer[1:]:
-        page.paragraph(line.strip())
-    page.heading("What it was taken for")
+    page = Page(f"Opened: {', '.join(result.sources)}")
+    tell = telling(result.result)
+    assert tell is not None, "what a file can become puts itself into a page"
+    tell(result.result, page)
+    page.heading("What the file was taken for")
     page.table(["what", "as"], [[key, value] for key, value in result.understood.items()])
     for note in result.notes:
-        page.paragraph(note)
-    figure, ax = subplots(1, 1, figsize=(8, 4))
-    result.result.plot(ax)
-    view = result.result.view()
-    if view is None:
-        page.figure(figure, "The result")
-    else:
-        held = result.result if isinstance(result.result, Model) else getattr(result.result, "model", None)
-        page.view(view, figure, "The result", held)
+        page.paragraph(f"{note[:1].upper()}{note[1:]}.")
     page.result(as_json(result))
     return page.write(path)

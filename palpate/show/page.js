@@ -67,9 +67,14 @@
     image.addEventListener("click", () => figure.classList.toggle("large"));
   });
 
+  // a place is three numbers, for whoever goes on with them
+  const apart = (text) => {
+    if (text === "at x, y, z [mm]") return ["x [mm]", "y [mm]", "z [mm]"];
+    return /^-?[\d.]+(, -?[\d.]+){2}$/.test(text) ? text.split(", ") : [text];
+  };
   const cell = (text) => (/[",\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
   document.querySelectorAll(".scroll > table").forEach((table, k) => {
-    const rows = () => [...table.rows].map((row) => [...row.cells].map((c) => c.textContent.trim()));
+    const rows = () => [...table.rows].map((row) => [...row.cells].flatMap((c) => apart(c.textContent.trim())));
     const presses = table.closest("details.presses");
     const name = presses ? `${title}-presses.csv` : `${title}-table-${k + 1}.csv`;
     const csv = () => rows().map((row) => row.map(cell).join(",")).join("\r\n") + "\r\n";

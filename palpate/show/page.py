@@ -44,6 +44,7 @@ class Page:
         self._live = False
         self._terms = Terms()
         self._result = ""
+        self._drawn: list[tuple[Any, bytes]] = []
 
     def heading(self, text: str) -> None:
         """A section's heading."""
@@ -57,9 +58,11 @@ class Page:
         """Plain words; what stands between backticks is code."""
         self._parts.append(f"<p>{self._words(text)}</p>")
 
-    def next_step(self, text: str) -> None:
-        """What to do now, marked; what stands between backticks is code."""
-        self._parts.append(f'<p class="next">{self._words(text)}</p>')
+    def next_steps(self, steps: Sequence[str]) -> None:
+        """What to do now, marked; what stands between backticks is code. Nothing for none."""
+        if steps:
+            words = f"What to do next: {'; '.join(steps)}."
+            self._parts.append(f'<p class="next">{self._words(words)}</p>')
 
     def cards(self, cards: Sequence[tuple[str, str, str]]) -> None:
         """Answers side by side: (question, answer in a few words, a sentence or two) each."""
@@ -102,7 +105,7 @@ class Page:
 
     def result(self, figures: Mapping[str, Any]) -> None:
         """The numbers of the command's `--json`, which the page offers to keep."""
-        text = json.dumps(plain(dict(figures)), indent=1).replace("</", "<\\/")
+        text = json.dumps(plain(dict(figures)), indent=1).replace("<", "\\u003c")
         self._result = f'<script type="application/json" class="result">{text}</script>'
 
     def view(self, view: View, picture: Any, caption: str, model: Model | None = None) -> None:
@@ -128,6 +131,16 @@ class Page:
             + f"</footer>{self._scripts()}</body></html>"
         )
 
+    def save(self, folder: Path | str, figures: Mapping[str, Any]) -> dict[str, Path]:
+        """Write each picture as `folder/NAME.png`, drawn once for the page as well; returns the paths."""
+        paths = {}
+        for name, picture in figures.items():
+            data = self._png(picture)
+            paths[name] = Path(folder) / f"{name}.png"
+            with atomic_file(paths[name], PNG) as temporary:
+                temporary.write_bytes(data)
+        return paths
+
     def write(self, path: Path | str) -> Path:
         """Write the page whole; returns its path."""
         with atomic_file(path, PAGE) as temporary:
@@ -145,8 +158,16 @@ class Page:
     def _words(self, text: str) -> str:
         return self._terms.linked(_words(text))
 
+    def _png(self, picture: Any) -> bytes:
+        """A picture's PNG, drawn once."""
+        found = next((data for each, data in self._drawn if each is picture), None)
+        if found is None:
+            found = png_bytes(picture)
+            self._drawn.append((picture, found))
+        return found
+
     def _figure(self, picture: Any, caption: str) -> str:
-        data, said = png_bytes(picture), html.escape(caption)
+        data, said = self._png(picture), html.escape(caption)
         drawn = (
             f'<img alt="{said}" style="--legible:{_LEGIBLE * _width(data):.0f}px" '
             f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
@@ -237,16 +258,6 @@ def png_bytes(picture: Any) -> bytes:
     return buffer.getvalue()
 
 
-def save_figures(folder: Path | str, figures: dict[str, Any]) -> dict[str, Path]:
-    """Write each picture as `folder/NAME.png`; returns the paths by name."""
-    paths = {}
-    for name, picture in figures.items():
-        paths[name] = Path(folder) / f"{name}.png"
-        with atomic_file(paths[name], PNG) as temporary:
-            temporary.write_bytes(png_bytes(picture))
-    return paths
-
-
 def _is_words(value: Any) -> bool:
     """Whether a cell holds a phrase, which reads better from the left."""
     return isinstance(value, str) and sum(c.isalpha() for c in value) > 12
@@ -254,5 +265,7 @@ def _is_words(value: Any) -> bool:
 
 def _cell(value: Any) -> str:
     if isinstance(value, float):
-        return "&ndash;" if value != value else f"{value:.4g}"
+        if value != value:
+            return "&ndash;"
+        return f"{value:.0f}" if 1e4 <= abs(value) < 1e7 else f"{value:.4g}"
     return html.escape(str(value))

@@ -47,6 +47,23 @@ UNCERTAINTY = Quantity("shape uncertainty", "mm", 1e3, "Purples")
 FROM_ZERO = (ERROR, UNCERTAINTY, DEPTH)
 """Whose colours begin at nothing."""
 
+_SOFTNESS = (
+    (2e3, "fat tissue or a soft jelly"),
+    (8e3, "liver"),
+    (20e3, "relaxed muscle"),
+    (60e3, "a very soft silicone, or tensed muscle"),
+    (300e3, "a soft rubber"),
+    (10e6, "a firm rubber"),
+    (float("inf"), "a hard plastic, or stiffer"),
+)
+"""Up to a modulus, Pa: what is about as soft. Orders of magnitude of elastography and of data sheets."""
+
+
+def softness(modulus_pa: float) -> str:
+    """What is about as soft as a Young's modulus, Pa."""
+    return next(words for limit, words in _SOFTNESS if modulus_pa <= limit)
+
+
 _UNIT = re.compile(r"^(.*)\[(m|m/s|N|N/m|Pa|s)\]$")
 _NOTHING = 1e-9
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from palpate.show.page import file_words
 from palpate.show.quantities import ERROR
 from render.force_error import said
 from render.replay import ReplayResult
@@ -20,11 +21,18 @@ MEASURED, RENDERED = "#a8bccb", "#c1121f"
 def lines(result: ReplayResult) -> list[str]:
     """What `print` says, with units."""
     return [
-        f"{result.renderer}: error {result.rmse_n:.4g} N rms over {int(result.contact.sum())} contact "
-        f"samples, {100 * result.relative:.3g} % of the measured {result.force_rms_n:.4g} N rms"
-        + (f" (sensor noise {result.noise_n:.3g} N)" if result.noise_n is not None else ""),
+        f"{result.renderer}: rendered and measured force differ by {1e3 * result.rmse_n:.3g} mN, "
+        f"{100 * result.relative:.3g} % of the measured {result.force_rms_n:.3g} N"
+        + (f" (the sensor's noise: {1e3 * result.noise_n:.3g} mN)" if result.noise_n is not None else ""),
+        f"  root mean square over {int(result.contact.sum())} samples in contact",
         *([f"  {words}"] if (words := said(result.error_figures)) else []),
     ]
+
+
+def next_steps(result: ReplayResult) -> list[str]:
+    """What to do with the difference."""
+    recording, model = file_words(result.recording.path, "REC"), file_words(result.model.path, "MODEL")
+    return [f"see what makes it: `palpate diagnose {recording} --model {model} --report PAGE.html`"]
 
 
 def as_json(result: ReplayResult) -> dict[str, Any]:
@@ -53,7 +61,7 @@ def draw(result: ReplayResult, ax: Axes) -> None:
         ylabel="force magnitude [N]",
         xlim=(result.t[counted][0], result.t[counted][-1]),
         ylim=(0, 1.05 * most),
-        title=f"error {result.rmse_n:.3f} N rms, {100 * result.relative:.1f} %",
+        title=f"typically {1e3 * result.rmse_n:.0f} mN apart, {100 * result.relative:.1f} %",
     )
     ax.legend(loc="lower right", bbox_to_anchor=(1.0, 1.0), frameon=False, ncols=2)
 

@@ -17,7 +17,7 @@ from palpate.show.diagnosis import place as place_gap
 from palpate.show.diagnosis.figures import curve_pictures, first_picture, press_pictures
 from palpate.show.diagnosis.figures import view as view_of_gap
 from palpate.show.diagnosis.parameters import number, plain_key
-from palpate.show.diagnosis.words import AXIS_WORDS, force_words, percent, share_words, spoken
+from palpate.show.diagnosis.words import AXIS_WORDS, chance_words, force_words, percent, share_words, spoken
 from palpate.show.page import Page, new_figure
 
 if TYPE_CHECKING:
@@ -89,9 +89,9 @@ def draw(result: SimulatedGap, ax: Axes) -> None:
         width = max(share, 0.0)
         ax.barh([0], [width], left=left, color=COLOURS[name], label=f"{name} {percent(share)}", height=0.6)
         left += width
-    ax.set(yticks=[], xlim=(0, max(left, 1.0)), xlabel="share of the mean square of the gap")
-    ax.set_title(f"{result.simulator.name}: a gap of {force_words(result.gap_before_n)}", fontsize=11)
-    ax.legend(ncols=4, frameon=False, loc="upper center", bbox_to_anchor=(0.5, -0.35), fontsize=9)
+    words = f"share of the mean square of the gap of {force_words(result.gap_before_n)}"
+    ax.set(yticks=[], xlim=(0, max(left, 1.0)), xlabel=words)
+    ax.legend(ncols=4, frameon=False, loc="lower center", bbox_to_anchor=(0.5, 1.0), fontsize=9)
     ax.spines[["top", "right", "left"]].set_visible(False)
 
 
@@ -121,6 +121,86 @@ def keys_in_words(entry: EffectEntry) -> str:
         shown = "none: it sticks" if value is None else number(value, factor)
         said.append(f"{WORDS.get(key, words)} {shown} {unit}".strip())
     return ", ".join(said)
+
+
+_MOST = {
+    "numerics": "most of the gap is numerics",
+    "parameters": "most of the gap is parameters",
+    "reality": "most of the gap is what every ideal elastic simulation lacks",
+}
+
+
+def verdict(result: SimulatedGap) -> str:
+    """The answer in one sentence."""
+    if not result.effects:
+        return "nothing stands out: neither numerics nor parameters nor what an ideal simulation lacks"
+    first = max(PARTS, key=lambda name: result.parts[name].share)
+    most = _MOST[first]
+    if result.unexplained > result.parts[first].share:
+        most = "most of the gap is not explained"
+    rivals = f" (not ruled out: {spoken(result.candidates, 'or')})" if result.candidates else ""
+    return f"{most}; named: {spoken(result.effects)}{rivals}"
+
+
+def lines(result: SimulatedGap) -> list[str]:
+    """What `print` says: the answer, its three parts, what to mend, then what the simulator was given."""
+    after = f"{force_words(result.gap_after_n)} once all of it is mended, at places that were not fitted"
+    text = [
+        f"verdict: {verdict(result)}",
+        f"gap: simulated and measured force differ by {force_words(result.gap_before_n)} (the sensor's "
+        f"noise: {force_words(result.noise_n)}); {after}",
+        "  its parts, and their shares of its mean square:",
+    ]
+    for name in PARTS:
+        part = result.parts[name]
+        said = f"  {name}, {MEANING[name]}: {force_words(part.gap_n)}, {percent(part.share)}"
+        text.append(": ".join([said, *(["; ".join(_numbered(result, name))] if part.names else [])]))
+    text.append(
+        f"  unexplained: {force_words(result.unexplained_n)}, {percent(result.unexplained)} (the sensor's "
+        f"noise {percent(result.noise_share)}, first touches {percent(result.touch_share)})"
+    )
+    if result.mended is not None:
+        text.append(f"run again with {result.mended.settings}: {mended_words(result)}")
+    text += [f"advice: {each}" for each in result.advice]
+    given, about = result.simulator.stated, result.simulator
+    said = ", ".join(
+        f"{words} {shown} {unit}".rstrip() + ("" if key in given.given else " (not stated: the model's)")
+        for key, words, shown, unit in _given(result)
+    )
+    text.append(f"given to {about.name}{' ' + about.version if about.version else ''}: {said}")
+    text += [f"  note: {note}" for note in result.notes]
+    text += [f"  {reason}" for reason in result.reasons]
+    return [line.replace("\u00a0", " ") for line in text]
+
+
+def mended_words(result: SimulatedGap) -> str:
+    """What the run with mended settings measured, beside what was said of it; '' where there is none."""
+    if result.mended is None:
+        return ""
+    return (
+        f"the gap went from {force_words(result.gap_before_n)} to {force_words(result.mended.gap_n)} "
+        f"({force_words(result.without_numerics_n)} was said once its numerics are mended); still named: "
+        f"{spoken(result.mended.effects) or 'nothing'}"
+    )
+
+
+def _numbered(result: SimulatedGap, part: str) -> list[str]:
+    """What is named in a part, each with its numbers."""
+    known = {e.name: e for e in result.entries}
+    said = []
+    for name in result.parts[part].names:
+        numbers = keys_in_words(known[name]) if name in known else ""
+        said.append(name.replace("_", " ") + (f" ({numbers})" if numbers else ""))
+    return said
+
+
+def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
+    """(key, words, value, unit) of what the simulator was given."""
+    rows = []
+    for key, value in result.simulator.stated.as_json().items():
+        words, factor, unit = plain_key(key, value)
+        rows.append((key, words, "none: it sticks" if value is None else number(value, factor), unit))
+    return rows
 
 
 def _lead(result: SimulatedGap) -> str:
@@ -159,9 +239,10 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     assert result.reality.model is not None and result.reality.recording is not None
     page = Page(f"{result.simulator.name} against measured touch: {result.reality.recording.name}")
     page.lead(_lead(result))
+    page.next_steps(result.advice)
     page.cards(_cards(result))
-    for each in result.advice:
-        page.next_step(f"What to do: {each}.")
+    if result.mended is not None:
+        page.paragraph(f"Run again with {result.mended.settings}: {mended_words(result)}.")
     for note in result.notes:
         page.paragraph(f"Note: {note}.")
     figure = new_figure(9, 1.7, layout="constrained")
@@ -177,18 +258,23 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
         first_picture(result.reality.model, shown),
         "Left: how far this simulator is from the measured force around each place. Right: one press, "
         "measured, simulated, and (dashed) with all that is named mended.",
+        result.reality.model,
     )
     _stated(page, result)
     _tried(page, result)
     page.heading("What the difference depends on")
     page.table(
-        ["the difference depends on", "share of it", "probability that this is chance"],
-        [[AXIS_WORDS[a.axis], percent(a.share), f"{a.p:.2g}"] for a in result.where.axes],
+        ["the difference depends on", "share of it", "how often chance does this"],
+        [
+            [AXIS_WORDS[a.axis], percent(a.share), chance_words(a.p)]
+            for a in sorted(result.where.axes, key=lambda a: -a.share)
+        ],
     )
     page.figures(curve_pictures(shown))
     page.figures(press_pictures(shown))
     for reason in result.reasons:
         page.paragraph(reason[0].upper() + reason[1:] + ".")
+    page.result(result.as_json())
     return page.write(path)
 
 

@@ -31,13 +31,16 @@ def lines(result: Simulation) -> list[str]:
     """What `print` says, with units."""
     recording = result.recording
     words = [
-        f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(result.touches)} palpations of the "
+        f"Simulation {recording.name}: {recording.t[-1]:.0f} s, {len(result.touches)} touches of the "
         f"{result.phantom}",
-        f"  effects: {', '.join(result.truth['strengths']) or 'none'}",
+        f"  effects: {', '.join(n.replace('_', ' ') for n in result.truth['strengths']) or 'none'}",
     ]
     for name, size in result.truth.get("sizes", {}).items():
-        refit = size["rms_after_best_scale_n"]
-        words.append(f"  {name}: {size['rms_n']:.4f} N, {refit:.4f} N after a refit of the modulus")
+        left = 1e3 * size["rms_after_best_scale_n"]
+        words.append(
+            f"  {name.replace('_', ' ')} changes the force by {1e3 * size['rms_n']:.3g} mN; {left:.3g} mN "
+            "of that stays when another modulus is fitted"
+        )
     return words
 
 
@@ -67,19 +70,17 @@ def report(result: Simulation, path: Path | str) -> Path:
     """Write one page: what was simulated, the object, and every touch as read beside the ideal object's."""
     recording, truth = result.recording, result.truth
     strengths = truth["strengths"]
-    effects = ", ".join(f"{name.replace('_', ' ')} {value:g}" for name, value in strengths.items())
+    effects = " and ".join(
+        f"{name.replace('_', ' ')} of strength {value:g}" for name, value in strengths.items()
+    )
     page = Page(f"Simulated exploration of {recording.object_name}")
     page.lead(
         f"{len(result.touches)} touches in {recording.t[-1]:.0f} s of an object of "
         f"{truth['young_modulus_pa'] / 1e3:.1f} kPa, "
-        f"{'with ' + effects if effects else 'without any effect'}."
+        f"{f'with {effects} (1 is usual)' if effects else 'without any effect'}."
     )
     page.paragraph(_meaning(result))
-    where = file_words(recording.path, "REC")
-    page.next_step(
-        f"What to do next: see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
-        f"`palpate diagnose {where} --model MODEL --report PAGE.html`; feel it: `palpate touch MODEL`."
-    )
+    page.next_steps(next_steps(result))
     page.view(
         view(result),
         simulation_figure(result),
@@ -89,7 +90,7 @@ def report(result: Simulation, path: Path | str) -> Path:
     if truth.get("sizes"):
         page.heading("How large each effect is")
         page.table(
-            ["effect", "change of the force [mN]", "after a refit of the modulus [mN]"],
+            ["effect", "change of the force [mN]", "left with another modulus [mN]"],
             [
                 [name.replace("_", " "), *(f"{1e3 * size[key]:.1f}" for key in _SIZES)]
                 for name, size in truth["sizes"].items()
@@ -97,6 +98,16 @@ def report(result: Simulation, path: Path | str) -> Path:
         )
     page.result(result.as_json())
     return page.write(path)
+
+
+def next_steps(result: Simulation) -> list[str]:
+    """What to do with the recording."""
+    where = file_words(result.recording.path, "REC")
+    return [
+        f"see whether it is found: `palpate reconstruct {where} -o MODEL`, then "
+        f"`palpate diagnose {where} --model MODEL --report PAGE.html`",
+        "feel it: `palpate touch MODEL`",
+    ]
 
 
 _SIZES = ("rms_n", "rms_after_best_scale_n")

@@ -238,9 +238,10 @@ function start(root) {
     redraw();
   }
   function plot() {
+    if (!curves) return;  // the page has no curves, nor a place for them
     const svg = part("curve");
     svg.replaceChildren();
-    if (!curves || selected < 0) return;
+    if (selected < 0) return;
     const [a, b] = [curves.starts[selected], curves.starts[selected + 1]];
     const over = (line, k) => axis.value === "time" ? curves.time[k] : (line.depth || curves.depth)[k];
     const [part_of, less] = part("what").value.split(" "), measured = curves.lines.find(line => line.kind === "measured");

@@ -12,6 +12,7 @@ import numpy as np
 import pyvista
 import vtk
 
+from palpate.window.board import Board
 from palpate.window.game import Game
 from palpate.window.keys import KEYS
 from palpate.window.orbit import Orbit
@@ -50,26 +51,24 @@ class Controlled(Protocol):
     pointer: Pointer
     orbit: Orbit
     game: Game | None
+    boards: list[Board]
     notice: str
 
     @property
     def picture_renderers(self) -> list[vtk.vtkRenderer]:
         """Where an object is drawn."""
 
-    def set_inclusion(self, region: Region | None) -> None:
-        """Draw it there and let it be felt there."""
-
     def toggle_colour(self) -> None:
         """By displacement, or by local stiffness."""
 
-    def toggle_help(self) -> None:
-        """Show it, or not."""
+    def show_aside(self, which: str) -> None:
+        """Settings ('s') or help ('h') beside the pictures; those that are open close."""
 
     def answer(self) -> None:
         """The game's: the nodule is here."""
 
-    def close(self) -> None:
-        """End."""
+    def close(self, *, scenes: bool = False) -> None:
+        """End; scenes: to choose another."""
 
 
 class Controls:
@@ -107,6 +106,9 @@ class Controls:
             self._style.AddObserver(event, action)
 
     def _left(self, down: bool) -> None:
+        boards, at = self._window.boards, self.interactor.GetEventPosition()
+        if any(board.press(*at) if down else board.release() for board in boards):
+            return
         if down and self.interactor.GetShiftKey():
             self.grab()
         elif not down and self._dragged is not None:
@@ -126,6 +128,10 @@ class Controls:
 
     def _moved(self) -> None:
         x, y = self.interactor.GetEventPosition()
+        for board in self._window.boards:
+            if board.drag(x):
+                return
+            board.hover(x, y)
         if self._dragged is not None:
             self._drag(x, y)
         elif self._viewed is not None:
@@ -184,20 +190,28 @@ class Controls:
         if renderer is None or region is None or self._dragged is None:
             return
         centre, start = self._dragged
-        moved = centre + self._in_plane(renderer, centre, x, y) - start
-        self._window.set_inclusion(replace(region, centre_m=_triple(moved)))
+        self._move_to(centre + self._in_plane(renderer, centre, x, y) - start)
 
     def key(self, symbol: str) -> None:
         """A key by VTK's symbol; see palpate.window.keys."""
-        name = "arrows" if symbol in MOVES else NAMES.get(symbol, symbol)
-        if name not in self.offered:
-            return
-        if name != "arrows":
+        if symbol in MOVES:
+            region = self._session.inclusion
+            if region is not None and "arrows" in self.offered:
+                self._move_to(np.array(region.centre_m) + STEP_M * np.array(MOVES[symbol]))
+        else:
+            self.do(NAMES.get(symbol, symbol))
+
+    def do(self, name: str) -> None:
+        """What a key of palpate.window.keys does, where it does something now."""
+        if name in self.offered:
             self._actions()[name]()
-        elif self._session.inclusion is not None:
-            centre = np.array(self._session.inclusion.centre_m) + STEP_M * np.array(MOVES[symbol])
-            moved = replace(self._session.inclusion, centre_m=_triple(centre))
-            self._window.set_inclusion(moved)
+
+    def _move_to(self, centre: np.ndarray) -> None:
+        """The ball, but never out of the object, where nobody would see or feel it."""
+        region = self._session.inclusion
+        if region is not None:
+            inside = self._window.pointer.inside(centre, 0.5 * region.radius_m)
+            self._session.place_inclusion(replace(region, centre_m=_triple(inside)))
 
     @property
     def offered(self) -> frozenset[str]:
@@ -205,7 +219,6 @@ class Controls:
         session = self._session
         missing = {
             "space": session.has_force,
-            "b": bool(session.beside_name),
             "f": session.feels_inside,
             "i": session.feels_inside and self._window.game is None,
             "arrows": session.inclusion is not None and self._window.game is None,
@@ -225,7 +238,7 @@ class Controls:
         return {
             "space": session.toggle_force,
             "Tab": session.next_renderer,
-            "b": session.next_beside,
+            "b": session.toggle_beside,
             "plus": stiffer,
             "minus": softer,
             "bracketleft": lambda: window.pointer.deeper(-1),
@@ -237,22 +250,19 @@ class Controls:
             "i": self._toggle_inclusion,
             "r": self._toggle_recording,
             "p": self._save_picture,
-            "h": window.toggle_help,
+            "h": lambda: window.show_aside("h"),
+            "s": lambda: window.show_aside("s"),
+            "g": lambda: window.close(scenes=True),
             "q": window.close,
         }
 
     def _toggle_inclusion(self) -> None:
         if self._session.inclusion is not None:
             self._dragged = None
-            self._window.set_inclusion(None)
+            self._session.place_inclusion(None)
             return
-        pointer = self._window.pointer
-        target = pointer.target
-        normal = self._session.model.support.normal if target is None else target.normal
-        point = pointer.tip_m if target is None else target.point
-        centre = point - 2.0 * INCLUSION_RADIUS_M * normal
-        region = Region("inclusion", _triple(centre), INCLUSION_RADIUS_M, INCLUSION_RATIO)
-        self._window.set_inclusion(region)
+        centre, radius = self._window.pointer.under(INCLUSION_RADIUS_M)
+        self._session.place_inclusion(Region("inclusion", _triple(centre), radius, INCLUSION_RATIO))
 
     def _toggle_recording(self) -> None:
         if self._session.recording is not None:

@@ -34,15 +34,18 @@ class Game:
         self.answers: list[Answer] = []
         self._up = np.asarray(up, dtype=float)
         self._started_s: float | None = None
+        self._touching = False
 
     @property
     def answered(self) -> bool:
-        """Whether the nodule may be seen; the next touch begins the next round."""
+        """Whether the nodule may be seen; the next touch, from the air, begins the next round."""
         return bool(self.answers) and self._started_s is None
 
-    def touched(self, now_s: float) -> None:
-        """The tip touches: the clock runs."""
-        self._started_s = now_s if self._started_s is None else self._started_s
+    def follow(self, touching: bool, now_s: float) -> None:
+        """At every picture: a touch that begins starts the clock, where it does not run."""
+        if touching and not self._touching and self._started_s is None:
+            self._started_s = now_s
+        self._touching = touching
 
     def seconds(self, now_s: float) -> float:
         """Since this round's first touch."""
@@ -66,15 +69,15 @@ class Game:
     def lines(self, now_s: float) -> list[str]:
         """For the panel: what to do, the last round, and the mean score of each renderer."""
         if self._started_s is not None:
-            first = f"a nodule is hidden: find it, then Enter   {self.seconds(now_s):.0f} s"
+            first = f"A nodule is hidden: find it, then Enter. {self.seconds(now_s):.0f} s"
         elif self.answers:
             last = self.answers[-1]
             first = (
                 f"{1000 * last.off_m:.1f} mm beside the nodule after {last.seconds:.0f} s by "
-                f"{last.renderer}: {last.score:.0f} points; touch to go on, Tab for another renderer"
+                f"{last.renderer}: {last.score:.0f} points. Touch anew to go on, Tab for another renderer."
             )
         else:
-            first = "a nodule is hidden: press to find where it resists more, then Enter"
+            first = "A nodule is hidden: press to find where it resists more, then Enter."
         names = sorted({a.renderer for a in self.answers})
         scores = [
             f"{name} {np.mean([a.score for a in self.answers if a.renderer == name]):.0f} points in "

@@ -50,12 +50,14 @@ class FieldChange:
 class MovingInclusion:
     """model: the object without the ball; renderer: of that object, at any modulus."""
 
-    def __init__(self, model: Model, renderer: FemRenderer) -> None:
+    def __init__(self, model: Model, renderer: FemRenderer, progress: Progress = silent) -> None:
+        progress("factorising the object", 0.0)
         compliance = renderer.compliance
         self._mesh = model.mesh.quadratic()
         material = model.material
         hold = base_hold(model.effects, model.support.normal, material.young_modulus_pa)
         self._solver = Solver(self._mesh, material.poisson_ratio, model.element_ratio, hold=hold)
+        progress("spreading the touch", 0.3)
         wide = PatchSampler(self._mesh, float(compliance.patch_width_m[0])).matrix(compliance.points)
         width = min(contact_width(model.tool.tip_radius_m), float(compliance.own_width_m[0]))
         narrow = PatchSampler(self._mesh, width).matrix(compliance.own_points)
@@ -120,7 +122,7 @@ class InclusionMover:
         """Whether it is felt where it is wanted."""
         return self._placed == self.wanted
 
-    def follow(self, servo: Servo, drawing: FemRenderer) -> FemRenderer:
+    def follow(self, servo: Servo, drawing: FemRenderer, progress: Progress = silent) -> FemRenderer:
         """Compute the newest wanted place and let it be felt; returns `drawing` on the changed object.
 
         Where that fails, the ball is wanted where it is felt.
@@ -128,8 +130,8 @@ class InclusionMover:
         wanted, before = self.wanted, self._change
         self._count += 1
         try:
-            self._moving = self._moving or MovingInclusion(self._model, drawing)
-            self._change = self._moving.write(wanted, self._folder / f"field-{self._count}.npz")
+            self._moving = self._moving or MovingInclusion(self._model, drawing, progress)
+            self._change = self._moving.write(wanted, self._folder / f"field-{self._count}.npz", progress)
             self.apply(servo)
         except Exception:
             self.wanted = self._placed
@@ -138,6 +140,10 @@ class InclusionMover:
             before.path.unlink()
         self._placed = wanted
         return self._change.laid_on(drawing)
+
+    def laid_on(self, renderer: Renderer) -> Renderer:
+        """A renderer that was made anew, with the ball that is felt."""
+        return renderer if self._change is None else self._change.changed(renderer)
 
     def apply(self, servo: Servo) -> None:
         """To a renderer that the servo has got anew."""

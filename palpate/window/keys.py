@@ -1,44 +1,73 @@
-"""What mouse and keys of the touch window do, in words."""
+"""What mouse and keys of the touch window do, in words; buttons are made of the same list."""
 
 from __future__ import annotations
 
 from collections.abc import Container
+from dataclasses import dataclass
 
-KEYS: dict[str, str] = {
-    "space": "force on / off",
-    "Tab": "feel the next renderer",
-    "b": "compare with the next one: hunt-crossley, kelvin-voigt",
-    "plus": "stiffer by a quarter",
-    "minus": "softer by a fifth",
-    "bracketleft": "press less deep",
-    "bracketright": "press deeper",
-    "f": "friction: stick, 1, 0.5, 0.2, 0.05",
-    "c": "colour by displacement or by stiffness",
-    "i": "stiff ball under the tip, again: out",
-    "arrows": "move the ball, with PageUp and PageDown in height",
-    "Return": "the nodule is here",
-    "v": "the view of the beginning",
-    "r": "record, again: write the recording",
-    "p": "save a picture",
-    "h": "this help",
-    "q": "quit",
+from palpate.window.board import Item, Row
+
+
+@dataclass(frozen=True)
+class Key:
+    """does: for help and a button's tip. button: its words, '' for a key without a button."""
+
+    does: str
+    button: str = ""
+
+
+KEYS: dict[str, Key] = {
+    "Return": Key("The nodule is where the tip is", "It is here"),
+    "b": Key("Show a second renderer under the same tip, or only what you feel", "Side by side"),
+    "Tab": Key("Feel the next renderer", "Next renderer"),
+    "c": Key("Colour by the stiffness of a 3 mm press, or by displacement", "Stiffness map"),
+    "i": Key("Put a stiff ball under the tip, or take it out", "Stiff ball"),
+    "r": Key("Record what you do; again: write the recording", "Record"),
+    "p": Key("Save this window as a picture", "Save picture"),
+    "v": Key("Look from where you began", "First view"),
+    "space": Key("Switch the device's force on or off", "Force"),
+    "s": Key("Renderer, friction, stiffness, depth, effects", "Settings"),
+    "h": Key("What mouse and keys do", "Help"),
+    "g": Key("Leave this object and choose another", "Scenes"),
+    "q": Key("Force off, and close the window", "Quit"),
+    "plus": Key("Stiffer by a quarter"),
+    "minus": Key("Softer by a fifth"),
+    "bracketleft": Key("Press less deep"),
+    "bracketright": Key("Press deeper"),
+    "f": Key("Next friction: stick, 1, 0.5, 0.2, 0.05"),
+    "arrows": Key("Move the ball, with PageUp and PageDown in height"),
 }
-"""Key, in words for the help; palpate.window.controls maps VTK's key symbols to them."""
+"""By name; palpate.window.controls maps VTK's key symbols to these."""
 
-SHOWN = {"plus": "+", "minus": "-", "bracketleft": "[", "bracketright": "]", "Return": "Enter"}
-
-MOUSE: dict[str, str] = {
-    "move": "hover",
-    "left": "press, and drag sideways",
-    "wheel": "zoom; with Ctrl, or while pressing: how deep",
-    "right": "turn the view; with Shift: move it",
+SHOWN = {
+    "plus": "+",
+    "minus": "−",
+    "bracketleft": "[",
+    "bracketright": "]",
+    "Return": "Enter",
+    "space": "Space",
+    "arrows": "Arrows",
 }
-BALL = {"middle": "drag the ball (or Shift+left; wheel: nearer, farther)"}
+
+MOUSE = {
+    "Move": "Hover over the object",
+    "Left": "Press; drag sideways",
+    "Wheel": "Zoom; with Ctrl, or while pressing: how deep",
+    "Right": "Turn the view; with Shift: move it",
+}
+BALL = {"Middle": "Drag the ball (or Shift and left; wheel: nearer, farther)"}
 
 
-def help_text(offered: Container[str]) -> str:
-    """Every button, and every key that does something now, a line each."""
-    buttons = {**MOUSE, **(BALL if "arrows" in offered else {})}
-    keys = {SHOWN.get(key, key): what for key, what in KEYS.items() if key in offered}
-    width = max(map(len, (*keys, *buttons)))
-    return "\n".join(f"{key:<{width}}  {what}" for key, what in (*buttons.items(), *keys.items()))
+def shown(key: str) -> str:
+    """As it stands on a keyboard."""
+    return SHOWN.get(key, key.upper() if len(key) == 1 else key)
+
+
+def help_rows(offered: Container[str]) -> list[Row]:
+    """Every button of the mouse, and every key that does something now."""
+    lines = {**MOUSE, **(BALL if "arrows" in offered else {})}
+    lines |= {shown(name): key.does for name, key in KEYS.items() if name in offered}
+    return [
+        (Item(name, bold=True, size=12, wide=0.27), Item(does, size=12, wide=0.73))
+        for name, does in lines.items()
+    ]

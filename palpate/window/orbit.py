@@ -42,6 +42,11 @@ class Orbit:
         self._home_middle = np.array(middle_m, dtype=float)
         self.reset()
 
+    @property
+    def azimuth(self) -> float:
+        """Where the eye stands about the vertical, rad."""
+        return self._azimuth
+
     def reset(self) -> None:
         """Back to where it began."""
         self._azimuth, self._height, self._distance_m = self._home

@@ -21,6 +21,7 @@ class Pace:
         self._slow = False
         self._words_s = float("-inf")
         self._pictures = 0
+        self._all = True
 
     def next(self, now_s: float) -> tuple[bool, bool]:
         """At a picture that begins now: whether the second picture is drawn, and whether words and plots."""
@@ -30,11 +31,12 @@ class Pace:
         self._last_s = now_s
         self._slow = self._usual_s > (QUICK_S if self._slow else SLOW_S)
         self._pictures += 1
-        words = not self._slow or now_s - self._words_s >= WORDS_S
+        everything, self._all = self._all or not self._slow, False
+        words = everything or now_s - self._words_s >= WORDS_S
         if words:
             self._words_s = now_s
-        return not self._slow or self._pictures % 2 == 0, words
+        return everything or self._pictures % 2 == 0, words
 
     def forget(self) -> None:
-        """Words are drawn at the next picture, whatever it costs."""
-        self._words_s = float("-inf")
+        """All is drawn at the next picture, whatever it costs."""
+        self._all = True

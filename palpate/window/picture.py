@@ -6,11 +6,13 @@ from typing import Literal
 
 import numpy as np
 import pyvista
+import scipy.sparse as sp
 
 from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
 from palpate.window import shadow
+from palpate.window.board import INK, set_type
 from palpate.window.frames import Frame, View
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
@@ -24,6 +26,7 @@ LEAST_ARROW_N = 0.02
 SHADOW_IN_RADII, SHADOW_OFF_M, SHADOW_FADES_M = 1.4, 0.0006, 0.06
 DISPLACEMENT_RANGE_MM = (0.0, 6.0)
 STIFFNESS = f"secant stiffness at {1000 * DEPTH_M:.0f} mm (N/m)"
+SPREAD = 2
 TIP_COLOUR, ARROW_COLOUR, INCLUSION_COLOUR = "#d95f02", "#1b4f9c", "#7b1fa2"
 
 Colours = Literal["viridis", "YlOrRd"]
@@ -50,16 +53,18 @@ class ObjectPicture:
         self._rest = np.array(points, dtype=float)
         self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
         self._surface["displacement (mm)"] = np.zeros(len(points))
-        self._bent = False
+        self._moved = np.zeros_like(self._rest)
         self._flat = vertex_normals(self._rest, np.asarray(triangles))
-        self._smooth = renderer.contact.arrays.normals
+        felt = renderer.contact.arrays
+        self._smooth = _spread(felt.normals, felt.triangles[felt.free > 0])
         self._shade()
         self._actor: pyvista.Actor | None = None
         self._bar = ""
-        self._title = f"{label}  " if label else ""
+        self._title = label
         _add_support(plotter, model, self._rest)
         self._tip = plotter.add_mesh(
             pyvista.Sphere(radius=tip_radius_m, theta_resolution=24, phi_resolution=24),
+            smooth_shading=True,
             color=TIP_COLOUR,
             ambient=0.35,
             specular=0.4,
@@ -68,9 +73,12 @@ class ObjectPicture:
             pyvista.Arrow(tip_length=0.3, shaft_radius=0.03, tip_radius=0.08), color=ARROW_COLOUR, ambient=0.6
         )
         self._ball = plotter.add_mesh(
-            pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20), color=INCLUSION_COLOUR
+            pyvista.Sphere(radius=1.0, theta_resolution=20, phi_resolution=20),
+            smooth_shading=True,
+            color=INCLUSION_COLOUR,
         )
         self._ball.SetVisibility(False)
+        self._inside: Region | None = None
         self._arrow.SetVisibility(False)
         blot = shadow.blot(SHADOW_IN_RADII * tip_radius_m)
         self._shadow = plotter.add_mesh(
@@ -101,7 +109,7 @@ class ObjectPicture:
             opacity, culling = self._actor.prop.opacity, self._actor.prop.culling
             self._plotter.remove_actor(self._actor, render=False)
             self._plotter.scalar_bars.remove_scalar_bar(self._bar, render=False)
-        self._bar = f"{self._title}{name}"
+        self._bar = f"{name}{self._title}"
         self._actor = self._plotter.add_mesh(
             self._surface,
             scalars=name,
@@ -112,18 +120,19 @@ class ObjectPicture:
             diffuse=0.62,
             scalar_bar_args={
                 "title": self._bar,
-                "title_font_size": 12,
-                "label_font_size": 11,
                 "n_labels": 2,  # a third would lie under the title
                 "fmt": "%.0f",
-                "color": "black",
                 "width": 0.42,
                 "height": 0.06,
                 "position_x": 0.56,
                 "position_y": 0.02,
+                "unconstrained_font_size": True,
             },
             render=False,
         )
+        bar = self._plotter.scalar_bars[self._bar]
+        for words in (bar.GetTitleTextProperty(), bar.GetLabelTextProperty()):
+            set_type(words, 11, False, INK)
         self._actor.prop.interpolation, self._actor.prop.culling = "Gouraud", culling
 
     def _shade(self) -> None:
@@ -132,17 +141,19 @@ class ObjectPicture:
         self._surface.point_data["normals"] = self._smooth + now - self._flat
         self._surface.point_data.active_normals_name = "normals"
 
-    def see_through(self, on: bool) -> None:
-        """Show what is inside."""
+    def _see_through(self, on: bool) -> None:
         if self._actor is not None:
             self._actor.prop.opacity = 0.45 if on else 1.0
             # what is seen through is its front alone, whatever the order of its triangles
             self._actor.prop.culling = "back" if on else "none"
 
     def show_inclusion(self, region: Region | None) -> None:
-        """A ball where the inclusion is, or nothing."""
+        """A ball where the inclusion is, seen through the object, or nothing."""
+        if region == self._inside:
+            return
+        self._inside = region
         self._ball.SetVisibility(region is not None)
-        self.see_through(region is not None)
+        self._see_through(region is not None)
         if region is not None:
             self._ball.SetPosition(*region.centre_m)
             self._ball.SetScale(region.radius_m)
@@ -150,8 +161,8 @@ class ObjectPicture:
     def update(self, frame: Frame, view: View, below: Target | None = None) -> None:
         """Move surface, tip and arrow to a frame; below: what the tip's shadow falls on."""
         moved = view.displacement_m
-        if len(moved) == len(self._rest) and (self._bent or moved.any()):
-            self._bent = bool(moved.any())
+        if len(moved) == len(self._rest) and not np.array_equal(moved, self._moved):
+            self._moved = moved
             self._surface.points = self._rest + moved
             self._shade()
             self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)
@@ -167,6 +178,18 @@ class ObjectPicture:
         if size > LEAST_ARROW_N:
             start = frame.tip_m + self._radius * force / size  # out of the tip, not hidden in it
             self._arrow.SetUserMatrix(arrow_matrix(start, force, ARROW_M_PER_N * size))
+
+
+def _spread(normals: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """(v, 3) normals, each twice over the mean of its own and its neighbours' by these triangles: a narrow
+    rim turns over several of them, not in one, and shows none."""
+    v = len(normals)
+    i, j = triangles[:, [0, 1, 2, 1, 2, 0]].ravel(), triangles[:, [1, 2, 0, 0, 1, 2]].ravel()
+    near = sp.csr_matrix((np.ones(len(i)), (i, j)), shape=(v, v)) + sp.eye(v)
+    for _ in range(SPREAD):
+        normals = near @ normals
+        normals = normals / np.linalg.norm(normals, axis=1, keepdims=True)
+    return normals
 
 
 def _placed(point: np.ndarray, normal: np.ndarray) -> object:

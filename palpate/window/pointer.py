@@ -84,6 +84,30 @@ class Pointer:
         """What lies straight under a place (3,) m; None where nothing does."""
         return self._hit(place_m, place_m - 2.0 * self._safe * self._up)
 
+    def inside(self, point_m: np.ndarray, under_m: float) -> np.ndarray:
+        """(3,) m: the place itself, or the nearest one that lies so far under the surface; half way through
+        where the object is thinner than twice that."""
+        closest, normal = self._nearest(np.asarray(point_m, dtype=float))
+        if (point_m - closest) @ normal <= -under_m:
+            return np.asarray(point_m, dtype=float)
+        return closest - min(under_m, 0.5 * self._thickness(closest, normal)) * normal
+
+    def under(self, radius_m: float) -> tuple[np.ndarray, float]:
+        """Where a ball goes that is put under the tip: its centre (3,) m, a radius under the surface, and
+        its radius m, smaller in a thin object."""
+        target = self.target
+        if target is None or target.on_support:
+            point, normal = self._nearest(self._tip)
+        else:
+            point, normal = target.point, target.normal
+        thickness = self._thickness(point, normal)
+        return point - min(2.0 * radius_m, 0.5 * thickness) * normal, min(radius_m, 0.45 * thickness)
+
+    def _thickness(self, point: np.ndarray, normal: np.ndarray) -> float:
+        """m, from a place of the surface straight through to the other side."""
+        met = self._meets(point - 1e-4 * normal, point - 2.0 * self._safe * normal)
+        return 2e-3 if met is None else float(np.linalg.norm(met[1] - point))
+
     def deeper(self, steps: float) -> None:
         """The wheel: how deep a press goes, 0.5 mm a step."""
         self.go_deep(1e3 * self.press_depth_m + 0.5 * steps)
@@ -162,25 +186,33 @@ class Pointer:
         return centre
 
     def _closest(self, point: np.ndarray) -> tuple[np.ndarray, bool]:
+        place, normal = self._nearest(point)
+        return place, float((point - place) @ normal) < 0
+
+    def _nearest(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """The surface's nearest place, (3,) m, and the normal there."""
         found, cell, sub, squared = [0.0] * 3, vtk.mutable(0), vtk.mutable(0), vtk.mutable(0.0)
         self._locator.FindClosestPoint(point, found, cell, sub, squared)
         place = np.array(found)
-        normal = self._normal_at(int(cell), place)
-        return place, float((point - place) @ normal) < 0
+        return place, self._normal_at(int(cell), place)
 
     def _hit(self, near: np.ndarray, far: np.ndarray) -> Target | None:
         ray = far - near
-        share, place, parametric = vtk.mutable(0.0), [0.0] * 3, [0.0] * 3
-        sub, cell = vtk.mutable(0), vtk.mutable(0)
-        met = self._locator.IntersectWithLine(near, far, 1e-9, share, place, parametric, sub, cell)
+        met = self._meets(near, far)
         downward = float(ray @ self._up)
         on_plane = float((self._support_point - near) @ self._up) / downward if downward < -1e-12 else np.inf
-        if met and float(share) <= on_plane:
-            point = np.array(place)
-            return Target(point, self._normal_at(int(cell), point), False)
+        if met is not None and met[0] <= on_plane:
+            return Target(met[1], self._normal_at(met[2], met[1]), False)
         if 0 < on_plane <= 1:
             return Target(near + on_plane * ray, self._up, True)
         return None
+
+    def _meets(self, near: np.ndarray, far: np.ndarray) -> tuple[float, np.ndarray, int] | None:
+        """Where a line first meets the object: the share of it, the place (3,) m and the triangle."""
+        share, place, parametric = vtk.mutable(0.0), [0.0] * 3, [0.0] * 3
+        sub, cell = vtk.mutable(0), vtk.mutable(0)
+        met = self._locator.IntersectWithLine(near, far, 1e-9, share, place, parametric, sub, cell)
+        return (float(share), np.array(place), int(cell)) if met else None
 
     def _normal_at(self, cell: int, point: np.ndarray) -> np.ndarray:
         """Interpolated over the triangle, so that the tip does not jerk from facet to facet."""

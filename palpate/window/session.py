@@ -8,10 +8,10 @@ that it feels the same path at 1 kHz.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any, Self
 
@@ -38,7 +38,8 @@ from render.registry import create, names
 from render.scene import scene_of
 from scenes.phantoms import Region
 
-BESIDES = ("hunt-crossley", "kelvin-voigt")
+BESIDE = "hunt-crossley"
+"""The second renderer where nobody said which."""
 FRICTIONS = (math.inf, 1.0, 0.5, 0.2, 0.05)
 MODULUS_STEP = 1.25
 
@@ -81,6 +82,7 @@ class TouchSession:
         self._recording_path = asked.recording
         self._pictures = asked.pictures
         self._beside_name = asked.beside
+        self._last_beside = asked.beside or BESIDE
         self._beside: Beside | None = None
         self._device = DeviceChoice(device) if isinstance(device, str) else device
         self._has_force = spec_of(self._device.name).has_force
@@ -116,8 +118,16 @@ class TouchSession:
         progress("touching", 1.0)
         return self
 
-    def _create(self, name: str) -> Renderer:
-        return create(name, self.model, self._options)
+    def _create(self, name: str, progress: Progress = silent) -> Renderer:
+        """As the user has changed it so far."""
+        made = self._inclusion.laid_on(create(name, self.model, self._options, progress))
+        changed = self.young_modulus_pa != self.model.material.young_modulus_pa
+        return made.with_modulus(self.young_modulus_pa) if changed else made
+
+    def _loaded(self, name: str) -> Renderer:
+        if name not in self._renderers:
+            self._renderers[name] = self._create(name, self.worker.tell)
+        return self._renderers[name]
 
     def _apply(self) -> None:
         """What the user changed, to a renderer that is new."""
@@ -163,7 +173,7 @@ class TouchSession:
         beside = self._beside  # the worker may put another in its place
         sizes = np.zeros(len(rows)) if beside is None else beside.follow(rows["tip"])
         if not self._inclusion.settled:
-            self.worker.offer("moving the inclusion", self._follow_inclusion)
+            self.worker.offer("computing the ball", self._follow_inclusion)
         snapshot = self._servo.snapshot()
         if snapshot is None:
             return None
@@ -243,24 +253,50 @@ class TouchSession:
         self.worker.run("loading the next renderer", lambda: self._feel(_after(self.renderer_name, names())))
 
     def _feel(self, name: str) -> None:
-        if name == self.renderer_name:
-            return
-        if self._pictures and name not in self._renderers:
-            self._renderers[name] = self._create(name)
-        self._servo.set_renderer(name)
+        if name != self.renderer_name:
+            self._feel_anew(name)
+
+    def _feel_anew(self, name: str) -> None:
+        """Both processes load it at once; the old one is felt until then."""
+        with ThreadPoolExecutor(1) as pool:
+            drawing = pool.submit(self._loaded, name) if self._pictures else None
+            self._servo.set_renderer(name, self.worker.tell, options=self._options)
+            if drawing is not None:
+                drawing.result()
         self._apply()
 
-    def next_beside(self) -> None:
-        """The next second renderer, where there is one."""
-        self.worker.run(
-            "loading the next renderer", lambda: self._compare(_after(self._beside_name, BESIDES))
-        )
+    def set_beside(self, name: str) -> None:
+        """Another renderer under the same tip; '' for none."""
+        self.worker.run(f"loading {name}" if name else "one picture", lambda: self._compare(name))
+
+    def toggle_beside(self) -> None:
+        """The second renderer of before, or none."""
+        self.set_beside("" if self._beside_name else self._last_beside)
 
     def _compare(self, name: str) -> None:
-        if name not in self._renderers:
-            self._renderers[name] = self._create(name)
+        if name:
+            self._loaded(name)
+            self._last_beside = name
         self._beside_name = name
         self._restart_beside()
+
+    @property
+    def effects(self) -> bool:
+        """Whether the effects that the model names are rendered."""
+        return self._options.effects
+
+    def set_effects(self, on: bool) -> None:
+        """Render the effects that the model names, or the ideal model; what the user changed stays."""
+
+        def job() -> None:
+            self._options = replace(self._options, effects=on)
+            drawn = {self.renderer_name, self._beside_name} - {""}
+            # one after the other, while those of before still draw
+            self._renderers = {name: self._create(name, self.worker.tell) for name in drawn}
+            self._feel_anew(self.renderer_name)
+            self._compare(self._beside_name)
+
+        self.worker.run("changing the effects", job)
 
     @property
     def feels_inside(self) -> bool:
@@ -271,6 +307,10 @@ class TouchSession:
     def has_force(self) -> bool:
         """Whether the device gives any."""
         return self._has_force
+
+    def reset_modulus(self) -> None:
+        """As the model has it."""
+        self.scale_modulus(self.model.material.young_modulus_pa / self.young_modulus_pa)
 
     def scale_modulus(self, factor: float) -> None:
         """Stiffer or softer; costs nothing."""
@@ -288,9 +328,15 @@ class TouchSession:
 
     def next_friction(self) -> None:
         """Stick, then ever more slippery, then stick again."""
+        self._set_friction(lambda: next((f for f in FRICTIONS if f < self.friction), FRICTIONS[0]))
 
+    def set_friction(self, friction: float) -> None:
+        """Coulomb's coefficient; inf sticks."""
+        self._set_friction(lambda: friction)
+
+    def _set_friction(self, which: Callable[[], float]) -> None:
         def job() -> None:
-            friction = next((f for f in FRICTIONS if f < self.friction), FRICTIONS[0])
+            friction = which()
             self._servo.set_friction(friction)
             self.friction = friction
 
@@ -311,12 +357,12 @@ class TouchSession:
         return self._inclusion.settled
 
     def _follow_inclusion(self) -> None:
-        if "fem" not in self._renderers:
-            self._renderers["fem"] = self._create("fem").with_modulus(self.young_modulus_pa)
         while not self._inclusion.settled:
-            drawing = self._renderers["fem"]
+            drawing = self._loaded("fem")
             assert isinstance(drawing, FemRenderer), "'fem' is made by render.fem"
-            self._renderers["fem"] = self._inclusion.follow(self._servo, drawing)
+            self._renderers["fem"] = self._inclusion.follow(self._servo, drawing, self.worker.tell)
+            if self._beside is not None and self._beside.name == "fem":
+                self._beside.change(self._renderers["fem"])
 
     def report(self) -> ServoReport:
         """What the servo did so far."""

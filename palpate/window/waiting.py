@@ -1,24 +1,33 @@
-"""A window that shows how far a job has come, while the job runs in a thread of its own."""
+"""The window before there is anything to touch: scenes to choose from, and how far a job has come, while the
+job runs in a thread of its own."""
 
 from __future__ import annotations
 
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
-import numpy as np
 import pyvista
 import vtk
 
 from mechanics.errors import PalpateError
 from mechanics.progress import Progress
+from mechanics.recording import read_recording
+from palpate.window.board import GREY, HINT, PAPER, Board, Item
+from scenes.embedded import embedded_recording
+from scenes.phantoms import phantom
+from scenes.scene import Scene
 
 T = TypeVar("T")
 PERIOD_S = 0.05
-BACKGROUND, FULL, EMPTY = "#f4f6f8", "#1b4f9c", "#d9dee5"
-LEFT, RIGHT, LOW, HIGH = 0.25, 0.75, 0.46, 0.475
-"""Of the bar, in shares of the window."""
+SIZE = (1280, 800)
+BACKGROUND, OBJECT = "#f4f6f8", "#d9b96a"
+COLUMNS = 3
+SPACE, HEAD, PICTURE = 16, 76, 250
+"""Between cards, above them, and the height of a card's picture, pixels of a window of full size."""
+EVERY = 15
+"""Of a recording's samples one in so many is drawn."""
 
 
 class ClosedError(PalpateError):
@@ -47,52 +56,116 @@ class _Job(threading.Thread, Generic[T]):
 
 
 class WaitingWindow:
-    """Open from its making until `close`; `run` returns what the job returns."""
+    """Open from its making until `close`; `choose` returns one of `scenes`, `run` what the job returns."""
 
-    def __init__(self, title: str, size: tuple[int, int], *, off_screen: bool = False) -> None:
+    def __init__(
+        self, scenes: Sequence[Scene] = (), *, size: tuple[int, int] = SIZE, off_screen: bool = False
+    ):
         self._closed = False
-        self.plotter = pyvista.Plotter(off_screen=off_screen, window_size=list(size), title=title)
-        self.plotter.renderer.set_background(BACKGROUND)
-        self._text(title, 0.56, 16)
-        self._stage = self._text("", 0.38, 12)
-        self._bar(EMPTY, RIGHT)
-        self._full = self._bar(FULL, LEFT)
-        self.plotter.show(interactive_update=True, auto_close=False)
+        self._chosen: Scene | None = None
+        self.scenes = tuple(scenes)
+        self.plotter = pyvista.Plotter(
+            off_screen=off_screen,
+            window_size=list(size),
+            shape=(1, 1 + len(scenes)),
+            border=False,
+            title="Palpate",
+        )
+        base, *self._views = self.plotter.renderers
+        base.set_background(BACKGROUND)
+        base.viewport = (0.0, 0.0, 1.0, 1.0)
+        self.head = Board(base)
+        self.cards = [Board(base, fill=PAPER) for _ in scenes]
+        for place, (scene, view) in enumerate(zip(self.scenes, self._views, strict=True)):
+            self.plotter.subplot(0, 1 + place)
+            _draw(self.plotter, scene)
+            view.set_background(PAPER)
+        self._lay_out()
         iren = self.plotter.iren
-        if iren is not None:
-            iren.interactor.AddObserver("ExitEvent", lambda *_: self._gone())
+        assert iren is not None, "pyvista makes an interactor with its plotter"
+        iren.clear_key_event_callbacks()
+        iren.style = vtk.vtkInteractorStyleUser()
+        self.interactor = iren.interactor
+        for event, action in (
+            ("ExitEvent", self._gone),
+            ("MouseMoveEvent", self._hover),
+            ("LeftButtonPressEvent", self._press),
+            ("KeyPressEvent", self._key),
+        ):
+            self.interactor.AddObserver(event, lambda *_, action=action: action())
+        self.plotter.show(interactive_update=True, auto_close=False)
+
+    def _lay_out(self) -> None:
+        width, height = self.plotter.window_size
+        scale = min(width / SIZE[0], height / SIZE[1])
+        self.head.place(0, 0, width, height, scale)
+        words = [(Item("What do you want to touch?", size=22, bold=True),)]
+        self.head.show([*words, (Item("Click a scene.", colour=GREY),)] if self.scenes else [])
+        rows = -(-len(self.scenes) // COLUMNS)
+        space = SPACE * scale
+        for place, (board, view) in enumerate(zip(self.cards, self._views, strict=True)):
+            row, column = divmod(place, COLUMNS)
+            wide = (width - (COLUMNS + 1) * space) / COLUMNS
+            high = (height - HEAD * scale - rows * space) / rows
+            left, top = space + column * (wide + space), height - HEAD * scale - row * (high + space)
+            board.place(left, top - high, left + wide, top, scale)
+            inset = 3.0
+            low = top - PICTURE * scale
+            x0, x1 = (left + inset) / width, (left + wide - inset) / width
+            view.viewport = (x0, low / height, x1, (top - inset) / height)
+            view.reset_camera()
+            view.camera.zoom(1.2)
+        self._hover()
+
+    def _hover(self) -> None:
+        at = self.plotter.iren.interactor.GetEventPosition() if self.plotter.iren else (-1, -1)
+        for board, scene in zip(self.cards, self.scenes, strict=True):
+            board.fill = HINT if board.holds(*at) else PAPER
+            board.show(
+                [
+                    (Item("", size=PICTURE),),
+                    (Item(scene.title, size=15, bold=True),),
+                    (Item(scene.about, size=12, colour=GREY),),
+                ]
+            )
+
+    def _press(self) -> None:
+        at = self.interactor.GetEventPosition()
+        held = (scene for board, scene in zip(self.cards, self.scenes, strict=True) if board.holds(*at))
+        self._chosen = next(held, self._chosen)
+
+    def _key(self) -> None:
+        if self.interactor.GetKeySym() in ("q", "Escape"):
+            self._gone()
 
     def _gone(self) -> None:
         self._closed = True
 
-    def _text(self, text: str, height: float, size: int) -> pyvista.Text:
-        actor = pyvista.Text(text)
-        actor.prop.color, actor.prop.font_size, actor.prop.justification_horizontal = "black", size, "center"
-        actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        actor.SetPosition(0.5, height)
-        self.plotter.add_actor(actor, reset_camera=False)
-        return actor
+    def choose(self) -> Scene:
+        """The scene that a person clicks; raises ClosedError where he closes the window instead."""
+        size = self.plotter.window_size
+        while self._chosen is None and not self._closed:
+            if self.plotter.window_size != size:
+                size = self.plotter.window_size
+                self._lay_out()
+            self.plotter.update()
+            time.sleep(PERIOD_S)
+        if self._chosen is None:
+            raise ClosedError("the window was closed before a scene was chosen")
+        for board, view in zip(self.cards, self._views, strict=True):
+            board.fill = ""
+            board.show([])
+            view.SetDraw(False)
+        self.scenes, self.cards, self._views = (), [], []
+        return self._chosen
 
-    def _bar(self, colour: str, right: float) -> pyvista.PolyData:
-        bar = pyvista.PolyData.from_regular_faces(_corners(right), np.array([[0, 1, 2], [0, 2, 3]]))
-        mapper, place = vtk.vtkPolyDataMapper2D(), vtk.vtkCoordinate()
-        place.SetCoordinateSystemToNormalizedViewport()
-        mapper.SetTransformCoordinate(place)
-        mapper.SetInputData(bar)
-        actor = vtk.vtkActor2D()
-        actor.SetMapper(mapper)
-        actor.GetProperty().SetColor(*pyvista.Color(colour).float_rgb)
-        self.plotter.add_actor(actor, reset_camera=False)
-        return bar
-
-    def run(self, job: Callable[[Progress], T]) -> T:
-        """What `job(tell)` returns or raises; raises ClosedError where the window is closed meanwhile."""
+    def run(self, title: str, job: Callable[[Progress], T]) -> T:
+        """What `job(tell)` returns or raises, told under a title; raises ClosedError where the window is
+        closed meanwhile."""
         running = _Job(job)
         began = time.perf_counter()
         while running.is_alive() and not self._closed:
-            stage, share = running.said
-            self._stage.input = f"{stage}   {100 * share:.0f} %   {time.perf_counter() - began:.0f} s"
-            self._full.points = _corners(LEFT + min(max(share, 0.0), 1.0) * (RIGHT - LEFT))
+            self._tell(title, *running.said, time.perf_counter() - began)
             self.plotter.update()
             running.join(PERIOD_S)
         if running.error is not None:
@@ -101,11 +174,33 @@ class WaitingWindow:
             raise ClosedError("the window was closed before there was anything to touch")
         return running.result  # type: ignore[return-value]  # of a job that has ended without an error
 
+    def _tell(self, title: str, stage: str, share: float, seconds: float) -> None:
+        width, height = self.plotter.window_size
+        self.head.place(
+            0.25 * width, 0.4 * height, 0.75 * width, 0.6 * height, min(width / SIZE[0], height / SIZE[1])
+        )
+        self.head.show(
+            [
+                (Item(title, size=20, bold=True),),
+                (Item("", share=share),),
+                (Item(f"{stage}   {100 * share:.0f} %   {seconds:.0f} s", colour=GREY),),
+            ]
+        )
+
     def close(self) -> None:
         """No longer needed."""
         self._closed = True
         self.plotter.close()
 
 
-def _corners(right: float) -> np.ndarray:
-    return np.array([[LEFT, LOW, 0.0], [right, LOW, 0.0], [right, HIGH, 0.0], [LEFT, HIGH, 0.0]])
+def _draw(plotter: pyvista.Plotter, scene: Scene) -> None:
+    """A scene's object, or where the tip went in its recording."""
+    if scene.kind == "phantom":
+        shape = phantom(scene.source)
+        surface = pyvista.PolyData.from_regular_faces(shape.vertices, shape.faces)
+        plotter.add_mesh(surface, color=OBJECT, smooth_shading=True, split_sharp_edges=True, ambient=0.2)
+    else:
+        path = read_recording(embedded_recording(scene.source)).position[::EVERY]
+        plotter.add_points(path, color=OBJECT, point_size=2.0)
+    plotter.camera_position = "xz"
+    plotter.camera.elevation = 30.0

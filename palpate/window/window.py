@@ -1,4 +1,5 @@
-"""The touch window: pictures side by side, live plots below; palpate.window.controls moves the tip.
+"""The touch window: force, next step and buttons on the left, pictures, live plots below them, settings or
+help on the right; palpate.window.controls moves the tip.
 
 One timer drives everything: `tick` writes the mouse's pose for the servo process, reads its newest state,
 moves what is drawn. The servo never waits for a picture.
@@ -9,8 +10,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from pathlib import Path
-from textwrap import wrap
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import pyvista
@@ -18,20 +18,20 @@ import vtk
 
 from devices.channel import PoseChannel
 from mechanics.files import PNG, atomic_file
+from palpate.window.axes import Axes
+from palpate.window.board import PAPER, Board, Item
 from palpate.window.charts import LiveCharts
 from palpate.window.controls import Controls
-from palpate.window.frames import Frame, level
+from palpate.window.frames import Frame, View, level
 from palpate.window.game import Game
 from palpate.window.ghost import GhostTip
-from palpate.window.keys import help_text
 from palpate.window.orbit import Orbit
 from palpate.window.pace import Pace
+from palpate.window.panel import NextStep, aside_rows, main_rows
 from palpate.window.picture import ObjectPicture
-from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M, Pointer
+from palpate.window.pointer import Pointer
 from palpate.window.session import TouchSession
 from palpate.window.stiffness import StiffnessMap, common_limits
-from palpate.window.words import heading, hint, status
-from render.base import Renderer
 from scenes.phantoms import Region
 from scenes.scene import Scene
 
@@ -40,21 +40,21 @@ if TYPE_CHECKING:
 
 PERIOD_MS = 16
 SIZE = (1280, 800)
-CHARTS_SHARE = 0.28
-SLIDER_AT = 0.36
-"""Of the panel's height."""
-PANEL_SHARE = 0.42
-"""Of the charts' row: the panel of words, which covers nothing."""
-LEAST_TYPE = 9
+COLUMN, CHARTS = 280, 190
+"""Width of the columns beside the pictures and height of the plots, pixels of a window of full size."""
+LEAST_SCALE, MOST_SCALE = 0.55, 2.5
+BACKGROUND = "#f4f6f8"
 LIGHTS = (((-0.4, 0.55, 1.0), 0.9), ((0.9, -0.1, 0.6), 0.45))
 """Two that turn with the eye, (place, strength): each more is paid for at every pixel."""
-LETTER = 0.62
-"""Mean width of a letter over its type's size."""
 
 
 class TouchWindow:
     """Draws a started session. channel: where the mouse's pose goes, None where another device moves. guide:
-    of an exploration, whose suggestions are shown."""
+    of an exploration, whose suggestions are shown.
+
+    aside: what is open on the right: 's' settings, 'h' help, '' nothing. another: whether it was closed to
+    choose another scene.
+    """
 
     def __init__(
         self,
@@ -68,10 +68,11 @@ class TouchWindow:
     ) -> None:
         self.session = session
         self.scene = scene
+        self.guide = guide
         self.frames = 0
-        self.closed = False
-        self.notice = ""
-        self._ended = False
+        self.closed = self.another = self._ended = False
+        self.notice = self.aside = ""
+        self.moved_by_mouse = channel is not None
         self._channel = channel
         self._last_s = time.perf_counter()
         self._end_s = float("inf")
@@ -79,130 +80,66 @@ class TouchWindow:
         nodules = tuple(session.model.material.inclusions.values())
         up = session.model.support.normal
         self.game = Game(nodules, up) if scene.find and nodules else None
-        self.guide = guide
-        self._coloured = scene.colour == "stiffness"
-        halves = [(0, slice(None)), (1, slice(None))]
-        self.plotter = pyvista.Plotter(
+        self.coloured = scene.colour == "stiffness"
+        self.plotter = self._plotter(off_screen, size)
+        self._first, self._second, self._plots, self._column, self._aside = self.plotter.renderers
+        self.boards = [Board(self._column, fill=PAPER), Board(self._aside, fill=PAPER)]
+        self._headings = [Board(self._first), Board(self._second)]
+        self._laid_out: object = None
+        self._scale = 1.0
+        self._pace = Pace()
+        self._names: tuple[str, ...] = ()
+        self.pictures = [self._picture(0, session.renderer_name)]
+        self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
+        self._axes = Axes(self._first)
+        self.plotter.subplot(0, 2)
+        self._charts = LiveCharts(self.plotter, session.trace.seconds)
+        points, triangles = self.pictures[0].rest_surface
+        support, radius = session.model.support, session.servo.tip_radius_m
+        self.pointer = Pointer(points, triangles, radius, support.point, support.normal)
+        self.orbit = self._look()
+        self._next = NextStep(self, mouse=self.moved_by_mouse)
+        self._lay_out()
+        self.controls = Controls(self)
+
+    def _plotter(self, off_screen: bool, size: tuple[int, int]) -> pyvista.Plotter:
+        plotter = pyvista.Plotter(
             off_screen=off_screen,
             window_size=list(size),
-            shape=(2, 2),
-            row_weights=[100 - round(100 * CHARTS_SHARE), round(100 * CHARTS_SHARE)],
-            groups=halves[1:] if self.sides == 2 else halves,  # type: ignore[arg-type]  # it takes slices too
-            title=f"Palpate: {scene.title}",
+            shape=(1, 5),
+            title=f"{self.scene.title} - Palpate",
             border=False,
             lighting="none",
         )
-        for renderer in self.plotter.renderers:
-            renderer.set_background("#f4f6f8")
+        for renderer in plotter.renderers:
+            renderer.set_background(BACKGROUND)
             # blending in any order takes several passes over the whole picture; a shadow needs one
             renderer.UseOITOff()
         # smoothing edges costs more than all the rest where there is no graphics card
-        window = self.plotter.render_window
+        window = plotter.render_window
         assert window is not None, "a plotter has one until it is closed"
         window.SetMultiSamples(0)
-        self._headings: list[pyvista.Text] = []
-        self._texts: list[tuple[pyvista.Text, int]] = []
-        self._scaled_for = (0, 0)
-        self._pace = Pace()
-        self.pictures = [self._picture(side) for side in range(self.sides)]
-        self._ghost = GhostTip(self.plotter, session.servo.tip_radius_m) if guide else None
-        self.plotter.subplot(1, 0)
-        self._charts = LiveCharts(self.plotter, session.trace.seconds, self._names, left=PANEL_SHARE)
-        self._status = self._text("", (0.008, 0.95), "top", size=15)
-        self._hint = self._text(hint(mouse=channel is not None), (0.008, 0.04), "bottom", size=11)
-        self.plotter.subplot(0, 0)
-        self._help = self._text("", (0.01, 0.98), "top", font="courier")
-        self._help.prop.background_color, self._help.prop.background_opacity = "white", 0.9
-        self._help.SetVisibility(False)
-        plotter: Any = self.plotter  # its widgets' types are lost in PyVista's wrappers
-        plotter.add_axes(interactive=False, color="black", line_width=2, viewport=(0.0, 0.0, 0.14, 0.2))
-        points, triangles = self.pictures[0].rest_surface
-        model = session.model
-        radius = session.servo.tip_radius_m
-        self.pointer = Pointer(points, triangles, radius, model.support.point, model.support.normal)
-        self._slider = None if channel is None else self._depth_slider()
-        self.orbit = self._look()
-        self.controls = Controls(self)
+        return plotter
 
     @property
     def sides(self) -> int:
-        """How many pictures there are."""
-        return 2 if self.session.beside_name else 1
+        """How many pictures there are to be seen."""
+        return max(1, len(self._names))
 
     @property
     def picture_renderers(self) -> list[vtk.vtkRenderer]:
         """Where an object is drawn."""
-        return [self.plotter.renderers[side] for side in range(self.sides)]
+        return [self._first, self._second][: self.sides]
 
-    @property
-    def _names(self) -> tuple[str, ...]:
-        beside = self.session.beside_name
-        return (self.session.renderer_name, beside) if beside else (self.session.renderer_name,)
-
-    def _drawing(self) -> tuple[Renderer, ...]:
-        return tuple(self.session.drawing(name) for name in self._names)
-
-    def _text(
-        self, text: str, place: tuple[float, float], anchor: str, *, size: int = 12, font: str = "arial"
-    ) -> pyvista.Text:
-        """Text in the active subplot; place: shares of its width and height."""
-        actor = pyvista.Text(text)
-        actor.prop.color, actor.prop.font_size, actor.prop.font_family = "black", size, font
-        actor.GetPositionCoordinate().SetCoordinateSystemToNormalizedViewport()
-        actor.SetPosition(*place)
-        actor.prop.justification_vertical = anchor
-        self._texts.append((actor, size))
-        self.plotter.add_actor(actor, reset_camera=False)
-        return actor
-
-    def _depth_slider(self) -> vtk.vtkSliderWidget:
-        """How deep a press goes, in the panel; a drag on it is none on the object."""
-        self.plotter.subplot(1, 0)
-        plotter: Any = self.plotter
-        pointer = self.pointer
-        slider: vtk.vtkSliderWidget = plotter.add_slider_widget(
-            pointer.go_deep,
-            (1e3 * LEAST_PRESS_M, 1e3 * MOST_PRESS_M),
-            value=1e3 * pointer.press_depth_m,
-            title="press depth [mm]",
-            pointa=(0.012, SLIDER_AT),
-            pointb=(0.012 + 0.5 * PANEL_SHARE, SLIDER_AT),
-            interaction_event="always",
-            title_height=0.05,
-            title_color="black",
-            color="#1b4f9c",
-            fmt="%.1f",
-            slider_width=0.035,
-            tube_width=0.008,
-        )
-        look: Any = slider.GetSliderRepresentation()
-        look.SetSliderLength(0.012)
-        look.SetEndCapLength(0.0)
-        look.SetLabelHeight(0.05)
-        look.GetTubeProperty().SetColor(*pyvista.Color("#b8c0cc").float_rgb)
-        for words in (look.GetLabelProperty(), look.GetTitleProperty()):
-            words.SetColor(0.0, 0.0, 0.0)
-            words.SetBold(False)
-            words.SetShadow(False)
-        return slider
-
-    def _picture(self, side: int) -> ObjectPicture:
+    def _picture(self, side: int, name: str) -> ObjectPicture:
         self.plotter.subplot(0, side)
         for place, strength in LIGHTS:
             light = pyvista.Light(position=place, light_type="camera light", intensity=strength)
             self.plotter.add_light(light, only_active=True)
-        name = self._names[side]
-        over = self._text(heading(name, felt=side == 0), (0.98, 0.985), "top", size=14)
-        over.prop.justification_horizontal = "right"
-        self._headings.append(over)
         session = self.session
+        drawing, radius = session.drawing(name), session.servo.tip_radius_m
         return ObjectPicture(
-            self.plotter,
-            session.drawing(name),
-            session.model,
-            session.servo.tip_radius_m,
-            place=(0, side),
-            label=name if side else "",
+            self.plotter, drawing, session.model, radius, place=(0, side), label=" " if side else ""
         )
 
     def _look(self) -> Orbit:
@@ -214,55 +151,87 @@ class TouchWindow:
         eye = middle + distance * (-0.8 * level(up) + 0.6 * up)
         self.plotter.subplot(0, 0)
         camera = self.plotter.camera
-        for renderer in self.picture_renderers[1:]:
-            renderer.camera = camera
+        self._second.camera = camera
         return Orbit(camera, middle, up, eye)
+
+    def _follow_views(self, views: tuple[View, ...]) -> None:
+        """As many pictures as there are views, each under its renderer's name."""
+        names = tuple(view.name for view in views)
+        if names == self._names:
+            return
+        if len(names) > len(self.pictures):
+            self.pictures.append(self._picture(1, names[1]))
+            self._second.camera = self.plotter.renderers[0].camera
+        if self.coloured:
+            self._map.forget()
+        self._names = names
+        self._charts.tell(len(names))
+
+    def _lay_out(self) -> None:
+        """Everything in its place, where the window, or what is open in it, has changed."""
+        width, height = self.plotter.window_size
+        state = (width, height, self.sides, self.aside)
+        if state == self._laid_out:
+            return
+        self._laid_out = state
+        self._pace.forget()
+        self._scale = scale = float(np.clip(min(width / SIZE[0], height / SIZE[1]), LEAST_SCALE, MOST_SCALE))
+        left, low = COLUMN * scale / width, CHARTS * scale / height
+        right = 1.0 - (left if self.aside else 0.0)
+        middle = 0.5 * (left + right) if self.sides == 2 else right
+        for renderer, viewport in (
+            (self._first, (left, low, middle, 1.0)),
+            (self._second, (middle, low, right, 1.0) if self.sides == 2 else (0.0, 0.0, 0.01, 0.01)),
+            (self._plots, (left, 0.0, right, low)),
+            (self._column, (0.0, 0.0, left, 1.0)),
+            (self._aside, (right, 0.0, 1.0, 1.0) if self.aside else (0.0, 0.0, 0.01, 0.01)),
+        ):
+            renderer.viewport = viewport
+        for board in self.boards:
+            board.changed = True
+        column, aside = self.boards
+        column.place(0, 0, left * width, height, scale)
+        aside.place(right * width, 0, width if self.aside else right * width - 1, height, scale)
+        for board, renderer in zip(self._headings, (self._first, self._second), strict=True):
+            x0, _, x1, _ = renderer.viewport
+            board.place(x0 * width, height - 60 * scale, x1 * width, height, scale)
 
     def toggle_colour(self) -> None:
         """Colour by displacement, or by local stiffness as soon as that is computed."""
-        self._coloured = not self._coloured
+        self.coloured = not self.coloured
         self._map.forget()
-        if not self._coloured:
+        if not self.coloured:
             for picture in self.pictures:
                 picture.colour_by_displacement()
 
-    def toggle_help(self) -> None:
-        """Show every key that does something now, or not."""
-        self._help.input = help_text(self.controls.offered)
-        self._help.SetVisibility(not self._help.GetVisibility())
+    def show_aside(self, which: str) -> None:
+        """Settings ('s') or help ('h') beside the pictures; those that are open close."""
+        self.aside = "" if which == self.aside else which
 
     def answer(self) -> None:
         """The game's: the nodule is where the mouse points; it is shown until the next touch."""
         target = self.pointer.target
         point = self.pointer.tip_m if target is None else target.point
         if self.game is not None and self.game.answer(point, time.perf_counter(), self.session.renderer_name):
-            self._reveal(True)
-
-    def _reveal(self, on: bool) -> None:
-        assert self.game is not None
-        region = None
-        if on:
-            ball = self.game.hidden[0]
-            region = Region("nodule", ball.centre_m, ball.radius_m, ball.modulus_ratio)
-        for picture in self.pictures:
-            picture.show_inclusion(region)
-        self._map.forget()
-        if not on and self._coloured:
-            for picture in self.pictures:
-                picture.colour_by_displacement()
+            self._map.forget()
 
     def _play(self, frame: Frame) -> None:
         """The clock runs from a touch, which hides the nodule again."""
-        if self.game is not None and frame.touching:
-            if self.game.answered:
-                self._reveal(False)
-            self.game.touched(time.perf_counter())
+        if self.game is None:
+            return
+        answered = self.game.answered
+        self.game.follow(frame.touching, time.perf_counter())
+        if answered and not self.game.answered and self.coloured:
+            for picture in self.pictures:
+                picture.colour_by_displacement()
 
-    def set_inclusion(self, region: Region | None) -> None:
-        """Draw it there, and let it be felt there as soon as that is computed."""
-        self.session.place_inclusion(region)
-        for picture in self.pictures:
-            picture.show_inclusion(region)
+    @property
+    def _inside(self) -> Region | None:
+        """What is drawn inside the object now."""
+        if self.game is None or not self.game.answered:
+            return self.session.inclusion
+        ball = self.game.hidden[0]
+        return Region("nodule", ball.centre_m, ball.radius_m, ball.modulus_ratio)
 
     def tick(self) -> Frame | None:
         """One frame: pose out, state in, pictures moved. Returns what was drawn."""
@@ -279,57 +248,49 @@ class TouchWindow:
         return frame
 
     def _draw(self, frame: Frame) -> None:
+        self._follow_views(frame.views)
+        self._lay_out()
         beside, words = self._pace.next(time.perf_counter())
-        self._thin_out(beside, words)
+        self._play(frame)
         below = self.pointer.below(frame.tip_m)
         for picture, view in zip(self.pictures if beside else self.pictures[:1], frame.views, strict=False):
             picture.update(frame, view, below)
-        self._play(frame)
-        if self._coloured and self.session.inclusion_felt and (self.game is None or self.game.answered):
-            maps = self._map.of(self._drawing())
+        for picture in self.pictures:
+            picture.show_inclusion(self._inside)
+        if self.coloured and self.session.inclusion_felt and (self.game is None or self.game.answered):
+            maps = self._map.of(tuple(self.session.drawing(name) for name in self._names))
             limits = common_limits(maps)
             for picture, stiffness in zip(self.pictures, maps, strict=False):
                 picture.colour_by_stiffness(stiffness, limits)
-        lines = status(self.session, self.scene, self.pointer, frame, self.notice)
-        if self.game is not None and (self.game.answered or not self._guiding):
-            lines += self.game.lines(time.perf_counter())
         if self.guide is not None and self._ghost is not None:
             self.guide.follow()
             self._ghost.show(self.guide.ghost)
-            lines += self.guide.lines()
-        if self._slider is not None:
-            self._slider.GetSliderRepresentation().SetValue(1e3 * self.pointer.press_depth_m)
-        self._scale_type()
-        width, _ = self.plotter.window_size
-        letters = int(PANEL_SHARE * width / (LETTER * self._status.prop.font_size))
-        self._status.input = "\n".join(part for line in lines for part in wrap(line, max(letters, 20)))
-        for side, (over, name) in enumerate(zip(self._headings, self._names, strict=True)):
-            over.input = heading(name, felt=side == 0)
+        self._axes.update(self._scale)
+        if words:
+            self._write(frame)
+        self._second.SetDraw(beside and self.sides == 2)
+        self._plots.SetDraw(words)
+        column, aside = self.boards
+        self._column.SetDraw(column.changed)  # else it stands there as it is
+        self._aside.SetDraw(aside.changed and bool(self.aside))
         self.frames += 1
 
-    @property
-    def _guiding(self) -> bool:
-        """Whether a next touch is suggested: one thing is asked for at a time."""
-        return self.guide is not None and self.guide.suggestion.kind != "stop"
+    def _write(self, frame: Frame) -> None:
+        self._charts.update(self.session.trace)
+        column, aside = self.boards
+        column.show(main_rows(self, frame))
+        aside.show(aside_rows(self) if self.aside else [])
+        for side, (board, name) in enumerate(zip(self._headings, self._names, strict=False)):
+            board.show([(Item(f"{name}: {'for comparison' if side else 'what is felt'}", bold=True),)])
 
-    def _thin_out(self, beside: bool, words: bool) -> None:
-        """Draw what is felt; the second picture, and words and plots, only where the pace allows them."""
-        if words:
-            self._charts.update(self.session.trace)
-        *pictures, panel = self.plotter.renderers
-        for renderer in pictures[1:]:
-            renderer.SetDraw(beside)
-        panel.SetDraw(words)
-
-    def _scale_type(self) -> None:
-        """Type grows and shrinks with the window."""
-        width, height = self.plotter.window_size
-        if (width, height) != self._scaled_for:
-            self._scaled_for = width, height
-            self._pace.forget()
-            share = min(width / SIZE[0], height / SIZE[1])
-            for text, points in self._texts:
-                text.prop.font_size = max(LEAST_TYPE, round(points * share))
+    def next_words(self, frame: Frame) -> str:
+        """What to do next: one thing at a time."""
+        if self.guide is not None and self.guide.suggestion.kind != "stop":
+            return "\n".join(self.guide.lines())
+        lines = [] if self.guide is None else self.guide.lines()
+        if self.game is not None:
+            return "\n".join([*lines, *self.game.lines(time.perf_counter())])
+        return "\n".join(lines) if lines else self._next.line(frame)
 
     def run(
         self,
@@ -361,6 +322,6 @@ class TouchWindow:
                     self.plotter.screenshot(str(temporary))
             self.controls.interactor.TerminateApp()
 
-    def close(self) -> None:
-        """End `run` at the next frame."""
-        self.closed = True
+    def close(self, *, scenes: bool = False) -> None:
+        """End `run` at the next frame; scenes: to choose another."""
+        self.closed, self.another = True, self.another or scenes

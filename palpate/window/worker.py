@@ -12,11 +12,14 @@ from mechanics.errors import PalpateError
 class Worker:
     """Runs one job after the other, in the order in which they were asked for.
 
-    busy: what is being done, in words, '' for nothing. failure: why the last job failed, '' where it did not.
+    busy: what is being done, in words, '' for nothing; share: how much of it. failure: why the last job
+    failed, '' where it did not.
     """
 
     def __init__(self) -> None:
         self.busy = ""
+        self.share = 0.0
+        self._words = ""
         self.failure = ""
         self._jobs: queue.Queue[tuple[str, Callable[[], None]]] = queue.Queue()
         threading.Thread(target=self._work, name="touch worker", daemon=True).start()
@@ -25,16 +28,26 @@ class Worker:
         """Do a job, after those that were asked for before."""
         self._jobs.put((words, job))
 
+    def tell(self, stage: str, share: float) -> None:
+        """A Progress for the job that runs."""
+        self.busy, self.share = f"{self._words}: {stage}", share
+
+    @property
+    def idle(self) -> bool:
+        """Whether every job is done."""
+        return not self._jobs.unfinished_tasks
+
     def offer(self, words: str, job: Callable[[], None]) -> bool:
         """Do a job at once, which will be offered again where it could not; False while there are others."""
-        if self._jobs.unfinished_tasks:
+        if not self.idle:
             return False
         self.run(words, job)
         return True
 
     def _work(self) -> None:
         while True:
-            self.busy, job = self._jobs.get()
+            self._words, job = self._jobs.get()
+            self.busy, self.share = self._words, 0.0
             try:
                 job()
                 self.failure = ""

@@ -17,6 +17,7 @@ from scipy.spatial import cKDTree
 
 from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.errors import OptionError
+from mechanics.key_values import number, pairs
 from mechanics.model import Model
 from mechanics.refine import refined_around
 from mechanics.tetmesh import TetMesh
@@ -34,6 +35,36 @@ class World(Protocol):
 
     def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
         """(3,) N on the tool once the tip's centre, (3,) m, is there, dt_s after the last step."""
+
+
+class SteppedWorld(ABC):
+    """One touch in a simulator that has a time step of its own: the tip is led along straight lines from
+    sample to sample, in whole steps; what is left of a sample goes to the next."""
+
+    def __init__(self, tip: np.ndarray, timestep_s: float) -> None:
+        self._tip, self._left, self._force = np.array(tip, dtype=float), 0.0, np.zeros(3)
+        self._timestep_s = timestep_s
+
+    @abstractmethod
+    def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
+        """One step of the simulator's own, at whose end the tip's centre is there; (3,) m, (3,) m/s."""
+
+    @abstractmethod
+    def force(self) -> np.ndarray:
+        """(3,) N on the tool after the last step."""
+
+    def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
+        """As `World.step`."""
+        self._left += dt_s
+        count = int(self._left / self._timestep_s + 1e-9)
+        self._left -= count * self._timestep_s
+        way = (np.asarray(tip, dtype=float) - self._tip) / max(count, 1)
+        for _ in range(count):
+            self._tip = self._tip + way
+            self.advance(self._tip, way / self._timestep_s)
+        if count:
+            self._force = self.force()
+        return self._force
 
 
 class Adapter(ABC):
@@ -75,26 +106,26 @@ class Adapter(ABC):
         centre = touchable[np.argmin(np.linalg.norm(touchable - tip, axis=1))]
         away = max(float(np.linalg.norm(centre - tip)), 1e-9)
         foot = tip + (centre - tip) * min(1.0, radius_m / away)
-        fine = self.mesh
-        for share in (2.0, 1.5, 1.0, 1.0):
-            fine, _ = refined_around(fine, foot, share * reach_m, edge_m)
-        return fine
+        return graded(self.mesh, foot, edge_m, reach_m)
+
+
+def graded(mesh: TetMesh, place: np.ndarray, edge_m: float, reach_m: float) -> TetMesh:
+    """A linear mesh with edges of at most about `edge_m` within `reach_m` of a place (3,) m."""
+    for share in (2.0, 1.5, 1.0, 1.0):
+        mesh, _ = refined_around(mesh, place, share * reach_m, edge_m)
+    return mesh
 
 
 def changed(settings: Any, text: str) -> Any:
     """The settings with KEY=VALUE words over them; raises OptionError for what is not there or no number."""
     known = {f.name for f in dataclasses.fields(settings)}
-    values = {}
-    for word in filter(None, (w.strip() for w in text.split(","))):
-        key, _, value = word.partition("=")
+    flag, values = "--simulator-set", {}
+    for key, value in pairs(filter(None, (w.strip() for w in text.split(","))), flag, "edge_radii=0.5"):
         if key not in known:
-            raise OptionError(f"--simulator-set {word}: allowed are {', '.join(sorted(known))}")
-        try:
-            values[key] = float(value)
-        except ValueError as error:
-            raise OptionError(f"--simulator-set {word}: it must be KEY=NUMBER") from error
+            raise OptionError(f"{flag} {key}={value}: allowed are {', '.join(sorted(known))}")
+        values[key] = number(flag, key, value)
         if not values[key] > 0:
-            raise OptionError(f"--simulator-set {word}: it must be greater than 0")
+            raise OptionError(f"{flag} {key}={value}: it must be greater than 0")
     return dataclasses.replace(settings, **values)
 
 

@@ -14,7 +14,7 @@ import numpy as np
 
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, DOCUMENTED, Adapter, World, made
+from render.simulators.base import BEST, DOCUMENTED, Adapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model
@@ -28,14 +28,17 @@ DENSITY_KG_M3 = 1000.0
 
 @dataclass(frozen=True)
 class Settings:
-    """timestep_s; solref_s, damping_ratio: solref of the contact; damping_s: of the flex's elasticity;
-    edge_radii: edges under the tip, in its radii, inf as the model has them."""
+    """timestep_s; solref_s, damping_ratio: solref of the contact; impedance, impedance_deep: its solimp;
+    damping_s: of the flex's elasticity; edge_radii: edges under the tip, in its radii, inf as the model has
+    them."""
 
     timestep_s: float
     solref_s: float
     damping_ratio: float = 1.0
     damping_s: float = 0.01
     edge_radii: float = np.inf
+    impedance: float = 0.9
+    impedance_deep: float = 0.95
 
 
 SETTINGS = {
@@ -53,6 +56,7 @@ def flex_xml(
     radius_m: float,
     friction: float = 0.5,
     solref: tuple[float, float] = (0.02, 1.0),
+    impedance: tuple[float, float] = (0.9, 0.95),
     damping_s: float = 0.01,
 ) -> str:
     """An object as a flex with a mocap sphere above its top."""
@@ -62,7 +66,7 @@ def flex_xml(
     mass = DENSITY_KG_M3 * float(mesh.volumes.sum())
     top = mesh.points.max(axis=0)
     middle = 0.5 * (top + mesh.points.min(axis=0))
-    contact = f'solref="{solref[0]:g} {solref[1]:g}"'
+    contact = f'solref="{solref[0]:g} {solref[1]:g}" solimp="{impedance[0]:g} {impedance[1]:g} 0.001"'
     return f"""<mujoco>
 <option timestep="{timestep_s:g}" gravity="0 0 0" integrator="discrete" solver="CG"/>
 <size memory="1G"/>
@@ -137,7 +141,7 @@ class MuJoCo(Adapter):
         xml = flex_xml(
             mesh, own.timestep_s, young_pa=given["young_modulus_pa"], poisson=given["poisson_ratio"],
             radius_m=radius_m, friction=self.friction, solref=(own.solref_s, own.damping_ratio),
-            damping_s=own.damping_s,
+            impedance=(own.impedance, own.impedance_deep), damping_s=own.damping_s,
         )  # fmt: skip
         return self._mujoco.MjModel.from_xml_string(xml)
 
@@ -151,25 +155,19 @@ class MuJoCo(Adapter):
         return _Touch(self._mujoco, self._whole[1], tip)
 
 
-class _Touch:
-    """One touch: the sphere is led along, in steps of the simulator's own."""
+class _Touch(SteppedWorld):
+    """One touch: the sphere is a mocap body."""
 
     def __init__(self, mujoco: Any, model: Any, tip: np.ndarray) -> None:
+        super().__init__(tip, float(model.opt.timestep))
         self._mujoco, self._model, self._data = mujoco, model, mujoco.MjData(model)
-        self._tip, self._left, self._force = np.array(tip), 0.0, np.zeros(3)
 
-    def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
-        own = float(self._model.opt.timestep)
-        self._left += dt_s
-        count = int(self._left / own + 1e-9)
-        self._left -= count * own
-        for k in range(count):
-            self._data.mocap_pos[0] = self._tip + (k + 1) / count * (tip - self._tip)
-            self._mujoco.mj_step(self._model, self._data)
-        if count:
-            self._tip = np.array(tip)
-            self._force = force_on_tip(self._mujoco, self._model, self._data)
-        return self._force
+    def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
+        self._data.mocap_pos[0] = tip
+        self._mujoco.mj_step(self._model, self._data)
+
+    def force(self) -> np.ndarray:
+        return force_on_tip(self._mujoco, self._model, self._data)
 
 
 def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:

@@ -16,6 +16,7 @@ from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
 from mechanics import pardiso
+from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
 from render.simulators.base import BEST, DOCUMENTED, Adapter, World, made
@@ -42,7 +43,10 @@ NEAR_RADII = 1.05
 """Of the tip: nodes so near to its centre may touch, as what it presses moves away from it."""
 MOVED_M = 2e-5
 """The tip's travel after which the contact is solved anew; between, the force is held."""
-ITERATIONS, SHARES = 30, (1.0, 0.5, 0.2, 0.05)
+BALANCED_M, GOOD_ENOUGH_M = 1e-8, 2e-6
+"""By which springs and object may miss each other; what is taken where no step leads nearer, a tenth of the
+travel between two balances."""
+ITERATIONS, SHARES = 60, (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
 """Of Newton's method, and the shares of a step that are tried."""
 
 
@@ -172,15 +176,15 @@ class _Touch:
         if not np.array_equal(near, self._chosen):
             old = dict(zip(self._chosen.tolist(), self._u, strict=True))
             self._chosen, self._matrix = near, self.solved.compliance(near)
+            self._lower = np.linalg.cholesky(self._matrix + self._matrix.T)
             self._u = np.array([old.get(int(k), np.zeros(3)) for k in near])
         own = np.median(np.diag(self._matrix).reshape(-1, 3).mean(axis=1))
         spring = self.penalty / own
         force, u = self._balanced(tip, near, spring)
         self._u = u
-        on = np.linalg.norm(force, axis=1) > 0
         relative = points[near] + u - tip
         kept = {}
-        for k in np.flatnonzero(on):
+        for k in np.flatnonzero(force.any(axis=1)):
             first = self._stuck.get(int(near[k]), relative[k])
             n = relative[k] / np.linalg.norm(relative[k])
             push = float(force[k] @ n)
@@ -193,56 +197,64 @@ class _Touch:
         return -force.sum(axis=0)
 
     def _balanced(self, tip: np.ndarray, near: np.ndarray, spring: float) -> tuple[np.ndarray, np.ndarray]:
-        """((c, 3) N on the nodes, (c, 3) m): where springs and object balance, by Newton's steps."""
-        points, u = self.solved.points[near], self._u.copy()
-        size = len(near)
-        force = np.zeros((size, 3))
-        for _ in range(ITERATIONS):
-            force, slope = self._springs(points + u - tip, near, spring)
-            residual = u.ravel() - self._matrix @ force.ravel()
-            if np.abs(residual).max() < 1e-8:
-                break
-            jacobian = np.eye(3 * size)
-            for k in np.flatnonzero(force.any(axis=1)):
-                block = slice(3 * k, 3 * k + 3)
-                jacobian[:, block] -= self._matrix[:, block] @ slope[k]
-            step = np.clip(np.linalg.solve(jacobian, residual), -1e-3, 1e-3).reshape(size, 3)
-            u = min(
-                (u - share * step for share in SHARES), key=lambda v: self._miss(points, v, tip, near, spring)
-            )
-        return force, u
+        """((c, 3) N on the nodes, (c, 3) m): where springs and object balance, by Newton's steps from the
+        last balance, else from rest. Raises OptionError where neither leads to one."""
+        points, anchor = self.solved.points[near], np.full((len(near), 3), np.nan)
+        for k, node in enumerate(near):
+            anchor[k] = self._stuck.get(int(node), anchor[k])
 
-    def _miss(
-        self, points: np.ndarray, u: np.ndarray, tip: np.ndarray, near: np.ndarray, spring: float
-    ) -> float:
-        """m, how far displacements are from balance."""
-        force, _ = self._springs(points + u - tip, near, spring)
-        return float(np.abs(u.ravel() - self._matrix @ force.ravel()).max())
+        def missed(u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+            force, slope = self._springs(points + u - tip, anchor, spring)
+            residual = u.ravel() - self._matrix @ force.ravel()
+            # in the norm of the object's energy, in which Newton's direction leads downwards
+            return force, slope, residual, float(np.linalg.norm(np.linalg.solve(self._lower, residual)))
+
+        for start in (self._u, np.zeros_like(points)):
+            u, now = start, missed(start)
+            for _ in range(ITERATIONS):
+                force, slope, residual, miss = now
+                if np.abs(residual).max() < BALANCED_M:
+                    return force, u
+                step = np.linalg.solve(self._jacobian(slope), residual).reshape(u.shape)
+                for share in SHARES:
+                    then = missed(u - share * step)
+                    if then[3] < (1 - 0.1 * share) * miss:
+                        break
+                u, now = u - share * step, then
+            if np.abs(now[2]).max() < GOOD_ENOUGH_M:
+                return now[0], u
+        raise OptionError(
+            f"scikit-fem: the contact finds no balance with the tip at {np.round(tip, 4).tolist()} m "
+            f"({1e3 * np.abs(now[2]).max():.2g} mm are left): lower --simulator-set penalty={self.penalty:g}"
+        )
+
+    def _jacobian(self, slope: np.ndarray) -> np.ndarray:
+        size = len(self._matrix)
+        by_node = self._matrix.reshape(size, -1, 3)
+        return np.eye(size) - np.einsum("ijk,jkl->ijl", by_node, slope).reshape(size, size)
 
     def _springs(
-        self, relative: np.ndarray, near: np.ndarray, spring: float
+        self, relative: np.ndarray, anchor: np.ndarray, spring: float
     ) -> tuple[np.ndarray, np.ndarray]:
-        """((c, 3) N on nodes at `relative` to the tip's centre, (c, 3, 3) N/m their slopes)."""
+        """((c, 3) N on nodes at `relative` to the tip's centre, (c, 3, 3) N/m their slopes). anchor: (c, 3) m
+        where each holds on to the tip, nan where it does not."""
         distance = np.maximum(np.linalg.norm(relative, axis=1), 1e-9)
-        n = relative / distance[:, None]
-        deep = self.radius_m - distance
-        force, slope = np.zeros_like(relative), np.zeros((len(relative), 3, 3))
-        for k in np.flatnonzero(deep > 0):
-            across = np.eye(3) - np.outer(n[k], n[k])
-            force[k] = spring * deep[k] * n[k]
-            slope[k] = -spring * np.outer(n[k], n[k]) + spring * deep[k] / distance[k] * across
-            first = self._stuck.get(int(near[k]))
-            if first is None:
-                continue
-            pull = -spring * across @ (relative[k] - first)
-            most = self.friction * spring * deep[k]
-            size = float(np.linalg.norm(pull))
-            if math.isfinite(most) and size > most:
-                force[k] += pull * most / size
-            else:
-                force[k] += pull
-                slope[k] -= spring * across
-        return force, slope
+        n, deep = relative / distance[:, None], np.maximum(self.radius_m - distance, 0.0)
+        along = n[:, :, None] * n[:, None]
+        across = np.eye(3) - along
+        slope = spring * ((deep / distance)[:, None, None] * across - along)
+        pull = -spring * np.einsum("cij,cj->ci", across, np.nan_to_num(relative - anchor))
+        size, most = np.linalg.norm(pull, axis=1), spring * deep * min(self.friction, 1e9)
+        share = np.minimum(1.0, most / np.maximum(size, 1e-12))
+        holds = np.isfinite(anchor[:, 0])
+        slope -= (spring * holds * share)[:, None, None] * across
+        slips = np.flatnonzero(holds & (share < 1))
+        to = pull[slips] / size[slips, None]
+        turned = (spring * share[slips])[:, None, None] * to[:, :, None] * to[:, None]
+        slope[slips] += turned - spring * self.friction * to[:, :, None] * n[slips, None]
+        touching = deep > 0
+        force = spring * deep[:, None] * n + share[:, None] * pull
+        return force * touching[:, None], slope * touching[:, None, None]
 
 
 def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:

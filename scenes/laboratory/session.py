@@ -82,6 +82,7 @@ class Session:
         self.phantom, self.modulus, self.options, self.staging = phantom, modulus, options, staging
         self.touches, self.parameters, self.seed = touches, parameters, seed
         self._solving = replace(solving, fineness=Fineness(finest=options.finest_mm))
+        self._ways: dict[float, Motion] = {}
         self.rotation, self.shift = np.eye(3), np.zeros(3)
         if options.frame:
             self.rotation, self.shift = random_frame(seed, 1e3 * phantom.height_m)
@@ -113,13 +114,17 @@ class Session:
         return touch_forces(self._shape(present), self.specimen(present, regions), self.touches, solving)
 
     def motion(self, radius: float) -> Motion:
-        """The same hand's way every time."""
+        """The same hand's way every time, made once."""
+        if radius in self._ways:
+            return self._ways[radius]
         hand = self.staging.hand
         traced = trace(self.phantom, hand, radius, self.modulus, self._rng("trace"))
         again = None
         if self.staging.complete or PROTOCOLS[self.options.protocol].complete:
             again = trace(self.phantom, hand, radius, self.modulus, self._rng("retrace"))
-        return motion(self.phantom, self.touches, traced, hand, radius, self._rng("motion"), again)
+        way = motion(self.phantom, self.touches, traced, hand, radius, self._rng("motion"), again)
+        self._ways[radius] = way
+        return way
 
     def run(
         self, present: Sequence[str], regions: bool = True, moved: np.ndarray | None = None

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from benchmarks.evidence import read
+from benchmarks.evidence import Figure, read
 from palpate import cli
 from palpate.operations.bench import clone, names
 
@@ -56,6 +56,15 @@ def test_evidence_is_kept_where_it_is_wanted(monkeypatch, tmp_path, capsys):
     kept = read(path)
     assert kept.command == "palpate bench one-d --repeats 1"
     assert any("bounded, robust" in figure.what for figure in kept.figures)
+
+
+def test_the_command_that_is_kept_holds_no_place_of_a_machine(monkeypatch, tmp_path):
+    monkeypatch.chdir(CLONE)
+    monkeypatch.setattr("benchmarks.diagnose_real.run", lambda _: {"figures": [Figure("ratio", 0.5)]})
+    path, data = tmp_path / "real.json", str(tmp_path)
+    words = ["bench", "diagnose-real", "--data", data, "--sets", "fish", f"--evidence={path}"]
+    assert cli.main(words) == 0
+    assert read(path).command == "palpate bench diagnose-real --sets fish"
 
 
 def test_every_benchmark_has_help(monkeypatch, capsys):

@@ -62,6 +62,16 @@ def test_a_stiffer_mesh_is_numerics_and_a_stated_modulus_a_parameter(world):
         assert shares(result) == pytest.approx(1.0)
 
 
+def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world):
+    """Both pull one way here, and a third of the force outweighs 20 ms."""
+    t, force, modulus = world[0].t, world[3], world[1].material.young_modulus_pa
+    late = np.column_stack([np.interp(t - 0.02, t, f) for f in 1.5 * force.T])
+    result = judged(world, late, modulus=1.5 * modulus)
+    assert set(result.effects) == {"time_step", "stated_modulus"}
+    sizes = {e.name: e.gap_after_n for e in result.entries}
+    assert sizes[result.effects[0]] < sizes[result.effects[1]]
+
+
 def test_a_late_force_is_the_time_step(world):
     t, force = world[0].t, world[3]
     result = judged(world, np.column_stack([np.interp(t - 0.03, t, f) for f in force.T]))

@@ -174,6 +174,20 @@ def test_a_gap_without_a_name_is_stated_by_its_size(nameless):
     assert 0.3 * excess < np.mean(nameless.where.bins["time_n"]) < 1.2 * excess
 
 
+def test_a_parameter_at_the_end_of_its_range_is_in_the_first_line(delayed):
+    result = delayed[2]
+    assert "end of its range" not in result.lines()[0]
+    attribution = result.attribution
+    found = attribution.final.found
+    values = found.values.copy()
+    parameter = next(e for e in found.effects if e.name == "time_delay").parameters[0]
+    values[found.place_of("time_delay")] = parameter.high
+    final = dataclasses.replace(attribution.final, found=dataclasses.replace(found, values=values))
+    bound = dataclasses.replace(result, attribution=dataclasses.replace(attribution, final=final))
+    assert f"time delay: {parameter.name} stands at the end of its range" in bound.lines()[0]
+    assert bound.as_json()["at_bound"] == [f"time delay: {parameter.name}"]
+
+
 def test_json_has_the_contract(delayed):
     data = delayed[2].as_json()
     assert {
@@ -181,7 +195,7 @@ def test_json_has_the_contract(delayed):
         "effects", "young_modulus_pa", "next_touch",
     } <= set(data)  # fmt: skip
     assert data["constant_rmse_n"] > data["gap_before_n"] > data["noise_n"] and data["at_bound"] == []
-    assert any("ceiling: a constant push" in line for line in delayed[2].lines())
+    assert any("a constant push instead of a model" in line for line in delayed[2].lines())
     assert [a["axis"] for a in data["where"]["axes"]] == [
         "depth", "rate", "phase", "direction", "space", "order", "repeat", "free_air",
     ]  # fmt: skip

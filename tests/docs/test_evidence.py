@@ -146,6 +146,14 @@ def test_a_page_shows_missed_targets_beside_met_ones(folder, tmp_path):
     assert "time of a tick" in index and "modulus of the cylinder" not in index
 
 
+def test_a_page_begins_with_what_its_benchmark_says_of_itself(folder, tmp_path):
+    (tmp_path / "benchmarks").mkdir()
+    (tmp_path / "benchmarks" / "first_touch.py").write_text('"""How soon one\nfeels. \n\nMore."""\n')
+    assert evidence.about("first-touch", tmp_path) == "How soon one feels."
+    assert evidence.about("gone", tmp_path) == ""
+    assert evidence.about("modulus") in evidence.page(evidence.read(folder / "modulus.json"))
+
+
 def test_pages_of_files_that_are_gone_go_too(folder, tmp_path):
     evidence.write(tmp_path / "pages", folder)
     (folder / "modulus.json").unlink()

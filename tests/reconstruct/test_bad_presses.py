@@ -12,6 +12,7 @@ from reconstruct.geometry.placed import nowhere
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.pipeline import Reconstruction, ReconstructOptions, reconstruct_fully
 from reconstruct.steps.s3_contacts.contacts import ContactOptions
+from reconstruct.steps.s3_contacts.left_out import off_surface
 from reconstruct.steps.s3_contacts.quasi_static import explore_points
 
 from .flat_contact import points
@@ -44,8 +45,8 @@ def spoilt(how: str) -> Recording:
         force[rows, 2] = -0.3 * ramp
     elif how == "upside down":
         force[rows, 2] = -2.0 + 2.0 * ramp
-    elif how == "offset":
-        force[rows, 2] += 0.5
+    elif how.startswith("offset"):
+        force[rows, 2] += float(how.split()[1])
     return dataclasses.replace(recording, force_on_tool=force)
 
 
@@ -58,7 +59,7 @@ def good() -> Reconstruction:
     "how",
     [
         "weak", "weak and rubbing", "pulls at last", "pulls and rubs", "negative, weak at last", "pulls",
-        "upside down", "offset",
+        "upside down", "offset 0.1", "offset 0.3",
     ],
 )  # fmt: skip
 def test_a_bad_place_ends_no_recording_of_points(good, how):
@@ -68,6 +69,23 @@ def test_a_bad_place_ends_no_recording_of_points(good, how):
     assert left in (0, 1) and len(made.exploration.rejected) == left
     for _, why in made.exploration.rejected:
         assert "the place at (10.0, 10.0, " in why and "rows 73 to 78" in why or "off the surface" in why
+    assert made.exploration.presses.deepest.max() < 1.1 * good.exploration.presses.deepest.max()
+    if how.startswith("offset"):
+        assert left == 1
+
+
+def test_a_place_that_lies_higher_is_kept():
+    """A lump that a plane does not know: its force rises from nothing, only earlier."""
+    recording = points(rows=ROWS)
+    position = recording.position.copy()
+    position[BAD * ROWS : (BAD + 1) * ROWS, 2] += 0.002
+    lump = dataclasses.replace(recording, position=position)
+    for held, left in ((lump, 0), (spoilt("offset 0.3"), 1)):
+        found = explore_points(held, nowhere(held), ContactOptions())
+        presses, up = found.presses, np.tile([0.0, 0.0, 1.0], (25, 1))
+        reasons = off_surface(presses, presses.point * [1.0, 1.0, 0.0], up, found.boundary)
+        told = [float(why.split("off by ")[1].split()[0]) for why in reasons if why]
+        assert told == pytest.approx([0.3] * left, abs=0.03)
 
 
 def test_what_is_left_out_says_which_press_and_why():

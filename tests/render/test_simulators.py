@@ -13,6 +13,7 @@ from render.options import RenderOptions
 from render.press import Stroke, press
 from render.registry import create, names, simulator_names
 from render.scene import in_the_air
+from render.simulators.base import SteppedWorld
 
 E, NU, RADIUS = 30e3, 0.4, 0.006
 
@@ -30,7 +31,8 @@ def pressed(model, name, **options):
 
 
 def test_they_are_named_apart_from_our_own():
-    assert {"scikit-fem", "mujoco"} <= set(simulator_names()) and not set(names()) & set(simulator_names())
+    others = set(simulator_names())
+    assert others == {"scikit-fem", "mujoco", "drake", "newton"} and not set(names()) & others
 
 
 def test_scikit_fem_pushes_back_near_hertz_and_lets_go(model):
@@ -48,12 +50,46 @@ def test_a_softer_penalty_is_a_softer_contact(model):
     assert soft.peak_force_n < 0.8 * pressed(model, "scikit-fem").peak_force_n
 
 
+def test_a_contact_without_balance_is_an_error_and_no_force(model, monkeypatch):
+    pytest.importorskip("skfem")
+    monkeypatch.setattr("render.simulators.scikit_fem.ITERATIONS", 1)
+    with pytest.raises(OptionError, match="finds no balance .* lower --simulator-set penalty=10"):
+        pressed(model, "scikit-fem")
+
+
 def test_mujoco_pushes_back_and_a_harder_contact_more(model, tmp_path, monkeypatch):
     pytest.importorskip("mujoco")
     monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs
     plain = pressed(model, "mujoco")
     hard = pressed(model, "mujoco", simulator_set="solref_s=0.004,timestep_s=0.001")
     assert plain.force_at(0.002)[2] > 0 and hard.peak_force_n > 1.2 * plain.peak_force_n
+
+
+@pytest.mark.parametrize(("name", "needs"), [("drake", "pydrake"), ("newton", "newton")])
+def test_a_simulator_of_steps_pushes_back_along_the_normal_and_lets_go(model, name, needs):
+    """Within a factor of three of Hertz at its documented settings, on the model's own coarse mesh."""
+    pytest.importorskip(needs)
+    curve = pressed(model, name)
+    hertz = 4 / 3 * E / (1 - NU**2) * np.sqrt(RADIUS) * 0.002**1.5
+    force = curve.force_at(0.002)
+    assert 0.5 * hertz < force[2] < 3.5 * hertz and np.abs(force[:2]).max() < 0.1 * force[2]
+    assert curve.force[0] == pytest.approx(0.0) and curve.force[-1] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_stepping_simulator_is_led_in_whole_steps_of_its_own():
+    class Counted(SteppedWorld):
+        tips = ()
+
+        def advance(self, tip, velocity):
+            self.tips += (tip[2],)
+
+        def force(self):
+            return np.array([0.0, 0.0, len(self.tips)])
+
+    world = Counted(np.zeros(3), 2e-3)
+    assert world.step(1e-3, np.array([0.0, 0.0, 0.1]))[2] == 0  # not a step's time yet
+    assert world.step(5e-3, np.array([0.0, 0.0, 0.3]))[2] == 3
+    assert world.tips == pytest.approx((0.1, 0.2, 0.3))
 
 
 def test_a_setting_that_is_not_there_is_refused(model):

@@ -4,6 +4,7 @@ what its scripts are told."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -59,7 +60,7 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Block,
     return block, {
         **about(renderer, depths),
         "one_d": None if beside is None else ONE_D,
-        "presses": presses,
+        "presses": {**presses, "word": press_word(model)},
         "arrays": block.index,
     }
 
@@ -68,6 +69,7 @@ def _flat(table: np.ndarray) -> np.ndarray:
     return table.reshape(len(table), -1)
 
 
+@lru_cache(maxsize=1)
 def one_d_renderer(model: Model) -> Renderer | None:
     """The interpolated 1D model of the page, None where the model's presses hold no parameters of it."""
     if not len(model.presses):
@@ -76,6 +78,11 @@ def one_d_renderer(model: Model) -> Renderer | None:
         return create(ONE_D, model)
     except ModelError:
         return None
+
+
+def press_word(model: Model) -> str:
+    """What the model's presses are: measured, or virtual where nobody touched the object of a scene."""
+    return "virtual" if model.provenance.get("method") == "scene" else "measured"
 
 
 def about(renderer: FemRenderer, depths_m: np.ndarray) -> dict[str, Any]:

@@ -9,7 +9,6 @@ import json
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -17,17 +16,19 @@ from mechanics.effects.registry import effect
 from mechanics.errors import OptionError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from palpate.exporting.page.contents import contents, one_d_renderer
+from palpate.exporting.page.contents import contents, one_d_renderer, press_word
 from palpate.exporting.subject import Subject
 from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 from render.fem import FemRenderer
 from render.press import Stroke, press
-from render.scene import in_the_air
+from render.scene import TouchScene, in_the_air
 
-SCRIPTS = ("data.js", "surface.js", "press.js", "shape.js", "draw.js", "chart.js", "spacemouse.js", "page.js")
-CORE = SCRIPTS[:3]
-"""What the numbers come from; it needs no page around it."""
+SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
+_VIRTUAL = (
+    " This object is a known shape of a known modulus that nobody touched: its presses are virtual, computed "
+    "by the same law."
+)
 
 
 def write(
@@ -40,27 +41,34 @@ def write(
     return (f"no {', no '.join(left_out(subject.model))}",)
 
 
-def page_of(renderer: FemRenderer, opens: list[float] | None = None, progress: Progress = silent) -> str:
+def page_of(
+    renderer: FemRenderer,
+    opens: list[float] | None = None,
+    progress: Progress = silent,
+    *,
+    title: str | None = None,
+) -> str:
     """The whole page of a model's finite-element renderer. opens: x, y, z, depth, m, of a press that it opens
-    on."""
+    on. title: the model's name unless given."""
     block, about = contents(renderer, progress)
     model = renderer.model
     about["opens"] = opens
     about["view"] = [float(np.radians(AZIMUTH_DEG)), float(np.radians(ELEVATION_DEG))]
-    title, table = _table(renderer)
+    table_title, table = _table(renderer)
     filled = {
-        "name": html.escape(model.name),
+        "name": html.escape(title or model.name),
         "summary": _summary(model),
         "style": file("page.css"),
         "picture": _picture(model),
         "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
-        "table_title": title,
+        "table_title": table_title,
         "table": table,
+        "word": press_word(model),
         "words": _words(renderer),
         "left_out": html.escape("; ".join(left_out(model))),
         "about": json.dumps(about, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
         "block": block.base64(),
-        "scripts": "\n".join(file(name) for name in SCRIPTS),
+        "scripts": "\n".join(file(f"{name}.js") for name in SCRIPTS),
     }
     page = file("page.html")
     for name, value in filled.items():
@@ -104,6 +112,7 @@ def _words(renderer: FemRenderer) -> str:
         f"interpolates; the tip sticks, and {slides}. The band holds the 95 % interval of the modulus and "
         "the error of the law. The shape that is drawn moves by the strongest modes of the compliance; "
         "the dent right under the tip is drawn so that it clears the ball."
+        + (_VIRTUAL if press_word(renderer.model) == "virtual" else "")
     )
 
 
@@ -118,47 +127,44 @@ def _picture(model: Model) -> str:
 
 
 def _table(renderer: FemRenderer) -> tuple[str, str]:
-    """Title and rows: presses at places that were measured, as measured, by finite elements and in 1D."""
+    """Title and rows: some of the model's own presses, as they were, by finite elements and in 1D."""
     model = renderer.model
     presses, beside = model.presses, one_d_renderer(model)
     chosen = np.unique(np.linspace(0, len(presses) - 1, min(len(presses), _ROWS)).round().astype(int))
-    head = [
+    word = press_word(model)
+    head = (
         "press",
-        "at x, y, z [mm]",
+        "",
         "depth [mm]",
-        "measured [N]",
+        f"{word} [N]",
         "finite elements [N]",
         "1D model [N]",
-        "",
-    ]
+        "at x, y, z [mm]",
+    )
     rows = []
+    scenes = [in_the_air(each) if each is not None else None for each in (renderer, beside)]
     for i in chosen:
         at, normal, depth = presses.point[i], presses.normal[i], float(presses.depth_m[i])
-        forces = [_pressed(each, at, normal, depth) for each in (renderer, beside)]
-        cells = [str(i + 1), ", ".join(f"{v:.0f}" for v in (1e3 * at).round() + 0.0), f"{1e3 * depth:.1f}"]
-        cells += [_number(v) for v in (_peak(model, int(i)), *forces)]
+        forces = [_pressed(each, at, normal, depth) for each in scenes]
         place = ",".join(f"{v:.6f}" for v in at)
-        rows.append((cells, f'<td><button data-at="{place}">press it</button></td>'))
+        cells = [str(i + 1), f'<button data-at="{place}">press it</button>', f"{1e3 * depth:.1f}"]
+        cells += [_number(v) for v in (_peak(model, int(i)), *forces)]
+        rows.append([*cells, ", ".join(f"{v:.0f}" for v in (1e3 * at).round() + 0.0)])
     if not rows:
         return "Measured presses: none", "<p>This model was not made from presses.</p>"
-    top = "".join(f'<th scope="col">{html.escape(text)}</th>' for text in head)
-    body = "".join(
-        "<tr>" + "".join(f"<td>{html.escape(c)}</td>" for c in cells) + b + "</tr>" for cells, b in rows
-    )
-    title = (
-        f"{len(rows)} of {len(presses)} measured presses"
-        if len(rows) < len(presses)
-        else "The measured presses"
-    )
+    top = "".join(f'<th scope="col">{text}</th>' for text in head)
+    body = "".join("<tr>" + "".join(f"<td>{cell}</td>" for cell in cells) + "</tr>" for cells in rows)
+    fewer = len(rows) < len(presses)
+    title = f"{len(rows)} of {len(presses)} {word} presses" if fewer else f"The {word} presses"
     return title, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def _pressed(renderer: Any, at: np.ndarray, normal: np.ndarray, depth_m: float) -> float:
-    """Normal force, N, of a straight press; NaN where there is no renderer or it misses."""
-    if renderer is None:
+def _pressed(scene: TouchScene | None, at: np.ndarray, normal: np.ndarray, depth_m: float) -> float:
+    """Normal force, N, of a straight press; NaN where there is no scene or it misses."""
+    if scene is None:
         return float("nan")
     try:
-        curve = press(in_the_air(renderer), at, -normal, Stroke(depth_m, 0.01))
+        curve = press(scene, at, -normal, Stroke(depth_m, 0.01))
     except OptionError:
         return float("nan")
     return float(curve.force_at(depth_m) @ normal)

@@ -4,7 +4,7 @@
 // in which one pressed, other tips, and the support beside the object.
 
 const CHANNELS = 14;
-const STEPS = 80; // of a straight press
+const STEPS = 160; // of a straight press
 const WALKS = 10; // of the place that holds a tip, in one step
 const STEEPNESS = 1 / 1.3; // about: forces go as the depth to the power of 1.3
 
@@ -92,7 +92,7 @@ class Touch {
 
   // Moves the tip's centre, in steps short beside the table's.
   moveTo(tip) {
-    const way = plus(tip, this.tip, -1), parts = Math.max(1, Math.ceil(size(way) / (this.tables.most / 32)));
+    const way = plus(tip, this.tip, -1), parts = Math.max(1, Math.ceil(size(way) / (this.tables.most / 64)));
     const from = this.tip;
     for (let i = 1; i <= parts && this.place; i++) this.step(plus(from, way, i / parts));
   }
@@ -154,6 +154,7 @@ class Touch {
           this.settle();
           const { depth, offset } = this.from(this.tip);
           if (depth > 0) {
+            this.stuck = across(this.stuck, this.normal); // along the surface where it holds now, not where it did
             this.shift(depth, offset);
             continue;
           }

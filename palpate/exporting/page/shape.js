@@ -15,8 +15,9 @@ class Shape {
     this.moved = new Float32Array(3 * this.corners);
     this.points = Float32Array.from(surface.vertices);
     // what is drawn is as smooth as what is felt: the contact normals, turned as the facets turn
-    this.normals = Float32Array.from(surface.normals);
     this.facets = Float32Array.from(this.normalsOf(this.points));
+    this.rest = this.normalsAtRest();
+    this.normals = Float32Array.from(this.rest);
     this.still = true;
   }
 
@@ -25,7 +26,7 @@ class Shape {
     if (!touch.touching) {
       if (this.still) return false;
       this.points.set(this.surface.vertices);
-      this.normals.set(this.surface.normals);
+      this.normals.set(this.rest);
       this.still = true;
       return true;
     }
@@ -33,7 +34,7 @@ class Shape {
     this.far(touch);
     this.dent(touch);
     const now = this.normalsOf(this.points);
-    for (let i = 0; i < now.length; i++) this.normals[i] = this.surface.normals[i] + now[i] - this.facets[i];
+    for (let i = 0; i < now.length; i++) this.normals[i] = this.rest[i] + now[i] - this.facets[i];
     return true;
   }
 
@@ -89,14 +90,23 @@ class Shape {
     }
   }
 
-  // Unit normals of the facets around each vertex.
+  // The contact normals; at the rim of the base, where those lean under the object, the normals of its side.
+  normalsAtRest() {
+    const { triangles, free, normals } = this.surface, out = Float32Array.from(normals);
+    triangles.forEach((v, i) => {
+      if (!free[Math.floor(i / 3)]) out.set(this.facets.subarray(3 * v, 3 * v + 3), 3 * v);
+    });
+    return out;
+  }
+
+  // Unit normals of the facets around each vertex; those of the base count where there are no others.
   normalsOf(p) {
-    const t = this.surface.triangles, out = (this.sums ??= new Float32Array(p.length)).fill(0);
+    const { triangles: t, free } = this.surface, out = (this.sums ??= new Float32Array(p.length)).fill(0);
     for (let i = 0; i < t.length; i += 3) {
       const a = 3 * t[i], b = 3 * t[i + 1], c = 3 * t[i + 2];
       const ux = p[b] - p[a], uy = p[b + 1] - p[a + 1], uz = p[b + 2] - p[a + 2];
       const vx = p[c] - p[a], vy = p[c + 1] - p[a + 1], vz = p[c + 2] - p[a + 2];
-      const x = uy * vz - uz * vy, y = uz * vx - ux * vz, z = ux * vy - uy * vx;
+      const by = free[i / 3] ? 1 : 1e-3, x = by * (uy * vz - uz * vy), y = by * (uz * vx - ux * vz), z = by * (ux * vy - uy * vx);
       out[a] += x; out[a + 1] += y; out[a + 2] += z;
       out[b] += x; out[b + 1] += y; out[b + 2] += z;
       out[c] += x; out[c + 1] += y; out[c + 2] += z;

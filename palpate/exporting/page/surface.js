@@ -87,12 +87,14 @@ class Surface {
     return plus(plus(times(this.corner(triangle, 0), w[0]), this.corner(triangle, 1), w[1]), this.corner(triangle, 2), w[2]);
   }
 
-  // Where a ray from `eye` along the unit vector `way` first meets the outside; null where it misses. `points`: the
-  // vertices as they are shown, where they are not where they rest.
-  ray(eye, way, points = this.vertices) {
+  // Where a ray from `eye` along the unit vector `way` first meets the outside, at rest; null where it misses.
+  ray(eye, way) {
     let best = Infinity, place = null;
-    const t = this.triangles;
+    const { triangles: t, vertices: points, spheres: m } = this;
     for (let i = 0; i < this.count; i++) {
+      const x = m[4 * i] - eye[0], y = m[4 * i + 1] - eye[1], z = m[4 * i + 2] - eye[2];
+      const ahead = x * way[0] + y * way[1] + z * way[2];
+      if (x * x + y * y + z * z - ahead * ahead > 1.01 * m[4 * i + 3] ** 2 + 1e-12) continue;
       const [a, b, c] = [0, 1, 2].map((k) => 3 * t[3 * i + k]);
       const e1 = [points[b] - points[a], points[b + 1] - points[a + 1], points[b + 2] - points[a + 2]];
       const e2 = [points[c] - points[a], points[c + 1] - points[a + 1], points[c + 2] - points[a + 2]];

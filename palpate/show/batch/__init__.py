@@ -11,14 +11,14 @@ from mechanics.model_files import read_model
 from palpate.batching.run import Batch
 from palpate.batching.steps import MODEL
 from palpate.show.batch.figures import draw_agreement
-from palpate.show.batch.page import lead, report, verdict_words
+from palpate.show.batch.page import lead, next_steps, report, verdict_words
 from palpate.show.scenery import OBJECT_COLOUR, surface_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
-__all__ = ["as_json", "draw", "lines", "place", "report"]
+__all__ = ["as_json", "draw", "lines", "next_steps", "place", "report"]
 
 _NAMED = 12
 _SHOWN = 12

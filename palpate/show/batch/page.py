@@ -34,7 +34,7 @@ def report(result: Batch, path: Path | str) -> Path:
     page.part(f"<style>\n{_file('batch.css')}</style>")
     page.lead(lead(result))
     page.paragraph(meaning(result))
-    page.next_step(_what_next(result))
+    page.next_steps(next_steps(result))
     if result.agreements:
         _agreement(page, result)
     page.heading("Recordings")
@@ -46,7 +46,9 @@ def report(result: Batch, path: Path | str) -> Path:
     page.part(_recordings(result))
     if "compare" in result.steps:
         page.paragraph("Errors of FEM and of the best 1D model: rms force at touches that no fit has seen.")
+    page.part('<p>The table as a file: <a href="summary.csv">summary.csv</a>.</p>')
     _cost(page, result)
+    page.result(result.as_json())
     page.part(f"<script>\n{_file('batch.js')}</script>")
     return page.write(path)
 
@@ -82,12 +84,13 @@ def meaning(result: Batch) -> str:
     return "No object was explored twice, so nothing is said about how far explorations agree."
 
 
-def _what_next(result: Batch) -> str:
+def next_steps(result: Batch) -> list[str]:
+    """What to do with the answers."""
     first = next((e.row.recording for e in result.entries if e.row.status == "done"), None)
     if any(e.row.status != "done" for e in result.entries):
-        return "What to do next: mend what a row names, and run the same command again; what is done is kept."
+        return ["mend what a row names, and run the same command again; what is done is kept"]
     feel = f"`palpate touch {result.folder / first / 'model'}`" if first else "`palpate touch OUT/NAME/model`"
-    return f"What to do next: open a recording's page by its name; feel one: {feel}."
+    return ["open a recording's page by its name", f"feel one: {feel}"]
 
 
 def _count(result: Batch) -> str:

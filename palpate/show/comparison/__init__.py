@@ -5,42 +5,42 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from diagnose.compare.comparison import Comparison, verdict
-from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS
+from diagnose.compare.models import RIVALS
 from palpate.show.comparison.figures import draw, view
-from palpate.show.comparison.page import report
+from palpate.show.comparison.page import lead, meaning, next_steps, report
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_dots, add_object
 
 if TYPE_CHECKING:
     from pyvista import Plotter
 
-__all__ = ["as_json", "draw", "lines", "place", "report", "view"]
+__all__ = ["as_json", "draw", "lines", "next_steps", "place", "report", "view"]
 
 
 def lines(result: Comparison) -> list[str]:
     """What `print` says, with units."""
     names = list(result.rmse_n)
-    text = [f"{'held out':<22}{'presses':>8}  " + "".join(f"{name:>26}" for name in names)]
+    text = [
+        lead(result),
+        f"  {meaning(result)}",
+        "error where no fit has looked, mN (in brackets: by how much the force is too large):",
+        f"  {'left out':<16}{'presses':>8}" + "".join(f"{name:>17}" for name in names),
+    ]
 
-    def row(label: str, count: int, rmse: dict, share: dict, bias: dict | None) -> str:
-        cells = []
-        for name in names:
-            cell = f"{rmse[name]:.3f} N {100 * share[name]:.1f} %"
-            cells.append(cell + (f" bias {100 * bias[name]:+.0f} %" if bias else ""))
-        return f"{label:<22}{count:>8}  " + "".join(f"{cell:>26}" for cell in cells)
+    def row(label: str, count: int, rmse: dict, bias: dict | None) -> str:
+        cells = [
+            f"{1e3 * rmse[name]:.0f}" + (f" ({100 * bias[name]:+.0f} %)" if bias else "") for name in names
+        ]
+        return f"  {label:<16}{count:>8}" + "".join(f"{cell:>17}" for cell in cells)
 
-    text.append(row("folds over sites", len(result.presses), result.rmse_n, result.relative_rmse, None))
+    text.append(row("single sites", len(result.presses), result.rmse_n, None))
     for r in result.regions:
-        text.append(row(r.region.name, int(r.region.members.sum()), r.rmse_n, r.relative_rmse, r.bias))
-    noise, constant = result.noise_n, result.constant_n
-    best = min(RIVALS, key=lambda name: result.rmse_n[name])
-    fem, rival = result.rmse_n["fem"], result.rmse_n[best]
-    lost = f"{best} predicts held-out presses better: {rival:.3f} N, FEM {fem:.3f} N"
+        text.append(row(r.region.name, int(r.region.members.sum()), r.rmse_n, r.bias))
     return [
-        *([lost] if rival < fem else []),
         *text,
-        f"floor: the sensor noise {noise:.3f} N, {best} {rival:.3f} N; ceiling: a constant push "
-        f"{constant:.3f} N; {verdict(result)}",
+        f"beside: the sensor's noise {1e3 * result.noise_n:.0f} mN, a constant push instead of a model "
+        f"{1e3 * result.constant_n:.0f} mN",
+        verdict(result),
     ]
 
 
@@ -60,7 +60,7 @@ def as_json(result: Comparison) -> dict[str, Any]:
             }
             for r in result.regions
         ],
-        "wins": {name: result.wins(name) for name in MODELS if name != HOMOGENEOUS},
+        "wins": {name: result.wins(name) for name in ("fem", *RIVALS)},
         "noise_n": result.noise_n,
         "constant_rmse_n": result.constant_n,
         "young_modulus_pa": result.moduli_pa,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from diagnose.compare.comparison import Comparison
-from diagnose.compare.models import HOMOGENEOUS, MODELS, RIVALS, stiffness_along
+from diagnose.compare.models import HOMOGENEOUS, RIVALS, stiffness_along
 from palpate.show.bars import draw_errors, height_of
 from palpate.show.model_view import facing, local, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, spread_over
@@ -23,15 +23,16 @@ if TYPE_CHECKING:
 
 COLOURS = {"fem": "#1d3557", "kelvin-voigt": "#e08e1b", "hunt-crossley": "#2a9d8f"}
 COLOURS |= {HOMOGENEOUS: "#8d99ae", "measured": "#c1121f"}
-_MARKS = ("o", "^", "s", "x")
+OTHER = "#7b2d8b"
+"""Of a simulator that is set beside them."""
+_MARKS = ("o", "^", "s", "x", "d")
 DEPTH_M = 0.004
 
 
 def compared(result: Comparison) -> tuple[str, ...]:
-    """The models that are shown: the FEM of one modulus only where some fold asked for a field."""
-    return (
-        MODELS if any(f is not None for f in result.fields) else tuple(m for m in MODELS if m != HOMOGENEOUS)
-    )
+    """What is shown: the FEM of one modulus only where some fold asked for a field."""
+    homogeneous = any(f is not None for f in result.fields)
+    return tuple(m for m in result.rmse_n if homogeneous or m != HOMOGENEOUS)
 
 
 def view(result: Comparison) -> View:
@@ -40,13 +41,29 @@ def view(result: Comparison) -> View:
     lines = [Line("measured", local(presses, presses.force), "measured")]
     for name in names:
         kind = "rendered" if name == "fem" else "effect"
-        lines.append(Line(name, local(presses, result.predicted[name]), kind, name in ("fem", *RIVALS)))
+        lines.append(
+            Line(called(name), local(presses, result.predicted[name]), kind, name in ("fem", *RIVALS))
+        )
     words = "Root mean square of predicted less measured force over each press, held out of every fit."
     colourings = [
-        Colouring(ERROR, None, result.press_rmse_n[name], words, name=f"error of {name}") for name in names
+        Colouring(ERROR, None, result.press_rmse_n[name], words, name=f"error of {called(name)}")
+        for name in names
     ]
     colourings += usual_colourings(result.model, presses)
     return view_of_presses(result.model, presses, colourings, lines, _worst(result))
+
+
+def called(model: str) -> str:
+    """A model's name as people write it."""
+    return _NAMES.get(model, model)
+
+
+_NAMES = {
+    "fem": "FEM",
+    HOMOGENEOUS: "FEM, one modulus",
+    "kelvin-voigt": "Kelvin–Voigt",
+    "hunt-crossley": "Hunt–Crossley",
+}
 
 
 def still(result: Comparison) -> Figure:
@@ -62,7 +79,13 @@ def still(result: Comparison) -> Figure:
     depth, normal = presses.depth[rows] * 1e3, presses.normal[worst]
     right.plot(depth, presses.push[rows], color=COLOURS["measured"], lw=1.8, label="measured")
     for name in ("fem", *RIVALS):
-        right.plot(depth, result.predicted[name][rows] @ normal, color=COLOURS[name], lw=1.2, label=name)
+        right.plot(
+            depth,
+            result.predicted[name][rows] @ normal,
+            color=COLOURS.get(name, OTHER),
+            lw=1.2,
+            label=called(name),
+        )
     right.set(xlabel="depth [mm]", ylabel="force into the surface [N]", title=f"press {worst + 1}")
     right.legend(frameon=False, fontsize=8.5)
     right.spines[["top", "right"]].set_visible(False)
@@ -75,7 +98,7 @@ def _worst(result: Comparison) -> int:
 
 def error_bars(result: Comparison) -> Figure:
     """Error of each model over all held-out presses."""
-    bars = [(name, result.rmse_n[name], COLOURS[name]) for name in compared(result)]
+    bars = [(called(name), result.rmse_n[name], COLOURS.get(name, OTHER)) for name in compared(result)]
     figure = new_figure(5.5, height_of(len(bars)), layout="constrained")
     draw_errors(figure.subplots(), bars, result.noise_n, "typical error of a held-out press [mN]")
     return figure
@@ -96,12 +119,17 @@ def draw(result: Comparison, ax: Axes) -> None:
     place = np.arange(len(order))
     for k, name in enumerate(compared(result)):
         ax.plot(
-            place, 1e3 * result.press_rmse_n[name][order], _MARKS[k], ms=4.5, color=COLOURS[name], label=name
+            place,
+            1e3 * result.press_rmse_n[name][order],
+            _MARKS[k],
+            ms=4.5,
+            color=COLOURS.get(name, OTHER),
+            label=called(name),
         )
-    ax.axhline(1e3 * result.noise_n, color="0.5", ls="--", lw=1, label="sensor noise")
+    ax.axhline(1e3 * result.noise_n, color="0.5", ls="--", lw=1, label="sensor's noise")
     step = -(-len(order) // 20)
     ax.set_xticks(place[::step], [str(i + 1) for i in order[::step]], fontsize=8)
-    ax.set(xlabel="number of the held-out press", ylabel="rms force error [mN]", yscale="log")
+    ax.set(xlabel="number of the held-out press", ylabel="typical error [mN]", yscale="log")
     for axis in (ax.yaxis.set_major_formatter, ax.yaxis.set_minor_formatter):
         axis(LogFormatter(labelOnlyBase=False, minor_thresholds=(2, 0.5)))
     ax.grid(axis="x", color="0.92", lw=0.6)
@@ -119,9 +147,9 @@ def scatter(result: Comparison) -> Figure:
     top = float(measured.max())
     for ax, name in zip(axes, compared(result), strict=True):
         predicted = (result.predicted[name] * normal).sum(axis=1)
-        ax.plot(measured[::10], predicted[::10], ".", ms=1.5, color=COLOURS[name], rasterized=True)
+        ax.plot(measured[::10], predicted[::10], ".", ms=1.5, color=COLOURS.get(name, OTHER), rasterized=True)
         ax.plot([0, top], [0, top], color="0.3", lw=0.8)
-        ax.set(title=name, xlabel="measured [N]", aspect="equal")
+        ax.set(title=called(name), xlabel="measured [N]", aspect="equal")
     axes[0].set_ylabel("predicted [N]")
     return figure
 
@@ -145,8 +173,8 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
     figure = new_figure(7, 3.4)
     ax = figure.subplots()
     x = coordinate[family][order] * 1e3
-    for name in compared(result):
-        ax.plot(x, forces[name][order], "o", ms=4, color=COLOURS[name], label=name)
+    for name in (n for n in compared(result) if n in forces):  # a simulator was run along the path alone
+        ax.plot(x, forces[name][order], "o", ms=4, color=COLOURS.get(name, OTHER), label=called(name))
     measured = _at_depth(result)
     for inside, face, label in ((False, "none", "measured, seen"), (True, None, "measured, left out")):
         chosen = family & (members == inside) & np.isfinite(measured)
@@ -164,7 +192,7 @@ def across_region(result: Comparison, members: np.ndarray) -> Figure:
         ylabel=f"normal force at {DEPTH_M * 1e3:g} mm [N]",
     )
     ax.margins(y=0.15)
-    ax.legend(frameon=False, fontsize=8, ncol=2)
+    ax.legend(frameon=False, fontsize=8, ncol=5, loc="lower center", bbox_to_anchor=(0.5, 1.0))
     return figure
 
 

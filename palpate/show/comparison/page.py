@@ -5,11 +5,12 @@ from __future__ import annotations
 from pathlib import Path
 
 from diagnose.compare.comparison import Comparison
-from diagnose.compare.models import HOMOGENEOUS, RIVALS
+from diagnose.compare.models import MODELS, RIVALS
 from palpate.show.comparison.figures import (
     DEPTH_M,
     across_region,
     by_press,
+    called,
     compared,
     error_bars,
     scatter,
@@ -26,44 +27,51 @@ def report(result: Comparison, path: Path | str) -> Path:
     page = Page(f"Who predicts the next touch: {recording.name}")
     page.lead(lead(result))
     page.paragraph(meaning(result))
-    model = file_words(result.model.path, "MODEL")
-    page.next_step(
-        f"What to do next: feel it: `palpate touch {model} --beside hunt-crossley`; ask what the FEM still "
-        f"leaves out: `palpate diagnose {file_words(recording.path, 'REC')} --model {model}`."
-    )
+    page.next_steps(next_steps(result))
     page.view(
         view(result),
         still(result),
         "Left: FEM's error at each press, held out of every fit. Right: the press that it predicts worst.",
         result.model,
     )
+    names = compared(result)
     page.figure(error_bars(result), "Error at places that were held out of every fit, of each model.")
     page.paragraph(
         "Every model is fitted to the same presses and predicts others, at other sites, along the measured "
         "paths. Errors are root mean squares of the force vector; the sensor's noise alone is "
         f"{1e3 * result.noise_n:.0f} mN. The 1D models are fitted press by press and interpolated over the "
-        f"surface; FEM has one number for the whole object, its Young's modulus ({HOMOGENEOUS}), or a smooth "
-        "field of it where the presses that it is fitted to ask for one: they did in "
-        f"{sum(f is not None for f in result.fields)} of {len(result.fields)} folds."
+        "surface; FEM has one number for the whole object, its Young's modulus, or a smooth field of it "
+        "where the presses that it is fitted to ask for one: they did in "
+        f"{sum(f is not None for f in result.fields)} of {len(result.fields)} fits."
     )
-    page.heading("Held-out palpations and regions")
-    names = compared(result)
+    for name in (n for n in names if n not in MODELS):
+        page.paragraph(
+            f"{name} was run along the recorded path; its modulus is fitted to the same presses, as its "
+            "force goes with it."
+        )
+    page.heading("What was left out of the fits")
     rows = [
         [
-            "folds over sites",
+            "single sites",
             len(result.presses),
-            *(1e3 * result.rmse_n[m] for m in names),
+            *(f"{1e3 * result.rmse_n[m]:.0f}" for m in names),
             *("–" for _ in names),
         ]
     ]
     for r in result.regions:
         bias = [f"{100 * r.bias[m]:+.0f} %" for m in names]
-        rows.append([r.region.name, int(r.region.members.sum()), *(1e3 * r.rmse_n[m] for m in names), *bias])
-    page.table(["held out", "presses", *(f"{m} [mN]" for m in names), *(f"bias {m}" for m in names)], rows)
+        rows.append(
+            [r.region.name, int(r.region.members.sum()), *(f"{1e3 * r.rmse_n[m]:.0f}" for m in names), *bias]
+        )
+    off, large = (f"{called(m)} [mN]" for m in names), (f"{called(m)}: force too large by" for m in names)
+    page.table(["left out", "presses", *off, *large], rows)
     for r in result.regions:
         page.paragraph(f"{r.region.name}: {r.region.words}.")
-    page.figure(by_press(result), "Held-out error of every press (folds over sites), sorted by FEM's.")
-    page.figure(scatter(result), "Normal force, predicted against measured, every held-out contact sample.")
+    page.figure(by_press(result), "Error of every press, left out of the fits, sorted by FEM's.")
+    page.figure(
+        scatter(result),
+        "Force into the surface, predicted against measured, of presses left out of the fits.",
+    )
     for r in result.regions:
         if r.region.name in ("top-centre", "base-band"):
             page.figure(
@@ -82,6 +90,16 @@ def report(result: Comparison, path: Path | str) -> Path:
     return page.write(path)
 
 
+def next_steps(result: Comparison) -> list[str]:
+    """What to do with the answer."""
+    model = file_words(result.model.path, "MODEL")
+    recording = file_words(None if result.recording is None else result.recording.path, "REC")
+    return [
+        f"feel it: `palpate touch {model} --beside hunt-crossley`",
+        f"ask what the FEM still leaves out: `palpate diagnose {recording} --model {model}`",
+    ]
+
+
 def lead(result: Comparison) -> str:
     """Which model predicts the next touch best, and by how much."""
     best = min(RIVALS, key=lambda name: result.rmse_n[name])
@@ -89,15 +107,11 @@ def lead(result: Comparison) -> str:
     if ratio >= 1.05:
         return (
             f"The FEM predicts a touch that it has not seen {ratio:.1f} times better than the better of the "
-            f"two 1D models ({_named(best)})."
+            f"two 1D models ({called(best)})."
         )
     if ratio > 0.95:
-        return f"The FEM and the better of the two 1D models ({_named(best)}) predict the next touch alike."
-    return f"A 1D model ({_named(best)}) predicts the next touch {1 / ratio:.1f} times better than the FEM."
-
-
-def _named(model: str) -> str:
-    return {"kelvin-voigt": "Kelvin–Voigt", "hunt-crossley": "Hunt–Crossley", "fem": "FEM"}.get(model, model)
+        return f"The FEM and the better of the two 1D models ({called(best)}) predict the next touch alike."
+    return f"A 1D model ({called(best)}) predicts the next touch {1 / ratio:.1f} times better than the FEM."
 
 
 def meaning(result: Comparison) -> str:
@@ -105,7 +119,7 @@ def meaning(result: Comparison) -> str:
     best = min(RIVALS, key=lambda name: result.rmse_n[name])
     fem, other, noise = (1e3 * v for v in (result.rmse_n["fem"], result.rmse_n[best], result.noise_n))
     words = (
-        f"At a place that it has not seen the FEM is {fem:.0f} mN off, {_named(best)} {other:.0f} mN, of "
+        f"At a place that it has not seen the FEM is {fem:.0f} mN off, {called(best)} {other:.0f} mN, of "
         f"which the sensor's noise is {noise:.0f} mN."
     )
     if result.rmse_n["fem"] < 1.3 * result.noise_n:

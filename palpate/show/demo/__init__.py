@@ -14,24 +14,27 @@ from palpate.show import model as made
 from palpate.show.demo.figures import figures, view
 from palpate.show.diagnosis.gaps import known
 from palpate.show.diagnosis.words import force_words, spoken, verdict
-from palpate.show.page import Page, file_words, save_figures
+from palpate.show.page import Page, file_words
 from palpate.show.reconstruction.exploration import force_over_time
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
-__all__ = ["as_json", "draw", "lines", "place", "report", "view"]
+__all__ = ["as_json", "draw", "lines", "next_steps", "place", "report", "view"]
 
 
 def lines(result: DemoResult) -> list[str]:
     """What `print` says, with units."""
     model = result.model
     return [
-        f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa from {len(model.presses)} presses",
-        f"rendered against measured force: {result.replay_rmse_n:.3f} N rms of "
-        f"{result.contact_force_rms_n:.3f} N rms",
-        str(result.servo),
+        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.2f} kPa "
+        "(Young's modulus)",
+        f"its force is typically {force_words(result.replay_rmse_n)} off, in touches of "
+        f"{force_words(result.contact_force_rms_n)}",
+        f"a hand would have felt it at {result.servo.rate_hz:.0f} forces a second: of "
+        f"{result.servo.ticks + result.servo.missed_ticks} {result.servo.missed_ticks} were skipped, "
+        f"{result.servo.late_ticks} came late",
         *([f"diagnosis: {verdict(result.diagnosis)}"] if result.diagnosis else []),
     ]
 
@@ -84,13 +87,9 @@ def report(result: DemoResult, path: Path | str) -> Path:
         f"{_truth(result)}). A hand would have felt it at {servo.rate_hz:.0f} forces a second"
         f"{_missed(servo)}."
     )
-    page.next_step(
-        "What to do next: feel it: `palpate touch "
-        f"{file_words(model.path or folder / 'model', 'MODEL')}`; then bring in your own recording: "
-        "`palpate open FILE`."
-    )
+    page.next_steps(next_steps(result))
     drawn = figures(result)
-    saved = save_figures(folder, drawn)
+    saved = page.save(folder, drawn)
     page.view(
         view(result),
         saved["object"],
@@ -98,7 +97,10 @@ def report(result: DemoResult, path: Path | str) -> Path:
         result.model,
     )
     page.heading("Measured beside rendered")
-    page.figure(drawn["presses"], "Four presses, from the softest to the hardest, measured and rendered.")
+    page.paragraph("Three presses, from the lightest to the hardest.")
+    page.figures(
+        [(drawn[name], f"{name.replace('-', ' ').capitalize()}.") for name in drawn if "press-" in name]
+    )
     if result.diagnosis is not None:
         page.heading("What a simpler simulation would leave out")
         page.paragraph(diagnosis_words(result))
@@ -109,17 +111,48 @@ def report(result: DemoResult, path: Path | str) -> Path:
     page.heading("How it was made")
     surface = result.reconstruction.surface
     page.paragraph(f"Shape: {surface.method}, {surface.reason}.")
-    page.paragraph(
-        f"The loop of 1000 forces a second: {str(servo).replace(chr(10), '; ')}. {sent_words(servo)}"
+    page.table(["the loop of 1000 forces a second", "against a simulated hand"], _loop(servo))
+    if words := sent_words(servo):
+        page.paragraph(words)
+    page.table(
+        ["step", "time [s]"], [[_STAGES.get(name, name), f"{s:.1f}"] for name, s in result.seconds.items()]
     )
-    page.table(["stage", "time [s]"], [[name, round(s, 1)] for name, s in result.seconds.items()])
     page.result(as_json(result))
     return page.write(path)
 
 
+def next_steps(result: DemoResult) -> list[str]:
+    """What to do after the demo."""
+    model = file_words(result.model.path, "MODEL")
+    return [f"feel it: `palpate touch {model}`", "bring in your own recording: `palpate open FILE`"]
+
+
 def _missed(servo: ServoReport) -> str:
     missed = servo.missed_ticks
-    return f", {missed} of which came late" if missed else ", none of them late"
+    return f"; of {servo.ticks + missed} {missed} were skipped" if missed else ", and none was skipped"
+
+
+_STAGES = {
+    "reconstruct": "from the recording to the model",
+    "precompute": "how every place gives",
+    "replay": "the recorded path once more",
+    "feel at 1 kHz": "a simulated hand at 1000 forces a second",
+    "diagnose": "what the simplest simulation leaves out",
+}
+
+
+def _loop(servo: ServoReport) -> list[list[str]]:
+    """What the loop did, in words."""
+    compute = servo.compute.summary()
+    return [
+        ["forces given", f"{servo.ticks} in {servo.seconds:.1f} s"],
+        ["skipped, since the machine was busy", str(servo.missed_ticks)],
+        ["given late", str(servo.late_ticks)],
+        ["to compute one force", f"{compute['median']:.0f} µs; 999 of 1000 within {compute['p99.9']:.0f} µs"],
+        ["in contact", f"{100 * servo.contact_share:.0f} % of the time"],
+        ["greatest force", f"{servo.peak_rendered_n:.2f} N rendered, {servo.peak_force_n:.2f} N sent"],
+        ["energy given to the hand", f"{1e3 * servo.energy_given_back_j:.3f} mJ at most"],
+    ]
 
 
 def _meaning(result: DemoResult) -> str:

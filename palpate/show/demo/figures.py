@@ -20,28 +20,30 @@ from render.felt_surface import felt_surface
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-SHOWN_PRESSES = 4
+SHOWN_PRESSES = 3
 _STEP_S = 0.05
 """Between samples of one press of a diagnosis; what is longer lies between presses."""
 
 
-def measured_against_rendered(axes: np.ndarray, result: DemoResult) -> np.ndarray:
+def press_figures(result: DemoResult) -> dict[str, Figure]:
     """Force along the normal over depth, measured and rendered, of presses spread over the peak force."""
     presses = result.model.presses
     shown = low_passed(presses)
     push = [shown.push[shown.rows([i])].max() for i in range(len(presses))]
-    chosen = np.argsort(push)[np.linspace(0, len(push) - 1, len(axes)).round().astype(int)]
+    chosen = np.argsort(push)[np.linspace(0, len(push) - 1, SHOWN_PRESSES).round().astype(int)]
     curves, smooth = presses.window(0.03, 0.03), shown.window(0.03, 0.03)
-    for ax, i in zip(axes, chosen, strict=True):
+    made = {}
+    for i in chosen:
+        made[f"press-{i + 1}"], ax = subplots(1, 1, figsize=(4.4, 3))
         own = curves.rows([i])
         depth, at = smooth.depth[own] * 1e3, np.searchsorted(result.recording.t, curves.t[own])
         rendered = result.rendered_n[at] @ presses.normal[i]
         ax.plot(depth, curves.push[own], ".", ms=1, color="#a8bccb", label="measured")
         ax.plot(depth, rendered, lw=1.5, color="#c1121f", label="rendered")
-        ax.set(title=f"press {i + 1}", xlabel="depth [mm]")
-    axes[0].set_ylabel("force along the normal [N]")
-    axes[0].legend(loc="upper left", frameon=False, markerscale=8)
-    return axes
+        ax.set(title=f"press {i + 1}", xlabel="depth [mm]", ylabel="force along the normal [N]")
+        ax.set_ylim(top=1.05 * max(push))
+        ax.legend(loc="upper left", frameon=False, markerscale=8)
+    return made
 
 
 def view(result: DemoResult) -> View:
@@ -60,7 +62,8 @@ def view(result: DemoResult) -> View:
         ERROR,
         None,
         each,
-        "Rendered less measured, root mean square over each press; between presses what is near.",
+        "Rendered less measured, root mean square over each press; between presses what is near, "
+        "paler where nobody touched.",
     )
     first, *others = usual_colourings(model)
     return view_of_presses(model, shown, [first, error, *others], lines, int(np.argmax(each)))
@@ -98,6 +101,4 @@ def figures(result: DemoResult) -> dict[str, Figure]:
     draw_touched(axes[0], result.model)
     doubt = felt_surface(result.model).uncertainty_m
     draw_object(axes[1], result.model, Colours(doubt * UNCERTAINTY.scale, UNCERTAINTY))
-    presses, axes = subplots(1, SHOWN_PRESSES, figsize=(12, 3), sharey=True)
-    measured_against_rendered(axes, result)
-    return {"force": force, "object": thing, "presses": presses}
+    return {"force": force, "object": thing, **press_figures(result)}

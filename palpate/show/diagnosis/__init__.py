@@ -9,7 +9,7 @@ import numpy as np
 from diagnose.verdict.result import Diagnosis
 from palpate.show.diagnosis.figures import draw, view
 from palpate.show.diagnosis.gaps import diagnosed, gap_at, sites_of
-from palpate.show.diagnosis.page import report
+from palpate.show.diagnosis.page import next_steps, report
 from palpate.show.diagnosis.words import lines
 from palpate.show.quantities import ERROR
 from palpate.show.scenery import add_arrow, add_dots, add_object, surface_of
@@ -17,7 +17,7 @@ from palpate.show.scenery import add_arrow, add_dots, add_object, surface_of
 if TYPE_CHECKING:
     from pyvista import Plotter
 
-__all__ = ["draw", "lines", "place", "report", "view"]
+__all__ = ["draw", "lines", "next_steps", "place", "report", "view"]
 
 
 def place(result: Diagnosis, plotter: Plotter) -> None:

@@ -75,7 +75,8 @@ def view(result: Diagnosis) -> View:
         ERROR,
         None,
         each,
-        "Measured less simulated, root mean square over each press; between presses what is near.",
+        "Measured less simulated, root mean square over each press; between presses what is near, "
+        "paler where nobody touched.",
     )
     force = "sideways" if sideways(result) else "into"
     return view_of_presses(model, t, [error, *usual_colourings(model, t)], lines, worst_press(result), force)
@@ -167,7 +168,7 @@ def curve_pictures(result: Diagnosis) -> list[tuple[Any, str]]:
     return made
 
 
-def press_pictures(result: Diagnosis, count: int = 4) -> list[tuple[Any, str]]:
+def press_pictures(result: Diagnosis, count: int = 3) -> list[tuple[Any, str]]:
     """Force against time of the presses with the largest gap, after the first, a picture each."""
     made = []
     for press in [press for press in ranked(result) if press != worst_press(result)][:count]:

@@ -44,7 +44,7 @@ def report(result: Diagnosis, path: Path | str) -> Path:
     page = Page(f"Measured and simulated touch: {recording.name}")
     page.lead(verdict(result))
     page.paragraph(consequence(result, typical))
-    page.next_step(_what_next(result, model, file_words(recording.path, "REC")))
+    page.next_steps(next_steps(result))
     page.cards(answers(result))
     page.view(view(result), first_picture(model, result), _caption(result), model)
     page.figure(gains_picture(result), _gains_caption(result))
@@ -58,8 +58,10 @@ def report(result: Diagnosis, path: Path | str) -> Path:
     return page.write(path)
 
 
-def _what_next(result: Diagnosis, model: Model, recording: str) -> str:
-    """What to do with the answer, in a sentence."""
+def next_steps(result: Diagnosis) -> list[str]:
+    """What to do with the answer."""
+    measured, model = diagnosed(result)
+    recording = file_words(measured.path, "REC")
     asked = {e.name: e.domain for e in result.entries if e.name in missing(result)}
     kept = [name for name, domain in asked.items() if domain != "instrument"]
     instrument = [name for name, domain in asked.items() if domain == "instrument"]
@@ -80,7 +82,7 @@ def _what_next(result: Diagnosis, model: Model, recording: str) -> str:
         said.append(f"feel it: `palpate touch {file_words(model.path, 'MODEL')}`")
     if result.next_touch is not None and result.unsettled:
         said.append("touch once more where it says below, which would settle what is open")
-    return "What to do next: " + "; ".join(said) + "."
+    return said
 
 
 def _caption(result: Diagnosis) -> str:

@@ -22,6 +22,7 @@ WORDS = {
     "m_rel": "width of the softening (m, of the greatest load)",
     "matrix": "reading per true force, 3 x 3",
     "tip_radius_m": "radius of the tip",
+    "young_modulus_pa": "Young's modulus",
     "poisson_ratio": "Poisson's ratio",
     "centre_m": "middle at",
     "radius_m": "radius",
@@ -46,6 +47,9 @@ WORDS = {
     "rotation_rad": "turn, x y z",
 }
 
+_SEVERAL = ("g", "tau_s")
+"""Keys whose lists hold one number for each of several processes."""
+
 
 def plain_key(key: str, value: Any = None) -> tuple[str, float, str]:
     """(words, factor from SI, unit) of a parameter's key, in units that a hand knows; value: what the unit is
@@ -66,6 +70,20 @@ def parameter_rows(result: Diagnosis) -> list[list[str]]:
         for key, value in entry.parameters.items() if entry.name in result.effects else ():
             words, factor, unit = plain_key(key, value)
             low, high = entry.intervals.get(key, (None, None))
-            span = "-" if low is None else f"{number(low, factor)} to {number(high, factor)}"
-            rows.append([entry.name.replace("_", " "), words, number(value, factor), span, unit])
+            for k, (one, least, most) in enumerate(_each(key, value, low, high)):
+                span = "-" if least is None else f"{number(least, factor)} to {number(most, factor)}"
+                said = f"{words} ({_ORDINALS[k]})" if one is not value else words
+                rows.append([entry.name.replace("_", " "), said, number(one, factor), span, unit])
     return rows
+
+
+_ORDINALS = ("first", "second", "third")
+
+
+def _each(key: str, value: Any, low: Any, high: Any) -> list[tuple[Any, Any, Any]]:
+    """The numbers of a list with their intervals, one by one; whole what belongs together, as x, y, z do."""
+    apart = key in _SEVERAL and isinstance(value, list | tuple) and 1 < len(value) <= len(_ORDINALS)
+    if not apart:
+        return [(value, low, high)]
+    nothing = [None] * len(value)
+    return list(zip(value, nothing if low is None else low, nothing if high is None else high, strict=True))

@@ -234,7 +234,7 @@ def lines(result: Diagnosis) -> list[str]:
     else:
         text.append(f"{off}{noise}")
     if result.constant_n is not None:
-        text.append(f"  floor: the noise; ceiling: a constant push is {force_words(result.constant_n)} off")
+        text.append(f"  a constant push instead of a model would be {force_words(result.constant_n)} off")
     _, where, because = _where(result)
     text.append(f"where: {_small(where)}")
     text.append(f"  {because}".replace(" (the press shown)", ""))
@@ -267,7 +267,7 @@ def touch_words(result: Diagnosis) -> str:
     if touch.kind != "press":
         return f"to tell {parted}: {touch.why}"
     x, y, z = (1e3 * v for v in (touch.x, touch.y, touch.z))
-    direction = ", ".join(f"{d + 0.0:.2f}" for d in touch.direction)
+    direction = ", ".join(f"{round(d, 2) + 0.0:g}" for d in touch.direction)
     hold = f", and hold for {touch.hold_s:.1f} s" if touch.hold_s > 0.05 else ""
     return (
         f"to tell {parted}, press at ({x:.0f}, {y:.0f}, {z:.0f}) mm in the direction ({direction}), "

@@ -8,14 +8,14 @@ import numpy as np
 
 from palpate.show import model as made
 from palpate.show.reconstruction.exploration import force_over_time
-from palpate.show.reconstruction.page import report, view
+from palpate.show.reconstruction.page import meaning, next_steps, report, tell, view
 from reconstruct.pipeline import Reconstruction
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from pyvista import Plotter
 
-__all__ = ["as_json", "draw", "lines", "place", "report", "view"]
+__all__ = ["as_json", "draw", "lines", "next_steps", "place", "report", "tell", "view"]
 
 _NAMED = 12
 
@@ -29,19 +29,22 @@ def lines(result: Reconstruction) -> list[str]:
     more = len(not_used) - _NAMED
     contacts = "1 contact" if len(not_used) == 1 else f"{len(not_used)} contacts"
     lines = [
-        f"{exploration.recording.name}: {len(exploration.presses)} palpations, "
+        f"{exploration.recording.name}: {len(exploration.presses)} presses, "
         f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa "
         f"(95 % sure: {low / 1e3:.2f} to {high / 1e3:.2f} kPa)",
+    ]
+    if result.doubt:
+        lines.append(f"not to be believed: {result.doubt}")
+    else:
+        lines.append(f"  {meaning(result)[0].lower()}{meaning(result)[1:]}")
+    lines += [
+        *(f.line() for f in result.findings),
         *([f"{contacts} not used:"] if not_used else []),
         *(f"  at {t:.2f} s: {reason}" for t, reason in not_used[:_NAMED]),
         *([f"  and {more} more (as_json, or --json, names all)"] if more > 0 else []),
     ]
-    if result.doubt:
-        lines.append(f"not to be believed: {result.doubt}")
-    lines += [f.line() for f in result.findings]
     if result.modulus:
-        misfit = float((result.modulus.press.rms_n**2).mean() ** 0.5)
-        lines.append(f"  {result.modulus.reason}; misfit of a press {misfit:.3f} N")
+        lines.append(f"modulus: {result.modulus.reason}")
     if exploration.delay_s:
         lines.append(
             f"the force reads {exploration.delay_s * 1e3:.0f} +- {exploration.delay_error_s * 1e3:.1f} "

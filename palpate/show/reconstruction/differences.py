@@ -9,6 +9,8 @@ from reconstruct.pipeline import Reconstruction
 from reconstruct.steps.s6_one_d.one_d import low_passed
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 
+_CHANCE = 0.05
+"""How often chance alone may do what is called a trend."""
 _PAPER_THRESHOLD_N, _PAPER_INDENTATION_M = 1.0, 0.010
 
 
@@ -94,11 +96,15 @@ def _trend(result: Reconstruction) -> str:
     if "e_pa" not in trends or "k_v" not in trends:
         return ""
     k, e = trends["k_v"], trends["e_pa"]
-    words = (
-        "Height. As in the paper, the 1D stiffness of presses on the side depends on the place (k_V changes "
-        f"by {100 * k.change:+.0f} % over the height, r = {k.pearson:+.2f})"
-    )
-    of_e = f"({100 * e.change:+.1f} %, r = {e.pearson:+.2f})"
+    of_k, of_e = f"{100 * k.change:+.0f} % over the height", f"{100 * e.change:+.1f} %"
+    if k.pearson_p > _CHANCE:
+        return (
+            "Height. In the paper the 1D stiffness of presses on the side goes with the height; here that "
+            f"cannot be told from chance (k_V changes by {of_k}, the modulus by {of_e})."
+        )
+    words = f"Height. As in the paper, the 1D stiffness of presses on the side goes with height (k_V: {of_k})"
     if abs(e.change) < 0.25 * abs(k.change):
-        return f"{words} and the modulus does not, or much less {of_e}."
-    return f"{words}. Here the modulus does so as well {of_e}, other than the paper's."
+        return f"{words} and the modulus does not, or much less ({of_e})."
+    if e.pearson_p > _CHANCE:
+        return f"{words}; that the modulus does so ({of_e}) cannot be told from chance."
+    return f"{words}. Here the modulus does so as well ({of_e}), other than the paper's."

@@ -92,7 +92,7 @@ def undamped_figure(models: dict[str, Model]) -> Figure:
         spread(ax, [m.presses.fits[name] for m in models.values()], list(models))
         ax.set_ylabel(label)
         ax.set_title(f"({letter})", loc="left", fontsize=10)
-        ax.tick_params(axis="x", labelrotation=20, labelsize=8)
+        ax.tick_params(axis="x", labelrotation=20, labelsize=8, labelbottom=len(models) > 1)
     return figure
 
 
@@ -105,7 +105,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
     limits = _limits([m for _, m, _, _ in views], "k_v", KELVIN_VOIGT)
     for ax, (called, shown, elevation, view) in zip(axes[0], views, strict=True):
         _coloured(ax, shown, "k_v", KELVIN_VOIGT, limits, elevation)
-        ax.set_title(f"{called} {view}".strip(), fontsize=10)
+        ax.set_title(f"{called if other else ''} {view}".strip(), fontsize=10)
     trends = {t.name: t for t in height_trends(model)}
     side, height = on_side(model), heights(model) * 1e3
     reach = 0.1
@@ -117,7 +117,7 @@ def spatial_figure(model: Model, name: str = "", other: tuple[str, Model] | None
         ax.set(xlabel="height above the support [mm]", ylabel=f"{label} over its mean [%]")
         reach = max([reach, *np.abs(share[np.isfinite(share)])])
         if key in trends:
-            ax.set_title(f"r = {trends[key].pearson:+.2f} (p = {trends[key].pearson_p:.2g})", fontsize=10)
+            ax.set_title(f"correlation {trends[key].pearson:+.2f}", fontsize=10)
     for ax in axes[1]:
         ax.set_ylim(-1.15 * reach, 1.15 * reach)
     return figure
@@ -161,12 +161,12 @@ def moduli_figure(models: dict[str, Model]) -> Figure:
         )
     axes[0].set(ylabel="Young's modulus [kPa]", xlim=(0.5, len(models) + 0.9))
     axes[0].margins(y=0.12)
-    axes[0].tick_params(axis="x", labelrotation=15)
+    axes[0].tick_params(axis="x", labelrotation=15, labelbottom=len(models) > 1)
     axes[0].set_title("(a)", loc="left", fontsize=10)
     limits = _limits([m for _, m in shown], "e_pa", MODULUS)
     for ax, (name, model) in zip(axes[1:], shown, strict=True):
         _coloured(ax, model, "e_pa", MODULUS, limits)
-        ax.set_title(f"(b) {name}", loc="left", fontsize=10)
+        ax.set_title(f"(b) {name}" if len(shown) > 1 else "(b)", loc="left", fontsize=10)
     return figure
 
 
@@ -176,7 +176,7 @@ def depth_figure(fit: ModulusFit) -> Figure:
     depth = np.array([row[0] for row in fit.by_depth]) * 1e3
     value = np.array([row[1] for row in fit.by_depth]) / 1e3
     agrees = np.array([row[2] for row in fit.by_depth])
-    ax.axhspan(*(np.array(fit.ci95_pa) / 1e3), color="#f1e3cf", label="95 % interval")
+    ax.axhspan(*(np.array(fit.ci95_pa) / 1e3), color="#f1e3cf", label="95 % sure")
     ax.plot(depth, value, "-", lw=1, color=FORCE_COLOUR)
     ax.plot(depth[agrees], value[agrees], "o", color=FORCE_COLOUR, label="agrees with shallower samples")
     if (~agrees).any():
@@ -198,5 +198,5 @@ def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, wo
     if bound > 1.3 * most:
         ax.set_xlim(min(0.0, float(values.min())), 1.05 * most)
         ax.plot([], [], " ", label="(to the right of the picture)")
-    ax.legend(frameon=False, fontsize=8)
+    ax.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return ax

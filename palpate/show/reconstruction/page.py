@@ -12,8 +12,8 @@ from mechanics.model import Model
 from mechanics.touch import forces_at
 from palpate.show.model_view import local, rms_by_press, usual_colourings, view_of_presses
 from palpate.show.object3d import Colours, draw_object, draw_touched
-from palpate.show.page import Page, file_words, save_figures, subplots
-from palpate.show.quantities import ERROR, MODULUS
+from palpate.show.page import Page, file_words, subplots
+from palpate.show.quantities import ERROR, MODULUS, softness
 from palpate.show.reconstruction.differences import differences
 from palpate.show.reconstruction.exploration import exploration_figures
 from palpate.show.reconstruction.modulus import (
@@ -27,6 +27,7 @@ from palpate.show.reconstruction.modulus import (
 )
 from palpate.show.reconstruction.tables import (
     one_d_table,
+    paper_remade,
     point_load_table,
     speed_table,
     table_one,
@@ -50,16 +51,11 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     path = Path(path)
     path = path if path.suffix else path.with_suffix(".html")
     figures = _figures(result, beside or {})
-    save_figures(path.with_suffix(""), figures)
     page = Page(f"Reconstruction of {result.exploration.recording.name}")
-    _summary(page, result)
-    page.view(
-        view(result), figures["object"],
-        "Left: first touches and fixed base. Right: the modulus of single presses, and where.",
-        result.model,
-    )  # fmt: skip
-    _how(page, result)
+    page.save(path.with_suffix(""), figures)
+    tell(result, page, figures["object"])
     page.heading("Exploration and geometry")
+    page.paragraph("From here on: the figures and tables of the paper, remade from this recording.")
     page.figure(
         figures["figure-2"], "Force magnitude, first touches (o) and peaks (+) (the paper's Figure 2)."
     )
@@ -163,29 +159,41 @@ def _figures(result: Reconstruction, beside: dict[str, Model]) -> dict[str, Figu
     return figures
 
 
-def _summary(page: Page, result: Reconstruction) -> None:
+def tell(result: Reconstruction, page: Page, picture: Figure | None = None) -> None:
+    """The answer, the object, and how it came about, into a page. picture: `object_figure`'s."""
     model = result.model
     low, high = model.material.young_modulus_ci95_pa
     page.lead(
         f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
         f"(Young's modulus; 95 % sure: {low / 1e3:.1f} to {high / 1e3:.1f} kPa)."
     )
-    page.paragraph(_meaning(result))
-    where = file_words(model.path, "MODEL")
-    recording = file_words(result.exploration.recording.path, "REC")
-    page.next_step(
-        f"What to do next: feel it: `palpate touch {where}`; see what it leaves out: "
-        f"`palpate diagnose {recording} --model {where} --report PAGE.html`."
-    )
+    page.paragraph(meaning(result))
+    page.next_steps(next_steps(result))
     for finding in result.findings:
         page.paragraph(finding.line())
+    page.view(
+        view(result), picture or object_figure(result.model),
+        "Left: first touches and fixed base. Right: the modulus of single presses, and where.",
+        result.model,
+    )  # fmt: skip
+    _how(page, result)
 
 
-def _meaning(result: Reconstruction) -> str:
+def next_steps(result: Reconstruction) -> list[str]:
+    """What to do with the model."""
+    where = file_words(result.model.path, "MODEL")
+    recording = file_words(result.exploration.recording.path, "REC")
+    return [
+        f"feel it: `palpate touch {where}`",
+        f"see what it leaves out: `palpate diagnose {recording} --model {where} --report PAGE.html`",
+    ]
+
+
+def meaning(result: Reconstruction) -> str:
     """What the modulus and its interval mean, in a sentence or two."""
     model = result.model
     e, (low, high) = model.material.young_modulus_pa, model.material.young_modulus_ci95_pa
-    words = f"About as soft as {next(words for limit, words in _SOFTNESS if e <= limit)}."
+    words = f"About as soft as {softness(e)}."
     if np.isfinite([low, high]).all():
         words += (
             f" Another exploration of the same object would be expected to find a modulus within "
@@ -197,35 +205,28 @@ def _meaning(result: Reconstruction) -> str:
     return words
 
 
-_SOFTNESS = (
-    (2e3, "fat tissue or a soft jelly"),
-    (8e3, "liver"),
-    (20e3, "relaxed muscle"),
-    (60e3, "a very soft silicone, or tensed muscle"),
-    (300e3, "a soft rubber"),
-    (np.inf, "a firm rubber, or stiffer"),
-)
-"""Up to a modulus, Pa: what is about as soft. Orders of magnitude of elastography and of data sheets."""
-
-
 def _how(page: Page, result: Reconstruction) -> None:
     surface = result.surface
     page.paragraph(
-        f"Shape: {surface.method} ({surface.reason}); volume {surface.volume_m3 * 1e6:.1f} cm³. The sensor's "
-        f"noise is {result.exploration.noise_n * 1e3:.1f} mN an axis. Method: "
-        f"{result.model.provenance['method']}."
+        f"Shape: {surface.method}; {surface.reason}. Volume {surface.volume_m3 * 1e6:.1f} cm³. The sensor's "
+        f"noise is {result.exploration.noise_n * 1e3:.1f} mN an axis. "
+        + (
+            "The method is the paper's own."
+            if paper_remade(result)
+            else "The method takes the tip's size into account, where the paper presses with a point."
+        )
     )
     if result.modulus:
         fit = result.modulus
         page.paragraph(
-            f"{fit.reason[0].upper()}{fit.reason[1:]}. From place to place the modulus differs by "
+            f"The modulus: {fit.reason}. From place to place it differs by "
             f"{100 * fit.between:.1f} %; what is not known of the shape makes it uncertain by another "
             f"{100 * fit.shape_error:.2f} %."
         )
         page.table(
-            ["dent law", "modulus [kPa]", "misfit of a press [mN]", "chosen in resamples"],
+            ["dent law", "modulus [kPa]", "left of a press [mN]", "best with places drawn at random"],
             [
-                [name, e / 1e3, 1e3 * misfit, f"{100 * share:.0f} %"]
+                [name, e / 1e3, f"{1e3 * misfit:.1f}", f"{100 * share:.0f} %"]
                 for name, (e, misfit, share) in fit.by_law.items()
             ],
         )

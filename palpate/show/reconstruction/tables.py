@@ -12,6 +12,7 @@ from mechanics.patch import PatchSampler
 from mechanics.refine import refined_near_surface, typical_edge
 from mechanics.sites import patch_compliance, patch_width
 from mechanics.solver import Solver
+from palpate.show.diagnosis.words import chance_words
 from palpate.show.page import Page
 from palpate.show.reconstruction.modulus import Trend
 from reconstruct.pipeline import Reconstruction
@@ -126,23 +127,23 @@ def trends_table(page: Page, trends: list[Trend]) -> None:
         page.paragraph("Fewer than five presses on the side: no trend with height can be told.")
         return
     page.paragraph(
-        f"Correlation with height over {trends[0].presses} presses on the side: the 1D stiffness follows the "
-        "height, the modulus should not."
+        f"Does a parameter go with the height of the {trends[0].presses} presses on the side? The stiffness "
+        "of a 1D model does, since the glued base is near; a modulus should not. A correlation is 0 where "
+        "they have nothing to do with one another, and 1 or -1 where one follows from the other."
     )
     page.table(
-        ["parameter", "Pearson r", "p", "Spearman", "p", "change over the height"],
+        [
+            *("parameter", "correlation with height", "chance alone does this"),
+            *("the same by rank", "chance alone does that", "change over the height"),
+        ],
         [
             [
-                *(_PARAMETERS[t.name], f"{t.pearson:+.2f}", _chance(t.pearson_p)),
-                *(f"{t.spearman:+.2f}", _chance(t.spearman_p), f"{100 * t.change:+.1f} %"),
+                *(_PARAMETERS[t.name], f"{t.pearson:+.2f}", chance_words(t.pearson_p)),
+                *(f"{t.spearman:+.2f}", chance_words(t.spearman_p), f"{100 * t.change:+.1f} %"),
             ]
             for t in trends
         ],
     )
-
-
-def _chance(p: float) -> str:
-    return "< 0.001" if p < 1e-3 else f"{p:.2g}"
 
 
 def point_load_table(page: Page, result: Reconstruction) -> None:
@@ -161,10 +162,10 @@ def speed_table(page: Page, result: Reconstruction) -> None:
     total = {**result.seconds, "whole": sum(result.seconds.values())}
     remade = paper_remade(result)
     rows: list[list[object]] = [
-        [name, seconds, *([PAPER_SECONDS.get(name, float("nan"))] if remade else [])]
+        [name, f"{seconds:.1f}", *([PAPER_SECONDS.get(name, float("nan"))] if remade else [])]
         for name, seconds in total.items()
     ]
     page.paragraph(
-        "Wall time of the steps on this machine" + (", and what the paper states:" if remade else ":")
+        "How long the steps took on this machine" + (", and what the paper states:" if remade else ":")
     )
     page.table(["step", "time [s]", *(["paper [s]"] if remade else [])], rows)

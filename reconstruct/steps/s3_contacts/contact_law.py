@@ -98,6 +98,20 @@ def fit_rise(travel: np.ndarray, force: np.ndarray, noise_n: float, *, guess_m: 
     return Rise(float(p[0]), error, float(np.exp(p[2])), float(np.exp(p[1])))
 
 
+def fit_offset(travel: np.ndarray, force: np.ndarray, noise_n: float) -> tuple[float, float, float]:
+    """(offset N, h N/m^1.5, c m/N) of the law with its first touch at travel 0 (n,) m and a force (n,) N that
+    is off by a constant."""
+    reach, top = max(float(travel.max()), 1e-6), max(float(np.ptp(force)), noise_n)
+    start = np.array([float(force.min()), np.log(1.5 * top / reach**1.5), np.log(_FAR_SHARE * reach / top)])
+
+    def missed(p: np.ndarray) -> np.ndarray:
+        return (p[0] + contact_law(travel, np.exp(p[1]), np.exp(p[2])) - force) / noise_n
+
+    span = np.array([np.inf, 8.0, 8.0])
+    found = least_squares(missed, start, bounds=(start - span, start + span), loss="soft_l1", f_scale=_SOFT)
+    return float(found.x[0]), float(np.exp(found.x[1])), float(np.exp(found.x[2]))
+
+
 def _residual(
     p: np.ndarray, travel: np.ndarray, force: np.ndarray, noise_n: float
 ) -> tuple[np.ndarray, np.ndarray]:

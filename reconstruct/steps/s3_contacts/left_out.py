@@ -16,6 +16,7 @@ from mechanics.presses import Presses
 from mechanics.robust import spread_about_zero
 from mechanics.segments import Segment
 from reconstruct.steps.s2_base.outline import Boundary
+from reconstruct.steps.s3_contacts.contact_law import contact_law, fit_offset, fit_rise
 from reconstruct.steps.s3_contacts.contacts import Exploration
 from reconstruct.steps.s3_contacts.on_support import on_it
 
@@ -23,7 +24,9 @@ SLIDE_RADII = 8.0
 """A contact whose tip wanders further than so many radii along the surface is no press: a drag within one is
 shorter."""
 _FAR_SPREADS = 6.0
-"""A first touch so many spreads of the others off the surface, and a tip's radius, lies on something else."""
+"""A first touch so many spreads of the others off the surface, and a tip's radius, lies on something else;
+nearer, its force may have an offset."""
+_LEAST_ROWS, _ODDS = 5, 9.0
 
 
 def sliding(presses: Presses) -> np.ndarray:
@@ -90,13 +93,36 @@ def off_surface(presses: Presses, points: np.ndarray, normals: np.ndarray, base:
     faces it, with outward normal (p, 3), is far from its first touch, or on the base that is held."""
     away = np.linalg.norm(presses.point - points, axis=1)
     usual = float(np.median(away))
-    most = max(_FAR_SPREADS * max(spread_about_zero(away), usual), presses.tip_radius_m)
+    strange = _FAR_SPREADS * max(spread_about_zero(away), usual)
+    most = max(strange, presses.tip_radius_m)
     held = (base.height(points) < 1e-6) & (normals @ base.support_normal < -0.5)
     reasons = []
-    for far, under in zip(away, held, strict=True):
+    for p, (far, under) in enumerate(zip(away, held, strict=True)):
         why = f"touches {1e3 * far:.1f} mm off the surface, where others touch {1e3 * usual:.1f} mm off it"
-        reasons.append("has a force that points into the support" if under else why if far > most else "")
+        reason = "has a force that points into the support" if under else why if far > most else ""
+        if not reason and far > strange and presses.quasi_static:
+            offset = _offset(presses, p, points[p], normals[p])
+            reason = f"has a force that is off by {offset:.3g} N: {why}" if offset else ""
+        reasons.append(reason)
     return reasons
+
+
+def _offset(presses: Presses, p: int, point: np.ndarray, normal: np.ndarray) -> float:
+    """N, by which the force of a press of points is off, if that explains it nine times better than a touch
+    off the surface does; 0.0 if not. Points have no free air that would tell it."""
+    rows = presses.parts[p]
+    push = presses.force[rows] @ normal
+    u = -(presses.position[rows] - point) @ normal + presses.tip_radius_m
+    if len(u) < _LEAST_ROWS:
+        return 0.0
+    noise = presses.noise_n
+    touched = fit_rise(u, push, noise, guess_m=float(u.min()))
+    shifted = fit_offset(u, push, noise)
+    least = len(u) * noise**2
+    off = float(((contact_law(u - touched.u0_m, touched.hertz, touched.compliance) - push) ** 2).sum())
+    own = float(((shifted[0] + contact_law(u, *shifted[1:]) - push) ** 2).sum())
+    better = 0.5 * len(u) * np.log(max(off, least) / max(own, least))
+    return shifted[0] if better > np.log(_ODDS) else 0.0
 
 
 def on_surface(

@@ -280,11 +280,11 @@ def _law_shares(whole: list[LawFit], site: np.ndarray, options: ModulusOptions, 
 def _reason(
     fits: list[LawFit], shares: list[float], limit: float, deepest: float, options: ModulusOptions
 ) -> str:
-    words = f"dent law {fits[0].law}"
+    words = f"the dent follows the {fits[0].law} law"
     if options.law == "auto":
-        words += f" chosen by {100 * shares[0]:.0f} % of the resamples"
+        words += f", which fits best in {100 * shares[0]:.0f} % of draws of the places"
     if options.greatest_depth_m is not None:
-        return words + f"; samples up to {limit * 1e3:g} mm as asked"
+        return words + f"; from samples up to {limit * 1e3:g} mm deep, as asked"
     if limit < deepest:
-        return words + f"; samples up to {limit * 1e3:g} mm, deeper ones disagree with shallower ones"
-    return words + "; samples of all depths, as they agree"
+        return words + f"; from samples up to {limit * 1e3:g} mm deep, as deeper ones say otherwise"
+    return words + "; from samples of all depths, as they agree"

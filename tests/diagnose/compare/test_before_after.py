@@ -7,6 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
+import palpate.show  # noqa: F401  who says and draws results
 from diagnose.compare.before_after import Side, changes
 from mechanics.box_mesh import box_mesh
 from mechanics.material import Material

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from benchmarks._tissue import tissue
-from diagnose.compare.comparison import CompareOptions, compare_presses
+from diagnose.compare.comparison import Along, CompareOptions, compare_presses
 from diagnose.compare.models import HOMOGENEOUS, RIVALS, as_touched
 from mechanics import solved_fields
 from mechanics.press_making import PathErrors, of_paths
+from palpate.show.comparison import lines
 from reconstruct.steps.s7_modulus.modulus_field import asked_for, fit_field
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -58,29 +61,62 @@ def test_a_first_touch_that_is_sure_stays():
     )
 
 
-def test_folds_share_factorisations_and_predict_what_each_alone_would(monkeypatch):
-    """To half a percent of the force; each fold's field is then solved by itself."""
+def test_a_simulator_beside_the_models_has_its_modulus_fitted_to_the_others_folds():
+    """Half the measured force is as good as all of it, and a constant push is not."""
+    slab = tissue(1, raster=3)
+    presses = slab.presses
+    halved = Along(presses.t, 0.5 * presses.net.force)
+    constant = Along(presses.t, np.ones_like(presses.force))
+    options = CompareOptions(folds=3, field="homogeneous")
+    result = compare_presses(presses, slab.model, options, simulated={"mujoco": halved, "constant": constant})
+    assert result.rmse_n["mujoco"] < 0.2 * result.rmse_n["fem"] < result.rmse_n["constant"]
+    assert all("mujoco" in region.bias for region in result.regions)
+
+
+@pytest.fixture(scope="module")
+def compared():
+    """(comparison, fields solved) with factorisations that folds share, then with each fold's own."""
     slab = tissue(1, raster=5)
-    solved, solve = [], solved_fields.solve_field
+    solved, solve, found = [], solved_fields.solve_field, []
 
     def counted(*given):
         solved.append(given)
         return solve(*given)
 
-    monkeypatch.setattr(solved_fields, "solve_field", counted)
-    found = {}
-    for apart in (solved_fields.APART, -1.0):
-        monkeypatch.setattr(solved_fields, "APART", apart)
-        result = compare_presses(slab.presses, slab.model, CompareOptions(folds=4))
-        assert all(field is not None for field in result.fields)
-        found[apart] = result, len(solved)
-        solved.clear()
-    (shared, few), (alone, many) = found.values()
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(solved_fields, "solve_field", counted)
+        for apart in (solved_fields.APART, -1.0):
+            patch.setattr(solved_fields, "APART", apart)
+            result = compare_presses(slab.presses, slab.model, CompareOptions(folds=4))
+            found.append((result, len(solved)))
+            solved.clear()
+    return found
+
+
+def test_folds_share_factorisations_and_predict_what_each_alone_would(compared):
+    """To half a percent of the force; each fold's field is then solved by itself."""
+    (shared, few), (alone, many) = compared
+    assert all(field is not None for result, _ in compared for field in result.fields)
     assert few < 0.5 * many
     off = shared.predicted["fem"] - alone.predicted["fem"]
     assert np.sqrt((off**2).mean()) < 0.005 * np.sqrt((shared.presses.force**2).mean())
     assert np.abs(off).max() > 0  # they are not the same computation
     assert shared.rmse_n["fem"] == pytest.approx(alone.rmse_n["fem"], rel=0.02)
+
+
+def test_a_1d_model_that_wins_is_in_the_first_line_with_floor_and_ceiling_below(compared):
+    won = compared[0][0]
+    half = {**won.rmse_n, "hunt-crossley": 0.5 * won.rmse_n["fem"]}
+    lost = dataclasses.replace(won, rmse_n=half)
+    assert (
+        lines(lost)[0] == "A 1D model (Hunt–Crossley) predicts the next touch 2.0 times better than the FEM."
+    )
+    assert not lines(won)[0].startswith("A 1D model")
+    for result in (won, lost):
+        noise, constant = 1e3 * result.noise_n, 1e3 * result.constant_n
+        assert f"the sensor's noise {noise:.0f} mN, a constant push" in lines(result)[-2]
+        assert lines(result)[-2].endswith(f" {constant:.0f} mN")
+    assert result.noise_n < won.rmse_n["fem"] < won.constant_n
 
 
 @pytest.mark.slow

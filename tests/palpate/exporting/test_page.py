@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import copy
 import json
+import shutil
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 import palpate as pp
 from devices.codecs import spacemouse
 from mechanics.effects.registry import effect
+from mechanics.model import Model
 from mechanics.model_files import read_model, write_model
 from palpate.exporting.page.band import force_band
 from palpate.exporting.page.button import button
@@ -24,7 +26,6 @@ from render.press import Stroke, press, read_curve
 from render.scene import in_the_air
 
 from ..show import browser
-from ..window.small import block_model
 
 needs_browser = pytest.mark.skipif(
     browser.browser_found() is None, reason="needs a browser: chromium or google-chrome on the PATH"
@@ -35,12 +36,13 @@ SHARE, AT_LEAST_N = 0.02, 0.005
 
 
 @pytest.fixture(scope="module")
-def renderer(tmp_path_factory: pytest.TempPathFactory) -> FemRenderer:
+def renderer(tmp_path_factory: pytest.TempPathFactory, block: Model) -> FemRenderer:
     """A block that was pressed at 16 places, on which a tip slides early."""
-    folder = tmp_path_factory.mktemp("page")
-    plain = block_model(folder)
-    slippery = plain.replaced(path=None, effects={**plain.effects, "friction_slip": {"mu": MU}})
-    return FemRenderer(read_model(write_model(folder / "MODEL", slippery)))
+    slippery = block.replaced(path=None, effects={**block.effects, "friction_slip": {"mu": MU}})
+    model = read_model(write_model(tmp_path_factory.mktemp("page") / "MODEL", slippery))
+    for condensed in block.path.glob("compliance-*.bin"):  # friction changes none of it
+        shutil.copy(condensed, model.path)
+    return FemRenderer(model)
 
 
 @pytest.fixture(scope="module")
@@ -67,8 +69,20 @@ def tab(shown, written: Path):
     assert shown.complaints == []
 
 
-def opened(tab, path: Path, width: int = 1200, height: int = 800) -> None:
-    tab.open(path, width, height)
+@pytest.fixture
+def asked(shown, written: Path):
+    """The page as it stands, for what a script asks of it: opened only where another one is."""
+    shown.complaints.clear()
+    if not shown.evaluate(
+        f"location.href === {json.dumps(written.as_uri())} && window.palpate !== undefined"
+    ):
+        opened(shown, written)
+    yield shown
+    assert shown.complaints == []
+
+
+def opened(tab, path: Path, width: int = 1200, height: int = 800, **more) -> None:
+    tab.open(path, width, height, **more)
     tab.wait("window.palpate !== undefined")
 
 
@@ -152,7 +166,7 @@ def test_the_file_is_one_page_that_fetches_nothing(written):
 
 
 @needs_browser
-def test_forces_are_those_of_palpate_press_stick_and_slide(tab, renderer):
+def test_forces_are_those_of_palpate_press_stick_and_slide(asked, renderer):
     scene, misses, slid = in_the_air(renderer), [], 0
     for at, way, depth in drawn_presses(renderer, 60):
         try:
@@ -160,24 +174,28 @@ def test_forces_are_those_of_palpate_press_stick_and_slide(tab, renderer):
         except pp.OptionError:
             continue
         force = curve.force_at(depth)
-        asked = f"palpate.press({json.dumps(at.tolist())}, {depth}, {json.dumps(way.tolist())})"
-        answer = tab.evaluate(asked)
+        words = f"palpate.page.presser.press({json.dumps(at.tolist())}, {depth}, {json.dumps(way.tolist())})"
+        answer = asked.evaluate(words)
+        touch = answer["touch"]
+        assert np.dot(touch["force"], touch["normal"]) == pytest.approx(touch["normalForce"], rel=1e-6), (
+            "what holds the tip sideways turns with the surface that it slides over"
+        )
         off = float(np.linalg.norm(np.array(answer["force_n"]) - force))
         along = float(force @ curve.normal)
         slid += np.linalg.norm(force - along * curve.normal) > 0.98 * MU * along
         misses.append(off / (SHARE * float(np.linalg.norm(force)) + AT_LEAST_N))
         assert answer["error_n"] > 0
     assert len(misses) > 50 and slid > 5
-    assert np.quantile(misses, 0.95) < 1, sorted(misses)[-6:]
+    assert np.quantile(misses, 0.95) < 1 and max(misses) < 1.5, sorted(misses)[-6:]
 
 
 @needs_browser
-def test_a_press_without_direction_is_straight_along_the_stated_normal(tab, renderer):
+def test_a_press_without_direction_is_straight_along_the_stated_normal(asked, renderer):
     presses = renderer.model.presses
     for i in (0, 7, 15):
         at, depth = presses.point[i], 0.003
         curve = press(in_the_air(renderer), at, -presses.normal[i], Stroke(depth, 0.01))
-        force = tab.evaluate(f"palpate.press({json.dumps(at.tolist())}, {depth})")["force_n"]
+        force = asked.evaluate(f"palpate.press({json.dumps(at.tolist())}, {depth})")["force_n"]
         assert np.allclose(force, curve.force_at(depth), rtol=SHARE, atol=AT_LEAST_N)
 
 
@@ -212,6 +230,21 @@ def test_the_mouse_presses_slides_and_lets_go(tab):
     tab.mouse("mouseReleased", x + 60, y, button="left", clickCount=1)
     tab.wait("!palpate.page.touch.touching")
     assert "greatest of the last press" in tab.evaluate("document.getElementById('parts').textContent")
+
+
+@needs_browser
+def test_the_tip_shows_once_what_it_does_unless_less_motion_is_liked(tab, written):
+    assert tab.evaluate("palpate.page.greeting") is None and state(tab, "touch.touching") is False
+    opened(tab, written, lively=True)
+    tab.wait("palpate.page.touch.normalForce > 0.1")
+    tab.wait("palpate.page.greeting === null && !palpate.page.touch.touching")
+    assert tab.evaluate("document.getElementById('parts').textContent") == "not pressed yet"
+    assert tab.evaluate("document.getElementById('copy').disabled"), "nobody pressed"
+    opened(tab, written, lively=True)
+    tab.wait("palpate.page.touch.normalForce > 0.1")
+    tab.evaluate("document.getElementById('stage').focus()")
+    tab.key("n", 78)
+    assert state(tab, "held") and state(tab, "touch.touching"), "what a person does comes first"
 
 
 @needs_browser
@@ -363,14 +396,15 @@ def test_without_webgl_one_line_says_so_and_forces_stay(shown, written):
         "0102",
     ],
 )
-def test_a_spacemouse_is_read_as_the_program_reads_it(tab, report):
+def test_a_spacemouse_is_read_as_the_program_reads_it(asked, report):
     """The codec's own documented reports."""
     data = bytes.fromhex(report)
     told = spacemouse.decode(data, spacemouse.Deflection())
     rest = f"new DataView(new Uint8Array({json.dumps(list(data[1:]))}).buffer)"
-    tab.evaluate(f"palpate.page.mouse.report({data[0]}, {rest})")
-    assert state(tab, "mouse.translation") == pytest.approx(list(told.translation))
-    assert state(tab, "mouse.rotation") == pytest.approx(list(told.rotation))
+    asked.evaluate("palpate.page.mouse.translation = [0, 0, 0]; palpate.page.mouse.rotation = [0, 0, 0]")
+    asked.evaluate(f"palpate.page.mouse.report({data[0]}, {rest})")
+    assert state(asked, "mouse.translation") == pytest.approx(list(told.translation))
+    assert state(asked, "mouse.rotation") == pytest.approx(list(told.rotation))
 
 
 @needs_browser
@@ -383,17 +417,21 @@ def test_a_spacemouse_moves_the_tip_and_presses(tab):
     tab.evaluate("clearInterval(window.pushing)")
 
 
-def test_a_report_carries_the_page_or_names_the_command(renderer):
-    carried = button(renderer.model)
+@pytest.fixture(scope="module")
+def carried(renderer: FemRenderer) -> str:
+    return button(renderer.model)
+
+
+def test_a_report_carries_the_page_or_names_the_command(carried, renderer):
     assert "press it</button>" in carried and len(carried) > 100_000
     elsewhere = button(renderer.model.replaced(path=None))
     assert "palpate export MODEL --to page" in elsewhere and len(elsewhere) < 1000
 
 
 @needs_browser
-def test_the_button_unpacks_the_page(shown, renderer, tmp_path):
+def test_the_button_unpacks_the_page(shown, carried, tmp_path):
     report = tmp_path / "report.html"
-    report.write_text(f"<!doctype html><meta charset=utf-8>{button(renderer.model)}", encoding="utf-8")
+    report.write_text(f"<!doctype html><meta charset=utf-8>{carried}", encoding="utf-8")
     shown.open(report)
     shown.wait("!document.querySelector('.press-it').hidden")
     shown.evaluate("window.open = () => null")  # a browser that blocks new tabs goes there in this one

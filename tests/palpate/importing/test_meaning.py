@@ -203,6 +203,23 @@ def test_arrays_get_the_checks_of_files():
         pp.recording(t, position[:, :2], force, tip_radius=0.004)
 
 
+@pytest.mark.parametrize(
+    ("units", "words"),
+    [
+        ((1.0, 1e3), "tip's path is .* these look like .*millimetres"),
+        ((1e3, 1.0), "these look like millisec"),
+    ],
+)
+def test_a_recording_that_was_built_in_other_units_is_refused_where_it_is_used(units, words):
+    t, x = np.arange(2000) / 200, np.linspace(0.0, 0.05, 2000)
+    position, force = np.column_stack([x, 0 * t, 0 * t]), np.column_stack([0 * t, 0 * t, np.sin(t)])
+    right = pp.Recording(t, position, force, 200.0, 0.004)
+    assert pp.read_recording(right) is right
+    strange = pp.Recording(units[0] * t, units[1] * position, force, 200.0, 0.004)
+    with pytest.raises(RecordingError, match=f"{words}.*pp.recording"):
+        pp.read_recording(strange)
+
+
 @pytest.mark.parametrize("seed", range(1, 13))
 def test_files_as_people_export_them_are_right_or_asked(tmp_path, seed):
     made = export(tmp_path, seed)

@@ -15,7 +15,7 @@ import palpate as pp
 import render.press
 import render.replay  # noqa: F401
 from diagnose.simulated.forces import ForcesOptions
-from palpate.operations._declare import declared, operation_of, written
+from palpate.operations._declare import check_options, declared, operation_of, written
 from palpate.operations._list import OPERATIONS, calls
 from palpate.operations._run import command_operation, parser_of
 from palpate.operations._shared import MeshFileOptions
@@ -201,6 +201,26 @@ def test_what_is_the_command_lines_alone_says_so(name):
 def test_what_is_no_option_is_told_before_any_work(name, recording, rooms):
     with pytest.raises(pp.OptionError, match=f"pp.{name} has no option 'mesh_siz': .*allowed are"):
         call(name, recording, mesh_siz=0.01)
+
+
+@pytest.mark.parametrize(
+    ("options", "words"),
+    [
+        ({"without": "adhesion, frction_slip"}, "'frction_slip' is no effect; did you mean friction_slip"),
+        ({"renderer": "mujoco", "stated": ["frction=0.5"]}, "--stated frction: not known; allowed are young"),
+        (
+            {"renderer": "mujoco", "simulator_set": "solref=1"},
+            "--simulator-set solref=1: allowed are damping",
+        ),
+        ({"renderer": "mujoco", "mended": "best,solref=1"}, "solref=1: allowed are damping"),
+    ],
+)
+def test_a_misspelt_effect_or_parameter_is_told_before_a_model_is_made(recording, rooms, options, words):
+    with pytest.raises(pp.OptionError, match=words):
+        pp.diagnose(recording, progress=False, **options)
+    if "without" in options:
+        with pytest.raises(pp.OptionError, match=words):
+            check_options("diagnose", options)  # as `batch` asks
 
 
 def test_near_misses_and_wrong_kinds_are_told(recording, rooms):

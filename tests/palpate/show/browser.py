@@ -76,14 +76,20 @@ class Tab:
             if not url.startswith(("file:", "data:", "blob:")):
                 self.complaints.append(f"fetched {url[:120]}")
 
-    def open(self, page: Path, width: int = 1280, height: int = 900, *, dark: bool = False) -> None:
-        """Load a page at a size in CSS pixels."""
+    def open(
+        self, page: Path, width: int = 1280, height: int = 900, *, dark: bool = False, lively: bool = False
+    ) -> None:
+        """Load a page at a size in CSS pixels; lively: things may move by themselves."""
         self.call(
             "Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
             mobile=width < 500,
         )  # fmt: skip
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.call("Emulation.setEmulatedMedia", features=[scheme])
+        liked = {
+            "prefers-color-scheme": "dark" if dark else "light",
+            "prefers-reduced-motion": "no-preference" if lively else "reduce",
+        }
+        features = [{"name": name, "value": value} for name, value in liked.items()]
+        self.call("Emulation.setEmulatedMedia", features=features)
         self.call("Page.navigate", url=page.resolve().as_uri())
         self.wait("document.readyState === 'complete'")
 
@@ -147,7 +153,8 @@ def a_tab(folder: Path) -> Iterator[Tab]:
         port = _port(folder / "DevToolsActivePort", process)
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/json", timeout=_PATIENCE_S) as answer:
             address = next(t for t in json.load(answer) if t["type"] == "page")["webSocketDebuggerUrl"]
-        with connect(address, max_size=None, open_timeout=_PATIENCE_S) as socket:
+        # without pings: a busy machine answers them late
+        with connect(address, max_size=None, open_timeout=_PATIENCE_S, ping_interval=None) as socket:
             yield Tab(socket)
     finally:
         os.killpg(process.pid, signal.SIGKILL)

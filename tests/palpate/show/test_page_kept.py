@@ -27,11 +27,13 @@ def tab(tmp_path_factory):
 def written(tmp_path_factory):
     page = Page("A result, to be kept")
     page.lead("Young's modulus 28.9 kPa.")
-    page.next_step("What to do next: `palpate touch MODEL`.")
+    page.next_steps(["`palpate touch MODEL`"])
     figure = Figure(figsize=(13, 3))
     figure.subplots().plot([0, 1], [0, 1])
     page.figure(figure, "A wide one.")
-    page.table(["effect", "a", "b", "c", "d, e"], [["creep", 1.0, 2.0, 3.0, 'said "so"']] * 3)
+    page.table(
+        ["effect", "at x, y, z [mm]", "b", "c", "d, e"], [["creep", "1, -2, 3", 2.0, 3.0, 'said "so"']] * 3
+    )
     page.result({"young_modulus_pa": 28900.0})
     return page.write(tmp_path_factory.mktemp("page") / "page.html")
 
@@ -48,7 +50,9 @@ def test_pictures_tables_and_numbers_can_be_kept(tab, written):
         press(tab, words)
     tab.wait("window.kept.length === 3")
     kept = tab.evaluate("window.kept.join('|')")
-    assert "<svg" in kept and 'creep,1,2,3,"said ""so"""' in kept and '"young_modulus_pa": 28900.0' in kept
+    assert (
+        "<svg" in kept and 'creep,1,-2,3,2,3,"said ""so"""' in kept and '"young_modulus_pa": 28900.0' in kept
+    )
     names = tab.evaluate("window.names")
     assert sorted(name.rpartition(".")[2] for name in names) == ["csv", "json", "png", "svg"]
     assert all(name.startswith("a-result-to-be-kept") for name in names)

@@ -82,6 +82,17 @@ def tab(shown, written: Path):
     assert shown.complaints == []
 
 
+@needs_browser
+def test_an_object_whose_presses_have_no_curves_is_turned_too(shown, tmp_path):
+    """It stayed a picture, since the empty place of the curves was drawn into."""
+    page, seen = Page("A ball"), a_view()
+    page.view(View(seen.thing, seen.places, seen.colourings), Figure(figsize=(3, 2)), "The picture.")
+    shown.complaints.clear()
+    shown.open(page.write(tmp_path / "plain.html"))
+    shown.wait("document.querySelector('section.view3d').dataset.state === 'live'")
+    assert shown.complaints == []
+
+
 def stage(tab) -> tuple[float, float, float, float]:
     """Left, top, width, height of the view."""
     tab.evaluate("document.querySelector('.stage').scrollIntoView({block: 'center'})")

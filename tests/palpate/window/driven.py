@@ -9,7 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate.window.frames import Frame
-from palpate.window.window import CHARTS_SHARE, TouchWindow
+from palpate.window.window import TouchWindow
 
 from ...support.waiting import PATIENCE_S
 from .small import SIZE
@@ -42,7 +42,8 @@ class Driven:
     def mouse(self, x: float, y: float) -> None:
         """x, y: shares of the first picture."""
         width, height = self.window.plotter.window_size
-        self.pixel(x * width / self.window.sides, (CHARTS_SHARE + (1.0 - CHARTS_SHARE) * y) * height)
+        left, low, right, high = self.window.picture_renderers[0].viewport
+        self.pixel((left + x * (right - left)) * width, (low + y * (high - low)) * height)
 
     def pixel(self, x: float, y: float) -> None:
         self.interactor.SetEventPosition(round(x), round(y))
@@ -57,6 +58,24 @@ class Driven:
 
     def button(self, down: bool, which: str = "Left") -> None:
         self.interactor.InvokeEvent(f"{which}Button{'Press' if down else 'Release'}Event")
+
+    def click(self, text: str) -> None:
+        """On the button of this text, in whichever column it is shown; waits for what it sets off."""
+
+        def buttons() -> list[tuple[float, float]]:
+            boards = self.window.boards
+            return [b.find(text) for b in boards if any(i.do and i.text == text for i, _ in b.placed)]
+
+        self.until(lambda frame: bool(buttons()))
+        self.pixel(*buttons()[0])
+        self.button(True)
+        self.button(False)
+        self.until(lambda frame: self.session.worker.idle)
+        self.frame()
+
+    def says(self, text: str, *, says: bool = True) -> None:
+        """Frames go by until this is said beside the pictures, or no longer."""
+        self.until(lambda frame: any(text in board.text for board in self.window.boards) == says)
 
     def wheel(self, steps: int, *, ctrl: bool = False) -> None:
         self.interactor.SetControlKey(int(ctrl))
@@ -110,7 +129,7 @@ class Driven:
 
     def look_from(self, azimuth: float) -> None:
         """Turn the view with the right button until the eye stands at this angle about the vertical, rad."""
-        width, height = self.window.plotter.window_size
+        width = self.window.plotter.window_size[0]
 
         def off() -> float:
             camera = self.window.picture_renderers[0].GetActiveCamera()
@@ -118,12 +137,12 @@ class Driven:
             return float(np.angle(np.exp(1j * (azimuth - np.arctan2(eye[1], eye[0])))))
 
         for _ in range(20):  # the hand takes hold again before the mouse leaves the picture
-            x = 0.5 * width / self.window.sides
-            self.pixel(x, 0.6 * height)
+            self.mouse(0.5, 0.5)
+            x, y = self.interactor.GetEventPosition()
             self.button(True, "Right")
             for _ in range(15):
                 x -= np.clip(60.0 * off(), -15.0, 15.0) * width / 1280.0
-                self.pixel(x, 0.6 * height)
+                self.pixel(x, y)
             self.button(False, "Right")
             if abs(off()) < 0.05:
                 return
@@ -131,7 +150,6 @@ class Driven:
 
     def look_down(self, elevation: float) -> None:
         """Turn the view with the right button until the eye stands so high above the horizon, rad."""
-        width, height = self.window.plotter.window_size
 
         def off() -> float:
             camera = self.window.picture_renderers[0].GetActiveCamera()
@@ -139,8 +157,8 @@ class Driven:
             return float(elevation - np.arcsin(eye[2] / np.linalg.norm(eye)))
 
         for _ in range(12):
-            x, y = 0.5 * width / self.window.sides, 0.6 * height
-            self.pixel(x, y)
+            self.mouse(0.5, 0.5)
+            x, y = self.interactor.GetEventPosition()
             self.button(True, "Right")
             for _ in range(10):
                 y -= np.clip(200.0 * off(), -12.0, 12.0)

@@ -9,22 +9,31 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+import pyvista
 
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
+from mechanics.errors import ModelError
 from mechanics.material import Ball
 from mechanics.model import Model
 from mechanics.recording import read_recording
+from palpate.operations.touch import Touched
+from palpate.window.axes import ROOM
+from palpate.window.board import BODY
+from palpate.window.charts import LEAST_MM, LEAST_N, LiveCharts
 from palpate.window.game import Game
+from palpate.window.panel import DEPTH
 from palpate.window.picture import STIFFNESS
 from palpate.window.session import SessionOptions, TouchSession
-from palpate.window.window import CHARTS_SHARE, TouchWindow
-from scenes.scene import Scene
+from palpate.window.window import COLUMN, TouchWindow
+from scenes.phantoms import Region
+from scenes.scene import Scene, load_scene
 
 from ...support.waiting import eventually
 from .driven import Driven
 
 SIZE = (640, 480)
+NODULE, UP = Ball((0.0, 0.0, 0.02), 0.005, 8.0), np.array([0.0, 0.0, 1.0])
 
 
 @pytest.fixture(scope="module")
@@ -53,6 +62,13 @@ def press(driven: Driven):
     driven.mouse(0.5, 0.55)
     driven.button(True)
     return driven.pressed(driven.window.pointer.press_depth_m)
+
+
+def seen_through(driven: Driven) -> bool:
+    """Whether the object lets what is inside be seen; then the ball is there as well."""
+    picture = driven.window.pictures[0]
+    assert (picture._actor.prop.opacity < 1.0) == bool(picture._ball.GetVisibility())
+    return picture._actor.prop.opacity < 1.0
 
 
 def release(driven: Driven):
@@ -100,22 +116,20 @@ def test_wheel_presses_deeper(driven: Driven) -> None:
 
 
 def test_the_slider_sets_the_depth_and_presses_nothing(driven: Driven) -> None:
-    window, pointer = driven.window, driven.window.pointer
-    look, panel = window._slider.GetSliderRepresentation(), window._slider.GetCurrentRenderer()
-    ends = [look.GetPoint1Coordinate(), look.GetPoint2Coordinate()]
-    left, right = (np.array(end.GetComputedDisplayValue(panel), dtype=float) for end in ends)
+    pointer, column = driven.window.pointer, driven.window.boards[0]
     driven.frame()
     before = pointer.press_depth_m
-    share = (1e3 * before - look.GetMinimumValue()) / (look.GetMaximumValue() - look.GetMinimumValue())
-    driven.pixel(*(left + share * (right - left)))
+    x, y = column.find(DEPTH)
+    driven.pixel(x, y)
     driven.button(True)
-    driven.pixel(*(left + 0.8 * (right - left)))
+    driven.pixel(x + 0.2 * COLUMN * column.scale, y)
     assert not pointer.pressing
     driven.button(False)
     assert pointer.press_depth_m > before + 0.002
+    driven.pixel(x, y)
+    assert pointer.press_depth_m > before + 0.002, "the slider was let go"
     pointer.go_deep(1e3 * before)
-    driven.frame()
-    assert look.GetValue() == pytest.approx(1e3 * before), "the slider follows the wheel and the keys"
+    driven.says(f"{1e3 * before:.1f} mm deep")  # the slider follows the wheel and the keys
     driven.mouse(0.5, 0.55)
 
 
@@ -256,37 +270,194 @@ def test_only_what_does_something_is_offered(driven: Driven) -> None:
 
 def test_a_guided_person_is_asked_for_one_thing_at_a_time(driven: Driven, monkeypatch) -> None:
     window = driven.window
-    guide = SimpleNamespace(suggestion=SimpleNamespace(kind="press"))
-    monkeypatch.setattr(window, "game", Game([Ball((0.0, 0.0, 0.02), 0.005, 8.0)], np.array([0.0, 0.0, 1.0])))
-    driven.frame()
-    assert "a nodule is hidden" in window._status.input
+    guide = SimpleNamespace(suggestion=SimpleNamespace(kind="press"), lines=lambda: ["press at the ghost"])
+    monkeypatch.setattr(window, "game", Game([NODULE], UP))
+    driven.says("A nodule is hidden")
     monkeypatch.setattr(window, "guide", guide)
-    driven.frame()
-    assert "a nodule is hidden" not in window._status.input
+    driven.says("press at the ghost")
+    driven.says("A nodule is hidden", says=False)
     guide.suggestion.kind = "stop"
+    driven.says("A nodule is hidden")
+
+
+def test_enter_while_pressing_keeps_the_answer(driven: Driven, monkeypatch) -> None:
+    game = Game([NODULE], UP)
+    monkeypatch.setattr(driven.window, "game", game)
+    press(driven)
+    driven.says("It is here")
+    driven.key("Return")
+    driven.wait(0.05)
+    assert game.answered and len(game.answers) == 1, "the press that goes on begins no round"
+    assert seen_through(driven)
+    driven.says("points")
+    release(driven)
+    assert game.answered and seen_through(driven)
+    press(driven)
+    assert not game.answered and not seen_through(driven), "the next touch does"
+    release(driven)
+
+
+def test_everything_stands_beside_everything_else(driven: Driven) -> None:
+    """Columns, pictures and plots share the window out; buttons lie in their column and not on another."""
+    for aside in ("s", "h", ""):
+        driven.window.show_aside(aside or driven.window.aside)
+        driven.says("Close", says=bool(aside))
+        areas = [(v[2] - v[0]) * (v[3] - v[1]) for v in (r.viewport for r in driven.window.plotter.renderers)]
+        assert sum(area for area in areas if area > 1e-3) == pytest.approx(1.0)
+        for board in driven.window.boards[: 2 if aside else 1]:
+            boxes = [at for item, at in board.placed if item.text]
+            assert all(board.holds(*at[:2]) and board.holds(*at[2:]) for at in boxes)
+            for k, (left, low, right, high) in enumerate(boxes):
+                assert not any(
+                    left < r and x < right and low < t and y < high for x, y, r, t in boxes[k + 1 :]
+                ), "nothing lies on another"
+
+
+def test_a_button_says_what_it_does_and_its_key(driven: Driven) -> None:
+    column = driven.window.boards[0]
     driven.frame()
-    assert "a nodule is hidden" in window._status.input
+    before = driven.picture()
+    driven.pixel(*column.find("Stiff ball"))
+    driven.frame()
+    shown = np.abs(driven.picture().astype(int) - before).sum(axis=2) > 0
+    assert shown[:, : round(COLUMN * column.scale)].mean() > 0.02, "a tip is drawn"
+    tips = {item.text: item.tip for item, _ in column.placed if item.do}
+    assert tips["Stiff ball"].endswith("(I)") and tips["Quit"].endswith("(Q)")
+    assert all(tips.values())
+    driven.mouse(0.5, 0.55)
 
 
-def test_the_panel_covers_no_picture(driven: Driven) -> None:
-    """With all words off and on, the pictures' pixels are the same."""
-    driven.until(lambda f: not any(sizes(f)))
-    rows = slice(0, int((1.0 - CHARTS_SHARE) * SIZE[1]) - 2)
-    shown = driven.picture()[rows]
-    driven.window._status.SetVisibility(False)
-    driven.window._hint.SetVisibility(False)
-    assert (driven.picture()[rows] == shown).all()
-    driven.window._status.SetVisibility(True)
-    driven.window._hint.SetVisibility(True)
+def test_the_force_is_large_and_the_next_step_is_said(driven: Driven) -> None:
+    column = driven.window.boards[0]
+    driven.says(f"{sizes(press(driven))[0]:.2f} N")
+    assert max(item.size for item, _ in column.placed if item.text.endswith(" N")) > 3 * BODY
+    release(driven)
+
+
+def test_an_empty_plot_shows_newtons_and_millimetres() -> None:
+    plotter = pyvista.Plotter(off_screen=True)
+    charts = LiveCharts(plotter, 6.0)
+    ranges = [list(chart.y_range) for chart in (charts._force, charts._depth)]
+    plotter.close()
+    assert ranges == [[0.0, LEAST_N], [0.0, LEAST_MM]] and LEAST_N > 0.1
+
+
+def test_no_letter_of_the_axes_lies_on_another(driven: Driven) -> None:
+    axes, orbit = driven.window._axes, driven.window.orbit
+    seen = set()
+    for _ in range(12):
+        orbit.turn(0.17, 0.03)
+        axes.update(1.0)
+        shown = [letter for letter in axes.letters if letter.GetVisibility()]
+        places = np.array([letter.GetPosition() for letter in shown])
+        gaps = np.linalg.norm(places[:, None] - places[None], axis=2) + 100.0 * np.eye(len(places))
+        assert gaps.min() > ROOM
+        seen.add(len(shown))
+    assert seen == {2, 3}, "and all are shown where there is room"
+    orbit.reset()
+
+
+def test_a_rim_shows_no_triangles(driven: Driven) -> None:
+    """Over a drawn triangle the light turns by little, also on the block's rims."""
+    felt, picture = driven.session.drawing("fem").contact.arrays, driven.window.pictures[0]
+    corners = picture._smooth[felt.triangles[felt.free > 0]]
+    turn = np.einsum("kcx,kcx->kc", corners, np.roll(corners, 1, axis=1)).min()
+    assert np.degrees(np.arccos(turn)) < 35.0
+
+
+def test_the_window_is_called_by_its_object(driven: Driven, tmp_path: Path) -> None:
+    assert driven.window.plotter.title.startswith("Block")
+    folder = tmp_path / "model"
+    folder.mkdir()
+    (folder / "model.toml").write_text('[provenance]\nrecording = "liver"\n')
+    assert load_scene(folder).title == "liver (model)"
+
+
+def test_a_mouse_is_not_told_of_forces_sent_to_it(driven: Driven) -> None:
+    press(driven)
+    report = driven.session.report()
+    lines = {
+        device: "\n".join(Touched(driven.window.scene, device, "fem", report, None, "").lines())
+        for device in ("mouse", "simulated")
+    }
+    assert "N rendered" in lines["mouse"] and "sent" not in lines["mouse"]
+    assert "N sent" in lines["simulated"]
+    release(driven)
+
+
+def test_two_pictures_by_one_button(driven: Driven) -> None:
+    window = driven.window
+    assert window.sides == 2
+    driven.click("Side by side")
+    assert window.sides == 1 and len(press(driven).views) == 1
+    left, _, right, _ = window.picture_renderers[0].viewport
+    assert right == 1.0, "what is felt has all the room"
+    driven.click("Side by side")
+    assert window.sides == 2
+    both = press(driven)
+    assert both.views[1].name == "hunt-crossley"
+    driven.says("N  hunt-crossley")
+    release(driven)
+
+
+def test_settings_change_what_is_felt(driven: Driven) -> None:
+    session = driven.session
+    driven.click("Settings")
+    driven.click("0.2")
+    assert session.friction == 0.2
+    driven.click("1")
+    driven.click("stiffer")
+    assert session.young_modulus_pa == pytest.approx(25e3)
+    driven.click("25.0 kPa")
+    assert session.young_modulus_pa == pytest.approx(20e3)
+    driven.click("hunt-crossley")
+    assert session.renderer_name == "hunt-crossley"
+    driven.says("Friction", says=False)
+    driven.click("fem")
+    assert session.renderer_name == "fem"
+    driven.says("finite strain")
+    driven.click("off")
+    assert not session.effects and driven.session.servo.alive
+    driven.click("on")
+    assert session.effects and session.worker.failure == ""
+    driven.click("Close")
+    driven.says("Friction", says=False)
+
+
+def test_a_ball_never_leaves_the_object(driven: Driven) -> None:
+    pointer = driven.window.pointer
+    driven.mouse_at(np.array([0.0, -0.05, 0.0]))  # on the support
+    assert pointer.target.on_support
+    centre, radius = pointer.under(0.008)
+    assert np.abs(centre[:2]).max() < 0.04 and radius < centre[2] < 0.04
+    thin = pointer.inside(np.array([0.0, 0.0, -0.02]), 0.004)
+    assert thin == pytest.approx([0.0, 0.0, 0.004], abs=1e-4)
+    assert pointer.inside(np.array([0.01, 0.0, 0.02]), 0.004) == pytest.approx([0.01, 0.0, 0.02])
+    driven.mouse(0.5, 0.55)
+
+
+def test_a_ball_that_cannot_be_computed_is_not_left_half_shown(driven: Driven, monkeypatch) -> None:
+    def fails(*_: object) -> None:
+        raise ModelError("no memory for it")
+
+    monkeypatch.setattr(driven.session._inclusion, "follow", fails)
+    driven.session.place_inclusion(Region("ball", (0.0, 0.0, 0.02), 0.008, 8.0))
+    driven.until(lambda f: driven.session.worker.failure)
+    assert "no memory for it" in driven.until(lambda f: driven.session.worker.failure).busy
+    driven.session.place_inclusion(None)
+    driven.frame()
+    assert not seen_through(driven)
+    driven.session.worker.run("going on", lambda: None)
+    driven.session.worker.wait()
 
 
 def test_help_and_screenshot(driven: Driven, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    before = driven.picture()
+    driven.click("Help")
+    driven.says("Press less deep")
     driven.key("h")
-    assert np.abs(driven.picture().astype(int) - before).mean() > 0.5
-    driven.key("h")
-    driven.key("p")
+    driven.says("Press less deep", says=False)
+    driven.click("Save picture")
     assert len(list(tmp_path.glob("touch-*.png"))) == 1
 
 

@@ -1,0 +1,73 @@
+"""Another simulator that is run along a recorded path: what is asked of it, and its force."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from mechanics.key_values import pairs
+from palpate.operations._declare import operand
+from render.options import RenderOptions
+from render.registry import simulator_names
+
+if TYPE_CHECKING:
+    import numpy as np
+
+    from mechanics.model import Model
+    from mechanics.progress import Progress
+    from mechanics.recording import Recording
+    from render.simulators.base import Adapter
+
+SETTINGS = ("documented", "best")
+
+
+def simulator_operand(words: str) -> Any:
+    """--renderer NAME, of the other simulators alone."""
+    return operand(None, words, choices=simulator_names())
+
+
+def settings_operand() -> Any:
+    """--simulator-settings, of --renderer."""
+    words = "of --renderer: as its own documentation says, or as good as it gets"
+    return operand("documented", words, choices=SETTINGS, rare=True)
+
+
+def numbers_operand(words: str = "numbers of these settings to change", default: str | None = "") -> Any:
+    """KEY=VALUE,... of a simulator's settings."""
+    return operand(default, f"{words}: KEY=VALUE, comma separated", metavar="KEY=VALUE,...", rare=True)
+
+
+class Ran(NamedTuple):
+    """What a simulator gave: force (n, 3) N on the tool at every row of the recording; of which adapter; its
+    settings in words."""
+
+    force: np.ndarray
+    adapter: Adapter
+    said: str
+
+
+def mended(settings: str, numbers: str, by: str) -> tuple[str, str]:
+    """(settings, numbers) with what mends them on top: one of SETTINGS, KEY=VALUE words, or both."""
+    words = words_of(by)
+    named = [word for word in words if word in SETTINGS]
+    over = dict(pairs(words_of(numbers), "--simulator-set", "edge_radii=0.5"))
+    over |= dict(pairs([w for w in words if w not in named], "--mended", "edge_radii=0.5"))
+    return (named or [settings])[-1], ",".join(f"{key}={value}" for key, value in over.items())
+
+
+def words_of(text: str) -> list[str]:
+    """The words of a comma separated list."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def run_along(
+    name: str, settings: str, numbers: str, model: Model, recording: Recording, progress: Progress
+) -> Ran:
+    """Run a simulator along a recording's path; raises OptionError where it is not installed, a setting is
+    not there, or it finds no answer."""
+    from render.registry import create
+    from render.replay import replay_recording
+
+    options = RenderOptions(simulator_settings=settings, simulator_set=numbers)
+    made: Any = create(name, model, options, progress)
+    force = replay_recording(made, recording, progress)
+    return Ran(force, made.adapter, f"settings {settings}" + (f", {numbers}" if numbers else ""))

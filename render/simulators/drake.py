@@ -1,0 +1,205 @@
+"""Drake: a deformable body of linear tetrahedra, its base behind a wall condition, and a rigid sphere that is
+moved by hand between the steps of its SAP solver.
+
+documented: the step, damping and coarse sphere of its deformable example, on the model's own mesh. best:
+edges of half the tip's radius under it, a finely meshed sphere, a tenth of the step and of the damping.
+"""
+
+from __future__ import annotations
+
+import importlib.metadata
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from mechanics.progress import Progress, silent
+from mechanics.tetmesh import TetMesh
+from render.simulators.base import BEST, DOCUMENTED, Adapter, SteppedWorld, World, made
+
+if TYPE_CHECKING:
+    from mechanics.model import Model
+    from render.base import Renderer
+    from render.options import RenderOptions
+
+DENSITY_KG_M3 = 1000.0
+HEAVY_KG = 1e6
+"""Of the sphere, whose pose and velocity are set at every step: the object does not move it within one."""
+
+
+@dataclass(frozen=True)
+class Settings:
+    """timestep_s; damping_s: stiffness damping of the object; sphere_radii: edges of the sphere's mesh, in
+    its radii; edge_radii: edges of the object under the tip, in its radii, inf as the model has them."""
+
+    timestep_s: float
+    damping_s: float
+    sphere_radii: float
+    edge_radii: float = np.inf
+
+
+SETTINGS = {DOCUMENTED: Settings(1e-2, 1e-2, 1.0), BEST: Settings(1e-3, 1e-3, 0.15, 0.5)}
+
+
+def vtk_text(mesh: TetMesh) -> str:
+    """A legacy VTK file of linear tetrahedra, as Drake reads them."""
+    points = "\n".join(f"{x:.9g} {y:.9g} {z:.9g}" for x, y, z in mesh.points)
+    cells = "\n".join("4 " + " ".join(map(str, row)) for row in mesh.tetrahedra)
+    count = len(mesh.tetrahedra)
+    kinds = "\n".join(["10"] * count)
+    return (
+        "# vtk DataFile Version 3.0\nobject\nASCII\nDATASET UNSTRUCTURED_GRID\n"
+        f"POINTS {len(mesh.points)} double\n{points}\nCELLS {count} {5 * count}\n{cells}\n"
+        f"CELL_TYPES {count}\n{kinds}\n"
+    )
+
+
+class Drake(Adapter):
+    """The adapter."""
+
+    name, extra, units = "drake", "drake", "SI: m, kg, s, N, Pa"
+    settings = SETTINGS
+    cannot = (
+        "linear tetrahedra alone, which lock near Poisson's ratio 0.5",
+        "one modulus a body",
+        "a tip without facets: the sphere is a mesh",
+        "no tip that sticks for ever: friction is a number",
+    )
+    advice = {
+        "contact_nodes": "refine the body's mesh under the tip, and the sphere's resolution_hint: "
+        "--simulator-settings best",
+        "contact_offset": "a smaller resolution_hint of the sphere, whose facets lie inside it: "
+        "--simulator-set sphere_radii=0.15",
+        "mesh_stiffness": "refine the body's mesh, and take a Poisson's ratio of 0.45 or below",
+        "numerical_damping": "lower stiffness_damping_coefficient and the plant's time_step: "
+        "--simulator-set damping_s=0.001,timestep_s=0.001",
+        "time_step": "a smaller time_step of the plant: --simulator-set timestep_s=0.001",
+        "lost_contact": "a smaller time_step, or more stiffness_damping_coefficient, where the body rings",
+    }
+
+    def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
+        import pydrake  # noqa: F401
+
+        super().__init__(model, options, friction if np.isfinite(friction) else 10.0)
+        self._whole: tuple[float, _Scene] | None = None
+
+    @property
+    def version(self) -> str:
+        return importlib.metadata.version("drake")
+
+    @property
+    def stated(self) -> dict[str, float]:
+        material = self.model.material
+        return {
+            "young_modulus_pa": material.young_modulus_pa,
+            "poisson_ratio": material.poisson_ratio,
+            "friction": self.friction,
+            "tip_radius_m": self.model.tool.tip_radius_m,
+        }
+
+    def begin(self, tip: np.ndarray, radius_m: float) -> World:
+        edge = self.own.edge_radii
+        if np.isfinite(edge):
+            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
+            return _Touch(self._scene(fine, radius_m), tip)
+        if self._whole is None or self._whole[0] != radius_m:
+            self._whole = radius_m, self._scene(self.mesh, radius_m)
+        return _Touch(self._whole[1], tip)
+
+    def _scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
+        return _Scene(mesh, self.model, self.own, self.stated, radius_m)
+
+
+class _Scene:
+    """A diagram with the body at rest; every touch has a context of its own."""
+
+    def __init__(
+        self, mesh: TetMesh, model: Model, own: Settings, given: dict[str, float], radius_m: float
+    ) -> None:
+        from pydrake.common import MemoryFile
+        from pydrake.geometry import (
+            AddContactMaterial,
+            AddRigidHydroelasticProperties,
+            GeometryInstance,
+            InMemoryMesh,
+            Mesh,
+            ProximityProperties,
+            Sphere,
+        )
+        from pydrake.math import RigidTransform
+        from pydrake.multibody.fem import DeformableBodyConfig, MaterialModel
+        from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, CoulombFriction
+        from pydrake.multibody.tree import SpatialInertia
+        from pydrake.systems.framework import DiagramBuilder
+
+        builder: Any = DiagramBuilder()
+        self.plant, _ = AddMultibodyPlantSceneGraph(builder, own.timestep_s)
+        self.plant.mutable_gravity_field().set_gravity_vector(np.zeros(3))
+        friction = CoulombFriction(given["friction"], given["friction"])
+        rigid = ProximityProperties()
+        AddContactMaterial(properties=rigid, friction=friction)
+        AddRigidHydroelasticProperties(own.sphere_radii * radius_m, rigid)
+        heavy = SpatialInertia.SolidSphereWithMass(HEAVY_KG, radius_m)
+        self.tip = self.plant.AddRigidBody("tip", heavy)
+        self.plant.RegisterCollisionGeometry(self.tip, RigidTransform(), Sphere(radius_m), "tip", rigid)
+        config: Any = DeformableBodyConfig()
+        config.set_youngs_modulus(given["young_modulus_pa"])
+        config.set_poissons_ratio(given["poisson_ratio"])
+        config.set_mass_density(DENSITY_KG_M3)
+        config.set_mass_damping_coefficient(0.0)
+        config.set_stiffness_damping_coefficient(own.damping_s)
+        config.set_material_model(MaterialModel.kLinearCorotated)
+        soft = ProximityProperties()
+        AddContactMaterial(properties=soft, friction=friction)
+        file = InMemoryMesh(mesh_file=MemoryFile(vtk_text(mesh), ".vtk", "object.vtk"))
+        shape = GeometryInstance(RigidTransform(), Mesh(file), "object")
+        shape.set_proximity_properties(soft)
+        bodies = self.plant.deformable_model()
+        body = bodies.RegisterDeformableBody(shape, config, 1.0)
+        up = model.support.normal
+        highest = mesh.points[mesh.fixed][np.argmax(mesh.points[mesh.fixed] @ up)]
+        bodies.SetWallBoundaryCondition(body, highest + 1e-6 * up, up)
+        self.plant.Finalize()
+        self.diagram, self.timestep_s = builder.Build(), own.timestep_s
+
+
+class _Touch(SteppedWorld):
+    """One touch: the sphere is set to where it was, with the velocity that leads it to where it shall be."""
+
+    def __init__(self, scene: _Scene, tip: np.ndarray) -> None:
+        from pydrake.systems.analysis import Simulator
+
+        super().__init__(tip, scene.timestep_s)
+        self._scene = scene
+        self._simulator: Any = Simulator(scene.diagram)
+        self._own = scene.plant.GetMyMutableContextFromRoot(self._simulator.get_mutable_context())
+        self._set(self._tip, np.zeros(3))
+        self._simulator.Initialize()
+
+    def _set(self, tip: np.ndarray, velocity: np.ndarray) -> None:
+        from pydrake.math import RigidTransform
+        from pydrake.multibody.math import SpatialVelocity
+
+        plant, body = self._scene.plant, self._scene.tip
+        plant.SetFreeBodyPose(self._own, body, RigidTransform(tip))
+        plant.SetFreeBodySpatialVelocity(
+            context=self._own, body=body, V_JpJc=SpatialVelocity(np.zeros(3), velocity)
+        )
+
+    def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:
+        self._set(tip - velocity * self._timestep_s, velocity)
+        context = self._simulator.get_context()
+        self._simulator.AdvanceTo(context.get_time() + self._timestep_s)
+
+    def force(self) -> np.ndarray:
+        seen = self._scene.plant.get_contact_results_output_port().Eval(self._own)
+        total = np.zeros(3)
+        for k in range(seen.num_deformable_contacts()):
+            # of the object, which is always the first of the two
+            total -= seen.deformable_contact_info(k).F_Ac_W().translational()
+        return total
+
+
+def create(name: str, model: Model, options: RenderOptions, progress: Progress = silent) -> Renderer:
+    """The renderer; raises OptionError where Drake is not installed."""
+    return made(Drake, model, options)

@@ -1,0 +1,179 @@
+"""Every code block of the guide runs, from an empty folder, as it stands; or a test or an essay that is named
+here does the same at its own pace."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import palpate as pp
+from palpate import cli
+from tests.palpate.importing.test_meaning import press, write
+from tests.support.waiting import eventually
+
+REPOSITORY = Path(__file__).resolve().parents[2]
+DOCS = REPOSITORY / "docs"
+GUIDE = [p for folder in ("tutorials", "howto") for p in sorted((DOCS / folder).glob("*.md"))]
+OTHERS = ("pip", "dask", "python3", ".venv/bin/python", ".venv/bin/palpate")
+"""Other programs; of them CI runs what installs and starts this one."""
+
+
+def nothing(folder: Path) -> None:
+    """The page's MODEL is a scene that is there already."""
+
+
+def a_recording(folder: Path) -> None:
+    pp.read_recording("silicone-1-cylinder").save(folder / "REC.csv")
+
+
+def a_robots_table(folder: Path) -> None:
+    """The embedded recording as another program wrote it: mm, and the force on the object."""
+    seen = pp.read_recording("silicone-1-cylinder")
+    rows = np.column_stack([seen.t, 1e3 * seen.position, -seen.force_on_tool])[::2]
+    np.savetxt(folder / "robot.csv", rows, "%.5f", ",", header="time,x,y,z,Fx,Fy,Fz", comments="")
+
+
+def an_array(folder: Path) -> None:
+    t = np.arange(2000) / 200
+    deep = 0.006 * np.sin(np.pi * t) ** 2 - 0.001
+    force = 400 * np.maximum(deep, 0)
+    rows = [t, 10 * np.floor(t), 0 * t, -1e3 * deep, 0 * t, 0 * t, force]
+    np.save(folder / "log.npy", np.column_stack(rows))
+
+
+def a_dent(folder: Path) -> None:
+    t, depth, force = press()
+    for name in ("dent", "curve1", "curve2", "piece1", "piece2", "FILE"):
+        write(folder / f"{name}.csv", [t, 12 - 1e3 * depth, -force], "Time (s),Height (mm),Load (N)")
+
+
+def a_part(folder: Path) -> None:
+    import trimesh
+
+    trimesh.creation.box((60, 60, 30)).apply_translation((0, 0, 15)).export(folder / "part.stl")
+
+
+RUN: dict[str, Callable[[Path], None]] = {
+    "howto/arrays.md": an_array,
+    "howto/cad-or-scan.md": a_part,
+    "howto/check-a-recording.md": a_recording,
+    "howto/device.md": nothing,
+    "howto/export.md": nothing,
+    "howto/force-test.md": nothing,
+    "howto/machine-curves.md": a_dent,
+    "howto/open-anything.md": a_dent,
+    "howto/own-data.md": a_robots_table,
+    "howto/press-a-page.md": nothing,
+    "howto/write-a-device.md": nothing,
+}
+"""Page: what makes the files that its commands name."""
+CHEAPLY = {"MODEL": "demo", "REC": "REC.csv", "FILE...": "FILE.csv", "dent.csv": "dent.csv --fast"}
+WIDELY = {"material": ["--fast", "--travel", "out"]}
+"""What is said beside, so that a stand-in costs little: fewer effects."""
+ELSEWHERE = {
+    "palpate batch": "tests/palpate/batch/test_batch_recordings.py",
+    "palpate calibrate": "tests/reconstruct/test_calibration.py",
+    "palpate check REC --full": "tests/palpate/test_check_command.py",
+    "palpate compare": "tests/diagnose/compare",
+    "palpate devices --measure": "tests/devices/test_devices_command.py",
+    "palpate diagnose": "examples/plot_05_a_slow_sensor.py",
+    "palpate explore": "tests/diagnose/explore",
+    "palpate import bag_folder": "tests/palpate/importing/test_import.py",
+    "palpate import palpation.csv": "tests/palpate/importing/test_import.py",
+    "palpate material FILE...": "tests/diagnose/specimen",
+    "palpate material dent.xlsx": "tests/palpate/importing/test_sheets.py",
+    "palpate open FILE...": "tests/palpate/operations/test_open.py",
+    "palpate open palpation.csv": "tests/reconstruct/test_sliding_on_a_slab.py",
+    "palpate reconstruct": "tests/reconstruct/test_command.py",
+    "palpate simulate": "tests/scenes/laboratory",
+    "palpate touch": "tests/palpate/window/test_touch_command.py",
+    "eval": "tests/palpate/test_help.py",
+    "howto/batch.md python": "examples/plot_13_a_batch.py",
+    "howto/cad-or-scan.md python": "examples/plot_10_your_own_mesh.py",
+    "howto/force-test.md python": "tests/palpate/operations/test_results.py",
+    "howto/guided-exploration.md python": "tests/diagnose/explore",
+    "howto/python.md python": "tests/palpate/operations/test_snippets.py",
+    "howto/write-an-effect.md python": "examples/plot_11_write_an_effect.py",
+    "howto/wrong-simulation.md python": "tests/diagnose/test_simulated.py",
+}
+"""What takes minutes, a window or a device: how it begins, and what does the same."""
+
+
+def lines_of(page: Path) -> list[str]:
+    """The lines of a page's shell blocks, joined where one goes on in the next, without remarks."""
+    blocks = re.findall(r"^```sh\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+    joined = "".join(blocks).replace("\\\n", " ").splitlines()
+    return [re.sub(r"\s+#\s.*", "", line).strip() for line in joined if line.strip()]
+
+
+def code_of(page: Path) -> list[str]:
+    """The Python blocks of a page."""
+    return re.findall(r"^```python\n(.*?)^```", page.read_text("utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def name_of(page: Path) -> str:
+    return str(page.relative_to(DOCS))
+
+
+def elsewhere(words: str) -> str | None:
+    """What does the same as a line; None for a line that runs here."""
+    fitting = [begin for begin in ELSEWHERE if words.startswith(begin)]
+    return ELSEWHERE[max(fitting, key=len)] if fitting else None
+
+
+@pytest.mark.parametrize("page", GUIDE, ids=name_of)
+def test_every_block_is_run_here_or_where_it_is_said(page):
+    for line in lines_of(page):
+        other = line.split()[0] in OTHERS
+        assert other or elsewhere(line) or name_of(page) in RUN, f"nothing runs '{line}'"
+    text = page.read_text("utf-8")
+    if code_of(page):
+        whole = len(re.findall(r"<!-- run: [\w-]+ -->", text)) > 0 or name_of(page) in PAGES_OF_CODE
+        assert whole or f"{name_of(page)} python" in ELSEWHERE, "nothing runs its Python"
+
+
+def test_what_does_the_same_is_there():
+    assert all((REPOSITORY / path).exists() for path in ELSEWHERE.values())
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", [p for p in GUIDE if name_of(p) in RUN], ids=name_of)
+def test_the_commands_of_a_page_run(page, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    RUN[name_of(page)](tmp_path)
+    done = 0
+    for line in lines_of(page):
+        if not line.startswith("palpate ") or elsewhere(line):
+            continue
+        words = shlex.split(line)[1:]
+        words = [each for word in words for each in CHEAPLY.get(word, word).split(" ")]
+        words = [
+            str(each) for word in words for each in (sorted(Path().glob(word)) if "*" in word else [word])
+        ]
+        code = cli.main([*words, *WIDELY.get(words[0], [])])
+        assert code == 0, line
+        done += 1
+    assert done, "a page that is run has at least one command that runs"
+
+
+PAGES_OF_CODE = {"howto/write-a-device.md"}
+
+
+def test_the_device_of_its_page_gives_a_position_and_takes_a_force(monkeypatch):
+    from types import ModuleType
+
+    module = ModuleType("devices.handle")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    exec(compile(code_of(DOCS / "howto" / "write-a-device.md")[0], "handle.py", "exec"), module.__dict__)
+    assert [each.present for each in module.find()] == [True]
+    with module.make() as device:
+        assert eventually(lambda: device.read().calibrated)
+        device.enable_force()
+        device.send_force(np.array([0.0, 0.0, 1.0]))
+        assert np.isfinite(device.read().position_m).all()
