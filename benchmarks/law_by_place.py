@@ -152,9 +152,8 @@ class OwnSolver:
 
         self.shape, options = shape, PressOptions(coupled=True)
         # even triangles: the solver curves them by their vertices' normals
-        even = trimesh.Trimesh(
-            *trimesh.remesh.subdivide_to_size(shape.vertices, shape.triangles, _EVEN_M), process=True
-        )
+        vertices, faces = trimesh.remesh.subdivide_to_size(shape.vertices, shape.triangles, _EVEN_M)
+        even = trimesh.Trimesh(vertices, faces, process=True)
         self._solver = PressSolver(
             mesh.linear(), (even.vertices, even.faces), young_modulus_pa=1.0, poisson_ratio=NU,
             tip_radius_m=TIP_M, options=options,
