@@ -7,6 +7,7 @@ filtered damping, bursts without contact.
 
 from __future__ import annotations
 
+import dataclasses
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -136,12 +137,13 @@ class Block:
 @dataclass(frozen=True)
 class Flaw:
     """name: of the numerical effect or stated parameter. strengths: least and greatest, drawn by logarithm.
-    plant(block, force, strength, rng): the force with it. given(strength): what the simulation was given."""
+    plant(block, force, strength, rng): the force with it. given(strength): fields of what the simulation was
+    given, so that two stand beside each other."""
 
     name: str
     strengths: tuple[float, float]
     plant: Callable[[Block, np.ndarray, float, np.random.Generator], np.ndarray] | None = None
-    given: Callable[[float], Given] | None = None
+    given: Callable[[float], dict[str, float]] | None = None
 
 
 def _each(block: Block, force: np.ndarray, change: Callable[[Press, np.ndarray], np.ndarray]) -> np.ndarray:
@@ -270,10 +272,10 @@ FLAWS: tuple[Flaw, ...] = (
     Flaw("tunnelling", (0.04, 0.25), fallen),
     Flaw("contact_offset", (8e-5, 1.2e-3)),
     Flaw("numerical_drift", (4e-6, 6e-5)),
-    Flaw("stated_modulus", (1.06, 3.0), given=lambda x: Given(modulus_pa=MODULUS_PA * x)),
-    Flaw("stated_tip_radius", (1.04, 1.5), given=lambda x: Given(radius_m=RADIUS_M * x)),
-    Flaw("stated_friction", (0.02, 0.25), given=lambda x: Given(friction=x)),
-    Flaw("stated_poisson_ratio", (0.30, 0.46), given=lambda x: Given(poisson=x)),
+    Flaw("stated_modulus", (1.06, 3.0), given=lambda x: {"modulus_pa": MODULUS_PA * x}),
+    Flaw("stated_tip_radius", (1.04, 1.5), given=lambda x: {"radius_m": RADIUS_M * x}),
+    Flaw("stated_friction", (0.02, 0.25), given=lambda x: {"friction": x}),
+    Flaw("stated_poisson_ratio", (0.30, 0.46), given=lambda x: {"poisson": x}),
 )
 
 
@@ -289,7 +291,7 @@ def simulated(
     given, drift, stands_off = Given(), np.zeros(3), 0.0
     for flaw, strength in planted:
         if flaw.given is not None:
-            given = flaw.given(strength)
+            given = dataclasses.replace(given, **flaw.given(strength))
         if flaw.name == "numerical_drift":
             direction = rng.normal(size=3) * [1, 0.3, 1]
             drift = strength * direction / np.linalg.norm(direction)

@@ -1,6 +1,7 @@
 """MuJoCo: the object as a flex of linear tetrahedra on its base, and the tip as a mocap sphere.
 
-A flex has one modulus and linear tetrahedra, which lock near nu = 0.5: it is stiffer than the model.
+A flex has one modulus and linear tetrahedra, which lock near nu = 0.5. They are graded under the tip; under a
+deep dent the flex is softer than the model.
 """
 
 from __future__ import annotations
@@ -12,12 +13,15 @@ import numpy as np
 from palpate.exporting.subject import DENSITY_KG_M3, Subject
 
 TIMESTEP_S = 1e-3
+CONTACT = 'solref="0.004 1" solimp="0.999 0.999 0.001"'
+"""As hard as the step allows: MuJoCo's own is a spring that goes with the mass of a node, which a fine mesh
+makes small."""
 
 
 def text_of(subject: Subject) -> str:
     """The MJCF scene; `mocap_pos[0]` is the tip's centre, which starts off the surface."""
-    mesh = subject.mesh.linear()
-    modulus = float(np.average(subject.element_modulus_pa, weights=mesh.volumes))
+    mesh = subject.graded()
+    touch = f'condim="3" friction="{subject.friction:g}" {CONTACT}'
     middle, span = mesh.points.mean(axis=0), float(np.ptp(mesh.points, axis=0).max())
     pressed = " ".join(f"{value:.9g}" for value in subject.pressed)
     return f"""<!-- {subject.label} -->
@@ -29,13 +33,14 @@ def text_of(subject: Subject) -> str:
 <worldbody>
 <light pos="{_row(middle + 3 * span * subject.model.support.normal)}"/>
 <body name="tip" mocap="true" pos="{_row(subject.start)}">
-<geom name="tip" type="sphere" size="{subject.radius_m:.6g}" condim="3" friction="0.5"/></body>
+<geom name="tip" type="sphere" size="{subject.radius_m:.6g}" {touch}/></body>
 <flexcomp name="object" type="direct" dim="3" mass="{DENSITY_KG_M3 * float(mesh.volumes.sum()):.6g}"
 radius="1e-4"
  point="{_row(mesh.points.ravel())}"
  element="{" ".join(map(str, mesh.tetrahedra.ravel()))}">
-<contact condim="3" selfcollide="none" friction="0.5"/>
-<elasticity young="{modulus:.6g}" poisson="{subject.model.material.poisson_ratio:.6g}" damping="0.01"/>
+<contact selfcollide="none" {touch}/>
+<elasticity young="{subject.mean_modulus_pa:.6g}" poisson="{subject.model.material.poisson_ratio:.6g}"
+ damping="0.01"/>
 <pin id="{" ".join(map(str, np.flatnonzero(mesh.fixed)))}"/>
 </flexcomp></worldbody></mujoco>
 """
@@ -44,7 +49,11 @@ radius="1e-4"
 def write(path: Path, subject: Subject) -> tuple[str, ...]:
     """Write the scene; what it cannot say."""
     path.write_text(text_of(subject), encoding="utf-8")
-    notes = ["linear tetrahedra, which come out stiffer than the model near nu = 0.5"]
+    notes = [
+        "linear tetrahedra, which come out stiffer than the model near nu = 0.5",
+        "a flex softens under a deep dent: compare presses of a sixth of the tip's radius",
+        subject.friction_note,
+    ]
     if np.ptp(subject.model.element_ratio) > 1e-9:
         notes.append("a flex has one modulus: the mean by volume")
     return tuple(notes)

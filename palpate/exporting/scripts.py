@@ -114,7 +114,7 @@ for k in range(STEPS):
     at = START + (PRESSED - START) * min(1.0, 2 * (k + 1) / STEPS)
     plant.SetFreeBodyPose(context, tip, RigidTransform(last))
     speed = SpatialVelocity(np.zeros(3), (at - last) / STEP_S)
-    plant.SetFreeBodySpatialVelocity(context=context, body=tip, V_PB=speed)
+    plant.SetFreeBodySpatialVelocity(context=context, body=tip, V_JpJc=speed)
     simulator.AdvanceTo((k + 1) * STEP_S)
     last = at
     if (k + 1) % 20 == 0:

@@ -2,7 +2,8 @@
 
 mujoco (.xml): a flex on its base and the tip as a mocap sphere. sofa (.scn): tetrahedra, base, a sphere's
 force. abaqus (.inp): hybrid tetrahedra, base, a rigid sphere that is pressed in. gmsh (.msh): mesh, groups,
-moduli. stl: the boundary. page (.html): one file that any browser opens, offline, in which the object can be
+moduli. usd (.usda): a deformable TetMesh with its material, base and tip. newton, drake (.py): scripts that
+press. stl: the boundary. page (.html): one file that any browser opens, offline, in which the object can be
 pressed. Metres, newtons, pascals, the model's frame (an STL's lengths as --unit says).
 """
 

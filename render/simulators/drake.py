@@ -183,7 +183,7 @@ class _Touch(SteppedWorld):
         plant, body = self._scene.plant, self._scene.tip
         plant.SetFreeBodyPose(self._own, body, RigidTransform(tip))
         plant.SetFreeBodySpatialVelocity(
-            context=self._own, body=body, V_PB=SpatialVelocity(np.zeros(3), velocity)
+            context=self._own, body=body, V_JpJc=SpatialVelocity(np.zeros(3), velocity)
         )
 
     def advance(self, tip: np.ndarray, velocity: np.ndarray) -> None:

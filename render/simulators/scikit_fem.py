@@ -43,8 +43,9 @@ NEAR_RADII = 1.05
 """Of the tip: nodes so near to its centre may touch, as what it presses moves away from it."""
 MOVED_M = 2e-5
 """The tip's travel after which the contact is solved anew; between, the force is held."""
-BALANCED_M = 1e-8
-"""By which springs and object may miss each other."""
+BALANCED_M, GOOD_ENOUGH_M = 1e-8, 2e-6
+"""By which springs and object may miss each other; what is taken where no step leads nearer, a tenth of the
+travel between two balances."""
 ITERATIONS, SHARES = 60, (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
 """Of Newton's method, and the shares of a step that are tried."""
 
@@ -220,6 +221,8 @@ class _Touch:
                     if then[3] < (1 - 0.1 * share) * miss:
                         break
                 u, now = u - share * step, then
+            if np.abs(now[2]).max() < GOOD_ENOUGH_M:
+                return now[0], u
         raise OptionError(
             f"scikit-fem: the contact finds no balance with the tip at {np.round(tip, 4).tolist()} m "
             f"({1e3 * np.abs(now[2]).max():.2g} mm are left): lower --simulator-set penalty={self.penalty:g}"
