@@ -12,8 +12,9 @@ from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
 from palpate.window import shadow
-from palpate.window.board import INK, set_type
+from palpate.window.board import INK
 from palpate.window.frames import Frame, View
+from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
 from render.base import Renderer
