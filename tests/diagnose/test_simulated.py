@@ -14,7 +14,7 @@ from diagnose.pipeline import diagnose
 from diagnose.simulated.against_law import seen_in_samples
 from diagnose.simulated.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
 from diagnose.simulated.pipeline import Asked, diagnose_simulated
-from diagnose.simulated.result import PARTS
+from diagnose.simulated.result import PARTS, Mended
 from diagnose.simulated.stated import StatedForward, stated_of
 from mechanics.effects.registry import NAMES as PHYSICAL
 from mechanics.errors import OptionError, RecordingError
@@ -82,7 +82,12 @@ def test_a_late_force_is_the_time_step(world):
 
 
 def test_json_has_the_keys_of_the_contract(world):
-    figures = judged(world, 1.5 * world[3]).as_json()
+    result = judged(world, 1.5 * world[3])
+    figures = result.as_json()
+    assert figures["mended"] is None and figures["gap_without_numerics_n"] < 0.5 * result.gap_before_n
+    again = dataclasses.replace(result, mended=Mended("settings best", 0.0123, ()))
+    assert again.as_json()["gap_after_measured_n"] == 0.0123
+    assert any("run again with settings best" in line and "12 mN" in line for line in again.lines())
     assert set(figures["parts"]) == {"reality", "parameters", "numerics"}
     assert all({"gap_n", "share"} <= set(part) for part in figures["parts"].values())
     assert {"name", "version", "stated"} <= set(figures["simulator"])
