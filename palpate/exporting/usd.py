@@ -19,11 +19,18 @@ REVISION = "63c74d79aa67dc98d8707af8ad68f2e1a10622b5"
 
 def write(path: Path, subject: Subject) -> tuple[str, ...]:
     """Write the stage (.usda); what it cannot say."""
+    path.write_text(_stage(subject), encoding="utf-8")
+    notes = ["linear tetrahedra, which come out stiffer than the model near nu = 0.5", subject.friction_note]
+    if np.ptp(subject.model.element_ratio) > 1e-9:
+        notes.append("a material has one modulus: the mean by volume")
+    return tuple(notes)
+
+
+def _stage(subject: Subject) -> str:
     mesh = subject.mesh.linear()
     held = np.flatnonzero(mesh.fixed)
     material = subject.model.material
-    path.write_text(
-        f'''#usda 1.0
+    return f'''#usda 1.0
 (
     defaultPrim = "World"
     doc = """{subject.label}; deformables by OpenUSD-proposals 111, {REVISION}"""
@@ -94,13 +101,7 @@ def Xform "World"
         uniform token[] xformOpOrder = ["xformOp:translate"]
     }}
 }}
-''',
-        encoding="utf-8",
-    )
-    notes = ["linear tetrahedra, which come out stiffer than the model near nu = 0.5", subject.friction_note]
-    if np.ptp(subject.model.element_ratio) > 1e-9:
-        notes.append("a material has one modulus: the mean by volume")
-    return tuple(notes)
+'''
 
 
 def _row(values: np.ndarray) -> str:

@@ -5,19 +5,18 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from functools import partial
-from typing import TYPE_CHECKING, TypeVar
+from typing import Protocol, TypeVar
 
 import numpy as np
 
 from palpate.window.board import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
+from palpate.window.controls import Controlled, Controls
 from palpate.window.frames import Frame
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
 from palpate.window.session import FRICTIONS, MODULUS_STEP
 from render.registry import names
-
-if TYPE_CHECKING:
-    from palpate.window.window import TouchWindow
+from scenes.scene import Scene
 
 T = TypeVar("T")
 WARNING = "#b3261e"
@@ -26,10 +25,23 @@ DEPTH = "press depth"
 """The slider's name."""
 
 
+class Shown(Controlled, Protocol):
+    """What stands beside the pictures of a window is read off it."""
+
+    scene: Scene
+    controls: Controls
+    aside: str
+    coloured: bool
+    moved_by_mouse: bool
+
+    def next_words(self, frame: Frame) -> str:
+        """What to do next."""
+
+
 class NextStep:
     """What a newcomer does next: each step is said until it was done, in this order."""
 
-    def __init__(self, window: TouchWindow, *, mouse: bool) -> None:
+    def __init__(self, window: Shown, *, mouse: bool) -> None:
         pointer, session, orbit = window.pointer, window.session, window.orbit
         depth, look = pointer.press_depth_m, orbit.azimuth
         self._began: np.ndarray | None = None
@@ -67,7 +79,7 @@ class NextStep:
         return self._steps[0][0] if self._steps else "Press anywhere. Settings changes what you feel."
 
 
-def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
+def main_rows(window: Shown, frame: Frame) -> list[Row]:
     """The column on the left."""
     session = window.session
     felt, *others = frame.views
@@ -98,7 +110,7 @@ def _where(frame: Frame) -> str:
     return "on the support" if any(np.linalg.norm(v.force_n) > 0.0 for v in frame.views) else "in air"
 
 
-def depth_rows(window: TouchWindow) -> list[Row]:
+def depth_rows(window: Shown) -> list[Row]:
     """How deep a press goes at most."""
     pointer = window.pointer
     low, high = 1e3 * LEAST_PRESS_M, 1e3 * MOST_PRESS_M
@@ -113,7 +125,7 @@ def depth_rows(window: TouchWindow) -> list[Row]:
     ]
 
 
-def _buttons(window: TouchWindow) -> list[Row]:
+def _buttons(window: Shown) -> list[Row]:
     session, offered = window.session, window.controls.offered
     chosen = {
         "b": bool(session.beside_name),
@@ -137,7 +149,7 @@ def _buttons(window: TouchWindow) -> list[Row]:
     return [*([(first,)] if first else []), *_grid(list(buttons.values()))]
 
 
-def _status(window: TouchWindow, frame: Frame) -> list[Row]:
+def _status(window: Shown, frame: Frame) -> list[Row]:
     """What goes on besides."""
     session, worker = window.session, window.session.worker
     rows: list[Row] = []
@@ -176,7 +188,7 @@ def _choices(chosen: T, every: Sequence[tuple[str, T]], do: Callable[[T], object
     return [Item(words, do=partial(do, value), on=value == chosen, size=12) for words, value in every]
 
 
-def settings_rows(window: TouchWindow) -> list[Row]:
+def settings_rows(window: Shown) -> list[Row]:
     """The column on the right: everything that may be changed about what is felt."""
     session = window.session
 
@@ -211,7 +223,7 @@ def settings_rows(window: TouchWindow) -> list[Row]:
     return rows
 
 
-def aside_rows(window: TouchWindow) -> list[Row]:
+def aside_rows(window: Shown) -> list[Row]:
     """What is open on the right."""
     heading = Item("Settings" if window.aside == "s" else "Help", size=16, bold=True, wide=3.0)
     close = Item("Close", do=lambda: window.show_aside(window.aside), size=12, wide=1.2)
