@@ -46,7 +46,12 @@ def contents(renderer: FemRenderer, progress: Progress = silent) -> tuple[Block,
     table = responses(renderer, depths)
     sizes = np.repeat(table.channels[:, :, :1].mean(axis=0), table.channels.shape[2], axis=1)
     sizes[:, 4:] /= _SIDEWAYS
-    block.modes("response", modes_of(_flat(table.channels), sizes.ravel(), ERROR))
+    both = np.concatenate([table.channels, table.bend_channels])
+    modes = modes_of(_flat(both), sizes.ravel(), ERROR)
+    # of a bend: what its middle differs by from the mean of its ends
+    modes.weights[len(table.channels) :] -= modes.weights[table.bends].mean(axis=1)
+    block.modes("response", modes)
+    block.whole("bends", table.bends)
     progress("page: forces", 0.6)
     beside = one_d_renderer(model)
     if beside is not None:

@@ -16,6 +16,28 @@ class Tables {
     this.oneD = about.one_d ? { weights: read("one_d_weights"), basis: read("one_d_basis") } : null;
     this.band = { weights: read("band_weights"), basis: read("band_basis") };
     this.out = new Float64Array(CHANNELS);
+    const bends = read("bends", Uint32Array), first = about.arrays.vertices.shape[0];
+    this.bends = new Map();
+    for (let i = 0; i < bends.length; i += 2) this.bends.set(bends[i] * first + bends[i + 1], first + i / 2);
+    this.first = first;
+    this.six = { rows: [], weights: [] };
+  }
+
+  // The rows of the response's modes that speak for a place, and how much: its corners, and the middles of those of
+  // its edges over which the surface bends (quadratic between them).
+  spoken(corners, weights) {
+    const { rows, weights: shares } = this.six;
+    rows.length = shares.length = 0;
+    for (let c = 0; c < 3; c++) {
+      rows.push(corners[c]);
+      shares.push(weights[c]);
+      const a = corners[c], b = corners[(c + 1) % 3], by = 4 * weights[c] * weights[(c + 1) % 3];
+      const middle = by > 0 ? this.bends.get(a < b ? a * this.first + b : b * this.first + a) : undefined;
+      if (middle === undefined) continue;
+      rows.push(middle);
+      shares.push(by);
+    }
+    return this.six;
   }
 
   // Values of some modes (columns for each depth) at a place and depth; the depths go as squares of their number.
@@ -26,7 +48,7 @@ class Tables {
     out.fill(0);
     for (let r = 0; r < rank; r++) {
       let weight = 0;
-      for (let c = 0; c < 3; c++) weight += weights[c] * modes.weights[corners[c] * rank + r];
+      for (let c = 0; c < corners.length; c++) weight += weights[c] * modes.weights[corners[c] * rank + r];
       const row = r * count * columns, high = row + (upper - 1) * columns, low = high - columns;
       for (let k = 0; k < columns; k++) {
         const below = upper > 1 ? modes.basis[low + k] : fromZero ? 0 : modes.basis[high + k];
@@ -37,7 +59,8 @@ class Tables {
   }
 
   response_(corners, weights, depth) {
-    return this.mixed(this.response, CHANNELS, corners, weights, depth, this.out);
+    const spoken = this.spoken(corners, weights);
+    return this.mixed(this.response, CHANNELS, spoken.rows, spoken.weights, depth, this.out);
   }
 
   // Normal force, N, of the 1D model.

@@ -5,7 +5,8 @@ press` (10 mm/s, sticking). From these follow, at depths that are dense near fir
     force      F0(d)           of the straight press, along the normal and sideways
     sideways   M(d) = dF/ds    change of the force on the tool with a sideways move s of the tip there
 and the page follows a path by F0(d) + sum of M ds, on Coulomb's cone. `Responses.channels` says how the
-numbers are turned so that they may be interpolated between vertices.
+numbers are turned so that they may be interpolated between vertices. Where the surface bends between two
+vertices, the middle of their edge is pressed too: the page interpolates quadratically there.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ SPEED_M_PER_S = 0.01
 _SLOPE = 0.5
 _SUBSTEPS = 3
 _AIR_M = 2e-3
+_BENT = float(np.cos(np.radians(4.0)))
 
 
 @dataclass(frozen=True)
@@ -32,11 +34,14 @@ class Responses:
     """depths_m: (k,) greater than 0. channels: (v, k, CHANNELS), N/m; each vanishes at depth 0 with the root
     of the depth or faster: normal force over depth; sideways force over depth (3, device frame); mean
     sideways stiffness; what it differs by in each direction (6: xx, yy, zz, xy, xz, yz); change of the normal
-    force with a sideways move (3).
+    force with a sideways move (3). bends: (b, 2) vertices of the edges over which the surface bends;
+    bend_channels: (b, k, CHANNELS) in the middles of these.
     """
 
     depths_m: np.ndarray
     channels: np.ndarray
+    bends: np.ndarray
+    bend_channels: np.ndarray
 
 
 def greatest_depth(renderer: Renderer) -> float:
@@ -57,35 +62,52 @@ def responses(renderer: Renderer, depths_m: np.ndarray) -> Responses:
     """The finite-element renderer's table at every vertex of its surface; those that cannot be pressed have
     that of the nearest one that can."""
     sticky, arrays = renderer.with_friction(np.inf), renderer.contact.arrays
-    vertices = _pressable(renderer)
-    frames = local_frames(arrays.normals[vertices])
+    vertices, bends = _pressable(renderer), _bends(renderer)
+    middle = arrays.normals[bends].sum(axis=1)
+    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    points = np.concatenate([arrays.vertices[vertices], arrays.vertices[bends].mean(axis=1)])
+    frames = local_frames(np.concatenate([arrays.normals[vertices], middle]))
     n, u, v = frames[:, 0], frames[:, 1], frames[:, 2]
-    straight = pressed(sticky, vertices, np.zeros_like(n), depths_m)
+    straight = pressed(sticky, points, n, np.zeros_like(n), depths_m)
     # a tip that is its radius aside of what holds it may be taken to have left the object
     slope = min(_SLOPE, 0.9 * renderer.model.tool.tip_radius_m / float(depths_m[-1]))
     per_m = []
     for axis in (u, v):
-        both = [pressed(sticky, vertices, sign * slope * axis, depths_m) for sign in (1.0, -1.0)]
+        both = [pressed(sticky, points, n, sign * slope * axis, depths_m) for sign in (1.0, -1.0)]
         gained = (both[0] - both[1]) / (2 * slope)
         per_m.append(_slopes(depths_m, gained))
     table = _channels(depths_m, straight, per_m, frames)
-    return Responses(depths_m, _everywhere(table, vertices, arrays.vertices))
+    own, between = np.split(table, [len(vertices)])
+    good = np.isfinite(between).all(axis=(1, 2))
+    return Responses(depths_m, _everywhere(own, vertices, arrays.vertices), bends[good], between[good])
+
+
+def _bends(renderer: Renderer) -> np.ndarray:
+    """(b, 2) vertices of the edges between places that can be pressed, over which the normal turns."""
+    arrays = renderer.contact.arrays
+    free = arrays.triangles[arrays.free > 0]
+    edges = np.unique(
+        np.sort(np.concatenate([free[:, [0, 1]], free[:, [1, 2]], free[:, [2, 0]]]), axis=1), axis=0
+    )
+    turned = np.einsum("ex,ex->e", *arrays.normals[edges].transpose(1, 0, 2)) < _BENT
+    return edges[turned & np.isin(edges, _pressable(renderer)).all(axis=1)]
 
 
 def straight_forces(renderer: Renderer, depths_m: np.ndarray) -> np.ndarray:
     """(v, k) N/m, normal force over depth of any renderer's straight presses at each vertex."""
     arrays, vertices = renderer.contact.arrays, _pressable(renderer)
-    normals = arrays.normals[vertices]
-    force = pressed(renderer, vertices, np.zeros_like(normals), depths_m)
+    points, normals = arrays.vertices[vertices], arrays.normals[vertices]
+    force = pressed(renderer, points, normals, np.zeros_like(normals), depths_m)
     table = np.einsum("pkx,px->pk", force, normals) / depths_m
     return _everywhere(table[:, :, None], vertices, arrays.vertices)[:, :, 0]
 
 
-def pressed(renderer: Renderer, vertices: np.ndarray, slope: np.ndarray, depths_m: np.ndarray) -> np.ndarray:
-    """(p, k, 3) N on the tool at depths (k,) m of presses at vertices (p,), which for each metre of depth go
-    aside by slope (p, 3); NaN where the tip met nothing."""
-    arrays, radius = renderer.contact.arrays, renderer.model.tool.tip_radius_m
-    points, normals = arrays.vertices[vertices], arrays.normals[vertices]
+def pressed(
+    renderer: Renderer, points: np.ndarray, normals: np.ndarray, slope: np.ndarray, depths_m: np.ndarray
+) -> np.ndarray:
+    """(p, k, 3) N on the tool at depths (k,) m of presses at points (p, 3) of the surface along its unit
+    normals (p, 3), which for each metre of depth go aside by slope (p, 3); NaN where the tip met nothing."""
+    radius = renderer.model.tool.tip_radius_m
     # between the depths of the table too, since what sticks remembers its way
     fine = np.interp(
         np.arange(_SUBSTEPS * len(depths_m)) + 1.0,
