@@ -21,7 +21,7 @@ import palpate as pp
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
-from diagnose.specimen.result import FLOORS, Material
+from diagnose.specimen.result import BETTER, FLOORS, Material
 from mechanics.errors import RecordingError
 from reconstruct.external.uniaxial import CEILING
 
@@ -32,7 +32,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Folder, which sets, how many pieces."""
     parser.add_argument("--data", required=True, help="folder that holds the sets' folders")
     parser.add_argument("--sets", default=",".join(SETS), help=f"which: {', '.join(SETS)}")
-    parser.add_argument("--session", default="230331", help="pieces of beef whose names begin so")
+    parser.add_argument(
+        "--session", default="230331", help="pieces of beef whose names begin so; with commas"
+    )
     parser.add_argument("--every", type=int, default=1, help="only each so-manieth silicone (default: 1)")
     parser.add_argument("--pieces", type=int, default=16, help="at most so many of them")
 
@@ -59,17 +61,18 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     figures: dict[str, Any] = {"rows": rows, "medians": medians, "figures": _over_floor(rows, names)}
     if "beef" in names:
         # what no diagnosis of other pieces can tell: a hold from its own ramp
-        figures["unseen_holds"] = holds_table(root / BEEF, arguments.session, arguments.pieces)
+        figures["unseen_holds"] = holds_table(root / BEEF, arguments.session.split(",")[0], arguments.pieces)
     return figures
 
 
 def _over_floor(rows: list[dict[str, Any]], names: list[str]) -> list[Figure]:
-    """Of each set the held-out error over that of the best 1D model, median, least and greatest."""
+    """Of each set the held-out error over that of the best 1D model, median, least and greatest; the limit is
+    where a report says that the 1D model predicts better."""
     figures = []
     for name in names:
         ratios = [row["error"] / row["floor"] for row in rows if row["set"] == name]
         what = f"{name}: held-out error over the best 1D model's, median of {len(ratios)}"
-        figures.append(Figure(what, float(np.median(ratios)), (min(ratios), max(ratios))).at_most(1.0))
+        figures.append(Figure(what, float(np.median(ratios)), (min(ratios), max(ratios))).at_most(1 / BETTER))
     return figures
 
 
@@ -143,14 +146,13 @@ def _fish(folder: Path, arguments: argparse.Namespace) -> Rows:
 
 
 def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
-    files = pieces_of(folder, arguments.session)[: arguments.pieces]
-    if len(files) < 6:
-        raise RecordingError(
-            f"'{folder}' holds {len(files)} pieces of session {arguments.session}; at least 6 are needed"
-        )
-    yield (
-        f"{len(files)} pieces of {arguments.session}",
-        pp.material(
+    for session in arguments.session.split(","):
+        files = pieces_of(folder, session)[: arguments.pieces]
+        if len(files) < 6:
+            raise RecordingError(
+                f"'{folder}' holds {len(files)} pieces of session {session}; at least 6 are needed"
+            )
+        made = pp.material(
             *files,
             kind="indentation",
             tip_radius_m=BEEF_TIP_M,
@@ -158,8 +160,8 @@ def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
             specimens=True,
             fast=True,
             progress=False,
-        ),
-    )
+        )
+        yield f"{len(files)} pieces of {session}", made
 
 
 SETS: dict[str, Callable[[Path, argparse.Namespace], Rows]] = {

@@ -88,8 +88,8 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 def _bounds(found: list[dict[str, np.ndarray]]) -> list[Figure]:
     """How often the stated 95 % width holds, and how wide it is beside the errors themselves."""
     error = np.concatenate([one["error_percent"] for one in found]) / 100
-    bent, sideways = np.concatenate([one["place"] for one in found], axis=1)
-    stated = law_share(DEPTHS_M / TIP_M, bent[:, None], sideways[:, None])
+    numbers = np.concatenate([one["place"] for one in found], axis=1)
+    stated = law_share(DEPTHS_M / TIP_M, *numbers[:, :, None])
     known = np.isfinite(error)
     beyond = float((np.abs(error) > stated)[known].mean())
     wide = float(np.median(stated[known]) / np.sqrt((error[known] ** 2).mean()))
@@ -152,9 +152,8 @@ class OwnSolver:
 
         self.shape, options = shape, PressOptions(coupled=True)
         # even triangles: the solver curves them by their vertices' normals
-        even = trimesh.Trimesh(
-            *trimesh.remesh.subdivide_to_size(shape.vertices, shape.triangles, _EVEN_M), process=True
-        )
+        vertices, faces = trimesh.remesh.subdivide_to_size(shape.vertices, shape.triangles, _EVEN_M)
+        even = trimesh.Trimesh(vertices, faces, process=True)
         self._solver = PressSolver(
             mesh.linear(), (even.vertices, even.faces), young_modulus_pa=1.0, poisson_ratio=NU,
             tip_radius_m=TIP_M, options=options,
@@ -183,7 +182,7 @@ def _kept(solve: Laboratory | OwnSolver, point: np.ndarray, normal: np.ndarray) 
 def _rendered(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(places, depths) m^2: normal force over the modulus as rendered; (2, places) render.force_error."""
+    """(places, depths) m^2: normal force over the modulus as rendered; (5, places) render.force_error."""
     model = Model(
         mesh=mesh.quadratic(),
         material=Material(1e4, NU, dent_law="neo-hookean"),
@@ -200,5 +199,5 @@ def _rendered(
         path = point + (TIP_M - way)[:, None] * normal
         force = renderer.follow(renderer.start([TIP_M]), path[:, None], np.full(len(way), 10.0))[:, 0]
         row[:] = np.interp(DEPTHS_M, way, force @ normal) / model.material.young_modulus_pa
-    vertices = renderer.contact.arrays.vertices
-    return result, place_numbers(renderer, TIP_M)[:, cKDTree(vertices).query(points)[1]]
+    near = cKDTree(renderer.contact.arrays.vertices).query(points)[1]
+    return result, place_numbers(renderer, TIP_M, near)

@@ -5,8 +5,9 @@ the files' numbers between the markers of a page:
 
     <!-- evidence: NAME what -->28.9<!-- end -->
 
-`what` is a figure's own; the number keeps the decimals with which it is written. A test runs `filled` over
-README and all pages and fails where a number differs or its file or figure is missing.
+`what` is a figure's own; the number keeps the decimals with which it is written. Where `what` is "processor",
+"date" or "commit" it is that word of the file. A test runs `filled` over README and all pages and fails where
+one differs or its file or figure is missing.
 """
 
 from __future__ import annotations
@@ -25,6 +26,7 @@ ROOT = Path(__file__).resolve().parents[1]
 EVIDENCE = ROOT / "docs" / "evidence"
 KEYS = {"command", "commit", "date", "processor", "figures"}
 FIGURE_KEYS = {"what", "value", "spread", "unit", "target", "met"}
+WORDS = ("processor", "date", "commit")
 MARKED = re.compile(r"(<!-- evidence: (\S+) (.+?) -->)(.*?)(<!-- end -->)", re.DOTALL)
 
 
@@ -79,6 +81,8 @@ def filled(text: str, folder: Path = EVIDENCE) -> str:
             raise EvidenceError(
                 f"'{stood}' is marked as '{what}' of {name}, but docs/evidence/{name}.json is missing"
             )
+        if what in WORDS:
+            return f"{begin}{getattr(read(path), what)}{end}"
         decimals = len(stood.strip().partition(".")[2])
         return f"{begin}{read(path).value(what):,.{decimals}f}{end}"
 

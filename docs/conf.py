@@ -17,6 +17,7 @@ ROOT = Path(__file__).resolve().parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "docs")]
 import _evidence  # noqa: E402
 import _reference  # noqa: E402
+import _touch  # noqa: E402
 
 project = "Palpate"
 author = "The Palpate developers"
@@ -98,8 +99,16 @@ def short_navigation(app, page, template, context, doctree):
         context["toctree"] = lambda **how: whole(**how | {"collapse": True, "maxdepth": 2})
 
 
+def with_pages_to_press(app):
+    """Those of docs/touch.md, written beside the site's own while these are made."""
+    if app.builder.format == "html":
+        process = _touch.started(Path(app.outdir) / "touch")
+        app.connect("build-finished", lambda app, problem: _touch.finished(process))
+
+
 def setup(app):
     """Sphinx's hook."""
+    app.connect("builder-inited", with_pages_to_press)
     _reference.write(ROOT / "docs" / "reference" / "generated")
     _evidence.write(ROOT / "docs" / "evidence" / "generated")
     app.connect("autodoc-process-docstring", plain_words)

@@ -37,6 +37,14 @@ def edge_correction(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> n
     return added[:, None, None] * normals[:, :, None] * normals[:, None, :]
 
 
+def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(k,) how near places (k, 3) are to a rim, by the first Gaussian, and to the base; 0 far away, 1 on a
+    straight rim of a right angle."""
+    _, over_base, _ = fitted()
+    near = laid(mesh, points, normals)
+    return near[:, np.argmin(over_base)], near[:, np.argmax(over_base)]
+
+
 def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k, g) what each Gaussian comes to at places (k, 3): 1 on a straight rim that turns by a right angle,
     and, but for the cosine, on a plane base."""

@@ -65,6 +65,14 @@ def invert(matrix: np.ndarray) -> int:
     return 0
 
 
+def _integer(value: int) -> object:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _pointer(array: np.ndarray) -> ctypes.c_void_p:
+    return ctypes.c_void_p(array.ctypes.data)
+
+
 class Pardiso:
     """A factorisation of a symmetric positive definite matrix; frees MKL's memory when it dies.
 
@@ -116,29 +124,23 @@ class Pardiso:
         return half
 
     def _call(self, phase: int, right: np.ndarray, solution: np.ndarray, count: int) -> None:
-        def integer(value: int) -> object:
-            return ctypes.byref(ctypes.c_int32(value))
-
-        def pointer(array: np.ndarray) -> ctypes.c_void_p:
-            return ctypes.c_void_p(array.ctypes.data)
-
         error = ctypes.c_int32(0)
         _mkl().pardiso(
-            pointer(self._handle),
-            integer(1),
-            integer(1),
-            integer(self._kind),
-            integer(phase),
-            integer(self.size),
-            pointer(self._values),
-            pointer(self._rows),
-            pointer(self._columns),
-            pointer(self._perm),
-            integer(count),
-            pointer(self._iparm),
-            integer(0),
-            pointer(right),
-            pointer(solution),
+            _pointer(self._handle),
+            _integer(1),
+            _integer(1),
+            _integer(self._kind),
+            _integer(phase),
+            _integer(self.size),
+            _pointer(self._values),
+            _pointer(self._rows),
+            _pointer(self._columns),
+            _pointer(self._perm),
+            _integer(count),
+            _pointer(self._iparm),
+            _integer(0),
+            _pointer(right),
+            _pointer(solution),
             ctypes.byref(error),
         )
         if error.value:
@@ -227,18 +229,12 @@ class _Phases:
         return solution
 
     def _call(self, phase: int, right: np.ndarray, solution: np.ndarray) -> None:
-        def integer(value: int) -> object:
-            return ctypes.byref(ctypes.c_int32(value))
-
-        def pointer(array: np.ndarray) -> ctypes.c_void_p:
-            return ctypes.c_void_p(array.ctypes.data)
-
         error = ctypes.c_int32(0)
         _mkl().pardiso(
-            pointer(self._handle), integer(1), integer(1), integer(self.kind), integer(phase),
-            integer(self.size), pointer(self._values), pointer(self._rows), pointer(self._columns),
-            pointer(self._perm), integer(1), pointer(self._iparm), integer(0), pointer(right),
-            pointer(solution), ctypes.byref(error),
+            _pointer(self._handle), _integer(1), _integer(1), _integer(self.kind), _integer(phase),
+            _integer(self.size), _pointer(self._values), _pointer(self._rows), _pointer(self._columns),
+            _pointer(self._perm), _integer(1), _pointer(self._iparm), _integer(0), _pointer(right),
+            _pointer(solution), ctypes.byref(error),
         )  # fmt: skip
         if error.value:
             raise ArithmeticError(f"Pardiso failed with error {error.value} in phase {phase}")

@@ -112,13 +112,14 @@ def _tick(renderer: Any) -> None:
     take_command(arrays, np.zeros(OUT_WIDTH))
 
 
-def _mark(stage: str) -> Path | None:
+def mark_of(stage: str) -> Path | None:
+    """The file that says that a stage is compiled; None where nothing is kept."""
     named = choose_folder() or os.environ.get("NUMBA_CACHE_DIR")  # the user's own folder
     return Path(named) / f"compiled-{stage.replace(' ', '-')}-by-{version('numba')}" if named else None
 
 
 def _done(names: Sequence[str]) -> bool:
-    marks = [_mark(name) for name in names]
+    marks = [mark_of(name) for name in names]
     return all(mark is not None and mark.is_file() for mark in marks)
 
 
@@ -127,7 +128,7 @@ def warm_up(names: Sequence[str]) -> None:
     work = stages(block_renderer())
     for name in names:
         work[name]()
-        mark = _mark(name)
+        mark = mark_of(name)
         if mark is not None:
             mark.touch()
 

@@ -13,14 +13,14 @@ if TYPE_CHECKING:
     from mechanics.model import Model
     from render.base import Renderer
 
-_RENDERERS = {
+RENDERERS = {
     "fem": "render.fem",
     "kelvin-voigt": "render.one_d_laws",
     "hunt-crossley": "render.one_d_laws",
     "hunt-crossley-undamped": "render.one_d_laws",
     "hunt-crossley-kh": "render.one_d_laws",
 }
-
+"""Our own."""
 
 _SIMULATORS = {
     "scikit-fem": "render.simulators.scikit_fem",
@@ -33,7 +33,7 @@ _SIMULATORS = {
 
 def names() -> tuple[str, ...]:
     """The names of our own renderers."""
-    return tuple(_RENDERERS)
+    return tuple(RENDERERS)
 
 
 def simulator_names() -> tuple[str, ...]:
@@ -41,11 +41,19 @@ def simulator_names() -> tuple[str, ...]:
     return tuple(_SIMULATORS)
 
 
+def check_settings(name: str, settings: str, numbers: str) -> None:
+    """Raise OptionError for numbers (KEY=VALUE, comma separated) that a simulator's settings do not have,
+    before any work."""
+    from render.simulators.base import changed
+
+    changed(importlib.import_module(_SIMULATORS[name]).SETTINGS[settings], numbers)
+
+
 def create(
     name: str, model: Model, options: RenderOptions | None = None, progress: Progress = silent
 ) -> Renderer:
     """The renderer of that name for a model; raises OptionError for a name that is not there."""
-    known = {**_RENDERERS, **_SIMULATORS}
+    known = {**RENDERERS, **_SIMULATORS}
     if name not in known:
         raise OptionError(f"'{name}' is no renderer; allowed are {', '.join(known)}")
     module = importlib.import_module(known[name])

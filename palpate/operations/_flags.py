@@ -14,7 +14,8 @@ from mechanics.errors import OptionError
 from mechanics.files import JSON
 from mechanics.names import near, unknown
 from mechanics.options import check_range, flag_of
-from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, type_words, written
+from palpate.operations._declare import GREATEST, OnCommandLine, Operation, declared, written
+from palpate.operations._fields import type_words
 
 _DEFAULT = re.compile(r" *\(default: ([^()]*(?:\([^()]*\)[^()]*)*)\)")
 _UNIT = re.compile(r" *\[([^\[\]]{1,9})\](?=$| \()")

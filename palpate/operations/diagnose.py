@@ -41,6 +41,7 @@ from palpate.operations.load import load
 from palpate.operations.read_recording import read_recording
 from palpate.operations.reconstruct import reconstruct
 from palpate.output import Output
+from render.registry import check_settings
 
 if TYPE_CHECKING:
     from diagnose.simulated.result import SimulatedGap
@@ -229,6 +230,10 @@ def _forces(asked: DiagnoseOperands) -> Any:
         raise OptionError("--simulated and --renderer both name a simulator: name one")
     if asked.mended is not None and asked.renderer is None:
         raise OptionError("--mended runs a simulator once more: name it by --renderer")
+    if asked.renderer is not None:
+        settings, numbers = asked.simulator_settings, asked.simulator_set
+        for each in ((settings, numbers), mended(settings, numbers, asked.mended or "")):
+            check_settings(asked.renderer, *each)
     if asked.simulated is None:
         if asked.stated and asked.renderer is None:
             words = "name its forces by --simulated, or the simulator by --renderer"

@@ -2,8 +2,8 @@
 
 MODEL_OR_SCENE is a MODEL folder, a scene (demo, silicone-1, silicone-2, silicone-3, bean, nodule,
 your-recording, or a scene's .toml), a recording, a phantom, or the file of a surface (STL, OBJ, PLY, glTF,
-VTP, VTU, MSH, INP) with --unit and --modulus. In the window the mouse hovers over the
-object, the left button presses, the wheel sets the depth, the right button turns the view; H lists the keys.
+VTP, VTU, MSH, INP) with --unit and --modulus. In the window the mouse hovers over the object, the left button
+presses, the wheel sets the depth, the right button turns the view; buttons do the rest.
 """
 
 from __future__ import annotations

@@ -105,7 +105,7 @@ class Page:
 
     def result(self, figures: Mapping[str, Any]) -> None:
         """The numbers of the command's `--json`, which the page offers to keep."""
-        text = json.dumps(plain(dict(figures)), indent=1).replace("</", "<\\/")
+        text = json.dumps(plain(dict(figures)), indent=1).replace("<", "\\u003c")
         self._result = f'<script type="application/json" class="result">{text}</script>'
 
     def view(self, view: View, picture: Any, caption: str, model: Model | None = None) -> None:

@@ -258,6 +258,7 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
         first_picture(result.reality.model, shown),
         "Left: how far this simulator is from the measured force around each place. Right: one press, "
         "measured, simulated, and (dashed) with all that is named mended.",
+        result.reality.model,
     )
     _stated(page, result)
     _tried(page, result)

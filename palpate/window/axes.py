@@ -6,7 +6,7 @@ import numpy as np
 import pyvista
 import vtk
 
-from palpate.window.board import set_type
+from palpate.window.lettering import set_type
 
 LENGTH, ROOM = 26.0, 12.0
 """Of an axis, and between letters, pixels of a window of full size."""

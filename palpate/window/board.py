@@ -6,16 +6,15 @@ of the window, counted from its lower left.
 
 from __future__ import annotations
 
-import importlib.util
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pyvista
 import vtk
+
+from palpate.window.lettering import cut, set_type, text_width, wrapped
 
 INK, GREY, ACCENT, SECOND = "#1c2430", "#667080", "#1b4f9c", "#d98c00"
 PAPER, BUTTON, OVER, HINT, NIGHT = "#ffffff", "#e9edf3", "#d3dded", "#e8f0fb", "#2b3442"
@@ -23,7 +22,6 @@ BODY = 13
 """Size of type in pixels, of a window of full size."""
 MARGIN, GAP, BUTTON_HEIGHT, SLIDER_HEIGHT, LINE = 14, 6, 30, 20, 1.32
 LEAST_TYPE = 8
-_FONTS = {False: "DejaVuSans.ttf", True: "DejaVuSans-Bold.ttf"}
 
 
 @dataclass(frozen=True)
@@ -167,7 +165,7 @@ class Board:
         if item.do is not None:
             boxes.append((at, ACCENT if item.on else OVER if over else item.fill or BUTTON))
             colour = PAPER if item.on else item.colour
-            fits = _cut(item.text, size, item.bold, right - left - GAP * self.scale)
+            fits = cut(item.text, size, item.bold, right - left - GAP * self.scale)
             at_middle = (0.5 * (left + right), middle)
             words.append(_Words(fits, at_middle, size, item.bold, colour, centred=True))
         elif item.share is not None:
@@ -269,82 +267,6 @@ class Board:
     def text(self) -> str:
         """All words, a row a line."""
         return "\n".join("  ".join(item.text for item in row) for row in self._rows)
-
-
-def title(text: str) -> list[Row]:
-    """Over the rows that follow, a little apart from those before."""
-    return [(Item("", size=4),), (Item(text, bold=True, colour=GREY, size=BODY - 1),)]
-
-
-def grid(items: Sequence[Item], columns: int = 2) -> list[Row]:
-    """Items side by side; the last row is filled with nothing."""
-    rows = [tuple(items[k : k + columns]) for k in range(0, len(items), columns)]
-    if rows and len(rows[-1]) < columns:
-        rows[-1] += tuple(Item("") for _ in range(columns - len(rows[-1])))
-    return rows
-
-
-@cache
-def font_file(bold: bool) -> str:
-    """The face of the window's type, which comes with Matplotlib; '' where that has none."""
-    spec = importlib.util.find_spec("matplotlib")
-    folder = Path(spec.origin).parent if spec is not None and spec.origin else Path()
-    path = folder / "mpl-data" / "fonts" / "ttf" / _FONTS[bold]
-    return str(path) if path.is_file() else ""
-
-
-def set_type(prop: vtk.vtkTextProperty, size: int, bold: bool, colour: str) -> None:
-    """The window's type."""
-    file = font_file(bold)
-    if file:
-        prop.SetFontFamily(vtk.VTK_FONT_FILE)
-        prop.SetFontFile(file)
-    else:
-        prop.SetFontFamilyToArial()
-        prop.SetBold(bold)
-    prop.SetFontSize(size)
-    prop.SetColor(*pyvista.Color(colour).float_rgb)
-
-
-@cache
-def _measure() -> tuple[Any, vtk.vtkTextProperty]:
-    return vtk.vtkTextRenderer.GetInstance(), vtk.vtkTextProperty()
-
-
-@cache
-def text_width(text: str, size: int, bold: bool) -> float:
-    """Pixels."""
-    renderer, prop = _measure()
-    set_type(prop, size, bold, INK)
-    box = [0] * 4
-    renderer.GetBoundingBox(prop, text or " ", box, 72)
-    return float(box[1] - box[0])
-
-
-@cache
-def wrapped(text: str, size: int, bold: bool, width: float) -> list[str]:
-    """Lines that are no wider, broken between words."""
-    lines: list[str] = []
-    for part in text.split("\n"):
-        line = ""
-        for word in part.split(" "):
-            longer = f"{line} {word}" if line else word
-            if line and text_width(longer, size, bold) > width:
-                lines.append(line)
-                line = word
-            else:
-                line = longer
-        lines.append(line)
-    return lines
-
-
-@cache
-def _cut(text: str, size: int, bold: bool, width: float) -> str:
-    """The text, or as much of it as fits."""
-    if text_width(text, size, bold) <= width:
-        return text
-    return next((f"{text[:n]}…" for n in range(len(text), 1, -1)
-                 if text_width(f"{text[:n]}…", size, bold) <= width), text[:1])  # fmt: skip
 
 
 def _quads() -> tuple[pyvista.PolyData, vtk.vtkActor2D]:

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pyvista
 
-from palpate.window.board import ACCENT, GREY, SECOND, set_type
+from palpate.window.board import ACCENT, GREY, SECOND
+from palpate.window.lettering import set_type
 from palpate.window.trace import Trace
 
 LEAST_N, LEAST_MM = 0.5, 2.0

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 
 import numpy as np
 
-from palpate.window.board import ACCENT, GREY, HINT, SECOND, Item, Row, grid, title
+from palpate.window.board import ACCENT, BODY, GREY, HINT, SECOND, Item, Row
 from palpate.window.frames import Frame
 from palpate.window.keys import KEYS, help_rows, shown
 from palpate.window.pointer import LEAST_PRESS_M, MOST_PRESS_M
@@ -80,10 +80,9 @@ def main_rows(window: TouchWindow, frame: Frame) -> list[Row]:
         (Item(about, size=12, colour=GREY),),
         (Item(f"{np.linalg.norm(felt.force_n):.2f} N", size=46, bold=True, colour=ACCENT),),
     ]
-    rows += [
-        (Item(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}", size=17, bold=True, colour=SECOND),)
-        for v in others
-    ]
+    # its row is there without it too: no button moves away from under the mouse
+    second = "".join(f"{np.linalg.norm(v.force_n):.2f} N  {v.name}" for v in others)
+    rows.append((Item(second, size=17, bold=True, colour=SECOND),))
     rows += [
         (Item(_where(frame), size=12, colour=GREY),),
         (Item(window.next_words(frame), fill=HINT, colour=ACCENT, least_lines=2),),
@@ -135,7 +134,7 @@ def _buttons(window: TouchWindow) -> list[Row]:
         if key.button and name in offered
     }
     first = buttons.pop("Return", None)
-    return [*([(first,)] if first else []), *grid(list(buttons.values()))]
+    return [*([(first,)] if first else []), *_grid(list(buttons.values()))]
 
 
 def _status(window: TouchWindow, frame: Frame) -> list[Row]:
@@ -144,7 +143,8 @@ def _status(window: TouchWindow, frame: Frame) -> list[Row]:
     rows: list[Row] = []
     if worker.busy:
         rows.append((Item(f"{worker.busy[0].upper()}{worker.busy[1:]}", size=12),))
-        rows.append((Item("busy", share=worker.share),))
+        if worker.share > 0.0:
+            rows.append((Item("busy", share=worker.share),))
     elif worker.failure:
         rows.append((Item(worker.failure, size=12, colour=WARNING),))
     if session.recording is not None:
@@ -158,6 +158,19 @@ def friction_words(friction: float) -> str:
     return "sticks" if math.isinf(friction) else f"friction {friction:g}"
 
 
+def _title(text: str) -> list[Row]:
+    """Over the rows that follow, a little apart from those before."""
+    return [(Item("", size=4),), (Item(text, bold=True, colour=GREY, size=BODY - 1),)]
+
+
+def _grid(items: Sequence[Item], columns: int = 2) -> list[Row]:
+    """Items side by side; the last row is filled with nothing."""
+    rows = [tuple(items[k : k + columns]) for k in range(0, len(items), columns)]
+    if rows and len(rows[-1]) < columns:
+        rows[-1] += tuple(Item("") for _ in range(columns - len(rows[-1])))
+    return rows
+
+
 def _choices(chosen: T, every: Sequence[tuple[str, T]], do: Callable[[T], object]) -> list[Item]:
     """A button each; the one that holds now is marked."""
     return [Item(words, do=partial(do, value), on=value == chosen, size=12) for words, value in every]
@@ -169,18 +182,18 @@ def settings_rows(window: TouchWindow) -> list[Row]:
 
     renderers = [(name, name) for name in names()]
     rows = [
-        *title("What you feel"),
-        *grid(_choices(session.renderer_name, renderers, session.set_renderer), 1),
-        *title("Beside it"),
-        *grid(_choices(session.beside_name, [("nothing", ""), *renderers], session.set_beside), 1),
+        *_title("What you feel"),
+        *_grid(_choices(session.renderer_name, renderers, session.set_renderer), 1),
+        *_title("Beside it"),
+        *_grid(_choices(session.beside_name, [("nothing", ""), *renderers], session.set_beside), 1),
     ]
     if session.feels_inside:
         frictions = [("sticks" if math.isinf(mu) else f"{mu:g}", mu) for mu in FRICTIONS]
         sticks, *slips = _choices(session.friction, frictions, session.set_friction)
         modulus = f"{session.young_modulus_pa / 1000:.1f} kPa"
-        rows += [*title("Friction"), (sticks,), tuple(slips)]
+        rows += [*_title("Friction"), (sticks,), tuple(slips)]
         rows += [
-            *title("Stiffness"),
+            *_title("Stiffness"),
             (
                 Item("softer", do=lambda: session.scale_modulus(1.0 / MODULUS_STEP), size=12),
                 Item(modulus, do=session.reset_modulus, tip="As the model has it", size=12),
@@ -190,11 +203,11 @@ def settings_rows(window: TouchWindow) -> list[Row]:
     if session.model.effects:
         on_off = [("on", True), ("off", False)]
         rows += [
-            *title(f"Effects: {', '.join(sorted(session.model.effects)).replace('_', ' ')}"),
+            *_title(f"Effects: {', '.join(sorted(session.model.effects)).replace('_', ' ')}"),
             tuple(_choices(session.effects, on_off, session.set_effects)),
         ]
     if window.moved_by_mouse:
-        rows += [*title("Depth"), *depth_rows(window)]
+        rows += [*_title("Depth"), *depth_rows(window)]
     return rows
 
 

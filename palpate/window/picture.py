@@ -12,8 +12,9 @@ from mechanics.frames import tangents
 from mechanics.model import Model
 from mechanics.tetmesh import vertex_normals
 from palpate.window import shadow
-from palpate.window.board import INK, set_type
+from palpate.window.board import INK
 from palpate.window.frames import Frame, View
+from palpate.window.lettering import set_type
 from palpate.window.pointer import Target
 from palpate.window.stiffness import DEPTH_M
 from render.base import Renderer
@@ -53,7 +54,7 @@ class ObjectPicture:
         self._rest = np.array(points, dtype=float)
         self._surface = pyvista.PolyData.from_regular_faces(self._rest.copy(), np.asarray(triangles))
         self._surface["displacement (mm)"] = np.zeros(len(points))
-        self._bent = False
+        self._moved = np.zeros_like(self._rest)
         self._flat = vertex_normals(self._rest, np.asarray(triangles))
         felt = renderer.contact.arrays
         self._smooth = _spread(felt.normals, felt.triangles[felt.free > 0])
@@ -161,8 +162,8 @@ class ObjectPicture:
     def update(self, frame: Frame, view: View, below: Target | None = None) -> None:
         """Move surface, tip and arrow to a frame; below: what the tip's shadow falls on."""
         moved = view.displacement_m
-        if len(moved) == len(self._rest) and (self._bent or moved.any()):
-            self._bent = bool(moved.any())
+        if len(moved) == len(self._rest) and not np.array_equal(moved, self._moved):
+            self._moved = moved
             self._surface.points = self._rest + moved
             self._shade()
             self._surface["displacement (mm)"] = 1000.0 * np.linalg.norm(moved, axis=1)

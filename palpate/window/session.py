@@ -290,7 +290,9 @@ class TouchSession:
 
         def job() -> None:
             self._options = replace(self._options, effects=on)
-            self._renderers.clear()
+            drawn = {self.renderer_name, self._beside_name} - {""}
+            # one after the other, while those of before still draw
+            self._renderers = {name: self._create(name, self.worker.tell) for name in drawn}
             self._feel_anew(self.renderer_name)
             self._compare(self._beside_name)
 

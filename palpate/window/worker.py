@@ -32,9 +32,14 @@ class Worker:
         """A Progress for the job that runs."""
         self.busy, self.share = f"{self._words}: {stage}", share
 
+    @property
+    def idle(self) -> bool:
+        """Whether every job is done."""
+        return not self._jobs.unfinished_tasks
+
     def offer(self, words: str, job: Callable[[], None]) -> bool:
         """Do a job at once, which will be offered again where it could not; False while there are others."""
-        if self._jobs.unfinished_tasks:
+        if not self.idle:
             return False
         self.run(words, job)
         return True

@@ -84,14 +84,21 @@ def _outline(surface: Surface) -> tuple[np.ndarray, np.ndarray]:
     return points, normal / np.linalg.norm(normal, axis=1)[:, None]
 
 
+_last_foot: dict[tuple[bytes, bytes, float], tuple[np.ndarray, np.ndarray, np.ndarray]] = {}
+"""`foot_path` of the object that was traced last: recordings are made of one object after the other."""
+
+
 def trace(
     phantom: Phantom, hand: HandOptions, radius: float, modulus_pa: float, rng: np.random.Generator
 ) -> Trace:
     """Comes down from the air, goes around one and a bit times while leaning, slipping and lifting off, goes
     up.
     """
-    surface = Surface(phantom.vertices * 1e3, phantom.faces)
-    path, outward, arc = foot_path(surface, radius)
+    key = (phantom.vertices.tobytes(), phantom.faces.tobytes(), radius)
+    if key not in _last_foot:
+        _last_foot.clear()
+        _last_foot[key] = foot_path(Surface(phantom.vertices * 1e3, phantom.faces), radius)
+    path, outward, arc = _last_foot[key]
     total = arc[-1]
     turns = hand.trace_rounds + rng.uniform(0.08, 0.22)
     duration = turns * total / (1e3 * hand.trace_speed_m_per_s)

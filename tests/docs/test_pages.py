@@ -130,3 +130,11 @@ def test_decisions_are_few_and_short():
 def test_every_picture_is_used():
     used = {name for page in PAGES for name in re.findall(r"images/([\w/-]+\.png)", page.read_text("utf-8"))}
     assert {str(p.relative_to(DOCS / "images")) for p in (DOCS / "images").rglob("*.png")} == used
+
+
+def test_every_object_that_can_be_pressed_has_its_page():
+    made = re.search(
+        r"^OBJECTS = \(([^)]*)\)", (DOCS / "_touch.py").read_text(encoding="utf-8"), re.MULTILINE
+    )
+    linked = re.findall(r"touch/([\w-]+)\.html", (DOCS / "touch.md").read_text(encoding="utf-8"))
+    assert made and set(re.findall(r'"([^"]+)"', made[1])) == set(linked)

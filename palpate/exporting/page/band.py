@@ -23,5 +23,5 @@ def force_band(renderer: FemRenderer, depth_m: np.ndarray) -> np.ndarray:
     if np.isfinite([low, high]).all():
         modulus = 0.5 * (high - low) / model.material.young_modulus_pa
     radius = model.tool.tip_radius_m
-    bent, sideways = place_numbers(renderer, radius)
-    return np.hypot(modulus, law_share(depth_m / radius, bent[:, None], sideways[:, None]))
+    numbers = place_numbers(renderer, radius)
+    return np.hypot(modulus, law_share(depth_m / radius, *numbers[:, :, None]))

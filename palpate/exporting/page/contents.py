@@ -4,6 +4,7 @@ what its scripts are told."""
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -68,6 +69,7 @@ def _flat(table: np.ndarray) -> np.ndarray:
     return table.reshape(len(table), -1)
 
 
+@lru_cache(maxsize=1)
 def one_d_renderer(model: Model) -> Renderer | None:
     """The interpolated 1D model of the page, None where the model's presses hold no parameters of it."""
     if not len(model.presses):

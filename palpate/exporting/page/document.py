@@ -9,7 +9,6 @@ import json
 from functools import cache
 from importlib.resources import files
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -22,11 +21,9 @@ from palpate.exporting.subject import Subject
 from palpate.show.object3d import AZIMUTH_DEG, ELEVATION_DEG, draw_touched
 from render.fem import FemRenderer
 from render.press import Stroke, press
-from render.scene import in_the_air
+from render.scene import TouchScene, in_the_air
 
-SCRIPTS = ("data.js", "surface.js", "press.js", "shape.js", "draw.js", "chart.js", "spacemouse.js", "page.js")
-CORE = SCRIPTS[:3]
-"""What the numbers come from; it needs no page around it."""
+SCRIPTS = ("data", "surface", "press", "shape", "draw", "chart", "spacemouse", "tip", "page")
 _ROWS = 12
 _VIRTUAL = (
     " This object is a known shape of a known modulus that nobody touched: its presses are virtual, computed "
@@ -44,28 +41,34 @@ def write(
     return (f"no {', no '.join(left_out(subject.model))}",)
 
 
-def page_of(renderer: FemRenderer, opens: list[float] | None = None, progress: Progress = silent) -> str:
+def page_of(
+    renderer: FemRenderer,
+    opens: list[float] | None = None,
+    progress: Progress = silent,
+    *,
+    title: str | None = None,
+) -> str:
     """The whole page of a model's finite-element renderer. opens: x, y, z, depth, m, of a press that it opens
-    on."""
+    on. title: the model's name unless given."""
     block, about = contents(renderer, progress)
     model = renderer.model
     about["opens"] = opens
     about["view"] = [float(np.radians(AZIMUTH_DEG)), float(np.radians(ELEVATION_DEG))]
-    title, table = _table(renderer)
+    table_title, table = _table(renderer)
     filled = {
-        "name": html.escape(model.name),
+        "name": html.escape(title or model.name),
         "summary": _summary(model),
         "style": file("page.css"),
         "picture": _picture(model),
         "one_d": '<li><i class="one-d"></i>interpolated 1D model</li>' if about["one_d"] else "",
-        "table_title": title,
+        "table_title": table_title,
         "table": table,
         "word": press_word(model),
         "words": _words(renderer),
         "left_out": html.escape("; ".join(left_out(model))),
         "about": json.dumps(about, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
         "block": block.base64(),
-        "scripts": "\n".join(file(name) for name in SCRIPTS),
+        "scripts": "\n".join(file(f"{name}.js") for name in SCRIPTS),
     }
     page = file("page.html")
     for name, value in filled.items():
@@ -139,9 +142,10 @@ def _table(renderer: FemRenderer) -> tuple[str, str]:
         "at x, y, z [mm]",
     )
     rows = []
+    scenes = [in_the_air(each) if each is not None else None for each in (renderer, beside)]
     for i in chosen:
         at, normal, depth = presses.point[i], presses.normal[i], float(presses.depth_m[i])
-        forces = [_pressed(each, at, normal, depth) for each in (renderer, beside)]
+        forces = [_pressed(each, at, normal, depth) for each in scenes]
         place = ",".join(f"{v:.6f}" for v in at)
         cells = [str(i + 1), f'<button data-at="{place}">press it</button>', f"{1e3 * depth:.1f}"]
         cells += [_number(v) for v in (_peak(model, int(i)), *forces)]
@@ -155,12 +159,12 @@ def _table(renderer: FemRenderer) -> tuple[str, str]:
     return title, f"<table><thead><tr>{top}</tr></thead><tbody>{body}</tbody></table>"
 
 
-def _pressed(renderer: Any, at: np.ndarray, normal: np.ndarray, depth_m: float) -> float:
-    """Normal force, N, of a straight press; NaN where there is no renderer or it misses."""
-    if renderer is None:
+def _pressed(scene: TouchScene | None, at: np.ndarray, normal: np.ndarray, depth_m: float) -> float:
+    """Normal force, N, of a straight press; NaN where there is no scene or it misses."""
+    if scene is None:
         return float("nan")
     try:
-        curve = press(in_the_air(renderer), at, -normal, Stroke(depth_m, 0.01))
+        curve = press(scene, at, -normal, Stroke(depth_m, 0.01))
     except OptionError:
         return float("nan")
     return float(curve.force_at(depth_m) @ normal)

@@ -342,7 +342,7 @@ class Camera {
   }
 
   matrix(aspect) {
-    const open = 0.26, fit = Math.min(0.88, aspect); // half the angle, and the narrower side holds the object
+    const open = 0.26, fit = Math.min(0.94, aspect); // half the angle, and the narrower side holds the object
     this.distance = 0.92 * this.size / Math.sin(open) / fit / this.zoom;
     this.aspect = aspect;
     this.eye = plus(this.middle, this.back, this.distance);

@@ -36,7 +36,7 @@ def lines(result: Reconstruction) -> list[str]:
     if result.doubt:
         lines.append(f"not to be believed: {result.doubt}")
     else:
-        lines.append(f"  {meaning(result)[0].lower()}{meaning(result)[1:]}")
+        lines += [f"  {said.removesuffix('.')}" for said in meaning(result).split(". ")]
     lines += [
         *(f.line() for f in result.findings),
         *([f"{contacts} not used:"] if not_used else []),

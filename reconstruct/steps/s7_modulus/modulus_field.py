@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from mechanics.edges import edge_correction
 from mechanics.effects import stiffness_field
 from mechanics.field_response import shares_of, tips_of
 from mechanics.model import Model
@@ -191,6 +192,7 @@ def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> 
     # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
     scale = under[:, None, None]
     far = scale * solved[places.place] + (scale - 1) * half[places.place]
+    far += scale * edge_correction(mesh, sites.points, sites.normals)
     nu = sites.poisson_ratio
     return FieldSites(TouchSites(sites.points, sites.normals, sites.curvature, far, width, nu), under)
 

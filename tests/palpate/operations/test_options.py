@@ -208,6 +208,11 @@ def test_what_is_no_option_is_told_before_any_work(name, recording, rooms):
     [
         ({"without": "adhesion, frction_slip"}, "'frction_slip' is no effect; did you mean friction_slip"),
         ({"renderer": "mujoco", "stated": ["frction=0.5"]}, "--stated frction: not known; allowed are young"),
+        (
+            {"renderer": "mujoco", "simulator_set": "solref=1"},
+            "--simulator-set solref=1: allowed are damping",
+        ),
+        ({"renderer": "mujoco", "mended": "best,solref=1"}, "solref=1: allowed are damping"),
     ],
 )
 def test_a_misspelt_effect_or_parameter_is_told_before_a_model_is_made(recording, rooms, options, words):

@@ -76,6 +76,9 @@ def servo(fake):
 
 
 def test_a_session_feels_follows_commands_and_ends_at_zero(fake, servo, tmp_path):
+    assert any("--stale is 2" in word and "default 0.02" in word for word in servo.words), "what is loosened"
+    assert any("--stale is 2" in word for word in servo.report().as_dict()["words"])
+    assert ServoOptions().loosened == ()
     assert eventually(lambda: servo.snapshot() is not None)
     recorder = Recorder(servo)
     assert eventually(lambda: servo.report().ticks > 100)
@@ -300,12 +303,6 @@ def test_a_stopped_window_takes_the_force_with_it(fake):
         parent.kill()
         parent.wait()
     assert eventually(lambda: not process_runs(process_id))
-
-
-def test_what_loosens_a_protection_is_said(servo):
-    assert any("--stale is 2" in word and "default 0.02" in word for word in servo.words)
-    assert any("--stale is 2" in word for word in servo.report().as_dict()["words"])
-    assert ServoOptions().loosened == ()
 
 
 def test_a_device_that_fails_ends_the_session_with_its_reason(fake):

@@ -70,7 +70,7 @@ class Driven:
         self.pixel(*buttons()[0])
         self.button(True)
         self.button(False)
-        self.session.worker.wait()
+        self.until(lambda frame: self.session.worker.idle)
         self.frame()
 
     def says(self, text: str, *, says: bool = True) -> None:
