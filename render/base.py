@@ -72,7 +72,7 @@ class Renderer(ABC):
     def with_modulus(self, young_modulus_pa: float) -> Renderer:
         """The same renderer for another global Young's modulus, without any precomputation."""
 
-    def with_friction(self, friction: float) -> Renderer:
+    def with_friction(self, friction: float) -> Self:
         """The same renderer with another Coulomb coefficient (inf sticks; the 1D models know none)."""
         if not friction >= 0:
             raise OptionError(f"friction is {friction}; it must be 0 or greater (inf sticks)")
