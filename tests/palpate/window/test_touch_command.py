@@ -128,7 +128,7 @@ def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -
     time.sleep(5.0)
     pointer("mousemove", "--window", window, "530", "280")
     time.sleep(3.0)
-    for _ in range(2):
+    for _ in range(4):
         pointer("mousedown", "1")
         time.sleep(4.0)
         pointer("mouseup", "1")
