@@ -39,8 +39,6 @@ DEPTHS_M = 1e-3 * np.array([1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0])
 BANDS_MM = ((1, 2), (2, 4), (4, 6), (6, 8))
 FINENESS = Fineness(2.0, 6.0, 0.5)
 """Of the laboratory: twice as fine moves a press from 1 mm on by at most 0.6 %."""
-_EVEN_M = 0.003
-"""Longest edges of the surface that our own solver is given."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -145,20 +143,15 @@ class Laboratory:
 class OwnSolver:
     """The same by mechanics.press_solver, on the tetrahedra of a mesh."""
 
-    name = "law by place, press solver 1"
+    name = "law by place, press solver 2"
 
     def __init__(self, shape: KnownShape, mesh: TetMesh) -> None:
-        import trimesh
-
         self.shape, options = shape, PressOptions(coupled=True)
-        # even triangles: the solver curves them by their vertices' normals
-        vertices, faces = trimesh.remesh.subdivide_to_size(shape.vertices, shape.triangles, _EVEN_M)
-        even = trimesh.Trimesh(vertices, faces, process=True)
         self._solver = PressSolver(
-            mesh.linear(), (even.vertices, even.faces), young_modulus_pa=1.0, poisson_ratio=NU,
+            mesh.linear(), (shape.vertices, shape.triangles), young_modulus_pa=1.0, poisson_ratio=NU,
             tip_radius_m=TIP_M, options=options,
         )  # fmt: skip
-        self.made_of = f"{options} {_EVEN_M}"
+        self.made_of = repr(options)
 
     def __call__(self, point: np.ndarray, normal: np.ndarray) -> np.ndarray:
         """(depths,) m^2: normal force over the modulus; NaN from where it finds no equilibrium."""

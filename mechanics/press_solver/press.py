@@ -10,6 +10,7 @@ from mechanics.errors import OptionError
 from mechanics.press_solver.body import Body, BodyMaterial
 from mechanics.press_solver.contact import SphereContact
 from mechanics.press_solver.equilibrium import Path
+from mechanics.press_solver.even_surface import even_surface
 from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.settling import Settling
@@ -69,8 +70,9 @@ class PressSolution:
 class PressSolver:
     """An object that is pressed: built once, asked place by place.
 
-    mesh: tetrahedra of the object, with their fixed base. surface: the felt one, (vertices, triangles), or
-    None where the mesh's own is. ratio: (m,) modulus of each tetrahedron over the global one, or None.
+    mesh: tetrahedra of the object, with their fixed base. surface: the shape's file, (vertices, triangles),
+    however coarse, or None where the mesh's own is felt. ratio: (m,) modulus of each tetrahedron over the
+    global one, or None.
     """
 
     def __init__(
@@ -84,7 +86,7 @@ class PressSolver:
         ratio: np.ndarray | None = None,
         options: PressOptions = PressOptions(),
     ) -> None:
-        self._surface = None if surface is None else FeltSurface(*surface)
+        self._surface = None if surface is None else FeltSurface(*even_surface(*surface))
         self.mesh = drawn_to(mesh, self._surface)
         self.young_modulus_pa, self.poisson_ratio = float(young_modulus_pa), float(poisson_ratio)
         self.tip_radius_m, self.options = float(tip_radius_m), options

@@ -7,6 +7,7 @@ from mechanics.box_mesh import box_mesh
 from mechanics.dent import dent_law
 from mechanics.errors import OptionError
 from mechanics.press_solver.condensing import SuperLuFactor, partial_factor
+from mechanics.press_solver.even_surface import even_surface
 from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.press import PressOptions, PressSolver
@@ -91,6 +92,54 @@ def test_new_nodes_lie_on_the_felt_surface():
     shell = shell[fine.points[shell, 2] > 0.005]
     off = np.linalg.norm(surface.nearest(fine.points[shell]) - fine.points[shell], axis=1)
     assert np.median(off) < 2e-6
+
+
+def test_a_coarse_files_plane_faces_and_rims_stay_where_they_are():
+    import trimesh
+
+    size = np.array([0.08, 0.08, 0.04])
+    shell = trimesh.creation.box(size)  # 12 triangles
+    solver = PressSolver(
+        box_mesh((4, 4, 2), tuple(size)),
+        (shell.vertices + [0, 0, size[2] / 2], shell.faces),
+        young_modulus_pa=1.0,
+        poisson_ratio=0.49,
+        tip_radius_m=RADIUS_M,
+    )
+    points = solver.mesh.points[np.unique(solver.mesh.touchable_surface)]
+    assert np.abs(off_box(points - [0, 0, size[2] / 2], size / 2)).max() < 2e-5
+
+
+def test_a_coarse_cylinders_felt_surface_is_round_up_to_its_rim():
+    import trimesh
+
+    radius, half = 0.04, 0.04
+    shell = trimesh.creation.cylinder(radius, 2 * half, sections=64)  # walls of one strip, 0.05 mm inside
+    turn, z = np.meshgrid(np.linspace(0, 2 * np.pi, 101), half - 1e-3 * np.array([0.5, 1.5, 4, 30]))
+    wall = np.stack([radius * np.cos(turn), radius * np.sin(turn), z], axis=-1).reshape(-1, 3)
+    cap = wall * [0.97, 0.97, 0] + [0, 0, half]
+    felt = FeltSurface(*even_surface(shell.vertices, shell.faces))
+    assert np.linalg.norm(felt.nearest(np.vstack([wall, cap])) - np.vstack([wall, cap]), axis=1).max() < 2e-5
+
+
+def test_an_even_surface_is_closed_but_for_its_creases():
+    import trimesh
+
+    shell = trimesh.creation.box((0.03, 0.02, 0.01))
+    vertices, triangles = even_surface(shell.vertices, shell.faces, 0.004)
+    edges = np.sort(triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
+    ends, shared = np.unique(edges, axis=0, return_counts=True)
+    assert shared.max() == 2
+    rim = vertices[ends[shared == 1]]
+    at_rim = np.isclose(np.abs(rim), [0.015, 0.01, 0.005]).sum(axis=-1)
+    assert (at_rim >= 2).all()
+    assert np.linalg.norm(np.diff(vertices[ends], axis=1), axis=2).max() <= 0.004
+
+
+def off_box(points: np.ndarray, half: np.ndarray) -> np.ndarray:
+    """(k,) m, signed distance of points (k, 3) from a box of half sizes (3,) m about the origin."""
+    out = np.abs(points) - half
+    return np.linalg.norm(np.maximum(out, 0), axis=1) + np.minimum(out.max(axis=1), 0)
 
 
 def test_both_factorisations_condense_alike():
