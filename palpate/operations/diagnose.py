@@ -239,6 +239,8 @@ def _forces(asked: DiagnoseOperands) -> Any:
         raise OptionError("--simulated and --renderer both name a simulator: name one")
     if asked.mended is not None and asked.renderer is None:
         raise OptionError("--mended runs a simulator once more: name it by --renderer")
+    if asked.presses is not None and asked.renderer is None:
+        raise OptionError("--presses says over how many a simulator is run: name it by --renderer")
     if asked.renderer is not None:
         settings, numbers = asked.simulator_settings, asked.simulator_set
         for each in ((settings, numbers), mended(settings, numbers, asked.mended or "")):
