@@ -174,7 +174,9 @@ def test_forces_are_those_of_palpate_press_stick_and_slide(asked, renderer):
         except pp.OptionError:
             continue
         force = curve.force_at(depth)
-        pressed = f"palpate.page.presser.press({json.dumps(at.tolist())}, {depth}, {json.dumps(way.tolist())})"
+        pressed = (
+            f"palpate.page.presser.press({json.dumps(at.tolist())}, {depth}, {json.dumps(way.tolist())})"
+        )
         # all of an answer is a megabyte: the touch knows the whole surface
         answer = asked.evaluate(
             f"(({{ force_n, error_n, touch: {{ force, normal, normalForce }} }}) =>"
