@@ -11,8 +11,8 @@ import numpy as np
 from mechanics.errors import OptionError
 from mechanics.files import Kind, atomic_file
 from mechanics.model import Model
-from mechanics.presses import Presses
-from mechanics.progress import Progress, silent
+from mechanics.presses import LEAD_S, Presses
+from mechanics.progress import Progress, Remaining, silent
 from mechanics.recording import Recording
 from mechanics.result import Result
 from mechanics.samples import runs
@@ -21,7 +21,7 @@ from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
 
 FORCES = Kind("a file of palpate replay", (b"t,fx,fy,fz",))
-_CHUNK = 4000
+_CHUNK, _TOLD = 4000, 100
 
 
 def replay(
@@ -61,6 +61,40 @@ def replay_recording(
     return replay(
         touched, recording.t, recording.position, tip_radius_m=recording.tip_radius_m, progress=progress
     )
+
+
+def replay_touches(
+    touched: Renderer | TouchScene,
+    recording: Recording,
+    presses: Presses,
+    chosen: np.ndarray,
+    progress: Progress = silent,
+) -> np.ndarray:
+    """`replay` over the chosen (p,) presses of a recording alone, each from shortly before its first touch to
+    shortly after its loss, and by itself: (n, 3) N at the recording's rows, zeros elsewhere."""
+    scene, t = scene_of(touched), recording.t
+    forces = np.zeros((len(t), 3))
+    before = np.concatenate([[-np.inf], presses.end_s[:-1]])
+    parts = [
+        slice(*np.searchsorted(t, [max(presses.onset_s[p] - LEAD_S, before[p]), presses.end_s[p] + LEAD_S]))
+        for p in np.flatnonzero(chosen)
+    ]
+    whole, done, left = sum(part.stop - part.start for part in parts), 0, Remaining()
+    left.tell(0.0)
+    if parts:
+        progress(f"press 1 of {len(parts)}", 0.0)
+    for k, own in enumerate(parts, 1):
+        for first in range(own.start, own.stop, _TOLD):
+            rows = slice(first, min(first + _TOLD, own.stop))
+            if first == own.start:
+                state = scene.start([recording.tip_radius_m])
+            steps = np.diff(t[rows], prepend=t[rows.start - 1] if rows.start else t[0] - 1e-3)
+            forces[rows] = scene.follow(state, np.array(recording.position[rows, None]), steps)[:, 0]
+            done += rows.stop - rows.start
+            left.tell(done / whole)
+            words = ", ".join(word for word in (f"press {k} of {len(parts)}", left.words()) if word)
+            progress(words, done / whole)
+    return forces
 
 
 def write_forces(path: Path | str, t: np.ndarray, forces: np.ndarray) -> None:

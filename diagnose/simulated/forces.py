@@ -46,12 +46,14 @@ class ForcesOptions:
 
 @dataclass(frozen=True)
 class Forces:
-    """t: (n,) s, increasing. force: (n, 3) N. name: of simulator or file. notes: what was told of them."""
+    """t: (n,) s, increasing. force: (n, 3) N. name: of simulator or file. notes: what was told of them.
+    chosen: (p,) bool, presses of the recording that the simulator was run over; None: all."""
 
     t: np.ndarray
     force: np.ndarray
     name: str
     notes: tuple[str, ...] = ()
+    chosen: np.ndarray | None = None
 
 
 @dataclass(frozen=True)
@@ -110,14 +112,17 @@ def aligned(given: Forces, presses: Presses, options: ForcesOptions) -> Aligned:
     if options.clock_offset_s is None:
         _same_clock(t, force, presses)
     at = np.column_stack([np.interp(presses.t, t, f, left=0.0, right=0.0) for f in force.T])
-    _same_direction(at, presses)
-    _of_newtons(at, presses, notes)
+    rows = presses.counted if given.chosen is None else presses.counted & given.chosen[presses.press]
+    _same_direction(at, presses, rows)
+    _of_newtons(at, presses, rows, notes)
     step, own = float(np.median(np.diff(t))), 1.0 / presses.sample_rate_hz
     if abs(step / own - 1) > 0.05:
         notes.append(
             f"rows come at {1 / step:.4g} Hz, the recording's at {1 / own:.4g} Hz: straight lines between"
         )
     usable = _without_gaps(t, presses, step)
+    if given.chosen is not None:
+        return Aligned(at, usable & given.chosen, tuple(notes))
     if not usable.all():
         notes.append(
             f"{(~usable).sum()} of {len(usable)} presses were left out: rows are missing for over "
@@ -164,8 +169,7 @@ def _same_clock(t: np.ndarray, force: np.ndarray, presses: Presses) -> None:
         )
 
 
-def _same_direction(at: np.ndarray, presses: Presses) -> None:
-    rows = presses.counted
+def _same_direction(at: np.ndarray, presses: Presses, rows: np.ndarray) -> None:
     measured = (presses.force - presses.free_air)[rows]
     size = np.sqrt((measured**2).sum() * (at[rows] ** 2).sum())
     cosine = float((measured * at[rows]).sum() / size) if size > 0 else 0.0
@@ -176,8 +180,7 @@ def _same_direction(at: np.ndarray, presses: Presses) -> None:
         )
 
 
-def _of_newtons(at: np.ndarray, presses: Presses, notes: list[str]) -> None:
-    rows = presses.counted
+def _of_newtons(at: np.ndarray, presses: Presses, rows: np.ndarray, notes: list[str]) -> None:
     measured = np.sqrt((presses.force[rows] ** 2).sum(axis=1).mean())
     size = np.sqrt((at[rows] ** 2).sum(axis=1).mean())
     if not size > 0:

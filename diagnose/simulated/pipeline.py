@@ -108,16 +108,20 @@ def diagnose_simulated(
 def _beside(presses: Presses, model: Model, given: Aligned, findings: Findings, stated: Stated) -> _Sides:
     """The forces as touches, row by row beside the real ones."""
     met = reached(presses) if model.fitted_to(presses) else np.ones(len(presses), dtype=bool)
-    signal, seen = seen_in_samples(signal_of(presses, given.force))
+    run = np.flatnonzero(given.usable)
+    own = presses.rows(run)
+    signal, seen = seen_in_samples(signal_of(presses.of(run), given.force[own]))
+    force = given.force.copy()
+    force[own] = signal.force
 
     def touches(force: np.ndarray) -> Presses:
         nothing = np.zeros_like(force)
         return touches_of(dataclasses.replace(presses, force=force, free_air=nothing).of(met))
 
-    raw, mended = touches(given.force), touches(signal.force)
+    raw, mended = touches(given.force), touches(force)
     keep = np.isin(raw.onset_s, presses.onset_s[given.usable])
     left = np.zeros(len(presses), bool)
-    np.logical_or.at(left, presses.press, signal.left)
+    np.logical_or.at(left, presses.press[own], signal.left)
     real = findings.forward
     rows = raw.rows(np.flatnonzero(keep))
     forward = StatedForward(mended.of(keep), _of(real.places, keep), stated)

@@ -14,8 +14,8 @@ from palpate.exporting.subject import DENSITY_KG_M3, Subject
 
 TIMESTEP_S = 1e-3
 CONTACT = 'solref="0.004 1" solimp="0.999 0.999 0.001"'
-"""As hard as the step allows: MuJoCo's own is a spring that goes with the mass of a node, which a fine mesh
-makes small."""
+"""As hard as the step allows: with MuJoCo's own a fine mesh came out softer than a coarse one. Its cause is
+not known; that it is a spring which goes with the mass of a node was not tested."""
 
 
 def text_of(subject: Subject) -> str:

@@ -37,10 +37,11 @@ def numbers_operand(words: str = "numbers of these settings to change", default:
 
 
 class Ran(NamedTuple):
-    """What a simulator gave: force (n, 3) N on the tool at every row of the recording; of which adapter; its
-    settings in words."""
+    """What a simulator gave: force (n, 3) N on the tool at every row of the recording, zeros where it was not
+    run; over which (p,) of the recording's presses; of which adapter; its settings in words."""
 
     force: np.ndarray
+    chosen: np.ndarray
     adapter: Adapter
     said: str
 
@@ -60,14 +61,31 @@ def words_of(text: str) -> list[str]:
 
 
 def run_along(
-    name: str, settings: str, numbers: str, model: Model, recording: Recording, progress: Progress
+    name: str,
+    settings: str,
+    numbers: str,
+    model: Model,
+    recording: Recording,
+    progress: Progress,
+    *,
+    most: int | None = None,
+    usual: bool = False,
 ) -> Ran:
-    """Run a simulator along a recording's path; raises OptionError where it is not installed, a setting is
-    not there, or it finds no answer."""
+    """Run a simulator along a recording's presses, `most` of them, spread over its places (None: all; usual:
+    as many as the adapter takes). Raises OptionError where it is not installed, a setting is not there, or it
+    finds no answer."""
+    from diagnose.simulated.chosen import spread_out
+    from reconstruct.placing import presses_on
     from render.registry import create
-    from render.replay import replay_recording
+    from render.replay import replay_touches
 
     options = RenderOptions(simulator_settings=settings, simulator_set=numbers)
+    said = f"settings {settings}" + (f", {numbers}" if numbers else "")
     made: Any = create(name, model, options, progress)
-    force = replay_recording(made, recording, progress)
-    return Ran(force, made.adapter, f"settings {settings}" + (f", {numbers}" if numbers else ""))
+    presses = presses_on(recording, model)
+    chosen = spread_out(presses, made.adapter.presses if most is None and usual else most)
+
+    def tell(words: str, share: float) -> None:
+        progress(f"{name}, {said}: {words}", share)
+
+    return Ran(replay_touches(made, recording, presses, chosen, tell), chosen, made.adapter, said)

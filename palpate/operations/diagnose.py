@@ -14,6 +14,7 @@ from __future__ import annotations
 from dataclasses import KW_ONLY, dataclass, replace
 from typing import TYPE_CHECKING, Any
 
+from diagnose.forward.touches import LEAST_PRESSES
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
 from diagnose.simulated.forces import ForcesOptions
 from mechanics.errors import OptionError
@@ -77,6 +78,12 @@ class DiagnoseOperands:
         "run --renderer once more as the advice says, and measure the gap that is left: best, or numbers of "
         "its settings (KEY=VALUE, comma separated)",
         metavar="SETTINGS",
+    )
+    presses: int | None = operand(
+        None,
+        "run --renderer over so many of the recording's presses, spread over its places; default: of a dear "
+        "simulator 12, of the others all",
+        low=LEAST_PRESSES,
     )
     stated: Any = operand(
         None,
@@ -212,12 +219,14 @@ def _simulation(
     from diagnose.simulated.stated import stated_of, stated_values
 
     assert asked.renderer is not None
-    ran = run_along(asked.renderer, settings, numbers, model, measured, tell)
+    ran = run_along(asked.renderer, settings, numbers, model, measured, tell, most=asked.presses, usual=True)
+    run, there = int(ran.chosen.sum()), len(ran.chosen)
+    some = f", spread over its places (--presses {there}: all)" if run < there else ""
     notes = (
-        f"run here along the recorded path: {ran.said}",
+        f"run here along {run} of the {there} recorded presses{some}: {ran.said}",
         *(f"it cannot say: {x}" for x in ran.adapter.cannot),
     )
-    forces = Forces(measured.t, ran.force, asked.renderer, notes)
+    forces = Forces(measured.t, ran.force, asked.renderer, notes, ran.chosen)
     # what the adapter gave it, but for what is said
     stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
     own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
@@ -230,6 +239,8 @@ def _forces(asked: DiagnoseOperands) -> Any:
         raise OptionError("--simulated and --renderer both name a simulator: name one")
     if asked.mended is not None and asked.renderer is None:
         raise OptionError("--mended runs a simulator once more: name it by --renderer")
+    if asked.presses is not None and asked.renderer is None:
+        raise OptionError("--presses says over how many a simulator is run: name it by --renderer")
     if asked.renderer is not None:
         settings, numbers = asked.simulator_settings, asked.simulator_set
         for each in ((settings, numbers), mended(settings, numbers, asked.mended or "")):

@@ -25,7 +25,7 @@ from render.base import Renderer, check_radii
 from render.options import RenderOptions
 from render.snapping import touched_surface
 
-NEAR_M, AWAY_M = 1.5e-3, 2.5e-3
+NEAR_M, AWAY_M = 0.5e-3, 1e-3
 """Of the tip's surface from the object: where a world begins, and where it ends."""
 DOCUMENTED, BEST = "documented", "best"
 
@@ -76,6 +76,9 @@ class Adapter(ABC):
     cannot: tuple[str, ...]
     advice: dict[str, str]
     extra: str
+
+    presses: int | None = None
+    """Of a recording, over how many it is run where nothing else is asked; None: all."""
 
     settings: dict[str, Any]
     """Of each of its two settings the frozen dataclass of numbers that `--simulator-set` changes."""

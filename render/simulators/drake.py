@@ -59,6 +59,7 @@ class Drake(Adapter):
 
     name, extra, units = "drake", "drake", "SI: m, kg, s, N, Pa"
     settings = SETTINGS
+    presses = 12
     cannot = (
         "linear tetrahedra alone, which lock near Poisson's ratio 0.5",
         "one modulus a body",

@@ -98,6 +98,7 @@ class MuJoCo(Adapter):
 
     name, extra, units = "mujoco", "mujoco", "SI: m, kg, s, N, Pa"
     settings = SETTINGS
+    presses = 12
     cannot = (
         "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
         "one modulus a flex",

@@ -50,6 +50,7 @@ class Newton(Adapter):
 
     name, extra, units = "newton", "newton", "SI in single precision: m, kg, s, N, Pa"
     settings = SETTINGS
+    presses = 12
     cannot = (
         "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
         "a hard contact: its spring (soft_contact_ke) diverges from some 1e4 N/m on",

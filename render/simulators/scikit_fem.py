@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from scipy.linalg import solve_triangular
 from scipy.sparse import csc_matrix
 from scipy.sparse.linalg import splu
 
@@ -207,7 +208,8 @@ class _Touch:
             force, slope = self._springs(points + u - tip, anchor, spring)
             residual = u.ravel() - self._matrix @ force.ravel()
             # in the norm of the object's energy, in which Newton's direction leads downwards
-            return force, slope, residual, float(np.linalg.norm(np.linalg.solve(self._lower, residual)))
+            whitened = solve_triangular(self._lower, residual, lower=True, check_finite=False)
+            return force, slope, residual, float(np.linalg.norm(whitened))
 
         for start in (self._u, np.zeros_like(points)):
             u, now = start, missed(start)
@@ -215,7 +217,7 @@ class _Touch:
                 force, slope, residual, miss = now
                 if np.abs(residual).max() < BALANCED_M:
                     return force, u
-                step = np.linalg.solve(self._jacobian(slope), residual).reshape(u.shape)
+                step = self._newton(slope, residual).reshape(u.shape)
                 for share in SHARES:
                     then = missed(u - share * step)
                     if then[3] < (1 - 0.1 * share) * miss:
@@ -228,10 +230,17 @@ class _Touch:
             f"({1e3 * np.abs(now[2]).max():.2g} mm are left): lower --simulator-set penalty={self.penalty:g}"
         )
 
-    def _jacobian(self, slope: np.ndarray) -> np.ndarray:
+    def _newton(self, slope: np.ndarray, residual: np.ndarray) -> np.ndarray:
+        """(3 c,) m: Newton's step. Only springs that are pressed have a slope, so only their nodes' steps are
+        coupled; the others follow from them."""
+        pressed = np.flatnonzero(slope.any(axis=(1, 2)))
+        if not len(pressed):
+            return residual
         size = len(self._matrix)
-        by_node = self._matrix.reshape(size, -1, 3)
-        return np.eye(size) - np.einsum("ijk,jkl->ijl", by_node, slope).reshape(size, size)
+        by_node = self._matrix.reshape(size, -1, 3)[:, pressed].transpose(1, 0, 2)
+        moved = np.matmul(by_node, slope[pressed]).transpose(1, 0, 2).reshape(size, -1)
+        own = (3 * pressed[:, None] + np.arange(3)).ravel()
+        return residual + moved @ np.linalg.solve(np.eye(len(own)) - moved[own], residual[own])
 
     def _springs(
         self, relative: np.ndarray, anchor: np.ndarray, spring: float

@@ -12,12 +12,14 @@ from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
 from diagnose.simulated.against_law import seen_in_samples
+from diagnose.simulated.chosen import spread_out
 from diagnose.simulated.forces import Forces, ForcesOptions, aligned, read_forces, sorted_forces
 from diagnose.simulated.pipeline import Asked, diagnose_simulated
 from diagnose.simulated.result import PARTS, Mended
 from diagnose.simulated.stated import StatedForward, stated_of
 from mechanics.effects.registry import NAMES as PHYSICAL
 from mechanics.errors import OptionError, RecordingError
+from mechanics.presses import LEAD_S
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -162,6 +164,21 @@ def test_a_press_without_rows_is_left_out_of_the_answer(world):
     result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
     assert result.effects[0] == "mesh_stiffness" and shares(result) == pytest.approx(1.0)
     assert len(result.touches) == len(reality.forward.touches) - 1
+
+
+def test_a_simulator_that_was_run_over_some_presses_is_judged_by_these_alone(world):
+    """What it was not run over is zero there, which is no contact that was lost."""
+    recording, model, reality, force = world
+    presses, t = model.presses, recording.t
+    chosen = spread_out(presses, 8)
+    assert chosen.sum() == 8 and not (chosen & ~spread_out(presses, 12)).any()  # fewer are some of more
+    assert len(np.unique(presses.site[chosen])) == 8 and spread_out(presses, None).all()
+    some = np.where(presses.of(chosen).touching(t, LEAD_S)[:, None], 1.5 * force, 0.0)
+    asked = Asked(Forces(t, some, "x", (), chosen), stated_of({}, model), OWN_CLOCK)
+    result = diagnose_simulated(recording, model, asked, FAST, reality=reality)
+    assert result.effects == ("mesh_stiffness",) and shares(result) == pytest.approx(1.0)
+    assert set(result.touches.onset_s) == set(presses.onset_s[chosen])
+    assert not any("left out" in note for note in result.notes)
 
 
 def test_files_are_read_or_refused(tmp_path):

@@ -13,7 +13,7 @@ from mechanics.press_cutting import FoundPresses, cut
 from mechanics.recording import Recording
 from palpate.cli import main
 from render.press import Stroke, greatest_difference, press, read_curve, write_curve
-from render.replay import replay, replay_error
+from render.replay import replay, replay_error, replay_touches
 
 TIP = 0.005
 
@@ -83,6 +83,13 @@ def test_replay_error_counts_contact_samples_of_phase_two_only(cylinder_renderer
             normal=np.array([[0.0, 0.0, 1.0]]),
         ),
     )
+    told = []
+    alone = replay_touches(
+        cylinder_renderer, recording, presses, np.array([True]), lambda *words: told.append(words)
+    )
+    assert alone == pytest.approx(forces, abs=1e-6) and not alone[:1000].any()
+    assert told[0] == ("press 1 of 1", 0.0) and told[-1][1] == 1.0
+    assert not replay_touches(cylinder_renderer, recording, presses, np.array([False])).any()
     error = replay_error(recording, presses, forces)
     assert error.rmse_n == pytest.approx(0.01 * np.sqrt(3), rel=0.05)
     touched = np.linalg.norm(np.vstack([np.zeros((lead, 3)), curve.force]), axis=1) > 0.05

@@ -59,13 +59,17 @@ class Block:
 
     def around(self, name: str, values: np.ndarray) -> None:
         """(n, c) in 16 bits with a sign, each column up to its greatest size."""
-        step = np.maximum(np.abs(values).max(axis=0), 1e-300) / _SIGNED
-        self._add(name, np.rint(values / step), "i2", low=[0.0] * len(step), step=step.tolist())
+        self._signed(name, values, np.maximum(np.abs(values).max(axis=0), 1e-300) / _SIGNED)
 
     def modes(self, name: str, modes: Modes) -> None:
-        """NAME_weights in 16 bits and NAME_basis in floats."""
-        self.around(f"{name}_weights", modes.weights)
+        """NAME_weights in 16 bits, all to the same error, which leaves few digits to a weak mode: it compresses
+        the better; and NAME_basis in floats."""
+        step = max(float(np.abs(modes.weights).max()), 1e-300) / _SIGNED
+        self._signed(f"{name}_weights", modes.weights, np.full(modes.weights.shape[1], step))
         self.floats(f"{name}_basis", modes.basis)
+
+    def _signed(self, name: str, values: np.ndarray, step: np.ndarray) -> None:
+        self._add(name, np.rint(values / step), "i2", low=[0.0] * len(step), step=step.tolist())
 
     def _add(self, name: str, values: np.ndarray, kind: str, **scale: list[float]) -> None:
         # column by column: neighbours are alike there, which compresses better

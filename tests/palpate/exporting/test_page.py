@@ -379,7 +379,7 @@ def test_without_webgl_one_line_says_so_and_forces_stay(shown, written):
         assert shown.evaluate("document.querySelector('.still').clientHeight > 100")
         shown.evaluate("document.querySelector('[data-at]').click()")
         shown.wait("palpate.page.touch.normalForce > 0.05")
-        assert "mm deep" in shown.evaluate("document.getElementById('parts').textContent")
+        shown.wait("document.getElementById('parts').textContent.includes('mm deep')")
     finally:
         shown.call("Page.removeScriptToEvaluateOnNewDocument", identifier=script)
 

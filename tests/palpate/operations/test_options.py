@@ -213,6 +213,7 @@ def test_what_is_no_option_is_told_before_any_work(name, recording, rooms):
             "--simulator-set solref=1: allowed are damping",
         ),
         ({"renderer": "mujoco", "mended": "best,solref=1"}, "solref=1: allowed are damping"),
+        ({"presses": 12}, "--presses says over how many a simulator is run: name it by --renderer"),
     ],
 )
 def test_a_misspelt_effect_or_parameter_is_told_before_a_model_is_made(recording, rooms, options, words):

@@ -123,12 +123,19 @@ def test_a_person_with_only_a_mouse(block: Model, screen: str, tmp_path: Path) -
             ["xdotool", *words], env=environment, capture_output=True, text=True, check=False
         ).stdout.strip()
 
-    assert eventually(lambda: pointer("search", "--name", ".- Palpate$")), "no window opened"
-    window = pointer("search", "--name", ".- Palpate$").splitlines()[-1]
-    time.sleep(5.0)
+    found: list[str] = []
+
+    def stands() -> bool:
+        """The window is the same in five looks: it is made anew while it opens."""
+        time.sleep(1.0)
+        found[:] = [*found[-4:], pointer("search", "--name", ".- Palpate$")]
+        return len(found) == 5 and len(set(found)) == 1 and bool(found[0])
+
+    assert eventually(stands), "no window opened"
+    window = found[0].splitlines()[-1]
     pointer("mousemove", "--window", window, "530", "280")
     time.sleep(3.0)
-    for _ in range(2):
+    for _ in range(4):
         pointer("mousedown", "1")
         time.sleep(4.0)
         pointer("mouseup", "1")

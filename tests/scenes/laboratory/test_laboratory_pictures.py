@@ -71,7 +71,8 @@ def test_command_writes_a_page_whose_places_lie_on_the_phantom(springs, tmp_path
     arguments = ["simulate", "cylinder", "-o", str(tmp_path / "c.csv.gz"), "--protocol", "brief", "--frame"]
     assert main([*arguments, "--effect", "tool_compliance=1", "--report", str(page)]) == 0
     text = page.read_text(encoding="utf-8")
-    assert 'class="view3d"' in text and "with tool compliance 1" in text and "palpate reconstruct" in text
+    assert 'class="view3d"' in text and "palpate reconstruct" in text
+    assert "with tool compliance of strength 1" in text
     result, _ = _figure({"tool_compliance": 1})
     seen = view(result)
     near = cKDTree(seen.thing.points).query(seen.places)[0]
