@@ -123,6 +123,8 @@ def keys_in_words(entry: EffectEntry) -> str:
     return ", ".join(said)
 
 
+LITTLE = 0.5
+"""Share of a gap, above which one that nothing explains is said first."""
 _MOST = {
     "numerics": "most of the gap is numerics",
     "parameters": "most of the gap is parameters",
@@ -203,13 +205,25 @@ def _given(result: SimulatedGap) -> list[tuple[str, str, str, str]]:
     return rows
 
 
-def _lead(result: SimulatedGap) -> str:
+def lead(result: SimulatedGap) -> str:
+    """The page's first words: how far off, and by what most; or that most of it is not explained."""
+    off, left = f"It is off by {force_words(result.gap_before_n)}", _open(result)
+    most = max(part.share for part in result.parts.values())
     if not result.effects:
+        if left > LITTLE:
+            return f"{off}, and nothing that is known here explains {percent(left)} of that."
         return "Nothing stands out: this simulation is as near to the measured forces as they can tell."
-    strongest = result.effects[0]
-    return f"It is off by {force_words(result.gap_before_n)}. Above all: {meaning(strongest)}." + (
+    strongest = meaning(result.effects[0])
+    if left > most:
+        return f"{off}, and {percent(left)} of that is not explained. A smaller part is: {strongest}."
+    return f"{off}. Above all: {strongest}." + (
         f" Not ruled out: {spoken(result.candidates, 'or')}." if result.candidates else ""
     )
+
+
+def _open(result: SimulatedGap) -> float:
+    """Share of the gap that neither a part nor noise nor first touches explain."""
+    return result.unexplained - result.noise_share - result.touch_share
 
 
 def _cards(result: SimulatedGap) -> list[tuple[str, str, str]]:
@@ -238,7 +252,7 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
     shown = as_diagnosis(result)
     assert result.reality.model is not None and result.reality.recording is not None
     page = Page(f"{result.simulator.name} against measured touch: {result.reality.recording.name}")
-    page.lead(_lead(result))
+    page.lead(lead(result))
     page.next_steps(result.advice)
     page.cards(_cards(result))
     if result.mended is not None:

@@ -20,6 +20,7 @@ from diagnose.simulated.stated import StatedForward, stated_of
 from mechanics.effects.registry import NAMES as PHYSICAL
 from mechanics.errors import OptionError, RecordingError
 from mechanics.presses import LEAD_S
+from palpate.show.simulated import lead
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -72,6 +73,15 @@ def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world
     assert set(result.effects) == {"time_step", "stated_modulus"}
     sizes = {e.name: e.gap_after_n for e in result.entries}
     assert sizes[result.effects[0]] < sizes[result.effects[1]]
+
+
+def test_a_gap_that_nothing_explains_is_said_first(world):
+    """A force that no parameter makes: it comes and goes from second to second."""
+    result = judged(world, world[3] * (1 + 0.8 * np.sin(2.4 * world[0].t))[:, None])
+    assert result.unexplained > 0.5
+    assert " explain" in lead(result) and "Above all" not in lead(result)
+    assert "Above all: " in lead(judged(world, 1.5 * world[3]))
+    assert "Nothing stands out" in lead(judged(world, world[3]))
 
 
 def test_a_late_force_is_the_time_step(world):
