@@ -8,6 +8,7 @@ does not reach the next, and free air costs nothing.
 from __future__ import annotations
 
 import dataclasses
+import importlib.metadata
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol, Self
@@ -28,6 +29,8 @@ from render.snapping import touched_surface
 NEAR_M, AWAY_M = 0.5e-3, 1e-3
 """Of the tip's surface from the object: where a world begins, and where it ends."""
 DOCUMENTED, BEST = "documented", "best"
+MOST_FRICTION = 10.0
+"""Instead of a tip that sticks for ever, where friction is a number."""
 
 
 class World(Protocol):
@@ -77,6 +80,9 @@ class Adapter(ABC):
     advice: dict[str, str]
     extra: str
 
+    poisson_limit = np.inf
+    """The greatest Poisson's ratio that it is given."""
+
     presses: int | None = None
     """Of a recording, over how many it is run where nothing else is asked; None: all."""
 
@@ -89,14 +95,20 @@ class Adapter(ABC):
         self.mesh = model.mesh.linear()
 
     @property
-    @abstractmethod
     def version(self) -> str:
         """Of the simulator that is installed."""
+        return importlib.metadata.version(self.name)
 
     @property
-    @abstractmethod
     def stated(self) -> dict[str, float]:
         """What it is given: young_modulus_pa, poisson_ratio, friction, tip_radius_m."""
+        material = self.model.material
+        return {
+            "young_modulus_pa": material.young_modulus_pa,
+            "poisson_ratio": min(material.poisson_ratio, self.poisson_limit),
+            "friction": self.friction,
+            "tip_radius_m": self.model.tool.tip_radius_m,
+        }
 
     @abstractmethod
     def begin(self, tip: np.ndarray, radius_m: float) -> World:
@@ -110,6 +122,32 @@ class Adapter(ABC):
         away = max(float(np.linalg.norm(centre - tip)), 1e-9)
         foot = tip + (centre - tip) * min(1.0, radius_m / away)
         return graded(self.mesh, foot, edge_m, reach_m)
+
+
+class SteppedAdapter(Adapter):
+    """One that is stepped (`SteppedWorld`), whose friction is a number, and whose settings have edge_radii:
+    a scene of the body and a tip serves all touches, but where its mesh is finer under each."""
+
+    def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
+        super().__init__(model, options, friction if np.isfinite(friction) else MOST_FRICTION)
+        self._whole: tuple[float, Any] | None = None
+
+    @abstractmethod
+    def scene(self, mesh: TetMesh, radius_m: float) -> Any:
+        """What is made of a mesh and a tip of that radius."""
+
+    @abstractmethod
+    def touch(self, scene: Any, tip: np.ndarray) -> World:
+        """A touch of its own in such a scene, as `begin`."""
+
+    def begin(self, tip: np.ndarray, radius_m: float) -> World:
+        edge = self.own.edge_radii
+        if np.isfinite(edge):
+            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
+            return self.touch(self.scene(fine, radius_m), tip)
+        if self._whole is None or self._whole[0] != radius_m:
+            self._whole = radius_m, self.scene(self.mesh, radius_m)
+        return self.touch(self._whole[1], tip)
 
 
 def graded(mesh: TetMesh, place: np.ndarray, edge_m: float, reach_m: float) -> TetMesh:

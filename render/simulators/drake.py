@@ -7,7 +7,6 @@ edges of half the tip's radius under it, a finely meshed sphere, a tenth of the 
 
 from __future__ import annotations
 
-import importlib.metadata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +14,7 @@ import numpy as np
 
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, DOCUMENTED, Adapter, SteppedWorld, World, made
+from render.simulators.base import BEST, DOCUMENTED, SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model
@@ -54,7 +53,7 @@ def vtk_text(mesh: TetMesh) -> str:
     )
 
 
-class Drake(Adapter):
+class Drake(SteppedAdapter):
     """The adapter."""
 
     name, extra, units = "drake", "drake", "SI: m, kg, s, N, Pa"
@@ -81,34 +80,13 @@ class Drake(Adapter):
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
         import pydrake  # noqa: F401
 
-        super().__init__(model, options, friction if np.isfinite(friction) else 10.0)
-        self._whole: tuple[float, _Scene] | None = None
+        super().__init__(model, options, friction)
 
-    @property
-    def version(self) -> str:
-        return importlib.metadata.version("drake")
-
-    @property
-    def stated(self) -> dict[str, float]:
-        material = self.model.material
-        return {
-            "young_modulus_pa": material.young_modulus_pa,
-            "poisson_ratio": material.poisson_ratio,
-            "friction": self.friction,
-            "tip_radius_m": self.model.tool.tip_radius_m,
-        }
-
-    def begin(self, tip: np.ndarray, radius_m: float) -> World:
-        edge = self.own.edge_radii
-        if np.isfinite(edge):
-            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
-            return _Touch(self._scene(fine, radius_m), tip)
-        if self._whole is None or self._whole[0] != radius_m:
-            self._whole = radius_m, self._scene(self.mesh, radius_m)
-        return _Touch(self._whole[1], tip)
-
-    def _scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
+    def scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
         return _Scene(mesh, self.model, self.own, self.stated, radius_m)
+
+    def touch(self, scene: _Scene, tip: np.ndarray) -> World:
+        return _Touch(scene, tip)
 
 
 class _Scene:

@@ -14,7 +14,7 @@ import numpy as np
 
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, DOCUMENTED, Adapter, SteppedWorld, World, made
+from render.simulators.base import BEST, DOCUMENTED, SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model
@@ -93,11 +93,12 @@ def force_on_tip(mujoco: Any, model: Any, data: Any) -> np.ndarray:
     return total
 
 
-class MuJoCo(Adapter):
+class MuJoCo(SteppedAdapter):
     """The adapter."""
 
     name, extra, units = "mujoco", "mujoco", "SI: m, kg, s, N, Pa"
     settings = SETTINGS
+    poisson_limit = POISSON_LIMIT
     presses = 12
     cannot = (
         "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
@@ -119,25 +120,10 @@ class MuJoCo(Adapter):
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
         import mujoco
 
-        super().__init__(model, options, friction if np.isfinite(friction) else 10.0)
+        super().__init__(model, options, friction)
         self._mujoco: Any = mujoco
-        self._whole: tuple[float, Any] | None = None
 
-    @property
-    def version(self) -> str:
-        return str(self._mujoco.__version__)
-
-    @property
-    def stated(self) -> dict[str, float]:
-        material = self.model.material
-        return {
-            "young_modulus_pa": material.young_modulus_pa,
-            "poisson_ratio": min(material.poisson_ratio, POISSON_LIMIT),
-            "friction": self.friction,
-            "tip_radius_m": self.model.tool.tip_radius_m,
-        }
-
-    def _compiled(self, mesh: TetMesh, radius_m: float) -> Any:
+    def scene(self, mesh: TetMesh, radius_m: float) -> Any:
         given, own = self.stated, self.own
         xml = flex_xml(
             mesh, own.timestep_s, young_pa=given["young_modulus_pa"], poisson=given["poisson_ratio"],
@@ -146,14 +132,8 @@ class MuJoCo(Adapter):
         )  # fmt: skip
         return self._mujoco.MjModel.from_xml_string(xml)
 
-    def begin(self, tip: np.ndarray, radius_m: float) -> World:
-        edge = self.own.edge_radii
-        if np.isfinite(edge):
-            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
-            return _Touch(self._mujoco, self._compiled(fine, radius_m), tip)
-        if self._whole is None or self._whole[0] != radius_m:
-            self._whole = radius_m, self._compiled(self.mesh, radius_m)
-        return _Touch(self._mujoco, self._whole[1], tip)
+    def touch(self, scene: Any, tip: np.ndarray) -> World:
+        return _Touch(self._mujoco, scene, tip)
 
 
 class _Touch(SteppedWorld):

@@ -8,7 +8,6 @@ edges of half the tip's radius under it, more sweeps a step; the contact is what
 from __future__ import annotations
 
 import importlib
-import importlib.metadata
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -16,7 +15,7 @@ import numpy as np
 
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, DOCUMENTED, Adapter, SteppedWorld, World, made
+from render.simulators.base import BEST, DOCUMENTED, SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model
@@ -45,11 +44,12 @@ class Settings:
 SETTINGS = {DOCUMENTED: Settings(1 / 600, 10, 1e3), BEST: Settings(1e-3, 20, 3e3, edge_radii=0.5)}
 
 
-class Newton(Adapter):
+class Newton(SteppedAdapter):
     """The adapter."""
 
     name, extra, units = "newton", "newton", "SI in single precision: m, kg, s, N, Pa"
     settings = SETTINGS
+    poisson_limit = POISSON_LIMIT
     presses = 12
     cannot = (
         "linear tetrahedra alone: they lock near Poisson's ratio 0.5, so it is 0.45 at most",
@@ -75,34 +75,13 @@ class Newton(Adapter):
         self._newton: Any = importlib.import_module("newton")
         self._warp: Any = importlib.import_module("warp")
         self._warp.config.log_level = self._warp.LOG_WARNING
-        super().__init__(model, options, friction if np.isfinite(friction) else 10.0)
-        self._whole: tuple[float, _Scene] | None = None
+        super().__init__(model, options, friction)
 
-    @property
-    def version(self) -> str:
-        return importlib.metadata.version("newton")
-
-    @property
-    def stated(self) -> dict[str, float]:
-        material = self.model.material
-        return {
-            "young_modulus_pa": material.young_modulus_pa,
-            "poisson_ratio": min(material.poisson_ratio, POISSON_LIMIT),
-            "friction": self.friction,
-            "tip_radius_m": self.model.tool.tip_radius_m,
-        }
-
-    def begin(self, tip: np.ndarray, radius_m: float) -> World:
-        edge = self.own.edge_radii
-        if np.isfinite(edge):
-            fine = self.mesh_around(tip, radius_m, edge * radius_m, 1.2 * radius_m)
-            return _Touch(self._scene(fine, radius_m), tip)
-        if self._whole is None or self._whole[0] != radius_m:
-            self._whole = radius_m, self._scene(self.mesh, radius_m)
-        return _Touch(self._whole[1], tip)
-
-    def _scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
+    def scene(self, mesh: TetMesh, radius_m: float) -> _Scene:
         return _Scene(self._newton, self._warp, mesh, self.own, self.stated, radius_m)
+
+    def touch(self, scene: _Scene, tip: np.ndarray) -> World:
+        return _Touch(scene, tip)
 
 
 class _Scene:

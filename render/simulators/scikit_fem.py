@@ -6,7 +6,6 @@ documented: its examples' linear tetrahedra (`ElementTetP1`) on the model's own 
 
 from __future__ import annotations
 
-import importlib.metadata
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -76,20 +75,6 @@ class ScikitFem(Adapter):
         super().__init__(model, options, friction)
         graded = math.isfinite(self.own.edge_radii)
         self._whole = None if graded else _Solved(self.mesh, model, round(self.own.order))
-
-    @property
-    def version(self) -> str:
-        return importlib.metadata.version("scikit-fem")
-
-    @property
-    def stated(self) -> dict[str, float]:
-        material = self.model.material
-        return {
-            "young_modulus_pa": material.young_modulus_pa,
-            "poisson_ratio": material.poisson_ratio,
-            "friction": self.friction,
-            "tip_radius_m": self.model.tool.tip_radius_m,
-        }
 
     def begin(self, tip: np.ndarray, radius_m: float) -> World:
         solved = self._whole
