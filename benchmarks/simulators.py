@@ -31,14 +31,13 @@ from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.progress import silent
 from mechanics.tetmesh import TetMesh
-from render.options import RenderOptions
+from render.options import SETTINGS, RenderOptions
 from render.registry import create, simulator_names
 from render.replay import replay
 
 YOUNG_PA, POISSON, RATE_HZ, SPEED_M_PER_S = 20e3, 0.45, 250.0, 0.02
 HOLD_S = 0.1
 UP = np.array([0.0, 0.0, 1.0])
-SETTINGS = ("documented", "best")
 
 
 @dataclass(frozen=True)

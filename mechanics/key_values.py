@@ -27,6 +27,11 @@ def pairs(given: Mapping[str, Any] | Iterable[str] | None, flag: str, example: s
     return list(found.items())
 
 
+def words_of(text: str) -> list[str]:
+    """The words of a comma separated list."""
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
 def number(flag: str, key: str, value: Any) -> float:
     """The value as a number; raises OptionError where it is none."""
     try:

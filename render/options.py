@@ -9,6 +9,9 @@ from mechanics.dent import dent_laws
 from mechanics.errors import OptionError
 from mechanics.options import option
 
+DOCUMENTED, BEST = SETTINGS = ("documented", "best")
+"""Of another simulator: as its own documentation says, or as good as it gets."""
+
 
 @dataclass(frozen=True)
 class RenderOptions:
@@ -34,9 +37,9 @@ class RenderOptions:
     )
 
     simulator_settings: str = option(
-        "documented",
+        DOCUMENTED,
         "of another simulator: as its own documentation says, or as good as it gets",
-        choices=("documented", "best"),
+        choices=SETTINGS,
     )
     simulator_set: str = option(
         "", "numbers of another simulator's settings to change: KEY=VALUE, comma separated"

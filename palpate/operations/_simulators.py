@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, NamedTuple
 
-from mechanics.key_values import pairs
+from mechanics.key_values import pairs, words_of
 from palpate.operations._declare import operand
-from render.options import RenderOptions
+from render.options import DOCUMENTED, SETTINGS, RenderOptions
 from render.registry import simulator_names
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from mechanics.recording import Recording
     from render.simulators.base import Adapter
 
-SETTINGS = ("documented", "best")
-
 
 def simulator_operand(words: str) -> Any:
     """--renderer NAME, of the other simulators alone."""
@@ -28,7 +26,7 @@ def simulator_operand(words: str) -> Any:
 def settings_operand() -> Any:
     """--simulator-settings, of --renderer."""
     words = "of --renderer: as its own documentation says, or as good as it gets"
-    return operand("documented", words, choices=SETTINGS, rare=True)
+    return operand(DOCUMENTED, words, choices=SETTINGS, rare=True)
 
 
 def numbers_operand(words: str = "numbers of these settings to change", default: str | None = "") -> Any:
@@ -53,11 +51,6 @@ def mended(settings: str, numbers: str, by: str) -> tuple[str, str]:
     over = dict(pairs(words_of(numbers), "--simulator-set", "edge_radii=0.5"))
     over |= dict(pairs([w for w in words if w not in named], "--mended", "edge_radii=0.5"))
     return (named or [settings])[-1], ",".join(f"{key}={value}" for key, value in over.items())
-
-
-def words_of(text: str) -> list[str]:
-    """The words of a comma separated list."""
-    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def run_along(

@@ -18,7 +18,7 @@ from scipy.spatial import cKDTree
 
 from mechanics.effects.friction_slip import EFFECT as SLIP
 from mechanics.errors import OptionError
-from mechanics.key_values import number, pairs
+from mechanics.key_values import number, pairs, words_of
 from mechanics.model import Model
 from mechanics.refine import refined_around
 from mechanics.tetmesh import TetMesh
@@ -28,7 +28,6 @@ from render.snapping import touched_surface
 
 NEAR_M, AWAY_M = 0.5e-3, 1e-3
 """Of the tip's surface from the object: where a world begins, and where it ends."""
-DOCUMENTED, BEST = "documented", "best"
 MOST_FRICTION = 10.0
 """Instead of a tip that sticks for ever, where friction is a number."""
 
@@ -161,7 +160,7 @@ def changed(settings: Any, text: str) -> Any:
     """The settings with KEY=VALUE words over them; raises OptionError for what is not there or no number."""
     known = {f.name for f in dataclasses.fields(settings)}
     flag, values = "--simulator-set", {}
-    for key, value in pairs(filter(None, (w.strip() for w in text.split(","))), flag, "edge_radii=0.5"):
+    for key, value in pairs(words_of(text), flag, "edge_radii=0.5"):
         if key not in known:
             raise OptionError(f"{flag} {key}={value}: allowed are {', '.join(sorted(known))}")
         values[key] = number(flag, key, value)

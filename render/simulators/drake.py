@@ -14,7 +14,8 @@ import numpy as np
 
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, DOCUMENTED, SteppedAdapter, SteppedWorld, World, made
+from render.options import BEST, DOCUMENTED
+from render.simulators.base import SteppedAdapter, SteppedWorld, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model

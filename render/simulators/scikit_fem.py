@@ -19,7 +19,8 @@ from mechanics import pardiso
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from mechanics.tetmesh import TetMesh
-from render.simulators.base import BEST, DOCUMENTED, Adapter, World, made
+from render.options import BEST, DOCUMENTED
+from render.simulators.base import Adapter, World, made
 
 if TYPE_CHECKING:
     from mechanics.model import Model
