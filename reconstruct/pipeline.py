@@ -34,7 +34,7 @@ from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
-from reconstruct.steps.s3_contacts.straightened import straightened
+from reconstruct.steps.s3_contacts.straightened import laid
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.background import BackgroundMesher
@@ -147,9 +147,7 @@ def _reconstructed(
     least = options.contact.least_palpations
     exploration, kept = on_surface(exploration, where.points, where.normals, least)
     where = where.of(kept)
-    presses = exploration.presses.on_surface(where.points, where.normals)
-    if geometry.slab_m or geometry.half_space:
-        presses = straightened(presses)
+    presses = laid(exploration.presses, where.points, where.normals, geometry.kind)
     curves = profiles(presses, options.filter.cutoff_hz)
     one_d = method.fit_one_d(curves, exploration.noise_n)
     clock.lap("1D models")
