@@ -77,7 +77,7 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
             uncertainty_m=np.full(len(vertices), local),
             support_point=foot,
             support_normal=up,
-            method="half-space" if options.half_space else "slab",
+            method=options.kind,
             reason=f"{words}, {how}; first touches lie {1e3 * rms:.2f} mm rms off it",
         ),
         local_sd_m=local,
@@ -87,7 +87,7 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
         base=base_of_rim(foot_rim(vertices, triangles, foot, up), foot, up, radius),
         residual_m=residual,
         about={
-            "kind": "half-space" if options.half_space else "slab",
+            "kind": options.kind,
             "pose": options.pose,
             "thickness_m": thickness,
             "residual_rms_m": rms,
