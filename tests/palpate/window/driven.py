@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate.window.frames import Frame
+from palpate.window.guide import Guide
 from palpate.window.window import TouchWindow
 
 from ...support.waiting import PATIENCE_S
@@ -83,10 +84,12 @@ class Driven:
             self.interactor.InvokeEvent(f"MouseWheel{'Forward' if steps > 0 else 'Backward'}Event")
         self.interactor.SetControlKey(0)
 
-    def key(self, symbol: str) -> None:
+    def key(self, symbol: str, *, wait: bool = True) -> None:
+        """wait: for what it sets off."""
         self.interactor.SetKeySym(symbol)
         self.interactor.InvokeEvent("KeyPressEvent")
-        self.session.worker.wait()
+        if wait:
+            self.session.worker.wait()
 
     def until(self, condition: Callable[[Frame], bool]) -> Frame:
         """Frames go by until `condition(frame)`; a frame that never comes fails the test."""
@@ -188,3 +191,18 @@ def along_the_foot(driven: Driven, side: np.ndarray) -> None:
         share = (driven.wait(0.01).time_s - start) / duration
     driven.button(False)
     driven.wait(0.4)
+
+
+def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
+    """One press where and as deep as it is suggested, seen from outside; waits for the next suggestion."""
+    s, made = guide.suggestion, guide.state.made
+    if np.hypot(*s.normal[:2]) > 0.15:
+        driven.look_from(float(np.arctan2(s.normal[1], s.normal[0])))
+    driven.look_down(float(np.clip(np.arcsin(s.normal[2]), 0.3, 1.2)))
+    driven.window.pointer.go_deep(1e3 * s.depth_m)
+    driven.mouse_at(s.point)
+    driven.wait(1.5)
+    driven.button(True)
+    driven.wait(s.depth_m / 0.02 + 0.8)
+    driven.button(False)
+    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy)
