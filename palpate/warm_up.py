@@ -23,13 +23,15 @@ from palpate.child import end_with_parent, module_command, module_environment
 
 BESIDE_ONE_ANOTHER = (("renderer", "replay"), ("tick", "spring-damper model"))
 """Stages by process: about the same work for each."""
+OF_A_TOUCH, OF_ITS_SERVO = (("renderer",),), ("tick", "spring-damper model")
+"""The same for a touch alone, whose servo process compiles its part itself before it is told what to do."""
 _SIZE_M, _TIP_RADIUS_M = 0.012, 0.005
 
 
 @contextmanager
-def warming_up() -> Iterator[Callable[[], object]]:
+def warming_up(processes_of: Sequence[Sequence[str]] = BESIDE_ONE_ANOTHER) -> Iterator[Callable[[], object]]:
     """What waits for the compiling processes, which are started at once and ended with the block where they
-    still run then; nothing is started where these kernels are compiled."""
+    still run then; nothing is started where these kernels are compiled. processes_of: stages by process."""
     processes = [
         subprocess.Popen(
             module_command("palpate.warm_up", *stages),
@@ -38,7 +40,7 @@ def warming_up() -> Iterator[Callable[[], object]]:
             stderr=subprocess.DEVNULL,
             env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
         )
-        for stages in BESIDE_ONE_ANOTHER
+        for stages in processes_of
         if not _done(stages)
     ]
     try:

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._flags import vector
+from palpate.operations._run import say_next
 from palpate.operations._shared import (
     MeshFileOptions,
     given_model,
@@ -84,6 +85,7 @@ def _answer(curve: Curve, asked: PressOperands, out: Output) -> int:
             f"{'differs' if code else 'agrees'}: greatest difference {worst:.4g} N at {when:.4g} s, "
             f"allowed {asked.tolerance:g} N"
         )
+    say_next(curve, out)
     out.json(figures)
     return code
 

@@ -47,6 +47,7 @@ _KINDS: dict[str, str | ModuleType] = {
     "diagnose.compare.before_after.Changes": "changes",
     "diagnose.verdict.result.Diagnosis": "diagnosis",
     "diagnose.simulated.result.SimulatedGap": "simulated",
+    "diagnose.explore.explored.Explored": "exploration",
     "diagnose.specimen.result.Material": "material",
     "scenes.laboratory.simulate.Simulation": "simulation",
     "palpate.importing.imported.Imported": "imported",

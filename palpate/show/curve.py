@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import OptionError
+from palpate.show.page import file_words
 from render.base import Renderer
 from render.force_error import said
 from render.press import Curve
@@ -28,6 +29,17 @@ def lines(result: Curve) -> list[str]:
         f"on the tool is ({force}) N",
         f"  the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s",
         *([f"  {words}"] if (words := said(result.error_figures)) else []),
+    ]
+
+
+def next_steps(result: Curve) -> list[str]:
+    """What to do with a model's curve; nothing with one that was read."""
+    if result.renderer is None:
+        return []
+    model = file_words(result.renderer.model.path, "MODEL")
+    return [
+        f"feel it: `palpate touch {model}`",
+        "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`",
     ]
 
 

@@ -23,6 +23,7 @@ from mechanics.compliance import load_or_condense
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
+from palpate.servo.started import StartedServo
 from palpate.window.frames import Frame, View
 from palpate.window.inclusion import InclusionMover
 from palpate.window.recording import SessionRecording
@@ -69,6 +70,7 @@ class TouchSession:
         device: DeviceChoice | str = "simulated",
         mapping: Mapping | None = None,
         options: SessionOptions | None = None,
+        started: StartedServo | None = None,
     ) -> None:
         asked = options or SessionOptions()
         self.model = model
@@ -93,20 +95,24 @@ class TouchSession:
             mapping=mapping,
             options=asked.servo,
             render_options=self._options,
+            started=started,
         )
         self._renderers: dict[str, Renderer] = {}
         self._inclusion = InclusionMover(model)
         self._next = 0
 
-    def start(self, progress: Progress = silent) -> Self:
-        """Spawn the servo, load the renderers that draw, begin to record where asked; force stays off."""
+    def start(self, progress: Progress = silent, *, compiled: Callable[[], object] = lambda: None) -> Self:
+        """Spawn the servo, load the renderers that draw, begin to record where asked; force stays off.
+
+        compiled: see Servo.start.
+        """
         drawn = ({self._servo.renderer} if self._pictures else set()) | ({self._beside_name} - {""})
         if "fem" in {self._servo.renderer, *drawn}:
             # once, before two processes ask for it at the same time
             load_or_condense(self.model, lambda stage, share: progress(stage, 0.5 * share))
         with ThreadPoolExecutor(1) as pool:
             loading = {name: pool.submit(self._create, name) for name in sorted(drawn)}
-            self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share))
+            self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share), compiled=compiled)
             self._renderers = {name: job.result() for name, job in loading.items()}
         for renderer in self._renderers.values():
             with_own_stiffness(renderer)
