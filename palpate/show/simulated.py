@@ -43,6 +43,7 @@ STATED = {
 WORDS = {
     "share": "share",
     "never_felt": "of it never felt at all",
+    "from_depth_m": "from a depth of",
     "ratio": "stiffness of the mesh, times what it should be",
     "ratio_softest_place": "at the softest place, times",
     "ratio_stiffest_place": "at the stiffest place, times",
