@@ -47,6 +47,7 @@ if TYPE_CHECKING:
 
 POLL_S = 0.1
 DEFAULT = "demo"
+_NOT_RECORDED = "keep the touch, for reconstruct, compare and diagnose: --record REC.csv.gz"
 
 
 @dataclass(frozen=True)
@@ -107,7 +108,8 @@ class Touched:
 
 def _answer(touched: Touched | None, asked: TouchOperands, out: Output) -> int:
     if touched is not None:
-        out.say(*touched.lines())
+        follows = f"see what it holds: palpate check {touched.record}" if touched.record else _NOT_RECORDED
+        out.say(*touched.lines(), f"next: {follows}")
         out.json({"scene": touched.scene.name, "device": touched.device, "servo": touched.report.as_dict()})
         if touched.failure:
             raise DeviceError(touched.failure)

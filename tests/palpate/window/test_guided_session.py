@@ -54,3 +54,8 @@ def test_a_guided_person_knows_the_object_after_a_dozen_presses(block: Model, tm
     assert low < block.material.young_modulus_pa < high
     model = reconstruct(read_recording(tmp_path / "guided.csv.gz"))
     assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.1)
+    result = explorer.explored(str(tmp_path / "guided.csv.gz"))
+    page = result.report(tmp_path / "page.html").read_text()
+    assert "What to do next: make a model of it" in page and '<section class="view3d"' in page
+    # the presses' reasons stand in it, and the last step knows what the state says
+    assert all(step.asked is not None and step.asked.why.split("'")[0] in page for step in result.steps[-3:])
