@@ -84,7 +84,7 @@ def attribute(
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
-        if search.sideways_off(current):
+        if search.forward.measured and search.sideways_off(current):
             passing = _not_blind_to_slip(search, passing)
         known = [scores[n] for n in sorted(seen) if n in scores]
         passing = [s for s in known if s.size_n > search.smallest_n] or passing

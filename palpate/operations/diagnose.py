@@ -229,7 +229,8 @@ def _simulation(
     # what the adapter gave it, but for what is said
     stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
     own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
-    return Asked(forces, stated, own_clock, ran.adapter.version, ran.adapter.advice, ran.said)
+    of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
+    return Asked(forces, stated, own_clock, *of_adapter)
 
 
 def _forces(asked: DiagnoseOperands) -> Any:

@@ -43,6 +43,7 @@ STATED = {
 WORDS = {
     "share": "share",
     "never_felt": "of it never felt at all",
+    "from_depth_m": "from a depth of",
     "effective_radius_m": "no contact is smaller than a patch of radius",
     "late_m": "and met late by",
     "stiffness_n_per_m": "stiffness of the contact",

@@ -181,7 +181,7 @@ class Controls:
 
     def _in_plane(self, renderer: vtkRenderer, centre: np.ndarray, x: int, y: int) -> np.ndarray:
         """(3,) m, the point under a pixel as far from the eye as `centre`."""
-        renderer.SetWorldPoint(*centre, 1.0)
+        renderer.SetWorldPoint(*_triple(centre), 1.0)
         renderer.WorldToDisplay()
         return unproject(renderer, x, y, renderer.GetDisplayPoint()[2])
 

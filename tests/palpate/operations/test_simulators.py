@@ -3,7 +3,7 @@
 import pytest
 
 from mechanics.errors import OptionError
-from palpate.operations._simulators import mended
+from palpate.operations._simulators import mended, told
 
 
 def test_what_mends_goes_on_top_of_what_was_asked():
@@ -12,3 +12,8 @@ def test_what_mends_goes_on_top_of_what_was_asked():
     assert mended("best", "", "solref_s=0.004") == ("best", "solref_s=0.004")
     with pytest.raises(OptionError, match="--mended 'better' must be KEY=VALUE"):
         mended("best", "", "better")
+
+
+def test_a_long_run_says_how_long_and_what_fewer_presses_take():
+    assert told(1200.0, 12) == "about 20 min in all; --presses 6 takes 10"
+    assert told(30.0, 12) == "about 0.5 min in all" and "--presses" not in told(1200.0, 6)
