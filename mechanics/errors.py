@@ -8,6 +8,10 @@ class PalpateError(Exception):
     """Base of every error that a user can mend; the command line prints it and exits with 2."""
 
 
+class PalpateWarning(UserWarning):
+    """Something is not as it should be, and the work goes on; the command line prints it in one line."""
+
+
 class FileError(PalpateError, OSError):
     """A file or folder cannot be opened or written, or would be replaced by something of another kind."""
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import warnings
 from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.errors import SurfaceError
+from mechanics.errors import PalpateWarning, SurfaceError
 from mechanics.nearest import triangle_areas
 from mechanics.surface_files import ClosedSurface
 
@@ -15,6 +16,13 @@ UPS = ("+x", "-x", "+y", "-y", "+z", "-z")
 _LOW, _FACING, _LEAST_FOOT = 0.01, 0.98, 0.01
 """Of the size: how high a foot's triangles may lie; cosine of their lean; their least share of the
 surface."""
+_POINT, _GENTLE = 0.15, 0.8
+"""A foot is a point that covers less than this share of what stands over it, where the surface beside it goes
+on as gently as this (cosine)."""
+
+
+class PointFoot(PalpateWarning):
+    """An object stands on the lowest point of a round underside."""
 
 
 @dataclass(frozen=True)
@@ -52,6 +60,13 @@ def standing(surface: ClosedSurface, up: str = "+z", sink_m: float = 0.0) -> Sta
             f"--sink {0.02 * np.ptp(vertices @ normal):.1g}"
         )
     nodes = np.unique(triangles[foot])
+    if _is_point(vertices, triangles, foot, normal):
+        warnings.warn(
+            f"'{surface.name}' stands on a point, the bottom of a round underside, and a real one settles: "
+            f"--sink {0.02 * np.ptp(vertices @ normal):.1g} cuts so many metres off flat",
+            PointFoot,
+            stacklevel=2,
+        )
     low = float((vertices[nodes] @ normal).min())
     vertices = vertices.copy()
     vertices[nodes] += np.outer(low - vertices[nodes] @ normal, normal)
@@ -81,6 +96,17 @@ def _foot(vertices: np.ndarray, triangles: np.ndarray, normal: np.ndarray) -> np
     height = vertices @ normal
     high = height[triangles].max(axis=1) - height.min()
     return (facing @ normal < -_FACING) & (high < _LOW * np.ptp(vertices, axis=0).max())
+
+
+def _is_point(vertices: np.ndarray, triangles: np.ndarray, foot: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether a foot (m,) bool is the bottom of a round underside."""
+    corners = vertices[triangles]
+    areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) @ normal / 2
+    if -areas[foot].sum() > _POINT * np.maximum(areas, 0.0).sum():
+        return False
+    beside = np.isin(triangles, np.unique(triangles[foot])).any(axis=1) & ~foot
+    whole = triangle_areas(vertices, triangles[beside])
+    return bool(-areas[beside].sum() > _GENTLE * whole.sum())
 
 
 def _share(vertices: np.ndarray, triangles: np.ndarray, chosen: np.ndarray) -> float:

@@ -130,6 +130,11 @@ class Model(Result):
             ratio = ratio * gradient_ratio(material.gradient, height)
         return ratio
 
+    @property
+    def untouched(self) -> bool:
+        """Whether nobody pressed the object: the presses were computed, as of a known shape."""
+        return self.provenance.get("method") == "scene"
+
     def fitted_to(self, presses: Presses) -> bool:
         """Whether its surface was fitted to these presses, and moves along with where they first met it."""
         return self.presses.recording == presses.recording

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +12,7 @@ from scipy.spatial import cKDTree
 from diagnose.explore.candidates import TOUCH_ERROR_M, ReachOptions
 from diagnose.explore.causes import Causes, causes_of
 from diagnose.explore.estimate import LEAST_PRESSES, Estimate, updated
+from diagnose.explore.explored import Explored, Step
 from diagnose.explore.goals import GoalOptions, GoalState
 from diagnose.explore.modulus import modulus_beside
 from diagnose.explore.segments import Instrument, Segment, check_joined, join, split
@@ -68,6 +69,8 @@ class Explorer:
         self._tests: list[float] = []
         self._causes: tuple[Causes, Weighing] | None = None
         self._beside: tuple[float, tuple[float, float]] | None = None
+        self._steps: list[Step] = []
+        self._last: Suggestion | None = None
 
     @classmethod
     def going_on(
@@ -128,6 +131,7 @@ class Explorer:
             self._trouble, self._air_hides = "", False
         except (ContactError, SurfaceError, MeshError, DiagnosisError, ModelError) as error:
             self._trouble, self._air_hides = str(error), isinstance(error, LoudAirError)
+        self._steps.append(Step(self._last, self.state))
 
     def _tested(self, before: Estimate) -> None:
         """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""
@@ -231,4 +235,12 @@ class Explorer:
         )
         if found.point is not None and self._estimate.surface is not None:
             self._asked.append(found.point)
+        self._last = found
         return found
+
+    def explored(self, path: str = "", truth: Mapping[str, Any] | None = None) -> Explored:
+        """What it came to so far. path: of the recording that holds it; truth: of a phantom."""
+        last = self._last or self.suggest()
+        return Explored(
+            path, tuple(self._steps), self.state, last, self.goals, self._estimate, truth=truth or {}
+        )

@@ -88,7 +88,7 @@ def diagnose_simulated(
     plain what the forces mean, DiagnosisError where the data cannot carry it.
     """
     options = options or DiagnoseOptions()
-    rules = attribution or AttributionOptions(most=1 if options.fast else 3)
+    rules = attribution or AttributionOptions()
     progress("forces", 0.0)
     presses = presses_on(recording, model)
     if presses.quasi_static:
@@ -245,6 +245,8 @@ def _weighed(
     touched = second - (real.ideal.force[rows] - law_at(forward, asked.stated, numerics) - given)
     end = touched - (real.full.force[rows] - real.ideal.force[rows])
     gaps = {"simulated": start, "numerics": first, "parameters": second, "touches": touched, "reality": end}
+    if weighing.gap_n(touched) ** 2 - weighing.gap_n(end) ** 2 < (rules.smallest * reality.noise_n) ** 2:
+        real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
     return _Weighed(
         asked, options.seed, options.bootstrap, reality, sides, numerics, real, wrong, weighing, gaps
     )
@@ -394,6 +396,8 @@ def _advice(w: _Weighed) -> tuple[str, ...]:
         "stated_friction": ("friction", ""),
         "stated_tip_radius": ("the tip's radius", "m"),
     }
+    if _unstated(w.asked.stated, w.numerics):
+        said.append("or stated modulus: nobody said what it was given; say it: --stated young_modulus_pa=PA")
     for p in w.wrong:
         what, unit = units[p.name]
         now = f"{p.measured:.4g} {unit}".strip() if math.isfinite(p.measured) else "infinite: the tip sticks"

@@ -116,7 +116,7 @@ def one_clock(
     together = all(
         len(t) == len(times["position"]) and np.array_equal(t, times["position"]) for t in times.values()
     )
-    rate = float(1 / np.median(np.diff(times["position"])))
+    rate = float(f"{1 / np.median(np.diff(times['position'])):.9g}")  # 1000, not 999.9999999952
     if together and said.offset_s in (None, 0, 0.0) and not said.rate_hz and rate >= LEAST_HZ:
         t = times["position"] - times["position"][0]
         return t, place.values, push.values, None if turn is None else turn.values, rate

@@ -83,6 +83,8 @@ def is_on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[
                 f"WARNING: the force grows as the tip moves along it, not against it ({sense.words}): is a "
                 f"sign wrong, or is it --force-on {other}?"
             )
+        turned = "" if said.force_on == "tool" else ": turned round"
+        notes.append(f"the force is that on the {said.force_on}, as said{turned}")
         return said.force_on == "tool", MOST_ODDS
     if not sense.sure:
         raise Unclear(
@@ -93,8 +95,8 @@ def is_on_tool(position: np.ndarray, force: np.ndarray, said: Said, notes: list[
         )
     if sense.value[0] < 0:
         notes.append(
-            "WARNING: the force grows as the tip moves along it, so it is taken as that on the object "
-            f"({sense.words}; --force-on tool if it is not)"
+            "WARNING: the force grows as the tip moves along it, so it is taken as that on the object and "
+            f"turned round ({sense.words}; --force-on tool if it is not)"
         )
     else:
         notes.append(f"the force is that on the tool ({sense.words})")

@@ -125,7 +125,7 @@ def read_mapping(path: Path | str) -> dict[str, Any]:
 @dataclass(frozen=True)
 class Column:
     """One column found: its table, its name there, factor to SI (with its sign), and the unit it was taken
-    in; assumed: nobody said the unit."""
+    in; assumed: nobody said the unit; unit_said: a person did, beside the names."""
 
     role: str
     table: Table | None
@@ -134,6 +134,7 @@ class Column:
     unit: str
     guessed: bool
     assumed: bool = False
+    unit_said: bool = False
 
     @property
     def values(self) -> np.ndarray | float:
@@ -146,7 +147,12 @@ class Column:
         if self.table is None:
             return f"{self.role} = {self.factor:g}"
         sign = "-" if self.factor < 0 else ""
-        return f"{self.role} = {sign}{self.name} [{self.unit}]" + (" (guessed)" if self.guessed else "")
+        own = unit_in(self.name, KIND[self.role]) if self.role in KIND else None
+        unit = "" if own == self.unit else f" [{self.unit}]"
+        how = "guessed" if self.guessed else "said"
+        if self.guessed and self.unit_said:
+            how = "guessed, unit said"
+        return f"{self.role} = {sign}{self.name}{unit} ({how})"
 
 
 _AXIS = {"x": ("x", "0"), "y": ("y", "1"), "z": ("z", "2")}
@@ -248,7 +254,7 @@ def _column(
     unit = plain(said.units[kind]) if kind in said.units else unit_in(name, kind)
     assumed = unit is None
     unit = unit or next(iter(SI[kind]))
-    return Column(role, table, name, sign * SI[kind][unit], unit, guessed, assumed)
+    return Column(role, table, name, sign * SI[kind][unit], unit, guessed, assumed, kind in said.units)
 
 
 def _guess(tables: Sequence[Table], role: str) -> tuple[Table, str] | None:

@@ -57,7 +57,6 @@ def write_imported(
     table = {
         "recording": about,
         "tool": {"tip_radius_m": recording.tip_radius_m},
-        "sensor": {"force_noise_std_n": recording.force_noise_std_n},
         "object": {"name": recording.object_name, **{k: v for k, v in thing.items() if k != "name"}},
         "import": {
             "files": sources,
@@ -65,6 +64,8 @@ def write_imported(
             "notes": list(understood.notes),
         },
     }
+    if recording.force_noise_std_n is not None:
+        table["sensor"] = {"force_noise_std_n": recording.force_noise_std_n}
     stem = path.name.removesuffix(".gz").removesuffix(".csv")
     with atomic_file(path.with_name(stem + ".toml"), DESCRIPTION) as temporary:
         temporary.write_text(dump_toml(table), encoding="utf-8")

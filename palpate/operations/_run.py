@@ -64,17 +64,24 @@ def answer(
         result.save(output)
         out.say(f"written: {output}")
     if page is not None:
-        out.say(f"report: {result.report(page)}")
+        out.say(report_words(result.report(page)))
     say_next(result, out)
     out.json({**(figures or {}), **result.as_json()})
     return 0
 
 
-def say_next(result: Any, out: Output) -> None:
-    """Say what to do with a result."""
+def report_words(page: Path) -> str:
+    """Where a page is; and the folder beside it, where its pictures were written as files too."""
+    folder = page.with_suffix("")
+    also = f" (its pictures as files too: {folder}{os.sep})" if any(folder.glob("*.png")) else ""
+    return f"report: {page}{also}"
+
+
+def say_next(result: Any, out: Output, **more: Any) -> None:
+    """Say what to do with a result. more: what its kind's `next_steps` takes beside."""
     from palpate.show import next_lines
 
-    out.say(*next_lines(result))
+    out.say(*next_lines(result, **more))
 
 
 def check_paths(parser: argparse.ArgumentParser, arguments: argparse.Namespace) -> None:

@@ -50,7 +50,11 @@ class CalibrateOperands:
 
 
 def _answer(result: Calibration, asked: CalibrateOperands, out: Output) -> int:
-    return answer(result, asked, out, lines=[f"written: {asked.save}"] if asked.save else [])
+    named = (
+        "" if asked.save is None else f'under [tool] in a recording\'s .toml: calibration = "{asked.save}"'
+    )
+    lines = [f"written: {asked.save}", f"next: let recordings be read by it, {named}"] if named else []
+    return answer(result, asked, out, lines=lines or ["next: keep it for recordings: --save TOOL.toml"])
 
 
 @operation(CalibrateOperands, GeometryOptions, often="shape slab_m unit", answer=_answer)

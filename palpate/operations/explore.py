@@ -13,11 +13,12 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from dataclasses import KW_ONLY, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from diagnose.explore.candidates import ReachOptions
+from diagnose.explore.explored import Explored
 from diagnose.explore.explorer import Explorer, State, Suggestion
 from diagnose.explore.goals import GoalOptions, check_goals
 from diagnose.explore.segments import Instrument
@@ -26,10 +27,12 @@ from mechanics.options import check_ranges
 from mechanics.quantities import POISSON_RATIO
 from mechanics.recording import read_recording
 from palpate.operations._declare import REQUIRED, Call, operand, operation
+from palpate.operations._run import say_next
 from palpate.operations._shared import (
     SAMPLES,
     output_operand,
     poisson_operand,
+    report_operand,
     seed_operand,
     tip_radius_operand,
 )
@@ -60,6 +63,7 @@ class ExploreOperands:
     going_on: str | None = operand(
         None, "go on with what was explored so far", flag="--continue", metavar="REC", reads=True
     )
+    report: str | None = report_operand("write the page of what was touched, what is known, and why")
     output: str = output_operand(
         "recording to write (.csv.gz, .csv), after every touch", "REC", SAMPLES, REQUIRED
     )
@@ -84,10 +88,13 @@ class ExploreOperands:
     seed: int = seed_operand()
 
 
-def _answer(figures: dict[str, Any], asked: ExploreOperands, out: Output) -> int:
+def _answer(result: Explored, asked: ExploreOperands, out: Output) -> int:
+    page = None if asked.report is None else result.report(asked.report)
     if not asked.robot:  # whose lines are all JSON
-        out.say(f"next: make a model of it: palpate reconstruct {asked.output} -o MODEL")
-    out.json({"recording": asked.output, **figures})
+        if page is not None:
+            out.say(f"report: {page}")
+        say_next(result, out)
+    out.json(result.as_json())
     return 0
 
 
@@ -100,8 +107,8 @@ def _answer(figures: dict[str, Any], asked: ExploreOperands, out: Output) -> int
     answer=_answer,
     progress=False,
 )
-def explore(asked: ExploreOperands, call: Call) -> dict[str, Any]:
-    """Explore until a goal, the limit or the robot ends it; the figures of what is known then."""
+def explore(asked: ExploreOperands, call: Call) -> Explored:
+    """Explore until a goal, the limit or the robot ends it; what was known after each touch."""
     if (asked.phantom is not None) + asked.robot + (asked.device is not None) != 1:
         raise OptionError("say who touches: one of --phantom NAME, --robot and --device NAME")
     goals, reach = call.of(GoalOptions), call.of(ReachOptions)
@@ -128,7 +135,7 @@ def _explorer(
     return made
 
 
-def _in_window(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> dict[str, Any]:
+def _in_window(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> Explored:
     from palpate.operations.touch import touch
     from palpate.window.guide import Guide
 
@@ -152,12 +159,11 @@ def _in_window(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: Re
     )
     if touched is not None:
         call.out.say(*touched.lines())
-    state = kept[-1].state
-    call.out.say(_line(kept[-1].suggest(), state))
-    return state.table()
+    call.out.say(_line(kept[-1].suggest(), kept[-1].state))
+    return kept[-1].explored(asked.output)
 
 
-def _by_robot(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> dict[str, Any]:
+def _by_robot(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> Explored:
     from palpate.robot.protocol import serve
 
     if not (asked.rate_hz > 0 and asked.tip_radius_m > 0):
@@ -170,12 +176,10 @@ def _by_robot(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: Rea
         print(line, flush=True)
 
     serve(explorer, sys.stdin, tell, lambda e: e.save(asked.output))
-    return explorer.state.table()
+    return explorer.explored(asked.output)
 
 
-def _on_phantom(
-    asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions
-) -> dict[str, Any]:
+def _on_phantom(asked: ExploreOperands, call: Call, goals: GoalOptions, reach: ReachOptions) -> Explored:
     from palpate.robot.laboratory import LaboratoryRobot
     from scenes.laboratory.session import SimulateOptions
     from scenes.phantoms import phantom
@@ -192,7 +196,6 @@ def _on_phantom(
     )
     explorer = _explorer(asked, goals, reach, robot.instrument, thing.poisson_ratio)
     robot.made = sum(s.kind == "press" for s in explorer.segments)
-    steps: list[dict] = []
     with call.progress("explore") as tell:
         while True:
             made = explorer.state.made
@@ -201,14 +204,10 @@ def _on_phantom(
             call.out.say(_line(suggestion, explorer.state))
             if suggestion.kind == "stop":
                 break
-            state = explorer.add(robot.carry_out(suggestion))
+            explorer.add(robot.carry_out(suggestion))
             explorer.save(asked.output)
-            steps.append({"suggest": suggestion.table(), "state": state.table()})
     call.out.say(f"written to {asked.output}")
-    figures = {"steps": steps, **explorer.state.table()}
-    if robot.last is not None:
-        figures["truth"] = dict(robot.last.truth)
-    return figures
+    return explorer.explored(asked.output, None if robot.last is None else robot.last.truth)
 
 
 def _line(suggestion: Suggestion, state: State) -> str:

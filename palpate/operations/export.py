@@ -45,7 +45,8 @@ class ExportOperands:
 
 
 def _answer(notes: tuple[str, ...], asked: ExportOperands, out: Output) -> int:
-    out.say(f"written for {asked.to}: {asked.path}", *(f"  {note}" for note in notes))
+    opened = FORMATS[asked.to].opened_by.replace("`", "").format(path=asked.path)
+    out.say(f"written for {asked.to}: {asked.path}", *(f"  {note}" for note in notes), f"next: {opened}")
     out.json({"to": asked.to, "path": asked.path, "notes": list(notes)})
     return 0
 

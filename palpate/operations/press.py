@@ -10,10 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import KW_ONLY, dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING
 
+from mechanics.surface_files import is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._flags import vector
+from palpate.operations._run import say_next
 from palpate.operations._shared import (
     MeshFileOptions,
     given_model,
@@ -65,11 +68,16 @@ class PressOperands:
 def _answer(curve: Curve, asked: PressOperands, out: Output) -> int:
     """Write, compare with what is expected: 1 where the forces differ."""
     from render.press import greatest_difference, read_curve
+    from scenes.phantoms import DEFAULT_MODULUS_PA
 
     expected = read_curve(asked.expect) if asked.expect else None
     if asked.output:
         curve.save(asked.output)
-    out.say(*curve.lines(), *([f"written: {asked.output}"] if asked.output else []))
+    out.say(*curve.lines())
+    if is_surface_file(Path(str(asked.model))):
+        out.say(f"  (the file says none: {DEFAULT_MODULUS_PA:g} Pa, unless --modulus states another)")
+    if asked.output:
+        out.say(f"written: {asked.output}")
     figures, code = curve.as_json(), 0
     if expected is not None:
         worst, when = greatest_difference(curve, expected)
@@ -84,6 +92,7 @@ def _answer(curve: Curve, asked: PressOperands, out: Output) -> int:
             f"{'differs' if code else 'agrees'}: greatest difference {worst:.4g} N at {when:.4g} s, "
             f"allowed {asked.tolerance:g} N"
         )
+    say_next(curve, out, written=asked.output)
     out.json(figures)
     return code
 

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from palpate.operations._declare import Call, operand, operation
-from palpate.operations._run import say_next
+from palpate.operations._run import report_words, say_next
 from palpate.operations._shared import MODEL, recording_operand, report_operand, save_operand, seed_operand
 from palpate.operations.read_recording import read_recording
 from palpate.output import Output, progress_bar
@@ -77,7 +77,7 @@ def _answer(result: Reconstruction, asked: ReconstructOperands, out: Output) -> 
         beside = {Path(name).name: read_model(name) for name in asked.beside}
         with progress_bar("report") as tell:
             load_or_condense(result.model, tell)  # the report's object can be pressed
-        out.say(f"report: {result.report(asked.report, beside)}")
+        out.say(report_words(result.report(asked.report, beside)))
     say_next(result, out)
     out.json({"model": asked.save, **result.as_json()})
     return 1 if result.doubt else 0

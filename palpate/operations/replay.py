@@ -45,8 +45,10 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     """Feed a recorded tip path to a renderer and compare its force with the measured one.
 
     model: or a renderer that is there already. The result has t (n,) s, force_n (n, 3) N on the tool, the
-    mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. Raises OptionError.
+    mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. Raises OptionError,
+    and ContactError for a recording that lies far from the model.
     """
+    from reconstruct.placing import check_near
     from reconstruct.steps.s3_contacts.quasi_static import is_points
     from render.replay import ReplayResult, replay_error, replay_recording
 
@@ -59,6 +61,7 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         )
     with call.progress("replay") as tell:
         scene = make(tell)
+        check_near(measured, scene.model)
         forces = replay_recording(scene, measured, tell)
     error = replay_error(measured, _touched(measured, scene.model), forces)
     return ReplayResult(

@@ -43,7 +43,7 @@ class SimulateOperands:
     )
     effects: Mapping[str, float] | None = operand(
         None,
-        "an effect and its strength (repeatable; docs/howto/simulate.md says what 1 is, 0 leaves it out): "
+        "an effect and its strength (repeatable; docs/reference/strengths.md: what 1 is; 0 leaves it out): "
         f"{', '.join(REGISTRY)}",
         flag="--effect",
         metavar="NAME=STRENGTH",

@@ -33,9 +33,13 @@ from palpate.servo.orphan import end_with_parent
 from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.source import RendererSource
 from palpate.servo.tick import TickParameters, tick_arrays
+from palpate.warm_up import warm_up
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
 from render.passivity import passivity_parameters
 from render.scene import TouchScene, in_the_air, scene_of
+
+GO = "go"
+"""What follows a job once all is compiled that another process compiles for it."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +137,7 @@ class ServoProcess:
         kind = self._device.spec
         scene = self._scene(renderer, model)
         self._progress("compiling the loop", 0.95)
+        pickle.load(commands)  # GO
         program = make_program(scene, self._arrays, self._parameters())
         locked = lock_memory()
         if locked:
@@ -249,6 +254,8 @@ def main(argv: list[str]) -> int:
     signal.signal(signal.SIGTERM, end)
     signal.signal(signal.SIGINT, end)
     commands = sys.stdin.buffer
+    if argv[3:]:
+        warm_up(argv[3:])
     try:
         jobs.append(pickle.load(commands))
         ServoProcess(block, jobs[0], tell).run(commands)

@@ -64,6 +64,13 @@ class ServoReport:
     def __str__(self) -> str:
         return self.text()
 
+    def _held_back(self) -> str:
+        """Why less was sent than rendered: the two rules that acted most; '' where none did."""
+        acted = sorted((n, word) for word, n in self.reasons.items())
+        if not acted or self.peak_force_n >= _LESS * self.peak_rendered_n:
+            return ""
+        return f" (safety held the rest back: {', '.join(word for _, word in acted[:-3:-1])})"
+
     def text(self, *, sent: bool = True) -> str:
         """In lines. sent: whether there was a device to send a force to."""
         c, late = self.compute.summary(), self.lateness.summary()
@@ -72,7 +79,7 @@ class ServoReport:
             f"{self.ticks + self.missed_ticks} {self.missed_ticks} were skipped, {self.late_ticks} came late",
             f"in contact {100 * self.contact_share:.0f} % of the time; greatest force "
             f"{self.peak_rendered_n:.2f} N rendered"
-            + (f", {self.peak_force_n:.2f} N sent" if sent else "")
+            + (f", {self.peak_force_n:.2f} N sent{self._held_back()}" if sent else "")
             + f"; energy given to the hand at most {1000 * self.energy_given_back_j:.3f} mJ",
             f"one force is computed in {c['median']:.0f} µs, 999 of 1000 within {c['p99.9']:.0f}, all within "
             f"{c['max']:.0f}",
@@ -80,6 +87,10 @@ class ServoReport:
             f"within {late['max']:.0f}",
         ]
         return "\n".join([*lines, *self.words])
+
+
+_LESS = 0.9
+"""Of the rendered force: what is sent below that was held back."""
 
 
 def report(

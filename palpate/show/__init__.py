@@ -47,6 +47,7 @@ _KINDS: dict[str, str | ModuleType] = {
     "diagnose.compare.before_after.Changes": "changes",
     "diagnose.verdict.result.Diagnosis": "diagnosis",
     "diagnose.simulated.result.SimulatedGap": "simulated",
+    "diagnose.explore.explored.Explored": "exploration",
     "diagnose.specimen.result.Material": "material",
     "scenes.laboratory.simulate.Simulation": "simulation",
     "palpate.importing.imported.Imported": "imported",
@@ -94,21 +95,22 @@ def telling(result: Result) -> Callable[..., None] | None:
     return getattr(_module_of(result), "tell", None)
 
 
-def next_lines(result: Result) -> list[str]:
+def next_lines(result: Result, **more: Any) -> list[str]:
     """What a terminal says last: what to do with a result, a step a line; nothing where its module says
-    none."""
+    none. more: what its `next_steps` takes beside."""
     return [
-        f"{'next:' if k == 0 else '     '} {step.replace('`', '')}" for k, step in enumerate(steps_of(result))
+        f"{'next:' if k == 0 else '     '} {step.replace('`', '')}"
+        for k, step in enumerate(steps_of(result, **more))
     ]
 
 
-def steps_of(result: Result) -> list[str]:
+def steps_of(result: Result, **more: Any) -> list[str]:
     """What to do with a result, commands between backticks; none of one that says its own lines."""
     try:
         module = _module_of(result)
     except OptionError:
         return []
-    return getattr(module, "next_steps", lambda _: [])(result)
+    return getattr(module, "next_steps", lambda _: [])(result, **more)
 
 
 class _Presenter:

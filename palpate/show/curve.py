@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from mechanics.errors import OptionError
+from palpate.show.page import file_words
 from render.base import Renderer
 from render.force_error import said
 from render.press import Curve
@@ -23,12 +24,25 @@ def lines(result: Curve) -> list[str]:
         return [f"a curve that was read: {result.peak_force_n:.4g} N at most, {depth * 1e3:.3g} mm deep"]
     force = ", ".join(f"{round(float(f), 3) + 0.0:g}" for f in result.force_at(depth))
     normal = ", ".join(f"{round(float(v), 2) + 0.0:g}" for v in np.asarray(result.normal))
+    modulus = result.renderer.model.material.young_modulus_pa / 1e3
     return [
         f"{result.renderer.name}: {result.peak_force_n:.3g} N at most; {depth * 1e3:.3g} mm deep the force "
         f"on the tool is ({force}) N",
-        f"  the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s",
+        f"  the surface faces ({normal}) there; {len(result.t)} samples in {result.t[-1]:.3g} s; "
+        f"the object's Young's modulus is {modulus:.4g} kPa",
         *([f"  {words}"] if (words := said(result.error_figures)) else []),
     ]
+
+
+def next_steps(result: Curve, written: str | None = None) -> list[str]:
+    """What to do with a model's curve; nothing with one that was read. written: its file."""
+    if result.renderer is None:
+        return []
+    model = file_words(result.renderer.model.path, "MODEL")
+    feel = f"feel it: `palpate touch {model}`"
+    if written is None:
+        return [feel, "see whether it stays so: press with `-o CURVE.csv`, later with `--expect CURVE.csv`"]
+    return [feel, f"see later whether it stays so: the same press with `--expect {written}`"]
 
 
 def as_json(result: Curve) -> dict[str, Any]:

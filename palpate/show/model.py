@@ -28,7 +28,7 @@ def lines(result: Model) -> list[str]:
     return [
         f"Model of {result.name}: {modulus_words(result)}, Poisson's ratio {nu:g}",
         f"  {with_unit(height, 'mm', 1e3, 3)} high; "
-        f"tip radius {with_unit(result.tool.tip_radius_m, 'mm', 1e3)}; {len(result.presses)} presses; "
+        f"tip radius {with_unit(result.tool.tip_radius_m, 'mm', 1e3)}; {presses_words(result)}; "
         f"effects: {', '.join(result.effects) or 'none'}",
         f"  mesh: {len(mesh.points)} nodes, {len(mesh.tetrahedra)} tetrahedra of order {mesh.order}, "
         f"edges of {with_unit(result.mesh_size_m, 'mm', 1e3)}",
@@ -98,6 +98,11 @@ def tell(result: Model, page: Page) -> None:
     page.view(view(result), figure, "The object, and the places touched.", result)
     for line in rest:
         page.paragraph(line.strip())
+
+
+def presses_words(model: Model) -> str:
+    """How many presses it holds, and whether anybody made them: '32 virtual presses'."""
+    return f"{len(model.presses)} {'virtual ' if model.untouched else ''}presses"
 
 
 def modulus_words(model: Model) -> str:

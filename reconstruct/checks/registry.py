@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from mechanics.errors import ContactError, NoBaseError, RecordingError
-from mechanics.recording import Recording
+from mechanics.model_files import read_model
+from mechanics.recording import Recording, base_model_of
 from reconstruct.checks.air import air, delay
 from reconstruct.checks.channels import channels
 from reconstruct.checks.clock import clock
@@ -21,6 +22,7 @@ from reconstruct.checks.outcome import Outcome, outcome
 from reconstruct.checks.samples import Samples
 from reconstruct.checks.support import dropped, support
 from reconstruct.checks.units import QUANTITIES, measured, settled
+from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.steps.s1_filter.low_pass import FilterOptions
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
@@ -95,14 +97,23 @@ def looked_at(recording: Recording) -> tuple[tuple[Finding, ...], Seen]:
 def _with_presses(recording: Recording, samples: CheckedSamples) -> tuple[Finding, ...]:
     found = samples.found
     try:
-        exploration = explore(recording, spans=samples.spans)
+        exploration = _explored(recording, samples.spans)
     except NoBaseError as error:
-        if recording.base_model is not None:
-            return found
         return ordered([*found, _refused(recording, "no base", error)])
     except ContactError as error:
         return ordered([*found, _refused(recording, "no presses", error)])
     return ordered([*found, *checked_presses(exploration)])
+
+
+def _explored(recording: Recording, spans: ContactSpans | None) -> Exploration:
+    """As reconstruction finds the presses: where no base is traced, over that of the model it names."""
+    try:
+        return explore(recording, spans=spans)
+    except NoBaseError:
+        if recording.base_model is None:
+            raise
+    base = base_of_model(read_model(base_model_of(recording)), recording.tip_radius_m)
+    return explore(recording, boundary=base, spans=spans)
 
 
 Seen = tuple[tuple[str, float, float], ...]

@@ -81,6 +81,16 @@ def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world
     assert sizes[result.effects[0]] < sizes[result.effects[1]]
 
 
+def test_two_flaws_are_named_by_a_quick_diagnosis_too(world):
+    """What takes long in a diagnosis is the object's own effects: the simulator's are never cut short."""
+    t, force = world[0].t, world[3]
+    result = judged(world, np.column_stack([np.interp(t - 0.02, t, f) for f in 1.5 * force.T]))
+    assert set(result.effects) == {"mesh_stiffness", "time_step"}
+    assert result.unexplained < 0.1
+    assert "1.5 times as stiff as it should be" in "\n".join(result.lines()).replace("1.49", "1.5")
+    assert "young_modulus_pa=" in " ".join(result.advice)
+
+
 def test_a_gap_that_nothing_explains_is_said_first(world):
     """A force that no parameter makes: it comes and goes from second to second."""
     result = judged(world, world[3] * (1 + 0.8 * np.sin(2.4 * world[0].t))[:, None])

@@ -177,3 +177,31 @@ def test_the_device_of_its_page_gives_a_position_and_takes_a_force(monkeypatch):
         device.enable_force()
         device.send_force(np.array([0.0, 0.0, 1.0]))
         assert np.isfinite(device.read().position_m).all()
+    wire = module.HandleWire(module.HandleOptions())
+    wire.connect()
+    low = min(wire.exchange(None, 0.01).position_m[2] for _ in range(250))
+    assert low < -0.03, "the hand reaches the object, whose top lies 30 mm below the device's origin"
+
+
+def test_the_bench_of_that_page_moves_feels_and_unplugs(monkeypatch):
+    from types import ModuleType
+
+    module = ModuleType("devices.handle")
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    driver, bench = code_of(DOCS / "howto" / "write-a-device.md")
+    exec(compile(driver, "handle.py", "exec"), module.__dict__)
+    names = {"Bench": object}
+    exec(compile(bench, "benches.py", "exec"), names)
+    made, push = names["HandleBench"](), np.array([0.0, 0.0, 1.0])
+
+    def felt() -> bool:
+        made.device.send_force(push)
+        return bool(np.array_equal(made.felt(), push))
+
+    with made.device as device:
+        made.move([0.01, 0.0, 0.0])
+        assert eventually(lambda: device.read().position_m[0] == 0.01)
+        device.enable_force()
+        assert eventually(felt)
+        made.unplug()
+        assert eventually(lambda: not made.felt().any() and not device.read().connected)

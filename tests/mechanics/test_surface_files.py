@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
+import warnings
 from pathlib import Path
 
 import meshio
@@ -16,7 +17,7 @@ from pyvista import examples
 
 from mechanics.box_mesh import box_mesh
 from mechanics.errors import SurfaceError
-from mechanics.flat_foot import standing
+from mechanics.flat_foot import PointFoot, standing
 from mechanics.surface_files import UNITS, ClosedSurface, read_surface
 
 SIZE_MM = (60, 50, 40)
@@ -218,6 +219,17 @@ def test_an_object_without_a_foot_says_what_to_do_and_can_be_cut():
     cap = np.pi * 0.003**2 * (0.03 - 0.001)
     assert shell.volume == pytest.approx(4 / 3 * np.pi * 0.03**3 - cap, rel=0.005)
     assert cut.support_point == pytest.approx([0, 0, -0.027], abs=1e-6)
+
+
+def test_a_round_underside_is_told_to_stand_on_a_point_and_a_flat_one_is_not():
+    flat = trimesh.creation.icosphere(subdivisions=4, radius=0.03).apply_scale([1, 1, 0.5])
+    with pytest.warns(PointFoot, match="stands on a point.* --sink 0.0006"):
+        standing(surface_of(flat))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        standing(surface_of(flat), sink_m=0.002)
+        standing(surface_of(trimesh.creation.box(extents=(0.06, 0.05, 0.04))))
+        standing(surface_of(trimesh.creation.cone(0.02, 0.04)))
 
 
 def test_up_is_a_direction_of_the_file():

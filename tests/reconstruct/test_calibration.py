@@ -15,6 +15,7 @@ from mechanics.calibration import Calibration, read_calibration
 from mechanics.errors import ContactError, OptionError, RecordingError
 from mechanics.recording import read_recording, write_recording
 from mechanics.samples import delayed
+from palpate import cli
 from reconstruct.geometry.placed import nowhere
 from reconstruct.steps.s3_contacts.contacts import explore
 from scenes.embedded import embedded_recording
@@ -141,3 +142,10 @@ def test_ground_of_known_modulus_tells_gain_and_bending_together(gain, stiffness
     soft, stiff = found.interval["stiffness_n_per_m"]
     assert soft < min(stiffness, STIFFEST) <= stiff
     assert ("tool's bending" in found.about["not_told"]) == (stiffness > STIFFEST)
+
+
+def test_the_command_says_how_recordings_are_read_by_it(tmp_path, capsys):
+    plate = write_recording(tmp_path / "plate.csv.gz", on_plate(1500.0, 0.0, 0.0, np.zeros(3)))
+    assert cli.main(["calibrate", str(plate), "--rigid", "-o", str(tmp_path / "tool.toml")]) == 0
+    said = capsys.readouterr().out
+    assert "next: " in said and f'calibration = "{tmp_path / "tool.toml"}"' in said

@@ -28,7 +28,8 @@ def test_a_curve_that_was_stored_is_met_again_and_another_law_is_told(model_fold
     stored, result = str(tmp_path / "top.csv"), tmp_path / "result.json"
     assert main(["press", model_folder, *DOWN, "-o", stored]) == 0
     assert main(["press", model_folder, *DOWN, "--expect", stored, "--tolerance", "1e-6"]) == 0
-    assert "agrees" in capsys.readouterr().out
+    said = capsys.readouterr().out
+    assert "agrees" in said and "next: feel it: palpate touch" in said
     other = [*DOWN, "--dent-law", "hertz", "--expect", stored, "--tolerance", "0.01", "--json", str(result)]
     assert main(["press", model_folder, *other]) == 1
     found = json.loads(result.read_text())

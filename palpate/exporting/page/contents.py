@@ -87,7 +87,7 @@ def one_d_renderer(model: Model) -> Renderer | None:
 
 def press_word(model: Model) -> str:
     """What the model's presses are: measured, or virtual where nobody touched the object of a scene."""
-    return "virtual" if model.provenance.get("method") == "scene" else "measured"
+    return "virtual" if model.untouched else "measured"
 
 
 def about(renderer: FemRenderer, depths_m: np.ndarray) -> dict[str, Any]:

@@ -200,6 +200,7 @@ def test_the_command_says_what_is_lost_and_refuses_in_one_line(tmp_path, capsys)
     out = tmp_path / "m.inp"
     words = ["export", str(folder), "--to", "abaqus", "-o", str(out), "--json", str(tmp_path / "j.json")]
     assert cli.main(words) == 0 and out.stat().st_size > 1000
+    assert "next: solve it with Abaqus or CalculiX" in capsys.readouterr().out
     assert "not in the file: friction_slip" in json.loads((tmp_path / "j.json").read_text())["notes"]
     for bad, part in (
         (["--to", "gmsh", "-o", str(out)], "must end in .msh"),

@@ -52,7 +52,23 @@ def test_units_separator_and_decimal_comma_come_from_the_file(tmp_path, world):
     (tmp_path / "log.csv").write_text("\n".join(lines), encoding="latin-1")
     made = pp.import_table(tmp_path / "log.csv", columns={"t": "Zeit"}, tip_radius_m=TIP)
     check(made.recording, world)
-    assert "x = x (mm) [mm] (guessed)" in str(made)
+    assert "x = x (mm) (guessed)" in str(made) and "t = Zeit (ms) (said)" in str(made)
+
+
+def test_what_was_said_is_told_from_what_was_guessed_and_a_turned_force_is_told(tmp_path, world):
+    held = {"t": np.round(world["t"], 6), **dict(zip("xyz", 1e3 * world["p"].T, strict=True))}
+    np.savez(tmp_path / "log.npz", **held, fz=-world["f"][:, 2])
+    said = {"units": {"position": "mm"}, "columns": {"fz": "#5"}, "force_on": "object"}
+    made = pp.import_table(tmp_path / "log.npz", tip_radius_m=TIP, **said)
+    for words in (
+        "x = x [mm] (guessed, unit said)",
+        "fz = fz [N] (said)",
+        "on the object, as said: turned round",
+    ):
+        assert words in str(made)
+    made.save(tmp_path / "mine.csv")
+    text = (tmp_path / "mine.toml").read_text()
+    assert f"sample_rate_hz = {RATE}" in text and "[sensor]" not in text
 
 
 @pytest.mark.parametrize("form", ["{} {}", "{}_{}", "{} [{}]", "{} ({})", "{} / {}", "{}, {}"])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 
 import numpy as np
@@ -50,6 +51,32 @@ def test_replay_of_a_stiffer_object_errs_by_its_share(felt, recording):
     assert errors == pytest.approx(np.full(3, result.rmse_n), rel=0.05)
 
 
+def test_a_recording_far_from_the_model_is_refused_in_a_line(felt, recording):
+    far = dataclasses.replace(recording, position=recording.position + np.array([0.5, 0.0, 0.0]))
+    for asked in (
+        pp.replay,
+        lambda model, rec: pp.diagnose(rec, model.model),
+        lambda m, r: pp.compare(r, m.model),
+    ):
+        with pytest.raises(pp.ContactError, match=r"lies 0.4\d m from the model .*: is it in another frame"):
+            asked(felt, far)
+
+
+def test_check_counts_presses_over_the_base_that_a_model_lends(folder, recording):
+    t = np.arange(3000) / 1000.0
+    wave = np.column_stack([0.08 * np.cos(3 * t), 0.08 * np.sin(3 * t), 0.08 + 0.03 * np.sin(5 * t)])
+    force = np.concatenate([0 * wave, recording.force_on_tool])
+    lent = dataclasses.replace(
+        recording,
+        t=np.arange(len(t) + len(recording.t)) / 1000.0,
+        position=np.concatenate([wave, recording.position]),
+        force_on_tool=force + np.random.default_rng(0).normal(0, 0.01, force.shape),
+        base_model=folder,
+    )
+    checked = pp.check(lent)
+    assert [f.name for f in checked.grave] == ["no presses"] and "usable" in checked.grave[0].saw
+
+
 def test_press_by_a_name_is_press_by_a_renderer(folder, curves):
     again = pp.press(str(folder), (0, 0, 0.03), (0, 0, -2), DEPTH_M, hold_s=0.1, friction=np.inf)
     assert np.array_equal(again.force, curves[0].force)
@@ -73,6 +100,14 @@ def test_it_prints_a_few_lines_with_units(results, name):
     assert repr(results[name]) == words
     assert 1 <= len(words.splitlines()) <= 6 and max(map(len, words.splitlines())) < 160
     assert re.search(r"\d (mm|N|kPa|Hz)\b", words) and "array(" not in words
+
+
+def test_a_curve_says_its_modulus_and_names_the_file_that_was_written(curves):
+    from palpate.show import next_lines
+
+    assert "the object's Young's modulus is 30 kPa" in str(curves[0])
+    assert "--expect mine.csv" in " ".join(next_lines(curves[0], written="mine.csv"))
+    assert "-o CURVE.csv" in " ".join(next_lines(curves[0]))
 
 
 @pytest.mark.parametrize("name", ["recording", "replay", "curve"])

@@ -7,6 +7,7 @@ import threading
 import numpy as np
 
 from palpate.servo.histogram import BINS, Histogram, bin_of, count, lower_edge_ns
+from palpate.servo.report import ServoReport
 from palpate.servo.seqlock import begin_write, read_copy, write_block
 
 from ...support.waiting import eventually
@@ -71,3 +72,18 @@ def test_a_writer_that_died_half_way_is_noticed():
     version, block = np.zeros(1, dtype=np.int64), np.zeros(4)
     begin_write(version)
     assert read_copy(version, block) is None
+
+
+def test_a_report_says_what_held_back_the_force_that_was_not_sent():
+    def said(sent_n: float) -> str:
+        times, acted = (
+            Histogram(np.zeros(BINS, dtype=np.int64), 0, 0),
+            {"force is off": 3, "ramping in": 50, "limited in its rise": 9},
+        )
+        return ServoReport(100, 0.1, 1000, 0, 0, times, times, 2.5, sent_n, 0.5, 0, 0, acted).text()
+
+    assert (
+        "2.50 N rendered, 0.70 N sent (safety held the rest back: ramping in, limited in its rise)"
+        in said(0.7)
+    )
+    assert "2.45 N sent;" in said(2.45)

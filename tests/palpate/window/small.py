@@ -14,7 +14,7 @@ from mechanics.tetmesh import TetMesh
 from scenes.virtual_presses import palpate_model
 
 SIZE = np.array([0.08, 0.08, 0.04])
-CELLS = (6, 6, 3)
+CELLS = (4, 4, 2)
 
 
 def block_mesh() -> TetMesh:
@@ -46,7 +46,7 @@ def block_model(folder: Path, young_modulus_pa: float = 20e3) -> Model:
         material=Material(young_modulus_pa, 0.49, dent_law="neo-hookean"),
         support=Support(np.zeros(3), np.array([0.0, 0.0, 1.0])),
         tool=Tool(0.005),
-        mesh_size_m=0.013,
+        mesh_size_m=0.02,
         effects={"finite_strain": {}},
     )
     return read_model(write_model(folder / "block", palpate_model(model, sites=16)))

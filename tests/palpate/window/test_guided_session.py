@@ -21,24 +21,9 @@ from palpate.window.window import TouchWindow
 from reconstruct.pipeline import reconstruct
 from scenes.scene import Scene
 
-from .driven import SIDES, Driven, along_the_foot
+from .driven import SIDES, Driven, along_the_foot, as_the_ghost_says
 
 MOST = 12
-
-
-def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
-    """One press where and as deep as it is suggested, seen from outside; waits for the next suggestion."""
-    s, made = guide.suggestion, guide.state.made
-    if np.hypot(*s.normal[:2]) > 0.15:
-        driven.look_from(float(np.arctan2(s.normal[1], s.normal[0])))
-    driven.look_down(float(np.clip(np.arcsin(s.normal[2]), 0.3, 1.2)))
-    driven.window.pointer.go_deep(1e3 * s.depth_m)
-    driven.mouse_at(s.point)
-    driven.wait(1.5)
-    driven.button(True)
-    driven.wait(s.depth_m / 0.02 + 0.8)
-    driven.button(False)
-    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy)
 
 
 @pytest.mark.slow
@@ -69,3 +54,8 @@ def test_a_guided_person_knows_the_object_after_a_dozen_presses(block: Model, tm
     assert low < block.material.young_modulus_pa < high
     model = reconstruct(read_recording(tmp_path / "guided.csv.gz"))
     assert model.material.young_modulus_pa == pytest.approx(block.material.young_modulus_pa, rel=0.1)
+    result = explorer.explored(str(tmp_path / "guided.csv.gz"))
+    page = result.report(tmp_path / "page.html").read_text()
+    assert "What to do next: make a model of it" in page and '<section class="view3d"' in page
+    # the presses' reasons stand in it, and the last step knows what the state says
+    assert all(step.asked is not None and step.asked.why.split("'")[0] in page for step in result.steps[-3:])
