@@ -77,6 +77,7 @@ class ScikitFem(Adapter):
 
         super().__init__(model, options, friction)
         graded = math.isfinite(self.own.edge_radii)
+        self.presses = 12 if graded else None
         self._whole = None if graded else _Solved(self.mesh, model, round(self.own.order))
 
     def begin(self, tip: np.ndarray, radius_m: float) -> World:
