@@ -103,7 +103,24 @@ def test_what_was_named_in_vain_is_in_the_first_line():
     assert "the ideal model" not in lines(better)[0]
 
 
+def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_said():
+    way = np.concatenate([np.linspace(-0.3e-3, 0, 60)[:-1], np.linspace(0, 1e-3, 300), np.full(200, 1e-3)])
+    dent = np.concatenate([way, np.linspace(1e-3, -0.3e-3, 360)])
+    since = np.maximum(np.arange(len(dent)) - 359, 0) / 100
+    modulus = 20e3 * (1 + np.exp(-since / 0.4))
+    force = np.asarray(dent_law("sphere").force(np.maximum(dent, 0), 1.0, 0.49, RADIUS)) * modulus
+    force += 0.002 * force.max() * np.random.default_rng(2).standard_normal(len(force))
+    made = material([Curve(np.arange(len(dent)) / 100, dent, force, "one")])
+    low, high = made.young_modulus_ci95_pa
+    assert low < 20e3 < high and "creep, a late force or play" in " ".join(lines(made))
+    assert "pulls" not in made.verdict, "noise alone pulls by no more"
+    depth, measured, predicted, *_ = made.seen
+    way_in = slice(0, int(np.argmax(measured)))
+    assert np.abs(predicted - measured)[way_in].max() < 0.05 * measured.max()
+    assert depth.max() == pytest.approx(1e-3, rel=0.05)
+
+
 def test_parameters_are_written_as_people_write_them():
     assert in_words("tool_compliance", {"stiffness_n_per_m": 64e3}) == "stiffness 64 N/mm"
     words = in_words("viscoelasticity", {"g": [0.3, 0.2], "tau_s": [0.5, 20.0]})
-    assert words == "g 0.3, 0.2, tau 500 ms, 20 s"
+    assert words == "of the lasting force 0.3 fades in 500 ms, 0.2 fades in 20 s"
