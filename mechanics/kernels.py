@@ -37,7 +37,7 @@ def _values(self: TargetConfig) -> dict[str, Any]:
 
 _DEFAULTS: dict[type, dict[str, Any]] = {}
 if hasattr(TargetConfig, "values") and "_values" in getattr(TargetConfig, "__slots__", ()):
-    TargetConfig.values = _values
+    TargetConfig.values = _values  # type: ignore[method-assign]
 
 
 def kernel(function: Any) -> Any:
