@@ -120,7 +120,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     recorded = partial(_Recorded.of, resolved["recording"], resolved["model"], arguments.presses)
     # MuJoCo leaves its warnings in a file where it runs
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        for name in arguments.cases:
+        for name in () if arguments.kept else arguments.cases:
             case: Any = cache(CASES.get(name, recorded))
             _pressed(name, case, arguments.only, arguments.settings, kept)
     rows = kept.in_order()
