@@ -105,11 +105,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, help="its MODEL folder (default: reconstruct)")
     parser.add_argument("--presses", type=int, default=6, help="of the recording, over how many")
     parser.add_argument("--page", type=Path, help="write a page with a curve for each case (HTML)")
-    parser.add_argument(
-        "--work",
-        type=Path,
-        help="folder that keeps every press; all that lie there are shown, none runs twice",
-    )
+    parser.add_argument("--work", type=Path, help="folder of presses that were run: they are shown, not run")
+    parser.add_argument("--kept", action="store_true", help="run nothing, show what lies in --work")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
