@@ -214,7 +214,7 @@ def principal_curvatures(
     seen = np.einsum("nx,nx->n", facing[node], normals[place]) > np.cos(np.radians(50))
     place, node = place[seen], node[seen]
     frames = local_frames(normals)
-    z, x, y = np.einsum("nax,nx->an", frames[place], mesh.points[nodes[node]] - points[place])
+    z, x, y = np.einsum("nix,nx->in", frames[place], mesh.points[nodes[node]] - points[place])
     fit = _least_squares(
         np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1), z, place, len(points)
     )

@@ -36,6 +36,8 @@ from tools.script import script
 PICTURE = Path(__file__).parent.parent / "docs" / "images" / "guided-session.png"
 SIZE = (1600, 1000)
 """Of the window and of the picture, pixels: each moment is drawn at twice its size."""
+GOALS = GoalOptions(modulus_within=0.1, surface_within_m=0.003)
+"""Wider than what `palpate explore` asks for: a handful of presses, where that takes dozens."""
 ARCS, STEPS = 8, 40
 """Strokes round the foot, the eye behind each, and the places of a stroke."""
 BEFORE_M, STROKE_S = 0.004, 1.6
@@ -83,7 +85,7 @@ def _guided() -> Iterator[tuple[Driven, Guide]]:
         session.enable()
         servo, nu = session.servo, session.model.material.poisson_ratio
         instrument = Instrument(servo.tip_radius_m, servo.options.rate_hz, {"poisson_ratio": nu})
-        explorer = Explorer(instrument, GoalOptions(), poisson_ratio=nu)
+        explorer = Explorer(instrument, GOALS, poisson_ratio=nu)
         guide = Guide(explorer, servo, session.model, session.worker, Path(folder) / "guided.csv.gz")
         window = TouchWindow(session, scene, channel, off_screen=True, size=SIZE, guide=guide)
         yield Driven(window), guide

@@ -10,10 +10,13 @@ from scipy.integrate import trapezoid
 
 from diagnose.specimen.bench import HAND_TIP_M, Bench
 from mechanics.dent import dent_law
+from reconstruct.steps.s1_filter.low_pass import white_noise_std
 
 APPROACH_LAWS = ("hertz", "sphere", "linear", "neo-hookean")
 _BLOCKS = 8
 _SHIFTS = np.linspace(-0.1, 0.1, 41)
+_PULLS = 5.0
+"""Standard deviations of the noise that a pull must exceed: no noise reaches so far in some thousand rows."""
 
 
 @dataclass(frozen=True)
@@ -23,7 +26,8 @@ class Approach:
 
     error: dent law (and 'hunt-crossley', 'regression', 'constant') -> rms error over rms force, median of
     the curves. law: the best of the dents. modulus_pa: (c,) by it. hysteresis: share of the work that does
-    not come back (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out.
+    not come back (NaN: the curves end in a hold); pull_n: (c,) N, greatest pull on the way out, 0 where noise
+    alone reaches so far. first: law's shift of the first curve's first touch, m in a hand's size.
     """
 
     error: dict[str, float]
@@ -31,6 +35,7 @@ class Approach:
     modulus_pa: np.ndarray
     hysteresis: float
     pull_n: np.ndarray
+    first: float = 0.0
 
 
 def approach_of(bench: Bench) -> Approach:
@@ -38,14 +43,16 @@ def approach_of(bench: Bench) -> Approach:
     presses, nu = bench.model.presses, bench.model.material.poisson_ratio
     errors: dict[str, list[float]] = {}
     moduli: dict[str, list[float]] = {}
+    shifts: dict[str, list[float]] = {}
     work, pull = [], []
     for part in presses.parts:
         u, push = presses.depth[part], presses.push[part]
         top = int(np.argmax(push))
         ways = u[: top + 1], push[: top + 1]
         for name in APPROACH_LAWS:
-            error, modulus = _left_out(*ways, dent_law(name), nu)
+            error, modulus, shift = _left_out(*ways, dent_law(name), nu)
             errors.setdefault(name, []).append(error)
+            shifts.setdefault(name, []).append(shift)
             moduli.setdefault(name, []).append(modulus)
         for name, order in (("hunt-crossley", 0), ("regression", 5)):
             errors.setdefault(name, []).append(_plainly_left_out(*ways, order))
@@ -55,19 +62,21 @@ def approach_of(bench: Bench) -> Approach:
         # a curve that ends in its hold gives nothing back to be weighed
         gone = 1 + trapezoid(push[back], u[back]) / given
         work.append(gone if u[part.stop - part.start - 1] < 0.5 * u.max() else np.nan)
-        pull.append(max(0.0, -float(push[top:].min())) / bench.similarity.force)
+        pulls = -float(push[top:].min())
+        sure = pulls > _PULLS * white_noise_std(push[:, None])
+        pull.append((pulls if sure else 0.0) / bench.similarity.force)
     medians = {name: float(np.median(values)) for name, values in errors.items()}
     law = min(APPROACH_LAWS, key=lambda name: medians[name])
     own = np.array(moduli[law]) / bench.similarity.modulus
-    return Approach(medians, law, own, float(np.median(work)), np.array(pull))
+    return Approach(medians, law, own, float(np.median(work)), np.array(pull), shifts[law][0])
 
 
 def _blocks(count: int) -> np.ndarray:
     return np.minimum(np.arange(count) * _BLOCKS // max(count, 1), _BLOCKS - 1)
 
 
-def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[float, float]:
-    """(held-out rms over rms, modulus) of one way in; first touch and modulus are free."""
+def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[float, float, float]:
+    """(held-out rms over rms, modulus, shift of first touch) of one way in; the last two are free."""
     span = float(u.max())
     shapes = np.array([law.force(np.maximum(u - s * span, 0.0), 1.0, nu, HAND_TIP_M) for s in _SHIFTS])
 
@@ -81,7 +90,8 @@ def _left_out(u: np.ndarray, push: np.ndarray, law: Any, nu: float) -> tuple[flo
     for b in range(1, _BLOCKS - 1):
         k, e = fitted(block != b)
         predicted[block == b] = e * shapes[k, block == b]
-    return _relative(predicted, push, block), fitted(np.ones(len(u), dtype=bool))[1]
+    k, e = fitted(np.ones(len(u), dtype=bool))
+    return _relative(predicted, push, block), e, float(_SHIFTS[k]) * span
 
 
 def _plainly_left_out(u: np.ndarray, push: np.ndarray, order: int) -> float:

@@ -16,6 +16,7 @@ from diagnose.specimen.bench import Bench, Curve, bench_of
 from diagnose.specimen.bench_diagnosis import diagnose_bench, modulus_interval, unseen_holds
 from diagnose.specimen.result import MachineTests, Material
 from diagnose.specimen.rivals import held_out_rivals
+from diagnose.specimen.seen import seen_of_all, seen_of_few
 from diagnose.specimen.yielding import Machine, Way, machine_of, own_moduli, rigid_interval, way_of
 from diagnose.specimen.zero import bias, late_contact
 from diagnose.verdict.result import Diagnosis
@@ -208,6 +209,7 @@ def _indentation(
         unknown=(*INDENTATION_UNKNOWN, *sorted({e.name for e in effects()} - tested)),
         diagnosis=made,
         odds=tests.odds,
+        seen=seen_of_all(bench, made),
     )
 
 
@@ -244,6 +246,12 @@ def _listed(names: Sequence[str]) -> str:
     return " and ".join(n.replace("_", " ") for n in names)
 
 
+_WIDE = 0.1
+"""Share of the work that may stay away in a solid whose modulus is one number."""
+_LOOP = (
+    "a loop so wide, or a force that fades while the tip rests, is creep, a late force or play: press more "
+    "slowly and hold to tell them; a slow press may be as much softer as the interval says"
+)
 _ALIKE = 1.1
 """The interval of a few curves covers laws that miss at most so many times what the best misses."""
 
@@ -286,6 +294,9 @@ def _few(
     nu = bench.model.material.poisson_ratio
     if len(ways) > 1 or np.isfinite(approach.hysteresis):
         machine = machine_of(ways, nu, tests.tip_radius_m, float(np.median(own)))
+    lost = approach.hysteresis if approach.hysteresis > _WIDE else 0.0
+    if lost:
+        notes.append(_LOOP)
     limit = _ALIKE * approach.error[approach.law]
     likely = [approach.law, *(n for n in APPROACH_LAWS if n != approach.law and approach.error[n] <= limit)]
     onset = {"onset_m": bench.onset_m[bench.used].tolist()}
@@ -295,8 +306,13 @@ def _few(
         curves=len(own),
         held_out="blocks of each way in",
         young_modulus_pa=float(own.mean()),
-        young_modulus_ci95_pa=_both(
-            float(own.mean()), own, rigid_interval(ways, nu, tests.tip_radius_m, float(own.mean()), likely)
+        young_modulus_ci95_pa=_with_loop(
+            lost,
+            _both(
+                float(own.mean()),
+                own,
+                rigid_interval(ways, nu, tests.tip_radius_m, float(own.mean()), likely),
+            ),
         ),
         law=approach.law,
         error=approach.error,
@@ -305,6 +321,7 @@ def _few(
         notes=(*notes, "fewer than 6 curves: none can be held out, so no effect of the material is named"),
         unknown=(*INDENTATION_UNKNOWN, "which effect, for want of curves"),
         odds=tests.odds,
+        seen=seen_of_few(bench, approach, None),
     )
     if machine is None:
         return common
@@ -312,9 +329,13 @@ def _few(
     return replace(
         common,
         young_modulus_pa=machine.modulus_pa,
-        young_modulus_ci95_pa=_both(
-            machine.modulus_pa, own_moduli(ways, nu, tests.tip_radius_m, machine), machine.modulus_ci95_pa
+        young_modulus_ci95_pa=_with_loop(
+            lost,
+            _both(
+                machine.modulus_pa, own_moduli(ways, nu, tests.tip_radius_m, machine), machine.modulus_ci95_pa
+            ),
         ),
+        seen=seen_of_few(bench, approach, machine),
         law=machine.law,
         error={**approach.error, "on a rigid machine": machine.rigid_error, "verdict": machine.error},
         verdict=f"the machine yields by {machine.stiffness_n_per_m / 1e3:.3g} N/mm "
@@ -323,6 +344,11 @@ def _few(
         parameters={**onset, TOOL.name: {"stiffness_n_per_m": machine.stiffness_n_per_m}},
         notes=(*common.notes, f"on a rigid machine the modulus would be {machine.rigid_modulus_pa:.4g} Pa"),
     )
+
+
+def _with_loop(lost: float, interval: tuple[float, float]) -> tuple[float, float]:
+    """The interval, Pa, of a modulus that a loop leaves open: it reaches down to what comes back."""
+    return (1 - lost) * interval[0], interval[1]
 
 
 def _force(newtons: float) -> str:

@@ -90,6 +90,11 @@ class Material(Result):
         return self.missed > self.error.get("constant", float("inf"))
 
     @property
+    def in_vain(self) -> bool:
+        """Whether what was named predicts held-out data worse than the ideal model does."""
+        return self.missed > self.error.get("ideal", float("inf"))
+
+    @property
     def beaten_by(self) -> str | None:
         """The 1D model that predicts held-out data better by more than `BETTER`, if one does."""
         limit = BETTER * self.missed

@@ -33,6 +33,7 @@ from palpate.importing.meaning import (
 from palpate.importing.sheets import SHEET_SUFFIXES, lines_of
 from palpate.importing.tables import Table, read_tables
 from palpate.importing.units import SI, without_unit
+from render.press import COLUMNS as PRESS_COLUMNS
 
 LEAST_ROWS = 8
 _HEAD = 40
@@ -143,6 +144,8 @@ def _aliases(said: SaidOfCurves) -> tuple[SaidOfCurves, tuple[int | None, int | 
 
 def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) -> _Raw:
     tables = read_tables(path)
+    if not said.columns and tuple(tables[0].columns) == PRESS_COLUMNS:
+        return _of_press(path, tables[0], notes)
     found = find_columns(tables, Said(columns=said.columns, units=said.units))
     if "t" not in found:
         raise RecordingError(
@@ -164,6 +167,24 @@ def _raw(path: Path, said: SaidOfCurves, notes: list[str], odds: list[float]) ->
     if fresh.sum() < LEAST_ROWS:
         raise RecordingError(f"'{path}' has {fresh.sum()} rows in order of time: {LEAST_ROWS} are needed")
     return _Raw(path, t[fresh], z[fresh], push[fresh], columns)
+
+
+def _of_press(path: Path, table: Table, notes: list[str]) -> _Raw:
+    """The curve of a `palpate press`, along its own line, which may lie aslant: m and N."""
+    t, *position, _ = (np.asarray(table.columns[name], float) for name in PRESS_COLUMNS[:5])
+    force = np.column_stack([table.columns[name] for name in PRESS_COLUMNS[5:]])
+    path_m = np.column_stack(position)
+    way = path_m - path_m[0]
+    farthest = way[int(np.argmax((way**2).sum(axis=1)))]
+    along = farthest / max(float(np.linalg.norm(farthest)), 1e-300)
+    notes.append(
+        "a curve of palpate press: travel and force along its line; a half-space stands for the object"
+    )
+    columns = {
+        role: Column(role, table, name, 1.0, unit, guessed=False)
+        for role, name, unit in (("t", "t", "s"), ("z", "travel", "m"), ("fz", "push", "N"))
+    }
+    return _Raw(path, t, way @ along, -force @ along, columns)
 
 
 def _one_clock(

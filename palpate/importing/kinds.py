@@ -11,6 +11,7 @@ from mechanics.surface_files import is_surface_file
 from palpate.importing.mapping import Said, find_columns
 from palpate.importing.specimens import is_chiaro, kind_of
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables
+from render.press import COLUMNS as PRESS_COLUMNS
 
 _CURVES = ("depth", "height", "load")
 
@@ -35,6 +36,9 @@ def kind_of_file(path: Path, columns: Mapping[str, str], units: Mapping[str, str
         return "curves"
     if any(role in columns for role in _CURVES):
         return "curves"
-    found = find_columns(read_tables(path), Said(columns=columns, units=units))
+    tables = read_tables(path)
+    if not columns and tuple(tables[0].columns) == PRESS_COLUMNS:
+        return "curves"
+    found = find_columns(tables, Said(columns=columns, units=units))
     sideways = [found[role] for role in ("x", "y") if found[role].table is not None]
     return "table" if sideways else "curves"

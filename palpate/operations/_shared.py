@@ -30,7 +30,9 @@ SAMPLES = "mechanics.recording:SAMPLES"
 
 
 def recording_operand(
-    default: Any = REQUIRED, words: str = "recording: .csv, .csv.gz or .toml", **more: Any
+    default: Any = REQUIRED,
+    words: str = "recording: .csv, .csv.gz, .toml, or an embedded one's name",
+    **more: Any,
 ) -> Any:
     """REC, which is read; in Python also what `read_recording` returned, or an embedded name."""
     return operand(default, words, metavar="REC", positional=True, reads=True, **more)

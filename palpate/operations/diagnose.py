@@ -1,7 +1,7 @@
 """What is wrong with a simulation: where its force leaves the measured one, which effect was left out, and
 how far the gap between them shrinks with it.
 
-REC is a recording's .csv, .csv.gz or .toml. Without --model the recording is reconstructed first. The answer
+REC is a recording, or the name of an embedded one. Without --model it is reconstructed first. The answer
 may be one effect, several, a set that the touches cannot tell apart, "none" (the gap is noise) or "unknown".
 Forces in N (root mean square in contact, at places that the fit had not seen), lengths in m, moduli in Pa.
 With --simulated FORCES.csv (t,fx,fy,fz: s, and N on the tool, along the recorded path) it is the gap of that

@@ -26,6 +26,8 @@ WORDS = {
     "noise": "what the sensor scatters by itself; no model goes below it",
     "95 %": "holds the true value 19 times of 20, on cases like those it was tested on",
     "resample": "do it again with places drawn at random, to see how far the answer moves",
+    "the paper": "Goksel, Jeon, Harders and Székely, Deformable Haptic Model Generation Through Manual "
+    "Exploration",
     "renderer": "turns tip positions into forces, a thousand times a second",
     "passivity": "the loop never gives the hand more energy than it took",
     "servo": "the process that runs the 1 kHz loop",

@@ -10,6 +10,7 @@ import numpy as np
 
 from diagnose.specimen.result import FLOORS, Material
 from mechanics.quantities import fitting_unit, quantity_words, split_key
+from palpate.show.diagnosis.words import meaning as meaning_of
 from palpate.show.page import Page, subplots
 from palpate.show.quantities import readable, softness
 
@@ -50,6 +51,8 @@ def _first(result: Material) -> str:
         )
     elif result.beaten_by is not None:
         doubts.append(f"{result.beaten_by} predicts held-out data better")
+    if result.in_vain and not result.beyond_constant:
+        doubts.append("the ideal model predicts held-out data better than with what was found")
     carried = ", which carries the modulus: NO ANSWER" if result.bound_carries else ""
     doubts += [f"{each} stands at the end of its range{carried}" for each in result.at_bound]
     return "; ".join([*doubts, result.verdict])
@@ -57,6 +60,10 @@ def _first(result: Material) -> str:
 
 def in_words(name: str, value: Any) -> str:
     """A parameter, or those of an effect, as people write them: 'stiffness 68 N/mm'."""
+    if isinstance(value, Mapping) and _fades(value):
+        parts = zip(value["g"], value["tau_s"], strict=True)
+        each = [f"{quantity_words('g', g)} fades in {quantity_words('tau_s', tau)}" for g, tau in parts]
+        return f"of the lasting force {', '.join(each)}"
     if isinstance(value, Mapping):
         return ", ".join(
             f"{split_key(key)[0].replace('_', ' ')} {in_words(key, v)}" for key, v in value.items()
@@ -66,6 +73,12 @@ def in_words(name: str, value: Any) -> str:
     if isinstance(value, bool) or not isinstance(value, int | float):
         return str(value)
     return quantity_words(name, value)
+
+
+def _fades(value: Mapping[str, Any]) -> bool:
+    """Whether these are shares of a force, each with the time in which it fades."""
+    shares, times = value.get("g"), value.get("tau_s")
+    return isinstance(shares, list) and isinstance(times, list) and len(shares) == len(times) > 0
 
 
 def report(result: Material, path: Path | str) -> Path:
@@ -84,7 +97,12 @@ def tell(result: Material, page: Page) -> None:
     page.next_steps(next_steps(result))
     figure, ax = subplots(1, 1, figsize=(8, 4))
     draw(result, ax)
-    page.figure(figure, "Measured, and by the law." if result.seen else "Error of the best of each kind.")
+    first = f"{Path(result.files[0]).name} as it was measured, and {_by(result)} over it."
+    page.figure(figure, first if result.seen else "Error of the best of each kind.")
+    for name in result.effects:
+        page.paragraph(
+            f"{name.replace('_', ' ')[:1].upper()}{name.replace('_', ' ')[1:]}: {meaning_of(name)}."
+        )
     page.heading("How far it is off")
     page.paragraph(
         f"Each way was fitted to the rest and predicts what was left out ({result.held_out}). A spring and "
@@ -146,6 +164,10 @@ def next_steps(result: Material) -> list[str]:
 _NAMED = 3
 _WAYS = {
     "verdict": "what was found",
+    "verdict, holds": "what was found, of the holds alone",
+    "ideal": "an ideal elastic material",
+    "ideal, holds": "an ideal elastic material, of the holds alone",
+    "on a rigid machine": "the best law on a machine that does not yield",
     "regression": "a regression, without mechanics",
     "constant": "one constant force",
     "kelvin-voigt": "a spring and damper (Kelvin–Voigt)",
@@ -165,6 +187,11 @@ _KILO = 1e3
 
 def _way(name: str) -> str:
     return _WAYS.get(name, name)
+
+
+def _by(result: Material) -> str:
+    """What the curve over the measured one is."""
+    return "what was found" if result.effects and result.kind == "indentation" else _way(result.law)
 
 
 def _called(name: str) -> str:
@@ -214,6 +241,6 @@ def draw(result: Material, ax: Axes) -> None:
     across, along = readable(across, [*x])
     up, both = readable(up, [*measured, *predicted])
     ax.plot(along, both[: len(measured)], ".", ms=4, color="#c1121f", label="measured")
-    ax.plot(along, both[len(measured) :], "-", lw=1, color="#1d3557", label=_way(result.law))
+    ax.plot(along, both[len(measured) :], "-", lw=1, color="#1d3557", label=_by(result))
     ax.set(xlabel=across, ylabel=up)
     ax.legend(frameon=False)

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)
 _LEGIBLE = 0.6
 """Of a picture's own width: the least at which its letters can be read; a tap on a phone shows it so."""
+_PHONE_PX = 400
+"""Across a phone: a legible picture that is wider says that a tap shows it large."""
 _MOST_COLUMNS = 3
 """Of a table that a phone shows side by side; in wider ones each row becomes a list."""
 _MOST_SVG, _MOST_PARTS = 400_000, 3000
@@ -175,7 +177,8 @@ class Page:
             f'src="data:image/png;base64,{base64.b64encode(data).decode()}">'
         )
         words = f"<figcaption>{self._terms.linked(said)}</figcaption>"
-        return f"<figure>{scrolling(drawn)}{words}{_svg(picture)}</figure>"
+        wide = ' class="wide"' if _LEGIBLE * _width(data) > _PHONE_PX else ""
+        return f"<figure{wide}>{scrolling(drawn)}{words}{_svg(picture)}</figure>"
 
 
 def scrolling(wide: str) -> str:

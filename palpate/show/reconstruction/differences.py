@@ -15,12 +15,12 @@ _PAPER_THRESHOLD_N, _PAPER_INDENTATION_M = 1.0, 0.010
 
 
 def differences(result: Reconstruction) -> list[str]:
-    """One paragraph each: touches, first touch, surface, load, law, interval, trend with height."""
+    """One paragraph each: touches, first touch, surface, load, law, interval."""
     paragraphs = [_touches(result), _surface(result), _load(result)]
     if result.modulus:
         paragraphs[1:1] = [_first_touch(result)]
         paragraphs += [_law(result.modulus)]
-    return [words for words in [*paragraphs, _trend(result)] if words]
+    return [words for words in paragraphs if words]
 
 
 def _touches(result: Reconstruction) -> str:
@@ -91,7 +91,8 @@ def _law(fit: ModulusFit) -> str:
     )
 
 
-def _trend(result: Reconstruction) -> str:
+def trend_words(result: Reconstruction) -> str:
+    """Whether stiffness and modulus go with height, in a sentence; '' where nothing can be told."""
     trends = {t.name: t for t in height_trends(result.model)}
     if "e_pa" not in trends or "k_v" not in trends:
         return ""
@@ -104,7 +105,7 @@ def _trend(result: Reconstruction) -> str:
         )
     words = f"Height. As in the paper, the 1D stiffness of presses on the side goes with height (k_V: {of_k})"
     if abs(e.change) < 0.25 * abs(k.change):
-        return f"{words} and the modulus does not, or much less ({of_e})."
+        return f"{words} and the modulus does not, or much less ({of_e}): as it should be."
     if e.pearson_p > _CHANCE:
         return f"{words}; that the modulus does so ({of_e}) cannot be told from chance."
     return f"{words}. Here the modulus does so as well ({of_e}), other than the paper's."

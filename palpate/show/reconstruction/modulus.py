@@ -86,9 +86,7 @@ def undamped_figure(models: dict[str, Model]) -> Figure:
     """Figure 4: k_V; k_C and r; k_H, one box a sample."""
     figure, axes = subplots(1, 4, figsize=(13, 3.4))
     labels = ("$k_V$ [N/m]", "$k_C$ [N/m$^r$]", "$r$", "$k_H$ [N/m$^r$]")
-    for ax, name, label, letter in zip(
-        axes, ("k_v", "k_c", "r_c", "k_h"), labels, ("a", "b", "b", "c"), strict=True
-    ):
+    for ax, name, label, letter in zip(axes, ("k_v", "k_c", "r_c", "k_h"), labels, "abcd", strict=True):
         spread(ax, [m.presses.fits[name] for m in models.values()], list(models))
         ax.set_ylabel(label)
         ax.set_title(f"({letter})", loc="left", fontsize=10)
@@ -193,10 +191,11 @@ def quality_histogram(ax: Axes, values: np.ndarray, label: str, bound: float, wo
     """Histogram of a mesh quality, its bound drawn where it lies among the values, else named."""
     ax.hist(values, bins=40, color=FORCE_COLOUR)
     most = float(values.max())
-    ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
     ax.set(xlabel=label, ylabel="count")
     if bound > 1.3 * most:
         ax.set_xlim(min(0.0, float(values.min())), 1.05 * most)
-        ax.plot([], [], " ", label="(to the right of the picture)")
+        ax.plot([], [], " ", label=f"all lie below the {word}, {bound:g}")
+    else:
+        ax.axvline(bound, color=PEAK_COLOUR, lw=1.5, label=f"{word} {bound:g}")
     ax.legend(frameon=False, fontsize=8, loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=2)
     return ax

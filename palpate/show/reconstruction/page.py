@@ -14,7 +14,7 @@ from palpate.show.model_view import local, rms_by_press, usual_colourings, view_
 from palpate.show.object3d import Colours, draw_object, draw_touched
 from palpate.show.page import Page, file_words, subplots
 from palpate.show.quantities import ERROR, MODULUS, softness
-from palpate.show.reconstruction.differences import differences
+from palpate.show.reconstruction.differences import differences, trend_words
 from palpate.show.reconstruction.exploration import exploration_figures
 from palpate.show.reconstruction.modulus import (
     depth_figure,
@@ -55,7 +55,10 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     page.save(path.with_suffix(""), figures)
     tell(result, page, figures["object"])
     page.heading("Exploration and geometry")
-    page.paragraph("From here on: the figures and tables of the paper, remade from this recording.")
+    page.paragraph(
+        "From here on: the figures and tables of the paper whose method this is, remade from this recording "
+        "(Goksel, Jeon, Harders and Székely, Deformable Haptic Model Generation Through Manual Exploration)."
+    )
     page.figure(
         figures["figure-2"], "Force magnitude, first touches (o) and peaks (+) (the paper's Figure 2)."
     )
@@ -68,8 +71,16 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
     _not_used(page, result)
     page.figure(figures["figure-mesh"], _mesh_words(result))
     page.heading("1D models")
-    page.figure(figures["figure-3d"], "Kelvin-Voigt and Hunt-Crossley parameters (the paper's Figure 3(d)).")
-    page.figure(figures["figure-4"], "Without damping; k_H at the mean exponent (the paper's Figure 4).")
+    page.figure(
+        figures["figure-3d"],
+        "A spring k and a damper b for each press: proportional to depth (Kelvin–Voigt, KV), or to a power r "
+        "of it (Hunt–Crossley, HC); a dot is a press (the paper's Figure 3(d)).",
+    )
+    page.figure(
+        figures["figure-4"],
+        "The same without the damper: (a) k_V, a spring alone; (b, c) k_C, one of a power r of depth; (d) "
+        "k_H, the same at the mean power of all presses (the paper's Figure 4).",
+    )
     one_d_table(page, result)
     page.heading("Where the parameters hold")
     page.figure(
@@ -78,6 +89,8 @@ def report(result: Reconstruction, path: Path | str, beside: dict[str, Model] | 
         "e over height on the side, relative to their means and on one scale (the paper's Figure 5).",
     )
     trends_table(page, height_trends(result.model))
+    if words := trend_words(result):
+        page.paragraph(words)
     page.heading("Modulus")
     page.figure(
         figures["figure-6"],
@@ -236,10 +249,11 @@ def _how(page: Page, result: Reconstruction) -> None:
         page.paragraph(
             f"The modulus: {fit.reason}. From place to place it differs by "
             f"{100 * fit.between:.1f} %; what is not known of the shape makes it uncertain by another "
-            f"{100 * fit.shape_error:.2f} %."
+            f"{100 * fit.shape_error:.2f} %. Which law is best was asked again of places drawn at random; "
+            "the last column says how often it was each."
         )
         page.table(
-            ["dent law", "modulus [kPa]", "left of a press [mN]", "best with places drawn at random"],
+            ["dent law", "modulus [kPa]", "not explained of a press [mN]", "best in so many draws"],
             [
                 [name, e / 1e3, f"{1e3 * misfit:.1f}", f"{100 * share:.0f} %"]
                 for name, (e, misfit, share) in fit.by_law.items()

@@ -41,8 +41,8 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
     header = [
         "sample",
         "geometry [m]",
-        "known e [kPa]",
-        "estimated e [kPa]",
+        "known modulus [kPa]",
+        "estimated modulus [kPa]",
         "95 % interval",
         "single presses [kPa]",
     ]
@@ -58,6 +58,8 @@ def table_one(result: Reconstruction, beside: dict[str, Model]) -> tuple[list[st
             name, str(shape), known, model.material.young_modulus_pa / 1e3,
             f"{low:.2f} to {high:.2f}", f"{np.nanmin(each):.1f} to {np.nanmax(each):.1f}",
         ])  # fmt: skip
+    if not any(row[1] for row in rows) and not any(row[2] == row[2] for row in rows):
+        return [header[0], *header[3:]], [[row[0], *row[3:]] for row in rows]  # nothing of them is known
     return header, rows
 
 
@@ -128,8 +130,9 @@ def trends_table(page: Page, trends: list[Trend]) -> None:
         return
     page.paragraph(
         f"Does a parameter go with the height of the {trends[0].presses} presses on the side? The stiffness "
-        "of a 1D model does, since the glued base is near; a modulus should not. A correlation is 0 where "
-        "they have nothing to do with one another, and 1 or -1 where one follows from the other."
+        "of a 1D model does, since the glued base is near; a modulus should change little: see the last "
+        "column. A correlation is 0 where they have nothing to do with one another, and 1 or -1 where one "
+        "follows from the other; even a change of 1 % may correlate well."
     )
     page.table(
         [

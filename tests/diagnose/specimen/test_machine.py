@@ -3,12 +3,14 @@ matters, and no number outside its own interval."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.material import material_of
-from diagnose.specimen.result import MachineTests
+from diagnose.specimen.result import MachineTests, Material
 from diagnose.specimen.yielding import machine_of, way_of
 from mechanics.dent import dent_law
 from palpate.show.material import as_json, in_words, lines
@@ -92,7 +94,33 @@ def test_an_answer_that_misses_more_than_a_constant_says_so_first():
     assert "NO ANSWER" in lines(made)[0] and as_json(made)["predicts"] is False
 
 
+def test_what_was_named_in_vain_is_in_the_first_line():
+    error = {"ideal": 0.39, "verdict": 0.41, "constant": 0.56, "kelvin-voigt": 0.5, "hunt-crossley": 0.5}
+    said = "tip radius explains the gap"
+    made = Material("indentation", ("a",), 6, "curves", 4e4, (3e4, 5e4), "linear", error, said)
+    assert "the ideal model predicts held-out data better than with what was found" in lines(made)[0]
+    better = dataclasses.replace(made, error={**error, "verdict": 0.38})
+    assert "the ideal model" not in lines(better)[0]
+
+
+def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_said():
+    way = np.concatenate([np.linspace(-0.3e-3, 0, 60)[:-1], np.linspace(0, 1e-3, 300), np.full(200, 1e-3)])
+    dent = np.concatenate([way, np.linspace(1e-3, -0.3e-3, 360)])
+    since = np.maximum(np.arange(len(dent)) - 359, 0) / 100
+    modulus = 20e3 * (1 + np.exp(-since / 0.4))
+    force = np.asarray(dent_law("sphere").force(np.maximum(dent, 0), 1.0, 0.49, RADIUS)) * modulus
+    force += 0.002 * force.max() * np.random.default_rng(2).standard_normal(len(force))
+    made = material([Curve(np.arange(len(dent)) / 100, dent, force, "one")])
+    low, high = made.young_modulus_ci95_pa
+    assert low < 20e3 < high and "creep, a late force or play" in " ".join(lines(made))
+    assert "pulls" not in made.verdict, "noise alone pulls by no more"
+    depth, measured, predicted, *_ = made.seen
+    way_in = slice(0, int(np.argmax(measured)))
+    assert np.abs(predicted - measured)[way_in].max() < 0.05 * measured.max()
+    assert depth.max() == pytest.approx(1e-3, rel=0.05)
+
+
 def test_parameters_are_written_as_people_write_them():
     assert in_words("tool_compliance", {"stiffness_n_per_m": 64e3}) == "stiffness 64 N/mm"
     words = in_words("viscoelasticity", {"g": [0.3, 0.2], "tau_s": [0.5, 20.0]})
-    assert words == "g 0.3, 0.2, tau 500 ms, 20 s"
+    assert words == "of the lasting force 0.3 fades in 500 ms, 0.2 fades in 20 s"

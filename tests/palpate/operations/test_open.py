@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import json
 
 import numpy as np
@@ -36,6 +37,17 @@ def test_a_machines_curve_becomes_a_material_and_a_page(tmp_path, monkeypatch, c
     assert held["odds"] >= 9 and held["result"]["young_modulus_pa"] == pytest.approx(MODULUS, rel=0.1)
     page = (tmp_path / "dent-palpate.html").read_text()
     assert "counts out of the sample" in page and page.rstrip().endswith("</html>")
+
+
+def test_a_curve_of_palpate_press_is_a_curve_whichever_way_it_went(tmp_path, curves):
+    """Of a block of 30 kPa, which is a little softer than a half-space of it, on a tip of 5 mm."""
+    turn = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]])
+    for name, way in (("down", np.eye(3)), ("aside", turn)):
+        pressed = dataclasses.replace(
+            curves[0], position=curves[0].position @ way, force=curves[0].force @ way
+        )
+        made = pp.open(pressed.save(tmp_path / f"{name}.csv"), tip_radius_m=0.005, progress=False)
+        assert made.kind == "curves" and made.result.young_modulus_pa == pytest.approx(30e3, rel=0.3)
 
 
 def test_a_robots_log_is_checked_and_what_is_grave_ends_with_1(tmp_path, monkeypatch, capsys):
