@@ -105,11 +105,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--model", type=Path, help="its MODEL folder (default: reconstruct)")
     parser.add_argument("--presses", type=int, default=6, help="of the recording, over how many")
     parser.add_argument("--page", type=Path, help="write a page with a curve for each case (HTML)")
-    parser.add_argument(
-        "--work",
-        type=Path,
-        help="folder that keeps every press; all that lie there are shown, none runs twice",
-    )
+    parser.add_argument("--work", type=Path, help="folder of presses that were run: they are shown, not run")
+    parser.add_argument("--kept", action="store_true", help="run nothing, show what lies in --work")
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
@@ -120,7 +117,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
     recorded = partial(_Recorded.of, resolved["recording"], resolved["model"], arguments.presses)
     # MuJoCo leaves its warnings in a file where it runs
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        for name in arguments.cases:
+        for name in () if arguments.kept else arguments.cases:
             case: Any = cache(CASES.get(name, recorded))
             _pressed(name, case, arguments.only, arguments.settings, kept)
     rows = kept.in_order()
@@ -132,20 +129,25 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
 
 
 def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
-    done = [r for r in rows if "failed" not in r]
+    # our own cost holds what is compiled at first
+    others = [r for r in rows if "failed" not in r and r["simulator"] != OURS]
     over = [
         Figure(f"{r['case']}, {r['simulator']}, {r['settings']}: {what} over truth", value, unit="1")
-        for r in done if r["simulator"] != OURS
+        for r in others
         for what, value in zip(r["what"], r["over"], strict=True)
     ]  # fmt: skip
     costs = []
-    for r in done:
-        words = ", ".join(filter(None, (r["case"], r["simulator"], r["settings"])))
+    for r in others:
+        words = f"{r['case']}, {r['simulator']}, {r['settings']}"
         costs.append(Figure(f"{words}: cost of the press", r["cpu_s"], unit="CPU s"))
         costs.append(Figure(f"{words}: cost a sample", 1e3 * r["cpu_s"] / r["samples"], unit="ms"))
     whole = [
-        Figure(f"all cases, {name}", sum(r["cpu_s"] for r in done if r["simulator"] == name), unit="CPU s")
-        for name in dict.fromkeys(r["simulator"] for r in done)
+        Figure(
+            f"all cases that were run, {name}",
+            sum(r["cpu_s"] for r in others if r["simulator"] == name),
+            unit="CPU s",
+        )
+        for name in dict.fromkeys(r["simulator"] for r in others)
     ]
     return [*over, *costs, *(f.at_most(LONGEST_S) for f in whole)]
 
@@ -253,7 +255,8 @@ def _said(row: dict[str, Any]) -> list[Any]:
     if "failed" in row:
         return [row["case"], row["simulator"], row["settings"], row["failed"], ""]
     over = ", ".join(f"{w} {x:.2f}" for w, x in zip(row["what"], row["over"], strict=True))
-    return [row["case"], row["simulator"], row["settings"], over, row["cpu_s"]]
+    cost = "" if row["simulator"] == OURS else f"{row['cpu_s']:.2g}"
+    return [row["case"], row["simulator"], row["settings"], over, cost]
 
 
 COLOURS = {"scikit-fem": "#2a9d8f", "mujoco": "#e76f51", "drake": "#1d3557", "newton": "#b8860b"}
@@ -287,8 +290,9 @@ def _draw(ax: Any, rows: list[dict[str, Any]]) -> None:
                 ax.plot(depth, measured[0], color="0.6", lw=3, label="measured")
             ax.plot(depth, force, color="k", lw=2, label=OURS)
             continue
-        style, label = ("--", "") if row["settings"] == DOCUMENTED else ("-", row["simulator"])
-        ax.plot(depth, force, style, lw=1.2, color=COLOURS[row["simulator"]], label=label or None)
+        style, name = "--" if row["settings"] == DOCUMENTED else "-", row["simulator"]
+        label = None if name in ax.get_legend_handles_labels()[1] else name
+        ax.plot(depth, force, style, lw=1.2, color=COLOURS[name], label=label)
     ax.set(xlabel="depth [mm]", ylabel="force [N]", xlim=(0, None))
     ax.legend(frameon=False, fontsize=8)
     ax.spines[["top", "right"]].set_visible(False)

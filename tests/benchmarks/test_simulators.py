@@ -36,7 +36,7 @@ def test_runs_at_several_times_make_one_table_and_a_page(tmp_path, monkeypatch):
         ("palpate", ""), ("scikit-fem", "documented"),
     ]  # fmt: skip
     assert any(f.what == "slab, scikit-fem, documented: 1 mm over truth" for f in found["figures"])
-    assert next(f for f in found["figures"] if f.what == "all cases, scikit-fem").met
+    assert next(f for f in found["figures"] if f.what == "all cases that were run, scikit-fem").met
     assert "scikit-fem" in (tmp_path / "p.html").read_text()
 
 

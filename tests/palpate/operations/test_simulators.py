@@ -22,8 +22,9 @@ def test_a_long_run_says_how_long_and_what_fewer_presses_take():
 
 @pytest.mark.slow
 def test_another_simulator_is_set_beside_the_models_over_every_press(folder, recording):
-    """Its modulus is fitted in each fold, as ours is: the recorded block is 1.25 times as stiff."""
+    """Linear tetrahedra of 15 mm under a tip of 5 are far off where our own law is not, on each press."""
     pytest.importorskip("skfem")
     found = pp.compare(recording, folder, renderer="scikit-fem", progress=False)
-    print(found)
-    assert 0
+    assert found.rmse_n["fem"] < found.rmse_n["scikit-fem"] < 2 * found.constant_n
+    errors = found.press_rmse_n["scikit-fem"]
+    assert len(errors) == 3 and (errors > 10 * found.press_rmse_n["fem"]).all()
