@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from benchmarks._free_air import FreeAir
-from mechanics.kernels import kernel
+from mechanics.kernels import step_kernel
 from mechanics.progress import Progress
 from render.base import State
 
@@ -24,7 +24,7 @@ class PlaneParameters(NamedTuple):
     series_compliance: np.ndarray
 
 
-@kernel
+@step_kernel
 def _kernel(parameters, state, tips):
     stiffness = parameters.stiffness[0]
     stiffness = stiffness / (1.0 + stiffness * parameters.series_compliance[0])

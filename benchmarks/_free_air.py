@@ -6,7 +6,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from mechanics.kernels import kernel
+from mechanics.kernels import step_kernel
 from render.base import State, new_state
 
 
@@ -17,7 +17,7 @@ class FreeAirParameters(NamedTuple):
     series_compliance: np.ndarray
 
 
-@kernel
+@step_kernel
 def _kernel(parameters, state, tips):
     for t in range(state.forces.shape[0]):
         for i in range(3):

@@ -8,12 +8,10 @@ metres.
 from __future__ import annotations
 
 import ast
-import importlib
 import inspect
 import textwrap
 import time
 from abc import ABC, abstractmethod
-from typing import Any
 
 import numpy as np
 
@@ -22,16 +20,17 @@ from mechanics.model import Model, Support, Tool
 from mechanics.solver import Solver
 from mechanics.tetmesh import TetMesh
 from reconstruct.steps.s7_modulus.modulus_paper import nearest_nodes
+from render.options import RenderOptions
 from render.simulators.mujoco import POISSON_LIMIT as FLEX_POISSON
 from render.simulators.mujoco import flex_xml
 
 NEAR_M = 0.009
 """Around a place: where a tip may touch, for a solver that is told of nodes."""
 SETTLE_S, TIMESTEP_S = 0.1, 0.001
-NEWTON_TIMESTEP_S, NEWTON_SWEEPS, NEWTON_STEPS = 0.005, 20, 40
+NEWTON_TIMESTEP_S, NEWTON_STEPS = 0.005, 40
 """Steps at each depth, half of them moving; three times as many change the force by 1 %."""
-NEWTON_CONTACT, NEWTON_SKIN_M = 1e5, 1e-4
-"""N/m of one contact, against some 500 N/m of the node below; and what keeps surfaces apart."""
+NEWTON_NUMBERS = f"timestep_s={NEWTON_TIMESTEP_S},sweeps=20,contact_n_per_m=1e5"
+"""One contact against some 500 N/m of the node below."""
 
 TIP_RADIUS_M = 0.005
 YOUNG_PA, POISSON = 30e3, 0.49
@@ -207,57 +206,25 @@ class Newton(Peer):
     name, made_for = "Newton", "many robots at once on a graphics card, some of what they hold soft"
 
     def __init__(self, mesh: TetMesh, young_pa: float, poisson: float, radius_m: float) -> None:
-        # typed by nobody where they are not installed, and other than they are used where they are
-        newton: Any = importlib.import_module("newton")
-        warp: Any = importlib.import_module("warp")
-        warp.config.log_level = warp.LOG_WARNING
-        nu = min(poisson, FLEX_POISSON)
-        none, upright = warp.vec3(0.0), warp.quat_identity()
-        builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
-        hard = newton.ModelBuilder.ShapeConfig(ke=NEWTON_CONTACT, kd=0.0, mu=0.5)
-        builder.add_shape_sphere(builder.add_body(is_kinematic=True), radius=radius_m, cfg=hard)
-        builder.add_soft_mesh(
-            pos=none, rot=upright, scale=1.0, vel=none, density=1000.0, particle_radius=NEWTON_SKIN_M,
-            vertices=[warp.vec3(*point) for point in mesh.points.tolist()],
-            indices=mesh.tetrahedra.ravel().tolist(),
-            k_mu=young_pa / (2 + 2 * nu), k_lambda=young_pa * nu / ((1 + nu) * (1 - 2 * nu)), k_damp=0.0,
-        )  # fmt: skip
-        for node in np.flatnonzero(mesh.fixed):
-            builder.particle_mass[node] = 0.0
-        builder.color()
-        self.model, self.radius_m = builder.finalize(device="cpu"), radius_m
-        self.model.soft_contact_ke, self.model.soft_contact_kd = NEWTON_CONTACT, 0.0
-        self.model.soft_contact_mu = 0.5
-        self.collisions = newton.CollisionPipeline(
-            self.model, soft_contact_gap=0.002, enable_rigid_soft_full_surface_contact=True
-        )
-        self.contacts = self.collisions.contacts()
-        self.solver = newton.solvers.SolverVBD(
-            self.model, iterations=NEWTON_SWEEPS, integrate_with_external_rigid_solver=True,
-            particle_enable_tile_solve=False,
-        )  # fmt: skip
-        self.seen = self.solver.observables({"contact_f"}, contacts=self.contacts)
-        self._step(self.model.state(), self.model.state(), mesh.points.max(axis=0) + 1.0)  # compiles
+        from render.simulators.newton import Newton as Adapter
 
-    def _step(self, now: Any, then: Any, tip: np.ndarray) -> np.ndarray:
-        pose = np.array([[*tip, 0.0, 0.0, 0.0, 1.0]], np.float32)
-        now.body_q.assign(pose)
-        then.body_q.assign(pose)
-        now.clear_forces()
-        self.collisions.collide(now, self.contacts)
-        self.solver.step(now, then, None, self.contacts, NEWTON_TIMESTEP_S, observables=self.seen)
-        return self.seen.contact_f.numpy()[self.contacts.rigid_contact_max :, :3].sum(axis=0)
+        low = mesh.points[mesh.fixed].mean(axis=0)
+        support = Support(low, np.array([0.0, 0.0, 1.0]))
+        model = Model(mesh, Material(young_pa, poisson), support, Tool(radius_m), mesh_size_m=0.01)
+        self.adapter = Adapter(model, RenderOptions(simulator_set=NEWTON_NUMBERS), 0.5)
+        self.radius_m = radius_m
+        far = mesh.points.max(axis=0) + 1.0
+        self.adapter.begin(far, radius_m).step(NEWTON_TIMESTEP_S, far)  # compiles
 
     def force(self, point: np.ndarray, normal: np.ndarray, depths_m: np.ndarray) -> np.ndarray:
         """The contact forces on the ball after it has rested at each depth."""
-        now, then = self.model.state(), self.model.state()
         forces, last = [], -1e-3
+        touch = self.adapter.begin(point + (self.radius_m - last) * normal, self.radius_m)
         for depth in depths_m:
             began = time.process_time()
             for k in range(NEWTON_STEPS):
                 at = last + (depth - last) * min(1.0, 2.0 * (k + 1) / NEWTON_STEPS)
-                push = self._step(now, then, point + (self.radius_m + NEWTON_SKIN_M - at) * normal)
-                now, then = then, now
+                push = touch.step(NEWTON_TIMESTEP_S, point + (self.radius_m - at) * normal)
             self.step_s += time.process_time() - began
             self.steps, last = self.steps + NEWTON_STEPS, depth
             forces.append(float(push @ normal))

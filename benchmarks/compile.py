@@ -7,6 +7,7 @@ finite-element renderer. The second finds the kernels on disk: the difference is
 from __future__ import annotations
 
 import argparse
+import gc
 import json
 import subprocess
 import sys
@@ -79,6 +80,7 @@ def _watch() -> dict[str, list[float]]:
 
 
 def _main() -> None:
+    gc.disable()  # as the processes that compile do
     kernels = _watch()
     from palpate.warm_up import block_renderer, stages
 

@@ -21,9 +21,10 @@ import palpate as pp
 from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from benchmarks.tissue_laws import BEEF, SILICONES, holds_table, pieces_of
-from diagnose.specimen.result import BETTER, FLOORS, Material
+from diagnose.specimen.result import FLOORS, Material
 from mechanics.errors import RecordingError
 from reconstruct.external.uniaxial import CEILING
+from reconstruct.steps.s7_modulus.held_out import BETTER
 
 BEEF_LAYER_M, BEEF_TIP_M = 0.0154, 0.005
 
@@ -158,7 +159,6 @@ def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
             tip_radius_m=BEEF_TIP_M,
             layer_m=BEEF_LAYER_M,
             specimens=True,
-            fast=True,
             progress=False,
         )
         yield f"{len(files)} pieces of {session}", made

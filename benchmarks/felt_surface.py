@@ -39,8 +39,7 @@ DEPTHS_M = (0.001, 0.003, 0.006)
 REACHED_M = 0.003
 """Height over the support from which a tip can touch."""
 RIM_M = 0.008
-"""Within this of a sharp edge, which is eased so that friction cannot snap over it, a place counts as at a
-rim."""
+"""Within this of a sharp edge a place counts as at a rim."""
 _AROUND_M = 0.012
 _UP = np.array([0.0, 0.0, 1.0])
 

@@ -175,7 +175,7 @@ def _kept(solve: Laboratory | OwnSolver, point: np.ndarray, normal: np.ndarray) 
 def _rendered(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, bent: bool
 ) -> tuple[np.ndarray, np.ndarray]:
-    """(places, depths) m^2: normal force over the modulus as rendered; (5, places) render.force_error."""
+    """(places, depths) m^2: normal force over the modulus as rendered; (4, places) render.force_error."""
     model = Model(
         mesh=mesh.quadratic(),
         material=Material(1e4, NU, dent_law="neo-hookean"),

@@ -4,18 +4,20 @@ half-space: a ball of 3 mm, 0.5 and 1 mm into the middle of a block of 60 x 60 x
 Hertz. sliding: the same ball at 1 mm, sticking, moved by 0.1 mm sideways, over Mindlin's 8 G a / (2 - nu).
 slab: a ball of 5 mm into a slab 6 mm thick. block, cylinder, dome: a ball of 5 mm, 1 and 2 mm into the middle
 of the top of a known shape. Of the last four the truth is this program's renderer, whose own error stands in
-the evidence of law-by-place. recording: every press of a recording, whose truth is what was measured. A block
-is no half-space, and its base is held: 1 is not quite the truth there.
+the evidence of law-by-place. recording: presses of a recording (the embedded one), spread over its places,
+whose truth is what was measured; the median of their peaks. A block is no half-space, and its base is held: 1
+is not quite the truth there.
 """
 
 from __future__ import annotations
 
 import argparse
 import contextlib
+import json
 import tempfile
 import time
-from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
@@ -26,17 +28,19 @@ from benchmarks.evidence import Figure
 from benchmarks.felt_surface import meshed
 from benchmarks.timing import table
 from mechanics.box_mesh import box_mesh
-from mechanics.errors import OptionError
 from mechanics.material import Material
 from mechanics.model import Model, Support, Tool
 from mechanics.progress import silent
 from mechanics.tetmesh import TetMesh
-from render.options import SETTINGS, RenderOptions
+from render.options import DOCUMENTED, SETTINGS, RenderOptions
 from render.registry import create, simulator_names
 from render.replay import replay
 
 YOUNG_PA, POISSON, RATE_HZ, SPEED_M_PER_S = 20e3, 0.45, 250.0, 0.02
 HOLD_S = 0.1
+OURS, RECORDING = "palpate", "recording"
+LONGEST_S = 600.0
+"""Of one simulator over all cases."""
 UP = np.array([0.0, 0.0, 1.0])
 
 
@@ -72,102 +76,173 @@ class Case:
         centre = self.top + (radius - down[:, None]) * UP + aside[:, None] * [1.0, 0.0, 0.0]
         return np.arange(len(down)) / RATE_HZ, centre, rests
 
+    def pressed(self, touched: Any, own: list[float] | None) -> dict[str, Any]:
+        """The fields of a row. own: N, our own renderer's, which are the truth where nothing else is."""
+        t, centre, rests = self.path()
+        force = replay(touched, t, centre, progress=silent)
+        found = np.array([force[k] @ UP for k in rests])
+        if self.aside_m:
+            found[-1] = -force[rests[-1]][0]
+        closed = None if self.truth_n is None else [*self.truth_n, *([self.aside_n] if self.aside_m else [])]
+        truth = np.array(next(each for each in (closed, own, found) if each is not None))
+        keep = slice(None, rests[len(self.depths_m) - 1] + 1)
+        down = self.top[2] + self.model.tool.tip_radius_m - centre[keep, 2]
+        return {
+            "what": [f"{1e3 * d:g} mm" for d in self.depths_m] + (["sideways"] if self.aside_m else []),
+            "newtons": found.tolist(),
+            "over": (found / truth).tolist(),
+            "curve": [(1e3 * down).tolist(), (force[keep] @ UP).tolist()],
+            "samples": len(t),
+        }
+
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Which simulators and cases."""
     parser.add_argument("--only", nargs="+", choices=simulator_names(), default=list(simulator_names()))
-    parser.add_argument("--cases", nargs="+", choices=tuple(CASES), default=list(CASES))
+    parser.add_argument("--cases", nargs="+", choices=(*CASES, RECORDING), default=[*CASES, RECORDING])
     parser.add_argument("--settings", nargs="+", choices=SETTINGS, default=list(SETTINGS))
     parser.add_argument("--recording", type=Path, help="whose presses are set beside the measured ones")
-    parser.add_argument("--model", type=Path, help="its MODEL folder (needed for --recording)")
+    parser.add_argument("--model", type=Path, help="its MODEL folder (default: reconstruct)")
+    parser.add_argument("--presses", type=int, default=6, help="of the recording, over how many")
     parser.add_argument("--page", type=Path, help="write a page with a curve for each case (HTML)")
+    parser.add_argument(
+        "--work",
+        type=Path,
+        help="folder that keeps every press; all that lie there are shown, none runs twice",
+    )
 
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Press with each; print newtons over truth and cost; return rows and figures."""
-    if arguments.recording is not None and arguments.model is None:
-        raise OptionError("--recording needs --model: simulators press a MODEL")
-    given = {name: getattr(arguments, name) for name in ("recording", "model", "page")}
+    given = {name: getattr(arguments, name) for name in ("recording", "model", "page", "work")}
     resolved = {name: None if path is None else path.resolve() for name, path in given.items()}
-    rows: list[dict[str, Any]] = []
+    kept = _Kept(resolved["work"])
+    recorded = partial(_Recorded.of, resolved["recording"], resolved["model"], arguments.presses)
     # MuJoCo leaves its warnings in a file where it runs
     with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-        for case in (CASES[name]() for name in arguments.cases):
-            rows += _pressed(case, arguments.only, arguments.settings)
-        recording, model = resolved["recording"], resolved["model"]
-        if recording is not None and model is not None:
-            rows += list(_recorded(recording, model, arguments))
+        for name in arguments.cases:
+            case: Any = cache(CASES.get(name, recorded))
+            _pressed(name, case, arguments.only, arguments.settings, kept)
+    rows = kept.in_order()
     header = ["case", "simulator", "settings", "newtons over truth", "cost [CPU s]"]
     print(table(header, [_said(row) for row in rows]))
     if resolved["page"] is not None:
         _write(rows, resolved["page"])
-    figures = [
+    return {"rows": [{k: v for k, v in r.items() if k != "curve"} for r in rows], "figures": _figures(rows)}
+
+
+def _figures(rows: list[dict[str, Any]]) -> list[Figure]:
+    done = [r for r in rows if "failed" not in r]
+    over = [
         Figure(f"{r['case']}, {r['simulator']}, {r['settings']}: {what} over truth", value, unit="1")
-        for r in rows if "failed" not in r and r["simulator"] != "palpate"
+        for r in done if r["simulator"] != OURS
         for what, value in zip(r["what"], r["over"], strict=True)
     ]  # fmt: skip
-    costs = [
-        Figure(f"{r['case']}, {r['simulator']}, {r['settings']}: cost of the press", r["cpu_s"], unit="CPU s")
-        for r in rows if "failed" not in r
-    ]  # fmt: skip
-    return {"rows": [{k: v for k, v in r.items() if k != "curve"} for r in rows], "figures": figures + costs}
+    costs = []
+    for r in done:
+        words = ", ".join(filter(None, (r["case"], r["simulator"], r["settings"])))
+        costs.append(Figure(f"{words}: cost of the press", r["cpu_s"], unit="CPU s"))
+        costs.append(Figure(f"{words}: cost a sample", 1e3 * r["cpu_s"] / r["samples"], unit="ms"))
+    whole = [
+        Figure(f"all cases, {name}", sum(r["cpu_s"] for r in done if r["simulator"] == name), unit="CPU s")
+        for name in dict.fromkeys(r["simulator"] for r in done)
+    ]
+    return [*over, *costs, *(f.at_most(LONGEST_S) for f in whole)]
 
 
-def _pressed(case: Case, names: list[str], settings: list[str]) -> Iterator[dict[str, Any]]:
-    """Our own renderer first, which is the truth where nothing else is."""
-    truth = (
-        None if case.truth_n is None else np.array([*case.truth_n, *([case.aside_n] if case.aside_m else [])])
-    )
-    what = [f"{1e3 * d:g} mm" for d in case.depths_m] + (["sideways"] if case.aside_m else [])
-    t, centre, rests = case.path()
-    for name, setting in [("palpate", "")] + [(n, s) for n in names for s in settings]:
-        row: dict[str, Any] = {"case": case.name, "simulator": name, "settings": setting, "what": what}
+class _Kept:
+    """Rows by case, simulator and settings, and the folder in which they lie; None: only here."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.folder = folder
+        self.rows: dict[tuple[str, str, str], dict[str, Any]] = {}
+        if folder is not None:
+            folder.mkdir(parents=True, exist_ok=True)
+            for path in sorted(folder.glob("*.json")):
+                row = json.loads(path.read_text())
+                self.rows[row["case"], row["simulator"], row["settings"]] = row
+
+    def keep(self, row: dict[str, Any]) -> dict[str, Any]:
+        """The row, kept."""
+        key = row["case"], row["simulator"], row["settings"]
+        self.rows[key] = row
+        if self.folder is not None:
+            (self.folder / f"{'_'.join(filter(None, key))}.json").write_text(json.dumps(row, default=float))
+        return row
+
+    def in_order(self) -> list[dict[str, Any]]:
+        """By case, then simulator, as they are listed."""
+        cases, names = [*CASES, RECORDING], [OURS, *simulator_names()]
+
+        def place(row: dict[str, Any]) -> tuple[int, int, int]:
+            setting = SETTINGS.index(row["settings"]) if row["settings"] else 0
+            return cases.index(row["case"]), names.index(row["simulator"]), setting
+
+        return sorted(self.rows.values(), key=place)
+
+
+def _pressed(name: str, case: Any, names: list[str], settings: list[str], kept: _Kept) -> None:
+    """Our own renderer first, which is the truth where nothing else is. case(): made where it is needed."""
+    for simulator, setting in [(OURS, "")] + [(n, s) for n in names for s in settings]:
+        if (name, simulator, setting) in kept.rows:
+            continue
+        own = kept.rows.get((name, OURS, ""), {}).get("newtons")
+        row: dict[str, Any] = {"case": name, "simulator": simulator, "settings": setting}
+        made = case()
         began = time.process_time()
         try:
-            made = create("fem" if name == "palpate" else name, case.model, _options(setting))
-            force = replay(made, t, centre, progress=silent)
+            touched = create("fem" if simulator == OURS else simulator, made.model, _options(setting))
+            found = made.pressed(touched, own)
         except Exception as error:  # a simulator's failure is a finding, not ours to hide or to die of
-            yield row | {"failed": str(error)[:80]}
+            kept.keep(row | {"failed": str(error)[:80]})
             continue
-        row["cpu_s"] = time.process_time() - began
-        found = np.array([force[k] @ UP for k in rests])
-        if case.aside_m:
-            found[-1] = -force[rests[-1]][0]
-        truth = found if truth is None else truth
-        down = case.top[2] + case.model.tool.tip_radius_m - centre[:, 2]
-        keep = slice(None, rests[len(case.depths_m) - 1] + 1)
-        curve = (1e3 * down[keep], force[keep] @ UP)
-        yield row | {"newtons": found.tolist(), "over": (found / truth).tolist(), "curve": curve}
+        kept.keep(row | {"cpu_s": time.process_time() - began} | found)
 
 
-def _recorded(path: Path, folder: Path, arguments: argparse.Namespace) -> Iterator[dict[str, Any]]:
-    """Peak force of each press over the measured one, the median over presses."""
-    from mechanics.model_files import read_model
-    from mechanics.recording import read_recording
-    from reconstruct.placing import presses_on
-    from render.replay import replay_recording
+@dataclass(frozen=True)
+class _Recorded:
+    """Presses of a recording, whose truth is what was measured."""
 
-    recording, model = read_recording(path), read_model(folder)
-    presses = presses_on(recording, model)
-    t, parts = presses.t, presses.parts
-    measured = np.linalg.norm(presses.force - presses.free_air, axis=1)
-    for name, setting in [("palpate", "")] + [(n, s) for n in arguments.only for s in arguments.settings]:
-        row: dict[str, Any] = {"case": path.name, "simulator": name, "settings": setting}
-        row["what"] = ["median of presses"]
-        began = time.process_time()
-        try:
-            made = create("fem" if name == "palpate" else name, model, _options(setting))
-            force = replay_recording(made, recording)
-        except Exception as error:  # as above
-            yield row | {"failed": str(error)[:80]}
-            continue
-        row["cpu_s"] = time.process_time() - began
-        at = np.column_stack([np.interp(t, recording.t, f) for f in force.T])
-        size = np.linalg.norm(at, axis=1)
-        ratio = [float(size[p].max() / measured[p].max()) for p in parts]
-        deepest = parts[int(np.argmax([measured[p].max() for p in parts]))]
-        curve = (1e3 * presses.depth[deepest], size[deepest])
-        yield row | {"newtons": [float(np.median(size))], "over": [float(np.median(ratio))], "curve": curve}
+    recording: Any
+    model: Model
+    presses: Any
+    chosen: np.ndarray
+
+    @classmethod
+    def of(cls, path: Path | None, folder: Path | None, most: int) -> _Recorded:
+        """The embedded recording where there is no path; reconstructed where there is no model."""
+        from diagnose.simulated.chosen import spread_out
+        from mechanics.model_files import read_model
+        from mechanics.recording import read_recording
+        from palpate.operations.reconstruct import reconstruct
+        from reconstruct.placing import presses_on
+        from scenes.embedded import embedded_recording
+
+        recording = read_recording(path or embedded_recording())
+        model = read_model(folder) if folder else reconstruct(recording, progress=False).model
+        presses = presses_on(recording, model)
+        return cls(recording, model, presses, spread_out(presses, most))
+
+    def pressed(self, touched: Any, own: list[float] | None) -> dict[str, Any]:
+        """The fields of a row."""
+        from render.replay import replay_touches
+
+        presses = self.presses
+        force = replay_touches(touched, self.recording, presses, self.chosen)
+        at = np.column_stack([np.interp(presses.t, self.recording.t, f) for f in force.T])
+        push = np.einsum("ni,ni->n", at, presses.normal[presses.press])
+        truth = presses.net.push
+        parts = [presses.parts[k] for k in np.flatnonzero(self.chosen)]
+        peaks = [(float(push[p].max()), float(truth[p].max())) for p in parts]
+        deepest = max(parts, key=lambda p: presses.travel[p, 0].max())
+        until = slice(deepest.start, deepest.start + int(np.argmax(presses.travel[deepest, 0])) + 1)
+        return {
+            "what": ["median of peaks"],
+            "newtons": [float(np.median([a for a, _ in peaks]))],
+            "over": [float(np.median([a / b for a, b in peaks]))],
+            "curve": [(1e3 * presses.travel[until, 0]).tolist(), push[until].tolist(), truth[until].tolist()],
+            "samples": int(sum(p.stop - p.start for p in parts)),
+        }
 
 
 def _options(setting: str) -> RenderOptions:
@@ -181,28 +256,42 @@ def _said(row: dict[str, Any]) -> list[Any]:
     return [row["case"], row["simulator"], row["settings"], over, row["cpu_s"]]
 
 
+COLOURS = {"scikit-fem": "#2a9d8f", "mujoco": "#e76f51", "drake": "#1d3557", "newton": "#b8860b"}
+
+
 def _write(rows: list[dict[str, Any]], path: Path) -> None:
     """A table, and the curves of every case."""
     from palpate.show.page import Page, new_figure
 
     page = Page("Simulators that press the same objects")
     page.paragraph((__doc__ or "").split("\n\n", 1)[1])
-    page.table(
-        ["case", "simulator", "settings", "newtons over truth", "cost [CPU s]"], [_said(r) for r in rows]
-    )
     for case in dict.fromkeys(row["case"] for row in rows):
+        own = [row for row in rows if row["case"] == case]
+        page.heading(case)
         figure = new_figure(7, 3.6, layout="constrained")
-        ax = figure.subplots()
-        for row in (r for r in rows if r["case"] == case and "curve" in r):
-            own = row["simulator"] == "palpate"
-            style = "-" if row["settings"] != "documented" else "--"
-            label = f"{row['simulator']} {row['settings']}".strip()
-            ax.plot(*row["curve"], style, lw=2.0 if own else 1.2, color="k" if own else None, label=label)
-        ax.set(xlabel="depth [mm]", ylabel="force [N]", title=case, xlim=(0, None))
-        ax.legend(frameon=False, fontsize=8)
-        ax.spines[["top", "right"]].set_visible(False)
-        page.figure(figure, f"{case}: force along the way in, and as it rests; dashed as documented.")
+        _draw(figure.subplots(), [row for row in own if "curve" in row])
+        page.figure(
+            figure, "Force along the way in, and as it rests; dashed as documented, solid at its best."
+        )
+        page.table(
+            ["simulator", "settings", "newtons over truth", "cost [CPU s]"], [_said(r)[1:] for r in own]
+        )
     page.write(path)
+
+
+def _draw(ax: Any, rows: list[dict[str, Any]]) -> None:
+    for row in rows:
+        depth, force, *measured = row["curve"]
+        if row["simulator"] == OURS:
+            if measured:
+                ax.plot(depth, measured[0], color="0.6", lw=3, label="measured")
+            ax.plot(depth, force, color="k", lw=2, label=OURS)
+            continue
+        style, label = ("--", "") if row["settings"] == DOCUMENTED else ("-", row["simulator"])
+        ax.plot(depth, force, style, lw=1.2, color=COLOURS[row["simulator"]], label=label or None)
+    ax.set(xlabel="depth [mm]", ylabel="force [N]", xlim=(0, None))
+    ax.legend(frameon=False, fontsize=8)
+    ax.spines[["top", "right"]].set_visible(False)
 
 
 def _model(mesh: TetMesh, radius_m: float, size_m: float) -> Model:

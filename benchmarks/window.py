@@ -56,7 +56,7 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
         window = TouchWindow(session, scene, channel, off_screen=True, size=tuple(arguments.size))
         window.plotter.show(interactive_update=True, auto_close=False)
         renderer = window.picture_renderers[0]
-        renderer.SetWorldPoint(*model.mesh.points.mean(axis=0), 1.0)
+        renderer.SetWorldPoint([*model.mesh.points.mean(axis=0).tolist(), 1.0])
         renderer.WorldToDisplay()
         window.controls.point(*(round(v) for v in renderer.GetDisplayPoint()[:2]))
         for name, down in (("in air", False), ("in a press", True)):

@@ -6,7 +6,7 @@ closure, fitted to cases of known truth (search/naming.toml).
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from scipy.special import logit
 
@@ -50,12 +50,21 @@ class AttributionOptions:
     least_of_first: float = option(
         0.25, "least size of a further effect, of the first's: no law is exact, what it leaves is no effect"
     )
-    most: int = option(3, "effects in one answer, at most")
+    most: int | None = option(None, "effects in one answer, at most; None: 3, of a quick diagnosis 1")
     z: float = option(5.0, "standard errors beyond which what free air or the support reads is no chance")
     shape_gain: float = option(
         12.0, "gain in log likelihood from which sites differ by more than their shape may"
     )
     unknown_chi: float = option(1.9, "lack of fit (whitened mean square) beyond which a remainder is unknown")
+
+    def within(self, most: int) -> AttributionOptions:
+        """The same with at most so many effects in an answer, where nothing else was asked for."""
+        return self if self.most is not None else replace(self, most=most)
+
+    @property
+    def greatest_number(self) -> int:
+        """Of effects in one answer."""
+        return 3 if self.most is None else self.most
 
     @property
     def beyond_doubt(self) -> float:

@@ -42,7 +42,8 @@ def diagnose(
     it."""
     options = options or DiagnoseOptions()
     nuisance = nuisance or NuisanceOptions()
-    rules = attribution or AttributionOptions(most=1 if options.fast else 3)
+    rules = attribution or AttributionOptions()
+    rules = rules.within(1) if options.fast else rules
     clock = Clock()
 
     progress("touches", 0.02)

@@ -8,8 +8,8 @@ class PalpateError(Exception):
     """Base of every error that a user can mend; the command line prints it and exits with 2."""
 
 
-class Noted(UserWarning):
-    """Something that a person should know of what was read; a command says it in one line."""
+class PalpateWarning(UserWarning):
+    """Something is not as it should be, and the work goes on; the command line prints it in one line."""
 
 
 class FileError(PalpateError, OSError):

@@ -23,6 +23,8 @@ from mechanics.tetmesh import TetMesh
 
 _CHUNK, _BATCH = 600, 24
 _SIX = np.triu_indices(3)
+_UNFELT, _FEW = 1e-6, 0.4
+"""Of the greatest weight: as good as none; share of the elements below which only those are summed."""
 _KNOWN = 16
 """Far fields that are remembered: a fit moves first touches many times between two changes of the object."""
 
@@ -65,7 +67,12 @@ class EnergyFields:
 
     def weighed(self, weight: np.ndarray) -> np.ndarray:
         """(q, 3, 3) 1/m, the sum of the elements' energies times weight (m,)."""
-        six = (weight.astype(np.float32) @ self._by_element).reshape(-1, 6)
+        size = np.abs(weight)
+        felt = np.flatnonzero(size > _UNFELT * size.max())
+        # a ball weighs few elements: the others are not even read
+        few = len(felt) < _FEW * len(weight)
+        own, by = (weight[felt], self._by_element[felt]) if few else (weight, self._by_element)
+        six = (own.astype(np.float32) @ by).reshape(-1, 6)
         tensor = np.empty((len(six), 3, 3), dtype=np.float32)
         tensor[:, _SIX[0], _SIX[1]] = tensor[:, _SIX[1], _SIX[0]] = six
         return tensor

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from mechanics.errors import Noted, SurfaceError
+from mechanics.errors import PalpateWarning, SurfaceError
 from mechanics.nearest import triangle_areas
 from mechanics.surface_files import ClosedSurface
 
@@ -21,7 +21,7 @@ _POINT, _GENTLE = 0.15, 0.8
 on as gently as this (cosine)."""
 
 
-class PointFoot(Noted):
+class PointFoot(PalpateWarning):
     """An object stands on the lowest point of a round underside."""
 
 

@@ -14,18 +14,39 @@ from typing import Any
 
 from numba import njit, typeof, types
 from numba.core.options import DefaultOptions
+from numba.core.targetconfig import TargetConfig
 
 from mechanics.kernel_cache import PACKAGES
 
 _OPTIONS: dict[str, Any] = {"cache": True, "error_model": "numpy"}
 if hasattr(DefaultOptions, "_nrt"):
     _OPTIONS["_nrt"] = False
-_ALONE: dict[str, Any] = {**_OPTIONS, "nogil": True, "no_cfunc_wrapper": True}
+_CALLED: dict[str, Any] = {**_OPTIONS, "no_cfunc_wrapper": True}
+_ALONE: dict[str, Any] = {**_CALLED, "nogil": True}
 _FROM_KERNELS: dict[str, Any] = {**_OPTIONS, "no_cpython_wrapper": True, "no_cfunc_wrapper": True}
 
 
+def _values(self: TargetConfig) -> dict[str, Any]:
+    """As numba's own, which asks for each option through a property: that was a tenth of all compiling, since
+    every operator is looked up by the options under which it is compiled."""
+    kind = type(self)
+    if kind not in _DEFAULTS:
+        _DEFAULTS[kind] = {name: option.default for name, option in kind.options.items()}
+    return _DEFAULTS[kind] | self._values
+
+
+_DEFAULTS: dict[type, dict[str, Any]] = {}
+if hasattr(TargetConfig, "values") and "_values" in getattr(TargetConfig, "__slots__", ()):
+    TargetConfig.values = _values
+
+
 def kernel(function: Any) -> Any:
-    """Compile a function that works on arrays in place and allocates nothing."""
+    """Compile a function that works on arrays in place and allocates nothing; Python and kernels call it."""
+    return njit(**_CALLED)(function)
+
+
+def step_kernel(function: Any) -> Any:
+    """Compile a renderer's step: a kernel of which there is a `pointer` as well."""
     return njit(**_OPTIONS)(function)
 
 
@@ -41,7 +62,7 @@ def part(function: Any) -> Any:
 
 def shared_part(function: Any) -> Any:
     """Compile a part that Python calls as well."""
-    return njit(forceinline=True, **_OPTIONS)(function)
+    return njit(forceinline=True, **_CALLED)(function)
 
 
 def inner(function: Any) -> Any:

@@ -20,7 +20,7 @@ import numpy as np
 
 from mechanics.bounds import LARGEST_N
 from mechanics.calibration import Calibration, read_calibration
-from mechanics.errors import Noted, RecordingError
+from mechanics.errors import PalpateWarning, RecordingError
 from mechanics.files import (
     Kind,
     atomic_file,
@@ -90,7 +90,7 @@ _QUICKEST_HZ = 2e4
 _RATE_FACTOR = 1.5
 
 
-class NotRead(Noted):
+class NotRead(PalpateWarning):
     """Something in a file was not read: a key that looks like one that is known, a segment of a time that was
     not recorded, rows without a number."""
 

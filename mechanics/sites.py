@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial import cKDTree
 
 from mechanics.compression import own_blocks
 from mechanics.edges import edge_correction
 from mechanics.errors import MeshError
-from mechanics.frames import tangents
+from mechanics.frames import local_frames
 from mechanics.material import Ball
 from mechanics.moduli import with_balls
 from mechanics.near_field import contact_width, sharpening
@@ -190,36 +191,48 @@ def mean_curvature(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
 ) -> np.ndarray:
     """(k,) 1/m mean of the principal curvatures at surface points, convex positive."""
-    return principal_curvatures(mesh, points, normals, tip_radius_m)[0].mean(axis=1)
+    return principal_curvatures(mesh, points, normals, tip_radius_m).mean(axis=1)
 
 
 def principal_curvatures(
     mesh: TetMesh, points: np.ndarray, normals: np.ndarray, tip_radius_m: float = USUAL_TIP_RADIUS_M
-) -> tuple[np.ndarray, np.ndarray]:
-    """(k, 2) 1/m at surface points, convex positive, the greatest first, and its unit direction (k, 3).
+) -> np.ndarray:
+    """(k, 2) 1/m at surface points, convex positive, the greatest first.
 
     Where the mesh's shape is known, means over the width of a tip's contact. Else of a paraboloid fitted to
     the nodes within 1.8 surface edges whose triangles face the normal within 50 degrees: near an edge that
     keeps the other face out. Fewer than 6 nodes count as flat.
     """
     if mesh.shape is not None:
-        return mesh.shape.curvatures(points, normals, contact_width(tip_radius_m))
+        return mesh.shape.curvatures(points, normals, contact_width(tip_radius_m))[0]
     triangles = mesh.touchable_surface[:, :3]
     nodes = np.unique(triangles)
     facing = vertex_normals(mesh.points, triangles)[nodes]
-    reach = 1.8 * typical_edge(mesh)
-    result, direction = np.zeros((len(points), 2)), np.zeros((len(points), 3))
-    for i, (point, normal) in enumerate(zip(points, normals, strict=True)):
-        u, v = tangents(normal)
-        direction[i] = u
-        offset = mesh.points[nodes] - point
-        near = (np.linalg.norm(offset, axis=1) < reach) & (facing @ normal > np.cos(np.radians(50)))
-        if near.sum() < 6:
-            continue
-        x, y, z = offset[near] @ u, offset[near] @ v, offset[near] @ normal
-        columns = np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1)
-        fit = np.linalg.lstsq(columns, z, rcond=None)[0]
-        values, axes = np.linalg.eigh(-np.array([[2 * fit[3], fit[4]], [fit[4], 2 * fit[5]]]))
-        result[i] = values[::-1]
-        direction[i] = axes[0, 1] * u + axes[1, 1] * v
-    return result, direction
+    near = cKDTree(mesh.points[nodes]).query_ball_point(points, 1.8 * typical_edge(mesh), return_sorted=True)
+    place = np.repeat(np.arange(len(points)), [len(each) for each in near])
+    node = np.concatenate([*near, []]).astype(int)
+    seen = np.einsum("nx,nx->n", facing[node], normals[place]) > np.cos(np.radians(50))
+    place, node = place[seen], node[seen]
+    frames = local_frames(normals)
+    z, x, y = np.einsum("nix,nx->in", frames[place], mesh.points[nodes[node]] - points[place])
+    fit = _least_squares(
+        np.stack([np.ones_like(x), x, y, x * x, x * y, y * y], axis=1), z, place, len(points)
+    )
+    fit[np.bincount(place, minlength=len(points)) < 6] = 0.0
+    bent = np.stack([2 * fit[:, 3], fit[:, 4], fit[:, 4], 2 * fit[:, 5]], axis=1)
+    return np.linalg.eigvalsh(-bent.reshape(-1, 2, 2))[:, ::-1]
+
+
+def _least_squares(columns: np.ndarray, values: np.ndarray, group: np.ndarray, groups: int) -> np.ndarray:
+    """(groups, c) least-squares solutions, of the least norm, of rows (n, c) and values (n,) that belong to
+    ascending groups (n,); one without rows is zero."""
+    held = np.bincount(group, minlength=groups)
+    row = np.arange(len(group)) - np.repeat(np.cumsum(held) - held, held)
+    matrix = np.zeros((groups, held.max(initial=1), columns.shape[1]))
+    matrix[group, row] = columns
+    right = np.zeros(matrix.shape[:2])
+    right[group, row] = values
+    u, s, vt = np.linalg.svd(matrix, full_matrices=False)
+    least = np.finfo(float).eps * np.maximum(held, columns.shape[1])[:, None] * s[:, :1]
+    share = np.einsum("gmc,gm->gc", u, right) * np.divide(1.0, s, out=np.zeros_like(s), where=s > least)
+    return np.einsum("gcd,gc->gd", vt, share)

@@ -89,16 +89,19 @@ class Estimate:
     """A field from presses.
 
     prior: the likeliest. gain: log likelihood by which it is likelier than places that scatter at random.
-    left_out: (s,) what each site differs from the others' prediction of it, in log modulus; scattered: (s,)
-    the same where no field is taken. level, level_sd: ln of the object's modulus, and its standard error.
+    site: (s,) numbers of the sites. left_out: (s,) what each differs from the others' prediction of it, in
+    log modulus; scattered: (s,) the same where no field is taken. foretold: (s,) ln of that prediction.
+    level, level_sd: ln of the object's modulus, and its standard error.
     field: its mean. covariance: (c, c) of ln E at its places. felt: standard deviation of ln E that the field
     says from site to site.
     """
 
     prior: Prior
     gain: float
+    site: np.ndarray
     left_out: np.ndarray
     scattered: np.ndarray
+    foretold: np.ndarray
     level: float
     level_sd: float
     field: SmoothField
@@ -193,11 +196,14 @@ def estimate(log_modulus: np.ndarray, error: np.ndarray, site: np.ndarray, views
     covariance = covariance + np.outer(unlevelled, unlevelled) / precise.sum()
     apart = cover + nothing[1][0] ** 2 * np.eye(len(y))
     _, plain, plain_rest = _levelled(y, apart)
+    left_out = rest / _left_out_weight(inverse)
     return Estimate(
         Prior(float(log_sd), float(length), float(scatter)),
         float(likelihood - nothing[0]),
-        rest / _left_out_weight(inverse),
+        np.unique(site),
+        left_out,
         plain_rest / _left_out_weight(plain),
+        y - left_out,
         float(level),
         float(1 / np.sqrt(precise.sum())),
         SmoothField(places, likeliest, float(length)),

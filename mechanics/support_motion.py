@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from scipy.linalg import cho_factor, cho_solve, solve
+from scipy.linalg import cho_factor, cho_solve, solve, solve_triangular
 from scipy.spatial import Delaunay
 
 from mechanics.elasticity import stiffness, triangle_mass
@@ -151,8 +151,9 @@ def _on_springs(places: Places, normal: float, tangential: float) -> np.ndarray:
     factor = cho_factor(motion.stiffness + np.kron(motion.mass, springs), overwrite_a=True)
     q, b3, _ = motion.reaction.shape
     flat = motion.reaction.transpose(1, 0, 2).reshape(b3, 3 * q)
-    moved = cho_solve(factor, flat).reshape(b3, q, 3)
-    compliance = np.einsum("qbi,bqj->qij", motion.reaction, moved)
+    half = solve_triangular(factor[0], flat, trans=0 if factor[1] else 1, lower=factor[1])
+    columns = half.reshape(b3, q, 3).transpose(1, 0, 2)
+    compliance = columns.transpose(0, 2, 1) @ columns
     return places.far + compliance[places.place]
 
 

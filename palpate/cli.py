@@ -87,7 +87,7 @@ def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
     import warnings
 
-    from mechanics.errors import Noted, PalpateError
+    from mechanics.errors import PalpateError, PalpateWarning
     from mechanics.files import refusal
     from palpate.operations._run import run_command
 
@@ -98,7 +98,7 @@ def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
     plain = warnings.showwarning
 
     def warned(message: Warning | str, category: type[Warning], *rest: Any, **more: Any) -> None:
-        if issubclass(category, Noted):
+        if issubclass(category, PalpateWarning):
             refused(f"warning: {message}")
         else:
             plain(message, category, *rest, **more)

@@ -94,7 +94,7 @@ def run_demo(source: Path | str, folder: Path, options: DemoOptions, seed: int =
     diagnosis = None
     if options.diagnosis:
         with stage("diagnose") as progress:
-            most = AttributionOptions().most
+            most = AttributionOptions().greatest_number
             found = diagnose(recording, model, fast=options.fast, most=most, seed=seed, progress=progress)
             diagnosis = found if isinstance(found, Diagnosis) else None  # no simulator was named
     return DemoResult(

@@ -7,6 +7,7 @@ done once. Run as `python -m palpate.warm_up STAGE...`; a failure costs only tim
 
 from __future__ import annotations
 
+import gc
 import os
 import subprocess
 import sys
@@ -23,13 +24,15 @@ from palpate.child import end_with_parent, module_command, module_environment
 
 BESIDE_ONE_ANOTHER = (("renderer", "replay"), ("tick", "spring-damper model"))
 """Stages by process: about the same work for each."""
+OF_A_TOUCH, OF_ITS_SERVO = (("renderer",),), ("tick", "spring-damper model")
+"""The same for a touch alone, whose servo process compiles its part itself before it is told what to do."""
 _SIZE_M, _TIP_RADIUS_M = 0.012, 0.005
 
 
 @contextmanager
-def warming_up() -> Iterator[Callable[[], object]]:
+def warming_up(processes_of: Sequence[Sequence[str]] = BESIDE_ONE_ANOTHER) -> Iterator[Callable[[], object]]:
     """What waits for the compiling processes, which are started at once and ended with the block where they
-    still run then; nothing is started where these kernels are compiled."""
+    still run then; nothing is started where these kernels are compiled. processes_of: stages by process."""
     processes = [
         subprocess.Popen(
             module_command("palpate.warm_up", *stages),
@@ -38,7 +41,7 @@ def warming_up() -> Iterator[Callable[[], object]]:
             stderr=subprocess.DEVNULL,
             env=module_environment(OMP_NUM_THREADS="1", MKL_NUM_THREADS="1"),
         )
-        for stages in BESIDE_ONE_ANOTHER
+        for stages in processes_of
         if not _done(stages)
     ]
     try:
@@ -124,7 +127,9 @@ def _done(names: Sequence[str]) -> bool:
 
 
 def warm_up(names: Sequence[str]) -> None:
-    """Compile these stages, and leave a mark for each."""
+    """Compile these stages, and leave a mark for each; in a process of their own, which then collects no
+    garbage: looking for it in all that numba keeps is a tenth of the work."""
+    gc.disable()
     work = stages(block_renderer())
     for name in names:
         work[name]()
@@ -136,3 +141,4 @@ def warm_up(names: Sequence[str]) -> None:
 if __name__ == "__main__":
     end_with_parent()
     warm_up(sys.argv[1:])
+    os._exit(0)  # tidying up what numba holds takes as long as a kernel

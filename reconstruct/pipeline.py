@@ -28,19 +28,19 @@ from reconstruct.geometry.known_base import base_of_model
 from reconstruct.geometry.known_shape import place
 from reconstruct.geometry.placed import Placed, nowhere
 from reconstruct.geometry.stated import GeometryOptions, stated_geometry
-from reconstruct.methods import BY_NAME, Body, Method
+from reconstruct.methods import BY_NAME, Body, Fitted, Method
 from reconstruct.methods import ReconstructOptions as ReconstructOptions
 from reconstruct.steps.s2_base.outline import Boundary
 from reconstruct.steps.s3_contacts.contacts import Exploration, explore
 from reconstruct.steps.s3_contacts.left_out import on_base, on_surface, within_slab, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
-from reconstruct.steps.s3_contacts.straightened import straightened
+from reconstruct.steps.s3_contacts.straightened import laid
 from reconstruct.steps.s4_surface.casting import CastPoints, cast
 from reconstruct.steps.s4_surface.surface import Surface, evidence_of, reconstruct_surface, shape_table
 from reconstruct.steps.s5_mesh.background import BackgroundMesher
 from reconstruct.steps.s5_mesh.meshing import Meshing, uncertainty_at
 from reconstruct.steps.s6_one_d.one_d import OneD, columns, profiles
-from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out
+from reconstruct.steps.s7_modulus.held_out import HeldOut, held_out, told_by_others
 from reconstruct.steps.s7_modulus.modulus import ModulusFit
 from reconstruct.steps.s7_modulus.modulus_field import with_fitted_field
 from reconstruct.steps.s7_modulus.modulus_paper import PaperFit
@@ -53,7 +53,7 @@ class Reconstruction(Result):
     sites and fit stand for the method finite-tip, paper_fit for the method paper; the others are None.
     seconds: wall time of each step. placed: a known geometry, None where it was reconstructed.
     findings: of the check-up, grave ones first; the interval is as wide as they make it. held_out: how the
-    modulus predicts places that were held out; None by the method paper, or of one place. `plot`: force over
+    model predicts places that were held out; None by the method paper, or of one place. `plot`: force over
     time with the touches that were found. `show`: the model.
     """
 
@@ -147,9 +147,7 @@ def _reconstructed(
     least = options.contact.least_palpations
     exploration, kept = on_surface(exploration, where.points, where.normals, least)
     where = where.of(kept)
-    presses = exploration.presses.on_surface(where.points, where.normals)
-    if geometry.slab_m or geometry.half_space:
-        presses = straightened(presses)
+    presses = laid(exploration.presses, where.points, where.normals, geometry.kind)
     curves = profiles(presses, options.filter.cutoff_hz)
     one_d = method.fit_one_d(curves, exploration.noise_n)
     clock.lap("1D models")
@@ -158,9 +156,6 @@ def _reconstructed(
     progress("factorise", 0.5)
     body = Body(mesh, poisson_ratio, surface, placed, where, presses, curves, exploration.noise_n)
     fitted = method.fit(body, progress, clock)
-    predicted = None
-    if fitted.sites is not None and fitted.modulus is not None:
-        predicted = held_out(presses, fitted.sites, fitted.modulus)
     interval = checkup.interval(outcome_of(presses, fitted.modulus_pa, fitted.ci95_pa, fitted.modulus))
     clock.lap("modulus")
     progress("model", 0.95)
@@ -176,9 +171,7 @@ def _reconstructed(
         provenance=_provenance(exploration, options, surface, fitted.modulus),
         about=_tables(surface, placed, fitted.sites, recording.tip_radius_m),
     )
-    if fitted.sites is not None and options.modulus_field.field != "homogeneous":
-        model = with_fitted_field(model, fitted.sites, exploration.noise_n)
-        clock.lap("modulus field")
+    model, predicted = _judged(model, fitted, options.modulus_field.field, exploration.noise_n, clock)
     progress("done", 1.0)
     return Reconstruction(
         model=model,
@@ -196,6 +189,26 @@ def _reconstructed(
         findings=checkup.found,
         held_out=predicted,
     )
+
+
+def _judged(
+    model: Model, fitted: Fitted, field: str, noise_n: float, clock: Clock
+) -> tuple[Model, HeldOut | None]:
+    """The model, with a field where that is wanted and its presses ask for one, and how it predicts places
+    that were held out."""
+    sites, modulus = fitted.sites, fitted.modulus
+    if sites is None or modulus is None:
+        return model, None
+    presses, told = model.presses, told_by_others(modulus)
+    predicted = held_out(presses, sites, modulus, told)
+    clock.lap("held-out places")
+    if field == "auto" or (field == "where-beaten" and predicted is not None and predicted.beaten_by):
+        model, of_field = with_fitted_field(model, sites, noise_n)
+        clock.lap("modulus field")
+        if of_field is not None:
+            predicted = held_out(presses, sites, modulus, of_field)
+            clock.lap("held-out places")
+    return model, predicted
 
 
 @dataclass(frozen=True)

@@ -13,6 +13,7 @@ from reconstruct.geometry.stated import GeometryOptions, stated_geometry
 from reconstruct.steps.s3_contacts.contacts import ContactOptions, explore
 from reconstruct.steps.s3_contacts.left_out import off_surface, without_slides
 from reconstruct.steps.s3_contacts.quasi_static import explore_points, is_points
+from reconstruct.steps.s3_contacts.straightened import laid
 from reconstruct.steps.s4_surface.casting import cast
 
 _ANY = ContactOptions(least_palpations=1)
@@ -38,7 +39,13 @@ def presses_on(recording: Recording, model: Model) -> Presses:
     kept = np.array([not reason for reason in reasons])
     if not kept.any():
         raise ContactError(f"none of the {len(kept)} presses is on the model: the first {reasons[0]}")
-    return found.of(kept).on_surface(where.points[kept], where.normals[kept])
+    return laid(found.of(kept), where.points[kept], where.normals[kept], _kind(recording, model))
+
+
+def _kind(recording: Recording, model: Model) -> str:
+    """Of the geometry: as the model says it, where it was placed, else as the recording states it."""
+    placed = model.about.get("geometry", {}).get("kind")
+    return str(placed or stated_geometry(recording, GeometryOptions()).kind)
 
 
 def check_near(recording: Recording, model: Model) -> None:

@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from mechanics.kernels import kernel
+from mechanics.kernels import step_kernel
 from render.contact import approach, lose, release, strayed
 from render.fem_coupling import carry_all, leave, link, locate, renew
 from render.fem_end_of_tick import conclude, forget
@@ -25,7 +25,7 @@ from render.frames import new_frame
 SWEEPS = 60
 
 
-@kernel
+@step_kernel
 def fem_step(p, state, tips):
     """One tick: tips (m, 3) m; writes the state's forces on the tools, N. See render.base.Renderer.step."""
     m = tips.shape[0]

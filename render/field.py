@@ -53,5 +53,5 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
             arrays.normals[v], model.material.poisson_ratio, width
         )
     curvatures = np.zeros((len(arrays.vertices), 2))
-    curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)[0]
+    curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
     return Field(far, curvatures.mean(axis=1), curvatures, softness, parents)

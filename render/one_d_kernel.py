@@ -11,7 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from mechanics.kernels import inner, kernel
+from mechanics.kernels import inner, step_kernel
 from render.base import Grip, new_grip, new_state
 from render.bvh import STACK
 from render.contact import approach, lose, release
@@ -93,7 +93,7 @@ def _through_spring(k, b, r, s, depth, rate, compliance):
     return force, stiffness / (1.0 + compliance * stiffness)
 
 
-@kernel
+@step_kernel
 def one_d_step(p, state, tips):
     """One tick: tips (m, 3) m; writes the state's forces on the tools, N. See render.base.Renderer.step."""
     grip = state.grip

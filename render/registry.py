@@ -15,10 +15,10 @@ if TYPE_CHECKING:
 
 RENDERERS = {
     "fem": "render.fem",
-    "kelvin-voigt": "render.one_d_laws",
-    "hunt-crossley": "render.one_d_laws",
-    "hunt-crossley-undamped": "render.one_d_laws",
-    "hunt-crossley-kh": "render.one_d_laws",
+    "kelvin-voigt": "render.one_d",
+    "hunt-crossley": "render.one_d",
+    "hunt-crossley-undamped": "render.one_d",
+    "hunt-crossley-kh": "render.one_d",
 }
 """Our own."""
 

@@ -2,41 +2,38 @@
 
 A mesh of 10 mm cuts a fillet of 12 mm by a millimetre, and another mesh cuts it elsewhere. Where the shape is
 known, each vertex of the contact surface lies on it, those of creases on its creases; triangles between them
-are so small, where it bends, that they leave it by some micrometres, and lie on it in the mean.
+are so small, where it bends, that they leave it by some micrometres, and lie on it in the mean. Beside sharp
+rims the contact normal turns; concave creases are rounded.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from mechanics.true_shape import TrueShape
+from render.triangles import cut, cut_beside, pseudonormals
 
 SAG_M = 8e-6
 """Between the middle of a fine edge and the shape: what is more is halved."""
 EDGE_ROUNDING_M, NORMAL_SMOOTHING_M = 2.2e-3, 2.5e-3
 """Widths of the Gaussians by which a crease is rounded, and its contact normal turned. With 1.5 mm a tip that
 slides by friction over a rim whose shape is not known stepped by 2.4 % of its force."""
-_KNOWN_ROUNDING_M = 1.5e-3
-"""The same where the shape is known: each tenth of a millimetre more makes places beside a sharp rim some per
-cent softer than they are."""
+_HOLLOW_ROUNDING_M = 1.5e-3
+"""The first of the concave creases of a known shape, whose sharp rims are not rounded."""
+RIM_STRIP_M = 2e-3
+"""Width of the strip on either side of a sharp rim over which the contact normal turns. With 1.5 mm a ball of
+5 mm that slides over the rim without friction steps; with 2.5 mm places 2 mm beside it are 4 % too stiff."""
 EASED_AGREEMENT = (0.99, 0.93)
 """Mean of the unit normals around a vertex above which nothing is eased, and below which all of it is."""
 _CREASE_SPACING_M = 1e-4
+_HOLLOW_REACH_M = 3 * NORMAL_SMOOTHING_M
 _REACH = 0.75  # fine edges from which a vertex is drawn onto a crease that its triangle crosses
 _CROSSES = np.cos(np.radians(25))
 _ROUNDS, _HALVINGS = 4, 3
-_PATTERNS = tuple(
-    np.array(p)
-    for p in (
-        [[0, 1, 2]],
-        [[0, 3, 2], [3, 1, 2]],
-        [[3, 1, 4], [0, 3, 4], [0, 4, 2]],
-        [[0, 3, 5], [3, 1, 4], [5, 4, 2], [3, 4, 5]],
-    )
-)
-"""Triangles of corners 0 to 2 and middles 3 to 5 of the edges 01, 12, 20, by how many of these are cut."""
 _ALIKE = 0.8
 _MEAN_GAP = 0.75  # of a triangle's gap to a round surface, over that at its middle
 
@@ -70,46 +67,28 @@ def halved_where_bent(
         ends = ends[chosen[gap[chosen] > SAG_M]]
         if not len(ends):
             break
-        vertices, triangles, part, weights = _halved(vertices, triangles, weights, ends)
+        vertices, triangles, part, weights = cut(vertices, triangles, weights, ends)
         within = within[part]
     return vertices, triangles, within, weights
 
 
-def _halved(
-    vertices: np.ndarray, triangles: np.ndarray, weights: np.ndarray, ends: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Triangles cut at the middles of edges (e, 2), ends ascending: two for one such edge, three for two."""
-    n = len(vertices)
-    key = ends[:, 0] * np.int64(n) + ends[:, 1]
-    order = np.argsort(key)
-    sides = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-    wanted = sides[..., 0] * np.int64(n) + sides[..., 1]
-    place = np.minimum(np.searchsorted(key[order], wanted), len(key) - 1)
-    middle = np.where(key[order][place] == wanted, n + order[place], -1)
-    cut = (middle >= 0).sum(axis=1)
-    # turned so that the first edge is cut, and of two the second as well
-    first = np.where(cut == 2, ((middle < 0).argmax(axis=1) + 1) % 3, (middle >= 0).argmax(axis=1))
-    turn = (first[:, None] + np.arange(3)) % 3
-    rows = np.arange(len(triangles))[:, None]
-    six = np.concatenate([triangles[rows, turn], middle[rows, turn]], axis=1)
-    corner = weights[rows, turn]
-    six_weights = np.concatenate([corner, (corner + np.roll(corner, -1, axis=1)) / 2], axis=1)
-    new, part, new_weights = [], [], []
-    for count, pattern in enumerate(_PATTERNS):
-        own = np.flatnonzero(cut == count)
-        new.append(six[own][:, pattern].reshape(-1, 3))
-        part.append(np.repeat(own, len(pattern)))
-        new_weights.append(six_weights[own][:, pattern].reshape(-1, 3, weights.shape[2]))
-    points = np.vstack([vertices, vertices[ends].mean(axis=1)])
-    return points, np.concatenate(new), np.concatenate(part), np.concatenate(new_weights)
+class OnShape(NamedTuple):
+    """vertices (v, 3) m on the shape, contact normals (v, 3), unit, outward; triangles (k, 3), the given one
+    (k,) that each lies in, and weights (k, 3, 3) at its corners of what interpolates over the given ones."""
+
+    vertices: np.ndarray
+    normals: np.ndarray
+    triangles: np.ndarray
+    within: np.ndarray
+    weights: np.ndarray
 
 
 def on_shape(
-    shape: TrueShape, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices (v, 3) m put onto the shape and their contact normals (v, 3), unit, outward.
+    shape: TrueShape, vertices: np.ndarray, triangles: np.ndarray, free: np.ndarray, weights: np.ndarray
+) -> OnShape:
+    """Put a contact surface onto the shape: its vertices (v, 3) m and triangles (k, 3), cut beside rims.
 
-    triangles: (k, 3), free: (k,) 1 where they may be touched; the base's inner vertices stay.
+    free: (k,) 1 where they may be touched; the base's inner vertices stay.
     """
     touch = triangles[free > 0]
     used = np.unique(touch)
@@ -122,8 +101,48 @@ def on_shape(
     placed[used] = _lifted(shape, placed, normals, touch, creased)[used]
     creased[rim] = False  # no tip gets under it
     if not creased.any() or edge > 2 * EDGE_ROUNDING_M:
-        return placed, normals
-    return _eased(placed, normals, touch, np.setdiff1d(used, rim), cKDTree(placed[creased]))
+        return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
+    hollow = creased & _beside_hollows(shape, placed)
+    sharp = creased & ~hollow
+    if hollow.any():
+        own = np.setdiff1d(used, rim)
+        placed, normals = _eased(placed, normals, touch, own, cKDTree(placed[hollow]))
+    if not sharp.any():
+        return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
+    line = _line(shape, placed[sharp], placed[rim])
+    before = len(placed)
+    placed, triangles, within, weights = cut_beside(
+        placed, triangles, free, weights, sharp, line, RIM_STRIP_M
+    )
+    placed[before:], facing = shape.foot(placed[before:])
+    normals = np.vstack([normals, facing])
+    own = np.setdiff1d(triangles[free[within] > 0], rim)
+    if hollow.any():
+        own = own[~_beside_hollows(shape, placed)[own]]
+    rims = np.flatnonzero(sharp)
+    between = pseudonormals(placed, triangles)[rims]
+    away = line.query(placed[own], distance_upper_bound=RIM_STRIP_M)[0]
+    own, away = own[away < RIM_STRIP_M], away[away < RIM_STRIP_M]
+    facing = between[cKDTree(placed[rims]).query(placed[own])[1]]
+    normals[own] = _towards(normals[own], facing, 1 - away / RIM_STRIP_M)
+    return OnShape(placed, normals, triangles, within, weights)
+
+
+def _line(shape: TrueShape, rims: np.ndarray, base: np.ndarray) -> cKDTree:
+    """Points along those creases that are nearer to vertices `rims` (r, 3) than to the base's."""
+    points = shape.crease_points(_CREASE_SPACING_M)
+    if len(base):
+        points = points[cKDTree(rims).query(points)[0] < cKDTree(base).query(points)[0]]
+    return cKDTree(points)
+
+
+def _beside_hollows(shape: TrueShape, points: np.ndarray) -> np.ndarray:
+    """(v,) bool, so close to a concave crease that it is eased."""
+    middles, _, turn = shape.creases_cut(_CREASE_SPACING_M)
+    if not (turn < 0).any():
+        return np.zeros(len(points), dtype=bool)
+    away = cKDTree(middles[turn < 0]).query(points, distance_upper_bound=_HOLLOW_REACH_M)[0]
+    return np.isfinite(away)
 
 
 def _on_creases(
@@ -181,9 +200,9 @@ def _lifted(
 def _eased(
     placed: np.ndarray, normals: np.ndarray, touch: np.ndarray, own: np.ndarray, creases: cKDTree
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Vertices `own` beside creases moved to the mean of the surface around them, and turned with it.
+    """Vertices `own` beside concave creases moved to the mean of the surface around them, and turned with it.
 
-    Over a sharp edge a tip that is held by friction would snap from one face to the other.
+    In a sharp hollow a tip that is held by friction would snap from one face to the other.
     """
     p = placed[touch]
     area = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -191,7 +210,7 @@ def _eased(
     places = ((p + np.roll(p, -1, axis=1)) / 2).reshape(-1, 3)
     parts = np.repeat(area / 6, 3, axis=0)
     size = np.linalg.norm(parts, axis=1)
-    widest = max(_KNOWN_ROUNDING_M, NORMAL_SMOOTHING_M)
+    widest = max(_HOLLOW_ROUNDING_M, NORMAL_SMOOTHING_M)
     near = creases.query(placed[own], distance_upper_bound=3 * widest)[0]
     own, near = own[np.isfinite(near)], near[np.isfinite(near)]
     pairs = cKDTree(placed[own]).sparse_distance_matrix(cKDTree(places), 3 * widest, output_type="ndarray")
@@ -206,21 +225,26 @@ def _eased(
 
     moved, turned = placed.copy(), normals.copy()
     unit = parts / np.maximum(size, 1e-300)[:, None]
-    agreement = np.linalg.norm(mean(unit, _KNOWN_ROUNDING_M), axis=1)
+    agreement = np.linalg.norm(mean(unit, _HOLLOW_ROUNDING_M), axis=1)
     flat, crease = EASED_AGREEMENT
     # round faces agree better than that: the mean would draw them inwards
-    share = _smooth_step((flat - agreement) / (flat - crease))
-    moved[own] += share * (mean(places, _KNOWN_ROUNDING_M) - placed[own])
+    share = _smooth_step((flat - agreement) / (flat - crease))[:, None]
+    moved[own] += share * (mean(places, _HOLLOW_ROUNDING_M) - placed[own])
     facing = mean(unit, NORMAL_SMOOTHING_M)
-    share = _smooth_step(3 - near / NORMAL_SMOOTHING_M)
-    turned[own] += share * (facing / np.linalg.norm(facing, axis=1, keepdims=True) - normals[own])
-    turned[own] /= np.linalg.norm(turned[own], axis=1, keepdims=True)
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    turned[own] = _towards(normals[own], facing, _smooth_step(3 - near / NORMAL_SMOOTHING_M))
     return moved, turned
 
 
+def _towards(normals: np.ndarray, facing: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """(k, 3) unit, turned by a share (k,) of the way from `normals` (k, 3) to `facing` (k, 3)."""
+    turned = normals + share[:, None] * (facing - normals)
+    return turned / np.linalg.norm(turned, axis=1, keepdims=True)
+
+
 def _smooth_step(x: np.ndarray) -> np.ndarray:
-    """(k, 1), 0 below 0 and 1 above 1."""
-    x = np.clip(x, 0.0, 1.0)[:, None]
+    """(k,), 0 below 0 and 1 above 1."""
+    x = np.clip(x, 0.0, 1.0)
     return x * x * (3 - 2 * x)
 
 

@@ -22,6 +22,7 @@ from mechanics.nearest import neighbours
 from mechanics.tetmesh import TetMesh
 from render.bvh import Bvh, build_bvh
 from render.shaped import EASED_AGREEMENT, EDGE_ROUNDING_M, NORMAL_SMOOTHING_M, halved_where_bent, on_shape
+from render.triangles import pseudonormals
 
 CREASE_DEGREES = 35.0
 
@@ -94,21 +95,22 @@ def contact_surface(mesh: TetMesh, *, edge_m: float = 2.5e-3, largest: int = 60_
             shape, vertices, triangles, free, parent_weights, largest
         )
         free, parents = free[within], parents[within]
+        placed = on_shape(shape, vertices, triangles, free, parent_weights)
+        vertices, triangles, parent_weights = placed.vertices, placed.triangles, placed.weights
+        free, parents = free[placed.within], parents[placed.within]
+    across = neighbours(triangles)
+    if (across < 0).any():
+        raise MeshError("the mesh's boundary is not closed: mesh the surface again")
     nodes = np.zeros((len(vertices), 3), dtype=np.int64)
     node_weights = np.zeros((len(vertices), 3))
     for corner in range(3):
         nodes[triangles[:, corner]] = parents
         node_weights[triangles[:, corner]] = parent_weights[:, corner]
-    across = neighbours(triangles)
-    if (across < 0).any():
-        raise MeshError("the mesh's boundary is not closed: mesh the surface again")
     if shape is None:
-        vertices, normals = _rounded_edges(vertices, triangles, free), None
-    else:
-        vertices, normals = on_shape(shape, vertices, triangles, free)
+        vertices = _rounded_edges(vertices, triangles, free)
     arrays = with_vertices(vertices, triangles, across, free)
-    if normals is not None:
-        arrays = arrays._replace(normals=normals)
+    if shape is not None:
+        arrays = arrays._replace(normals=placed.normals)
     return ContactSurface(arrays, nodes, node_weights, parents, parent_weights)
 
 
@@ -121,21 +123,13 @@ def with_vertices(
     length = np.linalg.norm(area, axis=1, keepdims=True)
     face = area / np.where(length > 0, length, 1.0)
     edge_pseudo = face[:, None, :] + face[neighbours]
-    pseudo = np.zeros_like(vertices)
-    for c in range(3):
-        a = p[:, (c + 1) % 3] - p[:, c]
-        b = p[:, (c + 2) % 3] - p[:, c]
-        cosine = np.einsum("ij,ij->i", a, b) / np.maximum(
-            np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1), 1e-300
-        )
-        np.add.at(pseudo, triangles[:, c], np.arccos(np.clip(cosine, -1, 1))[:, None] * face)
     return SurfaceArrays(
         vertices=np.ascontiguousarray(vertices),
         normals=_smooth_normals(vertices, triangles, free, area),
         triangles=np.ascontiguousarray(triangles, dtype=np.int64),
         neighbours=neighbours,
         free=free,
-        vertex_pseudo=pseudo,
+        vertex_pseudo=pseudonormals(vertices, triangles),
         edge_pseudo=np.ascontiguousarray(edge_pseudo),
         bvh=build_bvh(p),
     )

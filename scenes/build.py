@@ -9,6 +9,7 @@ from __future__ import annotations
 import hashlib
 import json
 import shutil
+import warnings
 from collections.abc import Collection
 from dataclasses import asdict, replace
 from pathlib import Path
@@ -16,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.errors import FileError, ModelError, SceneError
+from mechanics.errors import FileError, ModelError, PalpateWarning, SceneError
 from mechanics.files import atomic_folder, cache_folder, reading
 from mechanics.flat_foot import Standing, standing
 from mechanics.material import Ball, Material
@@ -30,7 +31,7 @@ from mechanics.true_shape import TrueShape
 from scenes.embedded import embedded_names, embedded_recording
 from scenes.phantoms import DEFAULT_MODULUS_PA, Region, phantom
 from scenes.scene import Scene, ball_of
-from scenes.shipped import shipped_model, unpack
+from scenes.shipped import DamagedError, shipped_model, unpack
 from scenes.virtual_presses import palpate_model
 
 VERSION = 7
@@ -48,14 +49,9 @@ def model_of(
     if scene.kind == "model" and _own(scene):
         return read_model(scene.source)
     path = _folder(scene, cache)
-    archive = shipped_model(path.name) if shipped else None
-    try:
-        if archive is not None and not (path / "model.toml").is_file():
-            unpack(archive, path)
-        if (path / "model.toml").is_file():
-            return read_model(path)
-    except (ModelError, FileError):
-        pass  # damaged, or a folder that refuses: built again below, which says why
+    kept = _kept(path, shipped_model(path.name) if shipped else None)
+    if kept is not None:
+        return kept
     model = _MAKERS[scene.kind](scene, progress)
     _check_inside(model)
     try:
@@ -65,6 +61,24 @@ def model_of(
         raise SceneError(
             f"'{path}' cannot be written ({error}): set PALPATE_CACHE to a folder of yours"
         ) from error
+
+
+def _kept(path: Path, archive: Path | None) -> Model | None:
+    """The model in a folder of the cache, else out of its archive; None where it is to be made anew."""
+    try:
+        if (path / "model.toml").is_file():
+            return read_model(path)
+    except (ModelError, FileError):
+        pass  # damaged
+    try:
+        if archive is not None:
+            unpack(archive, path)
+            return read_model(path)
+    except DamagedError as error:
+        warnings.warn(f"{error}; the model is made anew", PalpateWarning, stacklevel=3)
+    except (ModelError, FileError):
+        pass  # a folder that refuses: making it says why
+    return None
 
 
 def keep(scene: Scene, model: Path, *, cache: Path | None = None) -> None:

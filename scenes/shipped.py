@@ -12,7 +12,9 @@ out. Its name holds the whole key of its content, so that of another model it is
 from __future__ import annotations
 
 import io
+import lzma
 import re
+import struct
 import zipfile
 from pathlib import Path
 from typing import Any
@@ -26,10 +28,26 @@ from mechanics.model_files import MODEL
 from mechanics.store import write_arrays
 from mechanics.surface_compliance import SurfaceCompliance
 
+
+class DamagedError(FileError):
+    """An archive that came with the program cannot be read."""
+
+
 FOLDER = Path(__file__).parent / "shipped"
 _PACKED = re.compile(r"compliance-([0-9a-f]{64})\.npz")
 _DATE = (1980, 1, 1, 0, 0, 0)
 """Of every file in an archive: the same content gives the same bytes."""
+_DAMAGES = (
+    zipfile.BadZipFile,
+    lzma.LZMAError,
+    struct.error,
+    EOFError,
+    KeyError,
+    ValueError,
+    NotImplementedError,
+    RuntimeError,
+)
+"""What zipfile and NumPy raise at bytes that were changed."""
 
 
 def shipped_model(name: str) -> Path | None:
@@ -41,7 +59,7 @@ def shipped_model(name: str) -> Path | None:
 def unpack(archive: Path, folder: Path) -> None:
     """Write the MODEL folder of an archive, with its compliance as the cache keeps it.
 
-    Raises FileError where it cannot be written, or the archive cannot be read.
+    Raises FileError where it cannot be written, DamagedError where the archive cannot be read.
     """
     try:
         with zipfile.ZipFile(archive) as packed, atomic_folder(folder, MODEL) as target:
@@ -53,8 +71,8 @@ def unpack(archive: Path, folder: Path) -> None:
                 else:
                     made = _whole(data)
                     write_arrays(target / compliance_file(found[1]), found[1], made.arrays())
-    except (zipfile.BadZipFile, KeyError, ValueError) as error:
-        raise FileError(f"'{archive}' is damaged ({error}): install the program again") from error
+    except _DAMAGES as error:
+        raise DamagedError(f"'{archive}' is damaged ({error}): install the program again") from error
 
 
 def pack(folder: Path, archive: Path, compliance: SurfaceCompliance, key: str) -> None:

@@ -5,7 +5,8 @@
   smooth field of the modulus where they ask for one (reconstruct.steps.s7_modulus.modulus_field).
 - fem-homogeneous: the same with one modulus whatever they ask for.
 - kelvin-voigt, hunt-crossley: each training press fitted by itself, eq. (1) and (2) of Goksel et al., then
-  interpolated to the held-out place by radial basis functions (render.one_d), force along the normal.
+  interpolated to the held-out place by radial basis functions (mechanics.one_d_laws), force along the
+  normal.
 """
 
 from __future__ import annotations
@@ -17,6 +18,9 @@ from functools import partial
 import numpy as np
 
 from mechanics.model import Model
+from mechanics.one_d_laws import LAWS as ONE_D_LAWS
+from mechanics.one_d_laws import RIVALS as RIVALS
+from mechanics.one_d_laws import Law, forces_of, spread_law
 from mechanics.press_making import of_paths
 from mechanics.press_sites import sites_of
 from mechanics.pressed_places import UNIFORM, Places
@@ -37,9 +41,7 @@ from reconstruct.steps.s7_modulus.modulus_field import (
     with_field,
 )
 from reconstruct.steps.s7_modulus.press_fit import touched_by_law
-from render.one_d import Law, spread_law
 
-RIVALS = ("kelvin-voigt", "hunt-crossley")
 HOMOGENEOUS = "fem-homogeneous"
 MODELS = ("fem", *RIVALS, HOMOGENEOUS)
 LAWS = ("linear", "neo-hookean")
@@ -104,7 +106,6 @@ def prepare(
         for law in LAWS
     }
     fitted = columns(fit_robust(smooth.window(0.0, 0.0), table.noise.raw_n), np.zeros(len(table)))
-    one, none = np.ones(len(table)), np.zeros(len(table))
     places, own = places_at(model, table, solved), {}
     if field != "homogeneous":
         places.stages[UNIFORM] = solver
@@ -112,10 +113,7 @@ def prepare(
     return Prepared(
         presses,
         unit,
-        {
-            "kelvin-voigt": Law(fitted["k_kv"], fitted["b_kv"], one, none),
-            "hunt-crossley": Law(fitted["k_hc"], fitted["b_hc"], fitted["r_hc"], fitted["r_hc"]),
-        },
+        {name: ONE_D_LAWS[name](fitted) for name in RIVALS},
         solved,
         places,
         own,
@@ -186,18 +184,8 @@ def predicted(
     for name, fitted in prepared.laws.items():
         own = Law(*(column[train] for column in fitted))
         at = spread_law(whole.point[train], whole.site[train], own, whole.point[test], interpolation)
-        models[name] = partial(_one_d, presses, at)
+        models[name] = partial(forces_of, at, presses)
     return {name: as_touched(models[name], presses, first_touch) for name in MODELS}, fem
-
-
-def _one_d(presses: Presses, law: Law, moved_m: np.ndarray) -> np.ndarray:
-    """(n, 3) N of a 1D law's parameters (p,) of each press."""
-    k, b, r, s = (column[presses.press] for column in law)
-    u = np.maximum(presses.depth + moved_m[presses.press], 0.0)
-    inside = u > 0
-    safe = np.where(inside, u, 1.0)
-    push = np.where(inside, np.maximum(k * safe**r + b * safe**s * presses.rate, 0.0), 0.0)
-    return push[:, None] * presses.normal[presses.press]
 
 
 def as_touched(force: Callable[[np.ndarray], np.ndarray], presses: Presses, first_touch: str) -> np.ndarray:

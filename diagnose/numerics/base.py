@@ -18,13 +18,20 @@ LEAST_SHARE = 0.1
 @dataclass(frozen=True)
 class Signal:
     """A simulated force sample by sample: t (n,) s, force (n, 3) N on the tool, depth (n,) m of the tip below
-    the surface; parts: the samples of each press. left (n,) bool: samples that say nothing of the law."""
+    the surface, normal (n, 3) outward there; parts: the samples of each press. left (n,) bool: samples that
+    say nothing of the law."""
 
     t: np.ndarray
     force: np.ndarray
     depth: np.ndarray
+    normal: np.ndarray
     parts: tuple[slice, ...]
     left: np.ndarray
+
+    @property
+    def push(self) -> np.ndarray:
+        """(n,) N along the normal: below 0 where the tip is pulled in."""
+        return np.einsum("ni,ni->n", self.force, self.normal)
 
 
 @dataclass(frozen=True)
@@ -50,4 +57,5 @@ class NumericalEffect(Effect):
 
 def signal_of(presses: Presses, force: np.ndarray) -> Signal:
     """The signal of a table of presses (mechanics.presses) with a simulated force (n, 3) N at its rows."""
-    return Signal(presses.t, force, presses.travel[:, 0], tuple(presses.parts), np.zeros(len(force), bool))
+    normal, none = presses.normal[presses.press], np.zeros(len(force), bool)
+    return Signal(presses.t, force, presses.travel[:, 0], normal, tuple(presses.parts), none)

@@ -1,6 +1,8 @@
 """Lost or flickering contact: samples without force in the midst of a press. It shows in the samples
 themselves: they are filled from those beside them before any law is looked at."""
 
+import dataclasses
+
 import numpy as np
 from scipy.ndimage import grey_closing
 
@@ -45,7 +47,7 @@ def _see(signal: Signal) -> Seen:
     gone, held = lost(signal)
     if not gone.any():
         return Seen(signal, {})
-    mended = Signal(signal.t, filled(signal, gone), signal.depth, signal.parts, signal.left)
+    mended = dataclasses.replace(signal, force=filled(signal, gone))
     return Seen(mended, {"share": float(gone.sum() / held.sum())})
 
 

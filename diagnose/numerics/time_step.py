@@ -24,5 +24,6 @@ EFFECT = NumericalEffect(
     keys={"delay_s": Key(low=0.0, high=10.0, unit="s", required=True)},
     report=lambda values, scene, modulus_pa: {"delay_s": float(values[0])},
     change=_change,
-    advice="take smaller time steps, more iterations a step, or log each force with the position of its step",
+    advice="log each force with the position of its own step; if it is, take smaller time steps, or more "
+    "iterations a step",
 )

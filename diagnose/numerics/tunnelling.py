@@ -1,4 +1,12 @@
-"""Tunnelling: the tip passes through the surface and is no longer pushed back, though it is inside."""
+"""Tunnelling: the tip passes through the surface, and is pushed back less the deeper it goes, not at all, or
+is pulled in.
+
+It shows along the press: the push, force along the outward normal, falls while the tip goes deeper, and
+either never comes back before the tip is out, or comes back as the tip does, or is below zero. A late force,
+and one that goes with the tip's speed, do none of these.
+"""
+
+import dataclasses
 
 import numpy as np
 
@@ -10,46 +18,93 @@ from mechanics.schema import Key
 
 INSIDE = 0.5
 """Of a press's greatest depth, beyond which a tip without force is inside without being felt."""
+FELL_TO, CAME_BACK = 0.7, 0.1
+"""Shares of the greatest push before: what it falls to as the tip goes deeper, and by how much more it pushes
+again as the tip comes back."""
+DEEPER = 0.02
+"""Of a press's greatest depth, by which the tip is deeper than where it was pushed most."""
+
+
+STAYED = 0.2
+"""Share of its samples in which a silent tip is at rest or on its way in: else it is let go by damping."""
+_STEP = 5
+
+
+def _coming_out(depth: np.ndarray) -> np.ndarray:
+    """(n,) bool: the tip is on its way out, over ten rows, as positions come in an encoder's steps."""
+    padded = np.pad(depth, _STEP, mode="edge")
+    return padded[2 * _STEP :] < padded[: -2 * _STEP]
+
+
+def _silent(push: np.ndarray, depth: np.ndarray, t: np.ndarray, usual: float) -> int | None:
+    """The row from which a tip that is inside is not felt for as long as it is there; None: it is felt."""
+    inside = (depth > INSIDE * depth.max()) & (depth > 0)
+    silent = inside & (push < LEAST_SHARE * min(push.max(), usual) if push.max() > 0 else usual > 0)
+    # a force that comes late comes all the same, and a tip between nodes is felt at its deepest
+    felt = np.flatnonzero(push > LEAST_SHARE * usual)
+    over, deepest = int(felt[-1]) if len(felt) else -1, int(np.argmax(depth))
+    stays = ~_coming_out(depth)
+    lasting = [
+        a for a, b in runs(silent)
+        if t[b - 1] - t[a] > LONGEST_S and over < a and deepest < b and stays[a:b].mean() > STAYED
+    ]  # fmt: skip
+    return lasting[0] if lasting else None
+
+
+def _turned(push: np.ndarray, depth: np.ndarray, t: np.ndarray, usual: float) -> int | None:
+    """The row of the greatest push of a tip that is pushed back less as it goes deeper; None: it is not."""
+    most = np.maximum.accumulate(push)
+    if not most[-1] > LEAST_SHARE * usual:
+        return None
+    strongest = np.maximum.accumulate(np.where(push >= most, np.arange(len(push)), 0))
+    deeper = depth > depth[strongest] + DEEPER * depth.max()
+    deepest = int(np.argmax(depth))
+    fallen = deeper & (push < FELL_TO * most) & (depth > INSIDE * depth.max())
+    coming_out = _coming_out(depth)
+    for a, b in runs(fallen):
+        if not (a <= deepest < b and t[b - 1] - t[a] > LONGEST_S):
+            continue
+        out, inwards = push[deepest:][coming_out[deepest:]], push[a:b][~coming_out[a:b]]
+        back = out.max(initial=0.0) - max(push[deepest], 0.0) > CAME_BACK * most[a]
+        if back or inwards.min(initial=0.0) < -LEAST_SHARE * most[a]:
+            return int(strongest[a])
+    return None
 
 
 def _see(signal: Signal) -> Seen:
-    left, through, never = signal.left.copy(), 0, 0
-    usual = np.median([np.linalg.norm(signal.force[part], axis=1).max(initial=0.0) for part in signal.parts])
+    left, push, never, from_m = signal.left.copy(), signal.push, 0, []
+    usual = float(np.median([push[part].max(initial=0.0) for part in signal.parts]))
     for part in signal.parts:
-        size, depth, t = np.linalg.norm(signal.force[part], axis=1), signal.depth[part], signal.t[part]
-        if len(size) < 5:
+        if part.stop - part.start < 5:
             continue
-        silent = (size < LEAST_SHARE * min(size.max(), usual)) & (depth > INSIDE * depth.max()) & (depth > 0)
-        if not size.max() > 0:
-            silent = (depth > INSIDE * depth.max()) & (depth > 0) & bool(usual > 0)
-        # a force that comes late comes all the same, and a tip between nodes is felt at its deepest
-        felt = np.flatnonzero(size > LEAST_SHARE * usual)
-        over, deepest = int(felt[-1]) if len(felt) else -1, int(np.argmax(depth))
-        lasting = [
-            (a, b) for a, b in runs(silent) if t[b - 1] - t[a] > LONGEST_S and over < a and deepest < b
-        ]
-        if lasting:
-            through += 1
-            never += over < 0
+        own = push[part], signal.depth[part], signal.t[part], usual
+        fell = _silent(*own)
+        if fell is None:
+            fell = _turned(*own)
+        if fell is not None:
+            from_m.append(float(signal.depth[part][fell]))
+            never += not own[0].max() > LEAST_SHARE * usual
             # from where it fell through until it has come out again
-            left[part.start + lasting[0][0] : part.stop] = True
-    if not through:
+            left[part.start + fell : part.stop] = True
+    if not from_m:
         return Seen(signal, {})
-    mended = Signal(signal.t, signal.force, signal.depth, signal.parts, left)
-    return Seen(mended, {"share": through / len(signal.parts), "never_felt": never / len(signal.parts)})
+    mended = dataclasses.replace(signal, left=left)
+    keys = {"share": len(from_m) / len(signal.parts), "never_felt": never / len(signal.parts)}
+    return Seen(mended, keys | {"from_depth_m": float(np.median(from_m))})
 
 
 EFFECT = NumericalEffect(
     name="tunnelling",
     domain=DOMAIN,
     scope=Scope.READING,
-    words="the tip passes through the surface: inside, and no force",
-    plain_words="the simulated tip falls through the surface and is not felt any more",
+    words="the tip passes through the surface: inside, and pushed back less, not at all, or pulled in",
+    plain_words="the simulated tip falls through the surface and is not pushed back any more",
     parameters=(Parameter("share", "1", 0.0, 1.0, 0.0, (0.0,), 0.01),),
     keys={"share": Key(low=0.0, high=1.0, required=True)},
     report=no_keys,
     role=Role.FREE_AIR,
     see=_see,
-    advice="take smaller time steps, or contact that looks along the path (continuous) or into the volume, "
-    "not at a thin shell",
+    advice="take a finer mesh under the tip with a harder contact and smaller time steps, contact that looks "
+    "along the path (continuous) or into the volume, not at a thin shell, and a material that resists being "
+    "crushed flat (neo-Hookean)",
 )

@@ -60,14 +60,17 @@ def attribute(
     current = base
     chosen: list[str] = []
     steps: list[dict[str, Score]] = []
-    for step in range(search.options.most):
+    for step in range(search.options.greatest_number):
         scores: dict[str, Score] = {}
         for i, effect in enumerate(effects):
             if effect.name in current.found.names or of_one_phenomenon(effect, current.found.effects):
                 continue
             if of_one_phenomenon(effect, effects[:i]):
                 continue  # of the laws of one phenomenon the first stands for all until it is picked
-            progress(f"effect {step + 1}: {effect.name}", (step + i / len(effects)) / search.options.most)
+            progress(
+                f"effect {step + 1}: {effect.name}",
+                (step + i / len(effects)) / search.options.greatest_number,
+            )
             candidate = search.judge([*current.found.effects, effect], like=current)
             if not chosen:
                 candidate = _with_hidden_strain(search, effect, candidate, current)
@@ -81,12 +84,12 @@ def attribute(
         steps.append(scores)
         least = search.options.least_of_first * max((steps[0][n].size_n for n in chosen[:1]), default=0.0)
         passing = [s for s in scores.values() if search.passes(s, first=not chosen) and s.size_n > least]
-        if search.sideways_off(current):
+        if search.forward.measured and search.sideways_off(current):
             passing = _not_blind_to_slip(search, passing)
         known = [scores[n] for n in sorted(seen) if n in scores]
         passing = [s for s in known if s.size_n > search.smallest_n] or passing
         if not passing:
-            pair = None if step + 2 > search.options.most else _paired(search, effects, current)
+            pair = None if step + 2 > search.options.greatest_number else _paired(search, effects, current)
             if pair is None:
                 break
             chosen += [n for n in pair.found.names if n not in current.found.names]

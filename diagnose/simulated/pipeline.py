@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.forward.touches import reached, touches_of
+from diagnose.forward.touches import LEAST_PRESSES, LEAST_ROWS, reached, touches_of
 from diagnose.numerics.base import signal_of
 from diagnose.numerics.registry import NAMES, numerical
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
@@ -35,7 +35,7 @@ from diagnose.verdict.where import locate
 from mechanics.errors import DiagnosisError
 from mechanics.model import Model
 from mechanics.pressed_places import Places
-from mechanics.presses import Presses
+from mechanics.presses import MARGIN_S, Presses
 from mechanics.progress import Progress, part, silent
 from mechanics.recording import Recording
 from reconstruct.placing import presses_on
@@ -46,7 +46,7 @@ OWN_MODULUS = "stated_modulus"
 @dataclasses.dataclass(frozen=True)
 class Asked:
     """What is asked of a simulation: its forces, what it was given, how the file is meant; of one run
-    here its version, advice by numerical effect, and settings in words."""
+    here its version, advice by numerical effect, settings in words, and greatest Poisson's ratio."""
 
     forces: Forces
     stated: Stated
@@ -54,18 +54,19 @@ class Asked:
     version: str = ""
     advice: dict[str, str] = dataclasses.field(default_factory=dict)
     run_as: str = ""
+    poisson_limit: float = math.inf
 
 
 @dataclasses.dataclass
 class _Sides:
     """The simulation's presses beside the real ones. forward: of all its presses, with the mended signal;
-    raw: (n, 3) N, local, the force as it came; rows: of the real touches; fell: (p,) presses that the tip
-    fell through; seen: what the samples themselves showed."""
+    raw: (n, 3) N, local, the force as it came; rows: of the real touches; fell_s: (p,) s, from when on the
+    tip had fallen through, inf where it did not; seen: what the samples themselves showed."""
 
     forward: StatedForward
     raw: np.ndarray
     rows: np.ndarray
-    fell: np.ndarray
+    fell_s: np.ndarray
     seen: dict[str, dict[str, float]]
     notes: tuple[str, ...]
 
@@ -87,7 +88,7 @@ def diagnose_simulated(
     plain what the forces mean, DiagnosisError where the data cannot carry it.
     """
     options = options or DiagnoseOptions()
-    rules = attribution or AttributionOptions(most=1 if options.fast else 3)
+    rules = attribution or AttributionOptions()
     progress("forces", 0.0)
     presses = presses_on(recording, model)
     if presses.quasi_static:
@@ -120,14 +121,14 @@ def _beside(presses: Presses, model: Model, given: Aligned, findings: Findings, 
 
     raw, mended = touches(given.force), touches(force)
     keep = np.isin(raw.onset_s, presses.onset_s[given.usable])
-    left = np.zeros(len(presses), bool)
-    np.logical_or.at(left, presses.press[own], signal.left)
+    fell_s = np.full(len(presses), np.inf)
+    np.minimum.at(fell_s, presses.press[own][signal.left], signal.t[signal.left])
     real = findings.forward
     rows = raw.rows(np.flatnonzero(keep))
     forward = StatedForward(mended.of(keep), _of(real.places, keep), stated)
-    fell = np.isin(forward.touches.onset_s, presses.onset_s[left])
+    fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
     keys = {name: values for name, (_, values) in seen.items()}
-    return _Sides(forward, raw.local_force[rows], rows, fell, keys, given.notes)
+    return _Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes)
 
 
 def _of(places: Places, keep: np.ndarray) -> Places:
@@ -139,20 +140,24 @@ def _of(places: Places, keep: np.ndarray) -> Places:
 
 
 def _numerics(sides: _Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
-    """What is named against the law; presses that the tip fell through have no say, and get the law's
-    force."""
-    forward = sides.forward
-    if not sides.fell.any():
-        found = numerics_of(forward, rules, progress)
-    else:
-        held = ~sides.fell
-        of_held = StatedForward(forward.touches.of(held), _of(forward.places, held), forward.stated)
-        found = _with_fallen(sides, numerics_of(of_held, rules, progress), held)
-    return _with_seen(sides, found)
+    """What is named against the law. Presses that the tip fell through have a say until they did, where that
+    is long enough, and get the law's force with what was named from there on."""
+    forward, t = sides.forward, sides.forward.touches
+    until = np.minimum(t.end_s, sides.fell_s - MARGIN_S)
+    cut = dataclasses.replace(t, end_s=until)
+    seen = np.bincount(t.press[(t.t > t.onset_s[t.press]) & cut.counted], minlength=len(t))
+    held = np.isinf(sides.fell_s) | (seen >= LEAST_ROWS)
+    if held.sum() < LEAST_PRESSES:
+        cut, held = t, np.ones(len(t), bool)
+    sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
+    if held.all() and np.isinf(sides.fell_s).all():
+        return _with_seen(sides, numerics_of(forward, rules, progress))
+    of_held = StatedForward(cut.of(held), _of(forward.places, held), forward.stated)
+    return _with_seen(sides, _over_all(sides, numerics_of(of_held, rules, progress), held))
 
 
-def _with_fallen(sides: _Sides, found: Numerics, held: np.ndarray) -> Numerics:
-    """The same over all presses: those that the tip fell through have our law's force with what was named."""
+def _over_all(sides: _Sides, found: Numerics, held: np.ndarray) -> Numerics:
+    """The same over all presses: those that had no say have our law's force."""
     forward, t = sides.forward, sides.forward.touches
     rows = t.rows(np.flatnonzero(held))
     law = law_at(forward, forward.stated, found)
@@ -168,7 +173,7 @@ def _with_fallen(sides: _Sides, found: Numerics, held: np.ndarray) -> Numerics:
 def _with_seen(sides: _Sides, found: Numerics) -> Numerics:
     """With what the samples themselves showed, where it matters."""
     t = sides.forward.touches
-    fell = sides.fell[t.press]
+    fell = t.t >= sides.fell_s[t.press]
     mended = np.where(fell[:, None], found.with_numerics, t.local_force)
     parts = {
         "lost_contact": np.where(fell[:, None], 0.0, sides.raw - t.local_force),
@@ -240,6 +245,8 @@ def _weighed(
     touched = second - (real.ideal.force[rows] - law_at(forward, asked.stated, numerics) - given)
     end = touched - (real.full.force[rows] - real.ideal.force[rows])
     gaps = {"simulated": start, "numerics": first, "parameters": second, "touches": touched, "reality": end}
+    if weighing.gap_n(touched) ** 2 - weighing.gap_n(end) ** 2 < (rules.smallest * reality.noise_n) ** 2:
+        real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
     return _Weighed(
         asked, options.seed, options.bootstrap, reality, sides, numerics, real, wrong, weighing, gaps
     )
@@ -389,10 +396,19 @@ def _advice(w: _Weighed) -> tuple[str, ...]:
         "stated_friction": ("friction", ""),
         "stated_tip_radius": ("the tip's radius", "m"),
     }
+    if _unstated(w.asked.stated, w.numerics):
+        said.append("or stated modulus: nobody said what it was given; say it: --stated young_modulus_pa=PA")
     for p in w.wrong:
         what, unit = units[p.name]
         now = f"{p.measured:.4g} {unit}".strip() if math.isfinite(p.measured) else "infinite: the tip sticks"
-        said.append(f"{p.name.replace('_', ' ')}: give it {now} for {what} (it had {p.stated:.4g} {unit})")
+        limit = w.asked.poisson_limit if p.name == "stated_poisson_ratio" else math.inf
+        if p.measured <= limit or not math.isfinite(p.measured):
+            words = f"give it {now} for {what} (it had {p.stated:.4g} {unit})"
+        elif p.stated < limit:
+            words = f"give it {limit:g} for {what}, the most that it takes (the recording says {now})"
+        else:
+            words = f"the recording says {now}, and {limit:g} is the most that it takes: this part stays"
+        said.append(f"{p.name.replace('_', ' ')}: {words}")
     for name in w.real.names:
         said.append(
             f"{name.replace('_', ' ')}: no setting of an ideal elastic simulation has it; "

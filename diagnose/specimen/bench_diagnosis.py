@@ -8,7 +8,7 @@ import numpy as np
 from scipy.stats import t as student
 
 from diagnose.forward.touches import LEAST_PRESSES
-from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
+from diagnose.options import DiagnoseOptions, NuisanceOptions
 from diagnose.pipeline import diagnose
 from diagnose.search.descent import Descent
 from diagnose.search.fit import settings_of
@@ -35,7 +35,6 @@ def diagnose_bench(
         DiagnoseOptions(fast=fast, seed=seed),
         progress,
         nuisance=_nuisance(bench),
-        attribution=AttributionOptions(most=1 if fast else 3),
     )
 
 

@@ -12,6 +12,7 @@ from diagnose.specimen.bench import Curve
 from diagnose.verdict.result import Diagnosis
 from mechanics.result import Result
 from reconstruct.external.uniaxial import Uniaxial
+from reconstruct.steps.s7_modulus.held_out import BETTER
 
 FLOORS = {
     "relaxation": ("spring",),
@@ -20,8 +21,6 @@ FLOORS = {
     "indentation": ("kelvin-voigt", "hunt-crossley"),
 }
 """1D models, by kind of test."""
-BETTER = 0.95
-"""Share of an error below which another is called smaller."""
 
 
 @dataclass(frozen=True)
@@ -89,6 +88,11 @@ class Material(Result):
     def beyond_constant(self) -> bool:
         """Whether a constant predicts held-out data better."""
         return self.missed > self.error.get("constant", float("inf"))
+
+    @property
+    def in_vain(self) -> bool:
+        """Whether what was named predicts held-out data worse than the ideal model does."""
+        return self.missed > self.error.get("ideal", float("inf"))
 
     @property
     def beaten_by(self) -> str | None:

@@ -16,7 +16,7 @@ from scipy.spatial import cKDTree
 from mechanics.effects.base import Effect, Keys, Parameter, Scope
 from mechanics.effects.hints import Misfit, SearchHints
 from mechanics.effects.settings import Scene, Settings
-from mechanics.far_field import energy_fields, far_with_weights
+from mechanics.far_field import energy_fields
 from mechanics.material import BALL, Ball
 from mechanics.model import Model
 from mechanics.moduli import inclusion_ratio
@@ -36,6 +36,10 @@ STARTS = 6
 _SCALE = "inclusion_scale"
 _SCALE_LIMITS = (0.2, 4.0)
 FOUND = "diagnosed"
+_FAR = 40.0
+"""In soft edges beyond a ball: nothing of an element is in it."""
+_KNOWN = 16
+"""Balls that are remembered: a fit moves first touches, and other effects, many times beside one ball."""
 
 
 def softness(ratio: float) -> float:
@@ -46,15 +50,24 @@ def softness(ratio: float) -> float:
 def inside(centroid: np.ndarray, centre: np.ndarray, radius: float, blur: float) -> np.ndarray:
     """(m,) share of each element in the ball, with a soft edge of the elements' size."""
     away = centroid - centre
-    distance = np.sqrt(np.einsum("mi,mi->m", away, away))
-    return 1 / (1 + np.exp(np.clip((distance - radius) / (0.35 * blur), -40, 40)))
+    beyond = (np.sqrt(np.einsum("mi,mi->m", away, away)) - radius) / (0.35 * blur)
+    near = np.flatnonzero(beyond < _FAR)
+    share = np.zeros(len(centroid))
+    share[near] = 1 / (1 + np.exp(np.maximum(beyond[near], -_FAR)))
+    return share
 
 
 def first_order(values: np.ndarray, places: Places) -> np.ndarray:
     """(p, 3, 3) 1/m, change of each press's compliance, unit modulus; first order in the ball's energy."""
-    fields = energy_fields(places)
-    share = inside(fields.centroid, values[:3], values[3], fields.blur)
-    return far_with_weights(places, 1 + share * (softness(np.exp(values[4])) - 1)) - places.far
+    known: dict[bytes, np.ndarray] = places.stage("balls", dict)
+    key = values.tobytes()
+    if key not in known:
+        if len(known) >= _KNOWN:
+            del known[next(iter(known))]
+        fields = energy_fields(places)
+        share = inside(fields.centroid, values[:3], values[3], fields.blur)
+        known[key] = fields.weighed(share * (softness(np.exp(values[4])) - 1))[places.place].astype(float)
+    return known[key].copy()
 
 
 def _change(settings: Settings, values: np.ndarray, scene: Scene) -> None:

@@ -1,7 +1,7 @@
 """MuJoCo: the object as a flex of linear tetrahedra on its base, and the tip as a mocap sphere.
 
 A flex has one modulus and linear tetrahedra, which lock near nu = 0.5. They are graded under the tip; under a
-deep dent the flex is softer than the model.
+deep dent the flex, a Saint Venant-Kirchhoff solid, is softer than the model.
 """
 
 from __future__ import annotations
@@ -14,13 +14,15 @@ from palpate.exporting.subject import DENSITY_KG_M3, Subject
 
 TIMESTEP_S = 1e-3
 CONTACT = 'solref="0.004 1" solimp="0.999 0.999 0.001"'
-"""As hard as the step allows: with MuJoCo's own a fine mesh came out softer than a coarse one. Its cause is
-not known; that it is a spring which goes with the mass of a node was not tested."""
+"""As hard as the step allows."""
+EDGE_RADII = 1 / 3
+"""Of the tip: a file's flex is a Saint Venant-Kirchhoff solid, which the finer the mesh gives the more way
+where it is crushed; its radius, by which the surface stands off, makes up for that in a shallow press."""
 
 
 def text_of(subject: Subject) -> str:
     """The MJCF scene; `mocap_pos[0]` is the tip's centre, which starts off the surface."""
-    mesh = subject.graded()
+    mesh = subject.graded(EDGE_RADII)
     touch = f'condim="3" friction="{subject.friction:g}" {CONTACT}'
     middle, span = mesh.points.mean(axis=0), float(np.ptp(mesh.points, axis=0).max())
     pressed = " ".join(f"{value:.9g}" for value in subject.pressed)
@@ -51,7 +53,8 @@ def write(path: Path, subject: Subject) -> tuple[str, ...]:
     path.write_text(text_of(subject), encoding="utf-8")
     notes = [
         "linear tetrahedra, which come out stiffer than the model near nu = 0.5",
-        "a flex softens under a deep dent: compare presses of a sixth of the tip's radius",
+        "a flex softens under a deep dent: compare presses of a sixth of the tip's radius, or set elastic3d "
+        "of its MjSpec to 1 (stable neo-Hookean), which no file can say",
         subject.friction_note,
     ]
     if np.ptp(subject.model.element_ratio) > 1e-9:

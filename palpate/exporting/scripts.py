@@ -27,7 +27,7 @@ import warp as wp
 POINTS = np.array($points).reshape(-1, 3)
 TETRAHEDRA = $tetrahedra
 FIXED = $fixed
-SKIN_M, CONTACT_N_PER_M, SWEEPS = 1e-4, 3e3, 20
+SKIN_M, CONTACT_N_PER_M, SWEEPS = 1e-4, 10 * YOUNG_PA * RADIUS_M, 20
 
 builder = newton.ModelBuilder(gravity=(0.0, 0.0, 0.0))
 tip = builder.add_body(is_kinematic=True)
@@ -137,7 +137,7 @@ def write_newton(path: Path, subject: Subject) -> tuple[str, ...]:
         fixed=_list(np.flatnonzero(mesh.fixed)),
     )
     path.write_text(_head(subject, "pip install newton; python FILE", _NU) + body, encoding="utf-8")
-    return (*_notes(subject, _NU), "its contact gives: a spring of 3000 N/m each, as far as it converges")
+    return (*_notes(subject, _NU), "its contact gives: a spring of 10 E R each, as far as it converges")
 
 
 def write_drake(path: Path, subject: Subject) -> tuple[str, ...]:

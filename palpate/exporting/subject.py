@@ -61,9 +61,10 @@ class Subject:
         own = self.friction != USUAL_FRICTION
         return f"friction {self.friction:g}, " + ("of the model" if own else "as the model names none")
 
-    def graded(self) -> TetMesh:
-        """The linear mesh with edges of half the tip's radius under it, where the model's are longer."""
-        return graded(self.mesh.linear(), self.top, 0.5 * self.radius_m, 1.2 * self.radius_m)
+    def graded(self, edge_radii: float = 0.5) -> TetMesh:
+        """The linear mesh with edges of at most so many of the tip's radii under it, where the model's are
+        longer."""
+        return graded(self.mesh.linear(), self.top, edge_radii * self.radius_m, 1.2 * self.radius_m)
 
     @property
     def radius_m(self) -> float:

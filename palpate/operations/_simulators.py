@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import time
 from typing import TYPE_CHECKING, Any, NamedTuple
 
+from diagnose.forward.touches import LEAST_PRESSES
 from mechanics.key_values import pairs, words_of
 from palpate.operations._declare import operand
 from render.options import DOCUMENTED, SETTINGS, RenderOptions
@@ -32,6 +34,18 @@ def settings_operand() -> Any:
 def numbers_operand(words: str = "numbers of these settings to change", default: str | None = "") -> Any:
     """KEY=VALUE,... of a simulator's settings."""
     return operand(default, f"{words}: KEY=VALUE, comma separated", metavar="KEY=VALUE,...", rare=True)
+
+
+TOLD_FROM, LONG_S = 0.01, 60.0
+"""Of a run, from which its whole time is told; s, of a long one."""
+
+
+def told(whole_s: float, presses: int) -> str:
+    """What is said of a run that takes so long over so many presses."""
+    if whole_s < LONG_S or presses <= LEAST_PRESSES:
+        return f"about {max(whole_s / 60, 0.1):.2g} min in all"
+    fewer = whole_s * LEAST_PRESSES / presses
+    return f"about {whole_s / 60:.2g} min in all; --presses {LEAST_PRESSES} takes {fewer / 60:.2g}"
 
 
 class Ran(NamedTuple):
@@ -78,7 +92,12 @@ def run_along(
     presses = presses_on(recording, model)
     chosen = spread_out(presses, made.adapter.presses if most is None and usual else most)
 
+    begun, estimate = time.monotonic(), ""
+
     def tell(words: str, share: float) -> None:
-        progress(f"{name}, {said}: {words}", share)
+        nonlocal estimate
+        if not estimate and share > TOLD_FROM:
+            estimate = ", " + told((time.monotonic() - begun) / share, int(chosen.sum()))
+        progress(f"{name}, {said}: {words}{estimate}", share)
 
     return Ran(replay_touches(made, recording, presses, chosen, tell), chosen, made.adapter, said)

@@ -148,9 +148,9 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     """The sim-to-real gap: where simulated and measured force differ, which effect was left out, how far the
     gap shrinks with it on places that were not fitted; N rms.
 
-    fast: fewer effects, one in an answer. With simulated the answer is a SimulatedGap: that simulator's
-    numerics, the parameters that it was given, and what every ideal simulation lacks. Raises DiagnosisError
-    where the data cannot carry it.
+    fast: fewer effects, one in an answer; of a simulator's numerics all the same. With simulated the answer
+    is a SimulatedGap: that simulator's numerics, the parameters that it was given, and what every ideal
+    simulation lacks. Raises DiagnosisError where the data cannot carry it.
     """
     from diagnose.pipeline import diagnose as diagnosed
     from reconstruct.placing import presses_on
@@ -160,7 +160,6 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
     if asked.corrected and not str(asked.corrected).endswith((".csv", ".csv.gz")):
         raise OptionError(f"--corrected '{asked.corrected}' must end in .csv or .csv.gz")
     options = call.of(DiagnoseOptions, seed=asked.seed)
-    most = {"most": 1} if options.fast and "most" not in call.given else {}
     source, measured = given_model(asked.model, call), read_recording(asked.recording)
     with call.progress("diagnose") as tell:
         if source is None:
@@ -171,7 +170,7 @@ def diagnose(asked: DiagnoseOperands, call: Call) -> Diagnosis | SimulatedGap:
             made, begun = plain.replaced(presses=presses_on(measured, plain)), 0.0
         rules: dict[str, Any] = {
             "nuisance": call.of(NuisanceOptions),
-            "attribution": call.of(AttributionOptions, **most),
+            "attribution": call.of(AttributionOptions),
         }
 
         def rest(stage: str, share: float) -> None:
@@ -230,7 +229,8 @@ def _simulation(
     # what the adapter gave it, but for what is said
     stated = stated_of({**ran.adapter.stated, **stated_values(asked.stated)}, model)
     own_clock = call.of(ForcesOptions, clock_offset_s=0.0)
-    return Asked(forces, stated, own_clock, ran.adapter.version, ran.adapter.advice, ran.said)
+    of_adapter = ran.adapter.version, ran.adapter.advice, ran.said, ran.adapter.poisson_limit
+    return Asked(forces, stated, own_clock, *of_adapter)
 
 
 def _forces(asked: DiagnoseOperands) -> Any:

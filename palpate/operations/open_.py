@@ -177,7 +177,9 @@ def _reconstructed(
     checked = check(recording, progress=call.wanted)
     result: Any = checked
     if not checked.grave:
-        given: dict[str, Any] = {"slab_m": asked.slab_m} if asked.slab_m else {}
+        given: dict[str, Any] = {"field": "where-beaten"}
+        if asked.slab_m:
+            given["slab_m"] = asked.slab_m
         if asked.half_space:
             given["half_space"] = True
         result = reconstruct(recording, save=asked.save, seed=asked.seed, progress=call.wanted, **given)

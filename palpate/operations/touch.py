@@ -32,7 +32,8 @@ from palpate.operations._declare import Call, operand, operation
 from palpate.operations._shared import SAMPLES, MeshFileOptions, given_scene, seed_operand, with_friction
 from palpate.output import Output, progress_bar
 from palpate.servo import SafetyOptions, ServoOptions, ServoReport
-from palpate.warm_up import warming_up
+from palpate.servo.started import StartedServo
+from palpate.warm_up import OF_A_TOUCH, OF_ITS_SERVO, warming_up
 from palpate.window.session import SessionOptions, TouchSession
 from render.options import RenderOptions
 from render.registry import names
@@ -138,7 +139,7 @@ def touch(asked: TouchOperands, call: Call) -> Touched | None:
     )
     for word in servo_options.loosened:
         print(f"palpate touch: {word}", file=sys.stderr)
-    with warming_up() as compiling:  # while a person chooses, too
+    with warming_up(OF_A_TOUCH) as compiling:  # while a person chooses, too
         opening = _Opening(asked, call, name, servo_options, compiling)
         return _in_window(opening) if not asked.headless else _without(opening)
 
@@ -148,8 +149,9 @@ def _without(opening: _Opening) -> Touched:
     asked = opening.asked
     scene = opening.scene(asked.scene or DEFAULT)
     with ExitStack() as stack:
+        servo = stack.enter_context(StartedServo(OF_ITS_SERVO))
         with progress_bar("touch") as bar:
-            session, until = opening.session(stack, scene, None, bar)
+            session, until = opening.session(stack, servo, scene, None, bar)
         session.enable()
         _wait(session, until if asked.seconds is None else asked.seconds)
         return opening.touched(session, scene)
@@ -169,7 +171,7 @@ class _Opening:
         return given_scene(name, self.call)
 
     def session(
-        self, stack: ExitStack, scene: Scene, channel: PoseChannel | None, tell: Progress
+        self, stack: ExitStack, servo: StartedServo, scene: Scene, channel: PoseChannel | None, tell: Progress
     ) -> tuple[TouchSession, float | None]:
         """A started session, which the stack closes, and when its device will have done (s)."""
         asked, call = self.asked, self.call
@@ -186,11 +188,17 @@ class _Opening:
             pictures=not asked.headless,
         )
         mapping = _mapping(call, self.device, scene, model)
-        if options.renderer == "fem":
-            tell("compiling, once after an installation", 0.4)
-            self.compiling()
-        session = TouchSession(model, title=scene.title, device=device, mapping=mapping, options=options)
-        stack.enter_context(session).start(lambda stage, share: tell(stage, 0.5 + 0.5 * share))
+
+        def compiled() -> None:
+            if options.renderer == "fem":
+                tell("compiling, once after an installation", 0.5)
+                self.compiling()
+
+        session = TouchSession(
+            model, title=scene.title, device=device, mapping=mapping, options=options, started=servo
+        )
+        opened = stack.enter_context(session)
+        opened.start(lambda stage, share: tell(stage, 0.5 + 0.5 * share), compiled=compiled)
         return session, until
 
     def touched(self, session: TouchSession, scene: Scene) -> Touched:
@@ -202,21 +210,23 @@ class _Opening:
 def _in_window(opening: _Opening) -> Touched | None:
     """A window from the first moment on, where a scene is chosen and which shows how the preparation comes
     along; then the touch, of one scene after the other. None where a person closes it before."""
-    from palpate.window.waiting import ClosedError, WaitingWindow
-    from palpate.window.window import TouchWindow
-
     asked = opening.asked
     # who says how long is not there to choose
     name = asked.scene or (None if asked.seconds is None and asked.guide is None else DEFAULT)
     chosen = None if name is None else opening.scene(name)
     while True:
         with ExitStack() as stack:
+            servo = stack.enter_context(StartedServo(OF_ITS_SERVO))
+            # what draws is loaded while the servo loads
+            from palpate.window.waiting import ClosedError, WaitingWindow
+            from palpate.window.window import TouchWindow
+
             waiting = stack.enter_context(closing(WaitingWindow(_gallery() if chosen is None else ())))
             mouse = opening.device == "mouse"
             channel = stack.enter_context(closing(PoseChannel.create())) if mouse else None
             try:
                 scene = chosen or opening.scene(waiting.choose().name)
-                prepare = partial(opening.session, stack, scene, channel)
+                prepare = partial(opening.session, stack, servo, scene, channel)
                 session, until = waiting.run(scene.title, prepare)
             except ClosedError as error:
                 print(f"palpate touch: {error}", file=sys.stderr)

@@ -1,4 +1,4 @@
-"""The servo process's entry: `python -m palpate.servo BLOCK`, started by palpate.servo.client."""
+"""The servo process's entry: `python -m palpate.servo BLOCK PARENT STAGE...` (palpate.servo.started)."""
 
 import os
 import sys

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import json
-import os
 import pickle
 import queue
 import subprocess
 import threading
 import time
+from collections.abc import Callable
 from collections.abc import Mapping as MappingType
 from pathlib import Path
 from typing import Any, Self
@@ -20,12 +20,12 @@ from devices.registry import DeviceChoice
 from mechanics.errors import DeviceError, PalpateError
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
-from palpate.child import module_command, module_environment
 from palpate.servo.layout import BEAT, ENABLE, STOP, SharedArrays, SharedBlock
 from palpate.servo.options import ServoOptions
-from palpate.servo.process import Job
+from palpate.servo.process import GO, Job
 from palpate.servo.report import ServoReport, ServoSnapshot, report, ring_rows, snapshot
 from palpate.servo.source import ModelFolder, ModelSource, RendererChange, RendererSource
+from palpate.servo.started import StartedServo
 
 START_TIMEOUT_S = 600.0
 STOP_TIMEOUT_S = 5.0
@@ -36,7 +36,8 @@ class Servo:
     """A servo process as an object; use it in a `with` statement.
 
     model: a Model, a MODEL folder, or a RendererSource. device: a name or a DeviceChoice, made in the servo
-    process, which owns it. mapping: device to scene (devices.mapper), the identity by default.
+    process, which owns it. mapping: device to scene (devices.mapper), the identity by default. started: a
+    process that waits for its job; None: `start` makes one.
 
     Force lasts only while this side shows that it lives: every call here is a heartbeat, and so is each turn
     of `wait`. After `options.silence_s` without one the force goes off, and ramps in again at the next.
@@ -51,6 +52,7 @@ class Servo:
         options: ServoOptions | None = None,
         mapping: Mapping | None = None,
         render_options: Any = None,
+        started: StartedServo | None = None,
     ) -> None:
         self.options = options or ServoOptions()
         self._folder: ModelFolder | None = None
@@ -61,7 +63,8 @@ class Servo:
             self._source = model
         choice = DeviceChoice(device) if isinstance(device, str) else device
         self._job = Job(self._source, choice, self.options, mapping)
-        self._block = SharedBlock()
+        self._started = started
+        self._block = SharedBlock() if started is None else started.block
         self._process: subprocess.Popen[bytes] | None = None
         self._answers: queue.Queue[dict[str, Any]] = queue.Queue()
         self._words: list[str] = []
@@ -113,22 +116,18 @@ class Servo:
             self._listener.join(1.0)  # its last words may still be on their way
         return self._error
 
-    def start(self, progress: Progress = silent) -> Self:
+    def start(self, progress: Progress = silent, *, compiled: Callable[[], object] = lambda: None) -> Self:
         """Spawn; returns when compiled, warmed up and ticking with force off.
 
+        compiled: waits until what the servo runs need not be compiled by it; it loads the model meanwhile.
         Raises the PalpateError that the servo process met.
         """
-        self._process = subprocess.Popen(
-            module_command("palpate.servo", self._block.path, str(os.getpid())),
-            env=module_environment(),
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            # a Ctrl-C at the terminal is the parent's to handle
-            start_new_session=True,
-        )
+        self._process = (self._started or StartedServo(block=self._block)).take()
         self._listener = threading.Thread(target=self._listen, daemon=True)
         self._listener.start()
         self._send(self._job)
+        compiled()
+        self._send(GO)
         ready = self._await("ready", progress, START_TIMEOUT_S)
         self._block.forget()
         self._tip_radius_m = float(ready["tip_radius_m"])

@@ -33,9 +33,17 @@ from palpate.servo.orphan import end_with_parent
 from palpate.servo.realtime import lock_memory, quiet_interpreter, real_time_thread
 from palpate.servo.source import RendererSource
 from palpate.servo.tick import TickParameters, tick_arrays
+from palpate.warm_up import warm_up
 from render.coupling import series_compliance_m_per_n, stable_stiffness_n_per_m, stiffest_n_per_m
 from render.passivity import passivity_parameters
 from render.scene import TouchScene, in_the_air, scene_of
+
+GO = "go"
+"""What follows a job once all is compiled that another process compiles for it."""
+
+
+STEPS_IN = 30
+"""Ticks in which a press that is under way is made again by another renderer."""
 
 
 @dataclass(frozen=True)
@@ -133,6 +141,7 @@ class ServoProcess:
         kind = self._device.spec
         scene = self._scene(renderer, model)
         self._progress("compiling the loop", 0.95)
+        pickle.load(commands)  # GO
         program = make_program(scene, self._arrays, self._parameters())
         locked = lock_memory()
         if locked:
@@ -203,7 +212,9 @@ class ServoProcess:
             self._put(now.scene.renderer.with_friction(value))
         elif name == "source":
             scene = self._scene(*value.make(self._progress))
-            self._swap(make_program(scene, self._arrays, self._parameters()))
+            program = make_program(scene, self._arrays, self._parameters())
+            press_again(program, self._loop.program.state, self._arrays.tips)
+            self._swap(program)
             self._source = value
         elif name == "mapping":
             self._mapping = value
@@ -221,6 +232,18 @@ class ServoProcess:
         assert self._loop is not None
         if not self._loop.swap(program):
             raise PalpateError("the loop did not answer: stop the servo and start it again")
+
+
+def press_again(program: Program, before: Any, tips: np.ndarray) -> None:
+    """Bring a fresh program's tips from the air to where they are held now, as the state `before` has it: a
+    tip that is inside an object from the start is not held by it, and the hand would feel nothing.
+
+    tips: (m, 3) m, centres now.
+    """
+    renderer, now = program.scene.renderer, tips.copy()
+    away = np.where(before.touching != 0, before.depths + before.radii_m, 0.0)[:, None] * before.normals
+    for share in np.linspace(1.0, 0.0, STEPS_IN):
+        renderer.kernel(renderer.parameters, program.state, now + share * away)
 
 
 def main(argv: list[str]) -> int:
@@ -249,6 +272,8 @@ def main(argv: list[str]) -> int:
     signal.signal(signal.SIGTERM, end)
     signal.signal(signal.SIGINT, end)
     commands = sys.stdin.buffer
+    if argv[3:]:
+        warm_up(argv[3:])
     try:
         jobs.append(pickle.load(commands))
         ServoProcess(block, jobs[0], tell).run(commands)

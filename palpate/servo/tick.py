@@ -358,13 +358,12 @@ def account(arrays, parameters, deadline_ns, started_ns, ended_ns):
     counts[DEADLINE] = following
 
 
-@kernel
-def put_pose(arrays, pose):
+def put_pose(arrays: TickArrays, pose: np.ndarray) -> None:
     """Hand a pose (IN_WIDTH,) to the next tick."""
     write_block(arrays.inbox_version, arrays.inbox, pose)
 
 
-@kernel
-def take_command(arrays, command):
+def take_command(arrays: TickArrays, command: np.ndarray) -> int:
     """Copy the newest command (OUT_WIDTH,); returns its version, -1 where it could not be read."""
-    return read_block(arrays.outbox_version, arrays.outbox, command)
+    version: int = read_block(arrays.outbox_version, arrays.outbox, command)
+    return version

@@ -51,6 +51,8 @@ def _first(result: Material) -> str:
         )
     elif result.beaten_by is not None:
         doubts.append(f"{result.beaten_by} predicts held-out data better")
+    if result.in_vain and not result.beyond_constant:
+        doubts.append("the ideal model predicts held-out data better than with what was found")
     carried = ", which carries the modulus: NO ANSWER" if result.bound_carries else ""
     doubts += [f"{each} stands at the end of its range{carried}" for each in result.at_bound]
     return "; ".join([*doubts, result.verdict])

@@ -16,12 +16,13 @@ if TYPE_CHECKING:
 
 def lines(result: Opened) -> list[str]:
     """What `print` says, line by line."""
+    first, *more = result.result.lines()
     rest = [f"  {key}: {value}" for key, value in result.understood.items() if key != "took it for"]
     return [
-        f"{', '.join(result.sources)}: taken for {result.understood['took it for']}",
+        f"{', '.join(result.sources)}: taken for {result.understood['took it for']}; {first}",
         *rest,
         *(f"  {note}" for note in result.notes),
-        *result.result.lines(),
+        *more,
     ]
 
 

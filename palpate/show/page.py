@@ -63,8 +63,10 @@ class Page:
     def next_steps(self, steps: Sequence[str]) -> None:
         """What to do now, marked; what stands between backticks is code. Nothing for none."""
         if steps:
-            words = f"What to do next: {'; '.join(steps)}."
-            self._parts.append(f'<p class="next">{self._words(words)}</p>')
+            one = f" {self._words(steps[0])}." if len(steps) == 1 else ""
+            several = "".join(f"<li>{self._words(step)}</li>" for step in steps[len(steps) == 1 :])
+            listed = f"<ul>{several}</ul>" if several else ""
+            self._parts.append(f'<div class="next">What to do next:{one}{listed}</div>')
 
     def cards(self, cards: Sequence[tuple[str, str, str]]) -> None:
         """Answers side by side: (question, answer in a few words, a sentence or two) each."""

@@ -43,9 +43,7 @@ STATED = {
 WORDS = {
     "share": "share",
     "never_felt": "of it never felt at all",
-    "ratio": "stiffness of the mesh, times what it should be",
-    "ratio_softest_place": "at the softest place, times",
-    "ratio_stiffest_place": "at the stiffest place, times",
+    "from_depth_m": "from a depth of",
     "effective_radius_m": "no contact is smaller than a patch of radius",
     "late_m": "and met late by",
     "stiffness_n_per_m": "stiffness of the contact",
@@ -115,8 +113,13 @@ def meaning(name: str) -> str:
 
 def keys_in_words(entry: EffectEntry) -> str:
     """An entry's numbers with units that a hand knows."""
-    said = []
-    for key, value in entry.parameters.items():
+    said, values = [], dict(entry.parameters)
+    if "ratio" in values:
+        ratio, *ends = (values.pop(f"ratio{place}") for place in ("", "_softest_place", "_stiffest_place"))
+        low, high = (number(x) for x in sorted(ends))
+        places = "" if low == high else f", {low} to {high} from place to place"
+        said.append(f"{number(ratio)} times as stiff as it should be{places}")
+    for key, value in values.items():
         words, factor, unit = plain_key(key)
         shown = "none: it sticks" if value is None else number(value, factor)
         said.append(f"{WORDS.get(key, words)} {shown} {unit}".strip())
@@ -125,6 +128,8 @@ def keys_in_words(entry: EffectEntry) -> str:
 
 LITTLE = 0.5
 """Share of a gap, above which one that nothing explains is said first."""
+SHOWN = 0.02
+"""Share of a gap that a bar can show."""
 _MOST = {
     "numerics": "most of the gap is numerics",
     "parameters": "most of the gap is parameters",
@@ -213,10 +218,11 @@ def lead(result: SimulatedGap) -> str:
         if left > LITTLE:
             return f"{off}, and nothing that is known here explains {percent(left)} of that."
         return "Nothing stands out: this simulation is as near to the measured forces as they can tell."
-    strongest = meaning(result.effects[0])
+    numbers = {e.name: keys_in_words(e) for e in result.entries}
+    said = [meaning(n) + (f" ({numbers[n]})" if numbers.get(n) else "") for n in result.effects[:2]]
     if left > most:
-        return f"{off}, and {percent(left)} of that is not explained. A smaller part is: {strongest}."
-    return f"{off}. Above all: {strongest}." + (
+        return f"{off}, and {percent(left)} of that is not explained. A smaller part is: {said[0]}."
+    return f"{off}. Above all: {'; then: '.join(said)}." + (
         f" Not ruled out: {spoken(result.candidates, 'or')}." if result.candidates else ""
     )
 
@@ -259,14 +265,15 @@ def report(result: SimulatedGap, path: Path | str) -> Path:
         page.paragraph(f"Run again with {result.mended.settings}: {mended_words(result)}.")
     for note in result.notes:
         page.paragraph(f"Note: {note}.")
-    figure = new_figure(9, 1.7, layout="constrained")
-    draw(result, figure.subplots())
-    page.figure(
-        figure,
-        "Taken off one after another, at places that no fit has seen: numerics, parameters, then what every "
-        f"ideal simulation lacks. Of what is left {percent(result.noise_share)} is the sensor's noise and "
-        f"{percent(result.touch_share)} where exactly the object was first met.",
-    )
+    if sum(share > SHOWN for share in (result.unexplained, *(p.share for p in result.parts.values()))) > 1:
+        figure = new_figure(9, 1.7, layout="constrained")
+        draw(result, figure.subplots())
+        page.figure(
+            figure,
+            "Taken off one after another, at places that no fit has seen: numerics, parameters, then what "
+            f"every ideal simulation lacks. Of what is left {percent(result.noise_share)} is the sensor's "
+            f"noise and {percent(result.touch_share)} where exactly the object was first met.",
+        )
     page.view(
         view_of_gap(shown),
         first_picture(result.reality.model, shown),
@@ -311,7 +318,8 @@ def _stated(page: Page, result: SimulatedGap) -> None:
             ("it sticks" if v is None else v if v == "" else number(v, factor)) for v in (value, measured)
         ]
         said = "stated" if key in given.given else "not stated: the model's"
-        rows.append([words, shown[0], said, shown[1] or "agrees", unit])
+        own = "agrees" if key in given.given else "-"
+        rows.append([words, shown[0], said, shown[1] or own, unit])
     page.table(["parameter", "given", "by whom", "the recording says", "unit"], rows)
 
 
@@ -320,7 +328,9 @@ def _tried(page: Page, result: SimulatedGap) -> None:
     page.paragraph(
         "Each flaw of a simulator was held against the difference between its force and our own law's at the "
         "parameters that it was given, where no sensor's noise stands in the way, and judged at places that "
-        "the fit had not seen. The difference left is that to the measured force once this alone is mended."
+        "the fit had not seen. The difference left is that to the measured force once this alone is mended: "
+        "of two flaws that hide one another it can be more than before. A flaw that takes much away and is "
+        "unlikely is a worse account of the same than those that are named."
     )
     page.table(
         ["effect", "kind", "what it means", "how likely", "difference left [mN]", "taken away", "values"],

@@ -4,7 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pyvista
-import vtk
+from vtkmodules.vtkRenderingCore import (
+    vtkActor2D,
+    vtkCoordinate,
+    vtkPolyDataMapper2D,
+    vtkRenderer,
+    vtkTextActor,
+)
 
 from palpate.window.lettering import set_type
 
@@ -16,7 +22,7 @@ COLOURS = {"x": "#b3261e", "y": "#2e7d32", "z": "#1b4f9c"}
 class Axes:
     """In a renderer's lower left corner; `update` turns them with the eye."""
 
-    def __init__(self, renderer: vtk.vtkRenderer) -> None:
+    def __init__(self, renderer: vtkRenderer) -> None:
         self._renderer = renderer
         self._lines = pyvista.PolyData()
         self._lines.points = np.zeros((6, 3))
@@ -25,16 +31,16 @@ class Axes:
         self._lines.GetCellData().SetScalars(
             pyvista.convert_array(np.array(shades, dtype=np.uint8), name="shade")
         )
-        mapper, place = vtk.vtkPolyDataMapper2D(), vtk.vtkCoordinate()
+        mapper, place = vtkPolyDataMapper2D(), vtkCoordinate()
         place.SetCoordinateSystemToViewport()
         mapper.SetTransformCoordinate(place)
         mapper.SetInputData(self._lines)
         mapper.SetScalarModeToUseCellData()
-        actor = vtk.vtkActor2D()
+        actor = vtkActor2D()
         actor.SetMapper(mapper)
         actor.GetProperty().SetLineWidth(2.0)
         renderer.AddViewProp(actor)
-        self.letters = [vtk.vtkTextActor() for _ in COLOURS]
+        self.letters = [vtkTextActor() for _ in COLOURS]
         for letter, (name, colour) in zip(self.letters, COLOURS.items(), strict=True):
             letter.SetInput(name)
             set_type(letter.GetTextProperty(), 12, True, colour)

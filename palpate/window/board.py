@@ -12,7 +12,14 @@ from typing import Any
 
 import numpy as np
 import pyvista
-import vtk
+from vtkmodules.vtkCommonCore import VTK_TEXT_CENTERED, VTK_TEXT_LEFT, VTK_TEXT_TOP
+from vtkmodules.vtkRenderingCore import (
+    vtkActor2D,
+    vtkCoordinate,
+    vtkPolyDataMapper2D,
+    vtkRenderer,
+    vtkTextActor,
+)
 
 from palpate.window.lettering import cut, set_type, text_width, wrapped
 
@@ -68,7 +75,7 @@ class Board:
     fill: behind everything, '' for nothing. changed: whether it looks otherwise than it was drawn last.
     """
 
-    def __init__(self, renderer: vtk.vtkRenderer, *, fill: str = "") -> None:
+    def __init__(self, renderer: vtkRenderer, *, fill: str = "") -> None:
         self._renderer = renderer
         self.fill = fill
         self.scale = 1.0
@@ -81,7 +88,7 @@ class Board:
         self._held: tuple[Item, Rectangle] | None = None
         self._boxes, under = _quads()
         self._hint, over = _quads()
-        self._texts: list[vtk.vtkTextActor] = []
+        self._texts: list[vtkTextActor] = []
         # of a tip: drawn after all others
         self._last = [over, _text_actor()]
         renderer.AddViewProp(under)
@@ -269,10 +276,10 @@ class Board:
         return "\n".join("  ".join(item.text for item in row) for row in self._rows)
 
 
-def _quads() -> tuple[pyvista.PolyData, vtk.vtkActor2D]:
+def _quads() -> tuple[pyvista.PolyData, vtkActor2D]:
     """Flat shapes in the window's pixels, to be filled, and what draws them."""
-    boxes, actor = pyvista.PolyData(), vtk.vtkActor2D()
-    mapper, place = vtk.vtkPolyDataMapper2D(), vtk.vtkCoordinate()
+    boxes, actor = pyvista.PolyData(), vtkActor2D()
+    mapper, place = vtkPolyDataMapper2D(), vtkCoordinate()
     place.SetCoordinateSystemToDisplay()
     mapper.SetTransformCoordinate(place)
     mapper.SetInputData(boxes)
@@ -281,17 +288,17 @@ def _quads() -> tuple[pyvista.PolyData, vtk.vtkActor2D]:
     return boxes, actor
 
 
-def _text_actor() -> vtk.vtkTextActor:
-    actor = vtk.vtkTextActor()
+def _text_actor() -> vtkTextActor:
+    actor = vtkTextActor()
     actor.GetPositionCoordinate().SetCoordinateSystemToDisplay()
     return actor
 
 
-def _set(actor: vtk.vtkTextActor, words: _Words) -> None:
+def _set(actor: vtkTextActor, words: _Words) -> None:
     prop = actor.GetTextProperty()
     set_type(prop, words.size, words.bold, words.colour)
-    prop.SetJustification(vtk.VTK_TEXT_CENTERED if words.centred else vtk.VTK_TEXT_LEFT)
-    prop.SetVerticalJustification(vtk.VTK_TEXT_CENTERED if words.centred else vtk.VTK_TEXT_TOP)
+    prop.SetJustification(VTK_TEXT_CENTERED if words.centred else VTK_TEXT_LEFT)
+    prop.SetVerticalJustification(VTK_TEXT_CENTERED if words.centred else VTK_TEXT_TOP)
     actor.SetInput(words.text)
     actor.SetPosition(round(words.at[0]), round(words.at[1]))
 

@@ -10,7 +10,8 @@ from typing import Protocol
 
 import numpy as np
 import pyvista
-import vtk
+from vtkmodules.vtkInteractionStyle import vtkInteractorStyleTrackballCamera
+from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from palpate.window.board import Board
 from palpate.window.game import Game
@@ -55,7 +56,7 @@ class Controlled(Protocol):
     notice: str
 
     @property
-    def picture_renderers(self) -> list[vtk.vtkRenderer]:
+    def picture_renderers(self) -> list[vtkRenderer]:
         """Where an object is drawn."""
 
     def toggle_colour(self) -> None:
@@ -83,7 +84,7 @@ class Controls:
         iren = plotter.iren
         assert iren is not None, "pyvista makes an interactor with its plotter"
         self.interactor = iren.interactor
-        self._style = vtk.vtkInteractorStyleTrackballCamera()
+        self._style = vtkInteractorStyleTrackballCamera()
         # two quick presses would give the mouse to a chart, and pyvista's keys change the picture
         iren.untrack_click_position("left")
         iren.clear_key_event_callbacks()
@@ -149,7 +150,7 @@ class Controls:
             eye = np.array(renderer.GetActiveCamera().GetPosition())
             self._window.pointer.point_along(eye, unproject(renderer, x, y, 1.0))
 
-    def _under(self, x: int, y: int) -> vtk.vtkRenderer | None:
+    def _under(self, x: int, y: int) -> vtkRenderer | None:
         pictures = self._window.picture_renderers
         return next((renderer for renderer in pictures if renderer.IsInViewport(x, y)), None)
 
@@ -178,9 +179,9 @@ class Controls:
         """Leave the inclusion where it is."""
         self._dragged = None
 
-    def _in_plane(self, renderer: vtk.vtkRenderer, centre: np.ndarray, x: int, y: int) -> np.ndarray:
+    def _in_plane(self, renderer: vtkRenderer, centre: np.ndarray, x: int, y: int) -> np.ndarray:
         """(3,) m, the point under a pixel as far from the eye as `centre`."""
-        renderer.SetWorldPoint(*centre, 1.0)
+        renderer.SetWorldPoint(*_triple(centre), 1.0)
         renderer.WorldToDisplay()
         return unproject(renderer, x, y, renderer.GetDisplayPoint()[2])
 
@@ -280,7 +281,7 @@ def _stamp() -> str:
     return f"touch-{time.strftime('%Y%m%d-%H%M%S')}"
 
 
-def unproject(renderer: vtk.vtkRenderer, x: int, y: int, depth: float) -> np.ndarray:
+def unproject(renderer: vtkRenderer, x: int, y: int, depth: float) -> np.ndarray:
     """(3,) m, the scene's point under a pixel; depth 0 at the near plane, 1 at the far one."""
     renderer.SetDisplayPoint(x, y, depth)
     renderer.DisplayToWorld()

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import pyvista
-import vtk
+from vtkmodules.vtkCommonCore import VTK_FONT_FILE
+from vtkmodules.vtkRenderingCore import vtkTextProperty, vtkTextRenderer
 
 KEPT = 4096
 """Of measured words: numbers that run through would fill any memory."""
@@ -24,11 +25,11 @@ def font_file(bold: bool) -> str:
     return str(path) if path.is_file() else ""
 
 
-def set_type(prop: vtk.vtkTextProperty, size: int, bold: bool, colour: str) -> None:
+def set_type(prop: vtkTextProperty, size: int, bold: bool, colour: str) -> None:
     """The window's type."""
     file = font_file(bold)
     if file:
-        prop.SetFontFamily(vtk.VTK_FONT_FILE)
+        prop.SetFontFamily(VTK_FONT_FILE)
         prop.SetFontFile(file)
     else:
         prop.SetFontFamilyToArial()
@@ -38,8 +39,8 @@ def set_type(prop: vtk.vtkTextProperty, size: int, bold: bool, colour: str) -> N
 
 
 @cache
-def _measure() -> tuple[Any, vtk.vtkTextProperty]:
-    return vtk.vtkTextRenderer.GetInstance(), vtk.vtkTextProperty()
+def _measure() -> tuple[Any, vtkTextProperty]:
+    return vtkTextRenderer.GetInstance(), vtkTextProperty()
 
 
 @lru_cache(KEPT)

@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
-import vtk
+from vtkmodules.vtkRenderingCore import vtkCamera
 
 from palpate.window.frames import level
 
@@ -27,9 +27,7 @@ class Orbit:
     from_m: (3,) m where the eye begins.
     """
 
-    def __init__(
-        self, camera: vtk.vtkCamera, middle_m: np.ndarray, up: np.ndarray, from_m: np.ndarray
-    ) -> None:
+    def __init__(self, camera: vtkCamera, middle_m: np.ndarray, up: np.ndarray, from_m: np.ndarray) -> None:
         self._camera = camera
         self._up = np.array(up, dtype=float)
         away = level(self._up)

@@ -9,10 +9,12 @@ the last one it travels in free air, over the object where that stands in the wa
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pyvista
-import vtk
+from vtkmodules.vtkCommonCore import mutable
+from vtkmodules.vtkCommonDataModel import vtkStaticCellLocator
 
 from mechanics.tetmesh import vertex_normals
 
@@ -52,7 +54,7 @@ class Pointer:
         self._triangles = np.asarray(triangles)
         self._normals = vertex_normals(self._points, self._triangles)
         self._shell = pyvista.PolyData.from_regular_faces(self._points, self._triangles)
-        self._locator = vtk.vtkStaticCellLocator()
+        self._locator: Any = vtkStaticCellLocator()
         self._locator.SetDataSet(self._shell)
         self._locator.BuildLocator()
         self.radius = tip_radius_m
@@ -191,7 +193,7 @@ class Pointer:
 
     def _nearest(self, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """The surface's nearest place, (3,) m, and the normal there."""
-        found, cell, sub, squared = [0.0] * 3, vtk.mutable(0), vtk.mutable(0), vtk.mutable(0.0)
+        found, cell, sub, squared = [0.0] * 3, mutable(0), mutable(0), mutable(0.0)
         self._locator.FindClosestPoint(point, found, cell, sub, squared)
         place = np.array(found)
         return place, self._normal_at(int(cell), place)
@@ -209,8 +211,9 @@ class Pointer:
 
     def _meets(self, near: np.ndarray, far: np.ndarray) -> tuple[float, np.ndarray, int] | None:
         """Where a line first meets the object: the share of it, the place (3,) m and the triangle."""
-        share, place, parametric = vtk.mutable(0.0), [0.0] * 3, [0.0] * 3
-        sub, cell = vtk.mutable(0), vtk.mutable(0)
+        share: Any = mutable(0.0)
+        place, parametric = [0.0] * 3, [0.0] * 3
+        sub, cell = mutable(0), mutable(0)
         met = self._locator.IntersectWithLine(near, far, 1e-9, share, place, parametric, sub, cell)
         return (float(share), np.array(place), int(cell)) if met else None
 

@@ -23,6 +23,8 @@ from mechanics.compliance import load_or_condense
 from mechanics.model import Model
 from mechanics.progress import Progress, silent
 from palpate.servo import Servo, ServoOptions, ServoReport, ServoSnapshot
+from palpate.servo.started import StartedServo
+from palpate.window.drawn import DrawnRenderers
 from palpate.window.frames import Frame, View
 from palpate.window.inclusion import InclusionMover
 from palpate.window.recording import SessionRecording
@@ -31,10 +33,9 @@ from palpate.window.trace import Trace
 from palpate.window.worker import Worker
 from render.base import Renderer
 from render.effects import rendered_touch
-from render.felt_surface import with_own_stiffness
 from render.fem import FemRenderer
 from render.options import RenderOptions
-from render.registry import create, names
+from render.registry import names
 from render.scene import scene_of
 from scenes.phantoms import Region
 
@@ -69,14 +70,15 @@ class TouchSession:
         device: DeviceChoice | str = "simulated",
         mapping: Mapping | None = None,
         options: SessionOptions | None = None,
+        started: StartedServo | None = None,
     ) -> None:
         asked = options or SessionOptions()
         self.model = model
         self.title = title
         self.trace = Trace()
-        self.young_modulus_pa = model.material.young_modulus_pa
-        self._options = asked.render
-        self.friction = rendered_touch(model, self._options).friction
+        self._inclusion = InclusionMover(model)
+        self._drawn = DrawnRenderers(model, asked.render, self._inclusion)
+        self.friction = rendered_touch(model, asked.render).friction
         self.worker = Worker()
         self.recording: SessionRecording | None = None
         self._recording_path = asked.recording
@@ -92,24 +94,26 @@ class TouchSession:
             device=self._device,
             mapping=mapping,
             options=asked.servo,
-            render_options=self._options,
+            render_options=asked.render,
+            started=started,
         )
-        self._renderers: dict[str, Renderer] = {}
-        self._inclusion = InclusionMover(model)
         self._next = 0
 
-    def start(self, progress: Progress = silent) -> Self:
-        """Spawn the servo, load the renderers that draw, begin to record where asked; force stays off."""
+    def start(self, progress: Progress = silent, *, compiled: Callable[[], object] = lambda: None) -> Self:
+        """Spawn the servo, load the renderers that draw, begin to record where asked; force stays off.
+
+        compiled: see Servo.start.
+        """
         drawn = ({self._servo.renderer} if self._pictures else set()) | ({self._beside_name} - {""})
         if "fem" in {self._servo.renderer, *drawn}:
             # once, before two processes ask for it at the same time
             load_or_condense(self.model, lambda stage, share: progress(stage, 0.5 * share))
         with ThreadPoolExecutor(1) as pool:
-            loading = {name: pool.submit(self._create, name) for name in sorted(drawn)}
-            self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share))
-            self._renderers = {name: job.result() for name, job in loading.items()}
-        for renderer in self._renderers.values():
-            with_own_stiffness(renderer)
+            loading = [pool.submit(self._drawn.load, name) for name in sorted(drawn)]
+            self._servo.start(lambda stage, share: progress(stage, 0.5 + 0.4 * share), compiled=compiled)
+            for job in loading:
+                job.result()
+        self._drawn.know_stiffness()
         self._restart_beside()
         self._apply()
         self._next = int(self._servo.arrays.ring_head[0])
@@ -118,22 +122,11 @@ class TouchSession:
         progress("touching", 1.0)
         return self
 
-    def _create(self, name: str, progress: Progress = silent) -> Renderer:
-        """As the user has changed it so far."""
-        made = self._inclusion.laid_on(create(name, self.model, self._options, progress))
-        changed = self.young_modulus_pa != self.model.material.young_modulus_pa
-        return made.with_modulus(self.young_modulus_pa) if changed else made
-
-    def _loaded(self, name: str) -> Renderer:
-        if name not in self._renderers:
-            self._renderers[name] = self._create(name, self.worker.tell)
-        return self._renderers[name]
-
     def _apply(self) -> None:
         """What the user changed, to a renderer that is new."""
         if self.young_modulus_pa != self.model.material.young_modulus_pa:
             self._servo.set_modulus(self.young_modulus_pa)
-        if self.friction != rendered_touch(self.model, self._options).friction:
+        if self.friction != rendered_touch(self.model, self._drawn.options).friction:
             self._servo.set_friction(self.friction)
         self._inclusion.apply(self._servo)
 
@@ -152,9 +145,14 @@ class TouchSession:
         """The second renderer, '' for none."""
         return self._beside_name
 
+    @property
+    def young_modulus_pa(self) -> float:
+        """Of what is felt now."""
+        return self._drawn.young_modulus_pa
+
     def drawing(self, name: str) -> Renderer:
         """The renderer that draws: the named one where it is loaded, else any (they share the surface)."""
-        return self._renderers.get(name) or next(iter(self._renderers.values()))
+        return self._drawn.for_drawing(name)
 
     def enable(self) -> None:
         """Force on, ramping in."""
@@ -213,7 +211,7 @@ class TouchSession:
             self._beside = None
             return
         # the plane that is felt, which may be softer than the options' for the device's sake
-        scene = scene_of(self._renderers[name], self._servo.options.support_plane)
+        scene = scene_of(self._drawn.load(name), self._servo.options.support_plane)
         spec = spec_of(self._device.name)
         if spec.has_force:
             scene = scene.no_stiffer_than(spec.max_stiffness_n_per_m)
@@ -259,8 +257,8 @@ class TouchSession:
     def _feel_anew(self, name: str) -> None:
         """Both processes load it at once; the old one is felt until then."""
         with ThreadPoolExecutor(1) as pool:
-            drawing = pool.submit(self._loaded, name) if self._pictures else None
-            self._servo.set_renderer(name, self.worker.tell, options=self._options)
+            drawing = pool.submit(self._drawn.load, name, self.worker.tell) if self._pictures else None
+            self._servo.set_renderer(name, self.worker.tell, options=self._drawn.options)
             if drawing is not None:
                 drawing.result()
         self._apply()
@@ -275,7 +273,7 @@ class TouchSession:
 
     def _compare(self, name: str) -> None:
         if name:
-            self._loaded(name)
+            self._drawn.load(name, self.worker.tell)
             self._last_beside = name
         self._beside_name = name
         self._restart_beside()
@@ -283,16 +281,14 @@ class TouchSession:
     @property
     def effects(self) -> bool:
         """Whether the effects that the model names are rendered."""
-        return self._options.effects
+        return self._drawn.options.effects
 
     def set_effects(self, on: bool) -> None:
         """Render the effects that the model names, or the ideal model; what the user changed stays."""
 
         def job() -> None:
-            self._options = replace(self._options, effects=on)
-            drawn = {self.renderer_name, self._beside_name} - {""}
-            # one after the other, while those of before still draw
-            self._renderers = {name: self._create(name, self.worker.tell) for name in drawn}
+            self._drawn.options = replace(self._drawn.options, effects=on)
+            self._drawn.make_anew({self.renderer_name, self._beside_name} - {""}, self.worker.tell)
             self._feel_anew(self.renderer_name)
             self._compare(self._beside_name)
 
@@ -317,12 +313,10 @@ class TouchSession:
 
         def job() -> None:
             modulus = self.young_modulus_pa * factor
-            self.young_modulus_pa = modulus
             self._servo.set_modulus(modulus)
-            for name, renderer in list(self._renderers.items()):
-                self._renderers[name] = renderer.with_modulus(modulus)
+            self._drawn.set_modulus(modulus)
             if self._beside is not None:
-                self._beside.change(self._renderers[self._beside.name])
+                self._beside.change(self._drawn.load(self._beside.name))
 
         self.worker.run("changing the modulus", job)
 
@@ -358,11 +352,12 @@ class TouchSession:
 
     def _follow_inclusion(self) -> None:
         while not self._inclusion.settled:
-            drawing = self._loaded("fem")
+            drawing = self._drawn.load("fem", self.worker.tell)
             assert isinstance(drawing, FemRenderer), "'fem' is made by render.fem"
-            self._renderers["fem"] = self._inclusion.follow(self._servo, drawing, self.worker.tell)
+            changed = self._inclusion.follow(self._servo, drawing, self.worker.tell)
+            self._drawn.put("fem", changed)
             if self._beside is not None and self._beside.name == "fem":
-                self._beside.change(self._renderers["fem"])
+                self._beside.change(changed)
 
     def report(self) -> ServoReport:
         """What the servo did so far."""

@@ -9,7 +9,7 @@ from collections.abc import Callable, Sequence
 from typing import Generic, TypeVar
 
 import pyvista
-import vtk
+from vtkmodules.vtkInteractionStyle import vtkInteractorStyleUser
 
 from mechanics.errors import PalpateError
 from mechanics.progress import Progress
@@ -84,7 +84,7 @@ class WaitingWindow:
         iren = self.plotter.iren
         assert iren is not None, "pyvista makes an interactor with its plotter"
         iren.clear_key_event_callbacks()
-        iren.style = vtk.vtkInteractorStyleUser()
+        iren.style = vtkInteractorStyleUser()
         self.interactor = iren.interactor
         for event, action in (
             ("ExitEvent", self._gone),
@@ -148,7 +148,7 @@ class WaitingWindow:
             if self.plotter.window_size != size:
                 size = self.plotter.window_size
                 self._lay_out()
-            self.plotter.update()
+            self._go_on()
             time.sleep(PERIOD_S)
         if self._chosen is None:
             raise ClosedError("the window was closed before a scene was chosen")
@@ -166,13 +166,19 @@ class WaitingWindow:
         began = time.perf_counter()
         while running.is_alive() and not self._closed:
             self._tell(title, *running.said, time.perf_counter() - began)
-            self.plotter.update()
+            self._go_on()
             running.join(PERIOD_S)
         if running.error is not None:
             raise running.error
         if running.is_alive():
             raise ClosedError("the window was closed before there was anything to touch")
         return running.result  # type: ignore[return-value]  # of a job that has ended without an error
+
+    def _go_on(self) -> None:
+        """Take mouse and keys; draw only what looks otherwise: the job, too, needs the processor."""
+        self.interactor.ProcessEvents()
+        if any(board.changed for board in (self.head, *self.cards)):
+            self.plotter.render()
 
     def _tell(self, title: str, stage: str, share: float, seconds: float) -> None:
         width, height = self.plotter.window_size

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pyvista
-import vtk
+from vtkmodules.vtkRenderingCore import vtkRenderer
 
 from devices.channel import PoseChannel
 from mechanics.files import PNG, atomic_file
@@ -127,7 +127,7 @@ class TouchWindow:
         return max(1, len(self._names))
 
     @property
-    def picture_renderers(self) -> list[vtk.vtkRenderer]:
+    def picture_renderers(self) -> list[vtkRenderer]:
         """Where an object is drawn."""
         return [self._first, self._second][: self.sides]
 

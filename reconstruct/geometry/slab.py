@@ -21,6 +21,7 @@ from reconstruct.steps.s4_surface.surface import Surface
 
 _MARGIN, _CELLS = 2.0, 40
 """A slab reaches this many thicknesses beyond the touches, in at most so many cells a side."""
+_JUST_BELOW, _DEEP_CELLS = 0.99, 8
 _DEEP, _SPREAD, _WIDE = 16.0, 2.0, 1.2
 """A half-space is a block so many contact radii deep, at least so many times as deep as the touches spread,
 and so many times as wide as deep: its held base stiffens by what its free sides give back, to 2 % of the
@@ -77,7 +78,7 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
             uncertainty_m=np.full(len(vertices), local),
             support_point=foot,
             support_normal=up,
-            method="half-space" if options.half_space else "slab",
+            method=options.kind,
             reason=f"{words}, {how}; first touches lie {1e3 * rms:.2f} mm rms off it",
         ),
         local_sd_m=local,
@@ -87,7 +88,7 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
         base=base_of_rim(foot_rim(vertices, triangles, foot, up), foot, up, radius),
         residual_m=residual,
         about={
-            "kind": "half-space" if options.half_space else "slab",
+            "kind": options.kind,
             "pose": options.pose,
             "thickness_m": thickness,
             "residual_rms_m": rms,
@@ -101,8 +102,15 @@ def place_slab(presses: Presses, options: GeometryOptions, mesh_size_m: float) -
 
 def flat_mesh(size: np.ndarray, mesh_size_m: float, cells: int) -> TetMesh:
     """A slab of size (3,) m on its base, as fine at its surface as touches need (so that nothing is halved
-    again), in at most so many cells a side."""
+    again), in at most so many cells a side.
+
+    Where those are coarser, the solver of touches halves them at the surface; a deep block then is of cells
+    that halving makes just fine enough, as cells that are little too coarse would become far too fine.
+    """
     edge = max(min(mesh_size_m, SURFACE_EDGE_M, size[2] / 3), size[:2].max() / cells)
+    halved = _JUST_BELOW * SURFACE_EDGE_M * 2.0 ** np.ceil(np.log2(edge / SURFACE_EDGE_M))
+    if edge > SURFACE_EDGE_M and size[2] > _DEEP_CELLS * halved:
+        edge = halved
     nx, ny, nz = (max(3, int(np.ceil(length / edge))) for length in size)
     return box_mesh((nx, ny, nz), tuple(size))
 

@@ -47,7 +47,13 @@ class GeometryOptions:
     @property
     def known(self) -> bool:
         """Whether a geometry was given."""
-        return bool(self.shape) or self.slab_m is not None or self.half_space
+        return bool(self.kind)
+
+    @property
+    def kind(self) -> str:
+        """'shape', 'slab', 'half-space', or '' where it is not known."""
+        flat = "slab" if self.slab_m is not None else "half-space" if self.half_space else ""
+        return "shape" if self.shape else flat
 
 
 _STATED = {

@@ -1,8 +1,10 @@
 """MuJoCo: a flex of linear tetrahedra, its base pinned, and the tip as a mocap sphere.
 
 documented: the contact that its documentation has by default (solref 0.02 1) on the model's own mesh. best:
-edges of half the tip's radius under it, a contact of solref 0.004 1, half the time step. Poisson's ratio is
-0.45 at most in both: nearer to 0.5 its linear tetrahedra lock.
+edges of a third of the tip's radius under it, a contact of solref 0.004 1 and solimp 0.99 0.999, half the
+time step, and the stable neo-Hookean material: the one of its files, Saint Venant and Kirchhoff's, is crushed
+flat under a deep press and lets the tip through. Poisson's ratio is 0.45 at most in both: nearer to 0.5 its
+linear tetrahedra lock.
 """
 
 from __future__ import annotations
@@ -31,7 +33,8 @@ DENSITY_KG_M3 = 1000.0
 class Settings:
     """timestep_s; solref_s, damping_ratio: solref of the contact; impedance, impedance_deep: its solimp;
     damping_s: of the flex's elasticity; edge_radii: edges under the tip, in its radii, inf as the model has
-    them."""
+    them; skin_m: radius of the flex, by which its surface stands off; material: 1 Saint Venant-Kirchhoff, as
+    files have it, 2 stable neo-Hookean (elastic3d of an MjSpec)."""
 
     timestep_s: float
     solref_s: float
@@ -40,11 +43,13 @@ class Settings:
     edge_radii: float = np.inf
     impedance: float = 0.9
     impedance_deep: float = 0.95
+    skin_m: float = 1e-4
+    material: float = 1
 
 
 SETTINGS = {
     DOCUMENTED: Settings(2e-3, 0.02),
-    BEST: Settings(1e-3, 0.004, edge_radii=0.5),
+    BEST: Settings(1e-3, 0.004, 1.0, 0.002, 0.35, 0.99, 0.999, 1e-5, 2),
 }
 
 
@@ -59,6 +64,7 @@ def flex_xml(
     solref: tuple[float, float] = (0.02, 1.0),
     impedance: tuple[float, float] = (0.9, 0.95),
     damping_s: float = 0.01,
+    skin_m: float = 1e-4,
 ) -> str:
     """An object as a flex with a mocap sphere above its top."""
     points = " ".join(f"{value:.6g}" for value in mesh.points.ravel())
@@ -74,7 +80,7 @@ def flex_xml(
 <worldbody>
 <body name="tip" mocap="true" pos="{middle[0]} {middle[1]} {top[2] + radius_m + 0.001}">
 <geom type="sphere" size="{radius_m}" condim="3" friction="{friction:g}" {contact}/></body>
-<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="1e-4"
+<flexcomp name="object" type="direct" dim="3" mass="{mass}" radius="{skin_m:g}"
 point="{points}" element="{elements}">
 <contact condim="3" selfcollide="none" friction="{friction:g}" {contact}/>
 <elasticity young="{young_pa}" poisson="{poisson}" damping="{damping_s:g}"/>
@@ -110,12 +116,16 @@ class MuJoCo(SteppedAdapter):
     advice = {
         "contact_stiffness": 'a harder contact, solref="0.004 1" on geom and flex (twice timestep or more): '
         "--simulator-set solref_s=0.004,timestep_s=0.001",
-        "contact_nodes": "refine the flex to half the tip's radius under it: --simulator-settings best",
-        "contact_offset": 'margin="0", gap="0" and a small flex radius (1e-4)',
+        "contact_nodes": "refine the flex to a third of the tip's radius under it: --simulator-settings best",
+        "contact_offset": 'margin="0", gap="0" and a small flex radius: --simulator-set skin_m=1e-5',
         "mesh_stiffness": "refine the flex, and stay at poisson 0.45 or below",
         "numerical_damping": 'lower elasticity damping, and solref damping ratio 1; timestep="0.001"',
         "time_step": 'timestep="0.001" or less, more iterations',
         "lost_contact": 'solref="0.004 1" and timestep="0.001"',
+        "tunnelling": "the tip sinks through a soft contact, and Saint Venant-Kirchhoff elements are crushed "
+        'flat under it: solref="0.004 1", solimp="0.99 0.999 0.001", timestep="0.001", elastic3d=1 of an '
+        "MjSpec (stable neo-Hookean), and edges of a third of the tip's radius under it: "
+        "--simulator-settings best",
     }
 
     def __init__(self, model: Model, options: RenderOptions, friction: float) -> None:
@@ -129,9 +139,12 @@ class MuJoCo(SteppedAdapter):
         xml = flex_xml(
             mesh, own.timestep_s, young_pa=given["young_modulus_pa"], poisson=given["poisson_ratio"],
             radius_m=radius_m, friction=self.friction, solref=(own.solref_s, own.damping_ratio),
-            impedance=(own.impedance, own.impedance_deep), damping_s=own.damping_s,
+            impedance=(own.impedance, own.impedance_deep), damping_s=own.damping_s, skin_m=own.skin_m,
         )  # fmt: skip
-        return self._mujoco.MjModel.from_xml_string(xml)
+        spec = self._mujoco.MjSpec.from_string(xml)
+        for flex in spec.flexes:
+            flex.elastic3d = round(own.material) - 1
+        return spec.compile()
 
     def touch(self, scene: Any, tip: np.ndarray) -> World:
         return _Touch(self._mujoco, scene, tip)

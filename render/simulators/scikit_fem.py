@@ -49,6 +49,8 @@ BALANCED_M, GOOD_ENOUGH_M = 1e-8, 2e-6
 travel between two balances."""
 ITERATIONS, SHARES = 60, (1.0, 0.5, 0.25, 0.1, 0.03, 0.01)
 """Of Newton's method, and the shares of a step that are tried."""
+STIFFENING = (0.01, 0.03, 0.1, 0.3, 1.0)
+"""Shares of the springs, one after another, where the last balance leads to none."""
 
 
 class ScikitFem(Adapter):
@@ -75,6 +77,7 @@ class ScikitFem(Adapter):
 
         super().__init__(model, options, friction)
         graded = math.isfinite(self.own.edge_radii)
+        self.presses = 12 if graded else None
         self._whole = None if graded else _Solved(self.mesh, model, round(self.own.order))
 
     def begin(self, tip: np.ndarray, radius_m: float) -> World:
@@ -147,7 +150,7 @@ class _Touch:
         self._force = np.zeros(3)
         self._chosen = np.zeros(0, dtype=int)
         self._stuck: dict[int, np.ndarray] = {}
-        self._u = np.zeros((0, 3))
+        self._u, self._pushed = np.zeros((0, 3)), np.zeros((0, 3))
 
     def step(self, dt_s: float, tip: np.ndarray) -> np.ndarray:
         if self._at is None or np.linalg.norm(tip - self._at) > MOVED_M:
@@ -158,17 +161,19 @@ class _Touch:
         points = self.solved.points
         near = np.flatnonzero(np.linalg.norm(points - tip, axis=1) < NEAR_RADII * self.radius_m)
         if not len(near):
-            self._stuck, self._chosen, self._u = {}, near, np.zeros((0, 3))
+            self._stuck, self._chosen, self._u, self._pushed = {}, near, np.zeros((0, 3)), np.zeros((0, 3))
             return np.zeros(3)
         if not np.array_equal(near, self._chosen):
-            old = dict(zip(self._chosen.tolist(), self._u, strict=True))
+            old = dict(zip(self._chosen.tolist(), self._pushed, strict=True))
             self._chosen, self._matrix = near, self.solved.compliance(near)
             self._lower = np.linalg.cholesky(self._matrix + self._matrix.T)
-            self._u = np.array([old.get(int(k), np.zeros(3)) for k in near])
+            # a node that comes near has been moved along by those that are pressed
+            pushed = np.array([old.get(int(k), np.zeros(3)) for k in near])
+            self._u = (self._matrix @ pushed.ravel()).reshape(-1, 3)
         own = np.median(np.diag(self._matrix).reshape(-1, 3).mean(axis=1))
         spring = self.penalty / own
         force, u = self._balanced(tip, near, spring)
-        self._u = u
+        self._u, self._pushed = u, force
         relative = points[near] + u - tip
         kept = {}
         for k in np.flatnonzero(force.any(axis=1)):
@@ -184,11 +189,28 @@ class _Touch:
         return -force.sum(axis=0)
 
     def _balanced(self, tip: np.ndarray, near: np.ndarray, spring: float) -> tuple[np.ndarray, np.ndarray]:
-        """((c, 3) N on the nodes, (c, 3) m): where springs and object balance, by Newton's steps from the
-        last balance, else from rest. Raises OptionError where neither leads to one."""
-        points, anchor = self.solved.points[near], np.full((len(near), 3), np.nan)
+        """((c, 3) N on the nodes, (c, 3) m): where springs and object balance, from the last balance, else
+        from rest by springs that stiffen. Raises OptionError where neither leads to one."""
+        anchor = np.full((len(near), 3), np.nan)
         for k, node in enumerate(near):
             anchor[k] = self._stuck.get(int(node), anchor[k])
+        force, u, left = self._descended(self._u, tip, anchor, spring)
+        if left > GOOD_ENOUGH_M:
+            u = np.zeros_like(u)
+            for share in STIFFENING:
+                force, u, left = self._descended(u, tip, anchor, share * spring)
+        if left > GOOD_ENOUGH_M:
+            raise OptionError(
+                f"scikit-fem: the contact finds no balance with the tip at {np.round(tip, 4).tolist()} m "
+                f"({1e3 * left:.2g} mm are left): lower --simulator-set penalty={self.penalty:g}"
+            )
+        return force, u
+
+    def _descended(
+        self, u: np.ndarray, tip: np.ndarray, anchor: np.ndarray, spring: float
+    ) -> tuple[np.ndarray, np.ndarray, float]:
+        """((c, 3) N, (c, 3) m, m by which springs and object miss each other): Newton's steps from u."""
+        points = self.solved.points[self._chosen]
 
         def missed(u: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
             force, slope = self._springs(points + u - tip, anchor, spring)
@@ -197,24 +219,18 @@ class _Touch:
             whitened = solve_triangular(self._lower, residual, lower=True, check_finite=False)
             return force, slope, residual, float(np.linalg.norm(whitened))
 
-        for start in (self._u, np.zeros_like(points)):
-            u, now = start, missed(start)
-            for _ in range(ITERATIONS):
-                force, slope, residual, miss = now
-                if np.abs(residual).max() < BALANCED_M:
-                    return force, u
-                step = self._newton(slope, residual).reshape(u.shape)
-                for share in SHARES:
-                    then = missed(u - share * step)
-                    if then[3] < (1 - 0.1 * share) * miss:
-                        break
-                u, now = u - share * step, then
-            if np.abs(now[2]).max() < GOOD_ENOUGH_M:
-                return now[0], u
-        raise OptionError(
-            f"scikit-fem: the contact finds no balance with the tip at {np.round(tip, 4).tolist()} m "
-            f"({1e3 * np.abs(now[2]).max():.2g} mm are left): lower --simulator-set penalty={self.penalty:g}"
-        )
+        now = missed(u)
+        for _ in range(ITERATIONS):
+            force, slope, residual, miss = now
+            if np.abs(residual).max() < BALANCED_M:
+                break
+            step = self._newton(slope, residual).reshape(u.shape)
+            for share in SHARES:
+                then = missed(u - share * step)
+                if then[3] < (1 - 0.1 * share) * miss:
+                    break
+            u, now = u - share * step, then
+        return now[0], u, float(np.abs(now[2]).max())
 
     def _newton(self, slope: np.ndarray, residual: np.ndarray) -> np.ndarray:
         """(3 c,) m: Newton's step. Only springs that are pressed have a slope, so only their nodes' steps are

@@ -1,9 +1,12 @@
 """The conformance table: the path of a press, and our own renderer against closed forms."""
 
+import argparse
+
 import numpy as np
 import pytest
 
-from benchmarks.simulators import CASES, _pressed
+from benchmarks import simulators
+from benchmarks.simulators import CASES
 
 
 def test_a_press_rests_at_each_depth_and_goes_sideways():
@@ -16,7 +19,29 @@ def test_a_press_rests_at_each_depth_and_goes_sideways():
     assert len(case.truth_n) == 2 and case.aside_n > 0
 
 
+def run(tmp_path, *words):
+    parser = argparse.ArgumentParser()
+    simulators.add_arguments(parser)
+    return simulators.run(parser.parse_args([*words, "--work", str(tmp_path / "rows")]))
+
+
+def test_runs_at_several_times_make_one_table_and_a_page(tmp_path, monkeypatch):
+    """Each press is run once; a later run of other simulators shows the earlier ones too."""
+    pytest.importorskip("skfem")
+    run(tmp_path, "--cases", "slab", "--only", "scikit-fem", "--settings", "documented")
+    monkeypatch.setattr(simulators, "create", None)  # nothing is made anew
+    words = ["--cases", "slab", "--only", "scikit-fem", "--settings", "documented"]
+    found = run(tmp_path, *words, "--page", str(tmp_path / "p.html"))
+    assert [(r["simulator"], r["settings"]) for r in found["rows"]] == [
+        ("palpate", ""), ("scikit-fem", "documented"),
+    ]  # fmt: skip
+    assert any(f.what == "slab, scikit-fem, documented: 1 mm over truth" for f in found["figures"])
+    assert next(f for f in found["figures"] if f.what == "all cases, scikit-fem").met
+    assert "scikit-fem" in (tmp_path / "p.html").read_text()
+
+
 @pytest.mark.slow
-def test_our_own_renderer_is_near_hertz_and_mindlin():
-    (own,) = _pressed(CASES["sliding"](), [], [])
+def test_our_own_renderer_is_near_hertz_and_mindlin(tmp_path):
+    found = run(tmp_path, "--cases", "sliding", "--only", "scikit-fem", "--settings", "documented")
+    own = next(r for r in found["rows"] if r["simulator"] == "palpate")
     assert own["over"] == pytest.approx([1, 1, 1], abs=0.08)

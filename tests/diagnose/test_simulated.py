@@ -7,7 +7,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from diagnose.numerics.base import signal_of
+from diagnose.numerics.base import Signal, signal_of
 from diagnose.numerics.registry import NAMES, numericals
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
@@ -17,10 +17,16 @@ from diagnose.simulated.forces import Forces, ForcesOptions, aligned, read_force
 from diagnose.simulated.pipeline import Asked, diagnose_simulated
 from diagnose.simulated.result import PARTS, Mended
 from diagnose.simulated.stated import StatedForward, stated_of
+from mechanics.box_mesh import box_mesh
 from mechanics.effects.registry import NAMES as PHYSICAL
 from mechanics.errors import OptionError, RecordingError
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.presses import LEAD_S
+from mechanics.progress import silent
 from palpate.show.simulated import lead
+from render.registry import create
+from render.replay import replay
 
 FAST = DiagnoseOptions(fast=True, bootstrap=50)
 OWN_CLOCK = ForcesOptions(clock_offset_s=0.0)
@@ -73,6 +79,16 @@ def test_what_changes_the_force_most_is_named_first_whatever_part_it_is_in(world
     assert set(result.effects) == {"time_step", "stated_modulus"}
     sizes = {e.name: e.gap_after_n for e in result.entries}
     assert sizes[result.effects[0]] < sizes[result.effects[1]]
+
+
+def test_two_flaws_are_named_by_a_quick_diagnosis_too(world):
+    """What takes long in a diagnosis is the object's own effects: the simulator's are never cut short."""
+    t, force = world[0].t, world[3]
+    result = judged(world, np.column_stack([np.interp(t - 0.02, t, f) for f in 1.5 * force.T]))
+    assert set(result.effects) == {"mesh_stiffness", "time_step"}
+    assert result.unexplained < 0.1
+    assert "1.5 times as stiff as it should be" in "\n".join(result.lines()).replace("1.49", "1.5")
+    assert "young_modulus_pa=" in " ".join(result.advice)
 
 
 def test_a_gap_that_nothing_explains_is_said_first(world):
@@ -136,6 +152,68 @@ def test_flicker_and_falling_through_show_in_the_samples(world):
     _, seen = seen_in_samples(signal_of(presses, through))
     assert seen["tunnelling"][1]["share"] == pytest.approx(1 / len(presses))
     assert not seen_in_samples(signal_of(presses, at))[1]
+
+
+def passed_through(presses, force, which, *, turns):
+    """(n, 3) N: from 0.6 of the depth on these presses push less the deeper the tip is, or pull it in."""
+    out = force.copy()
+    for k in which:
+        part = presses.parts[k]
+        deep = presses.travel[part, 0] / presses.travel[part, 0].max()
+        out[part] *= (1 - np.clip((deep - 0.6) / 0.2, 0, 1.3 if turns else 0.85))[:, None]
+    return out
+
+
+@pytest.mark.parametrize("turns", [True, False])
+def test_a_push_that_falls_while_the_tip_goes_deeper_shows_in_the_samples(world, turns):
+    presses, force = world[1].presses, world[3]
+    at = np.column_stack([np.interp(presses.t, world[0].t, f) for f in force.T])
+    signal, seen = seen_in_samples(signal_of(presses, passed_through(presses, at, (2, 5, 7), turns=turns)))
+    assert seen["tunnelling"][1]["share"] == pytest.approx(3 / len(presses))
+    assert seen["tunnelling"][1]["never_felt"] == 0
+    assert seen["tunnelling"][1]["from_depth_m"] == pytest.approx(
+        0.6 * np.median(presses.deepest[[2, 5, 7]]), rel=0.2
+    )
+    left = np.unique(presses.press[signal.left])
+    assert list(left) == [2, 5, 7] and not signal.left[presses.travel[:, 0] < 0].all()
+
+
+def test_a_late_force_and_one_of_the_tips_speed_are_no_tunnelling(world):
+    presses, force = world[1].presses, world[3]
+    t = world[0].t
+    late = np.column_stack([np.interp(presses.t - 0.1, t, f) for f in force.T])
+    assert "tunnelling" not in seen_in_samples(signal_of(presses, late))[1]
+    at = np.column_stack([np.interp(presses.t, t, f) for f in force.T])
+    touching = (presses.travel[:, 0] > 0)[:, None]
+    damped = at + touching * 30.0 * presses.speed[:, None] * presses.normal[presses.press]
+    assert "tunnelling" not in seen_in_samples(signal_of(presses, damped))[1]
+
+
+def test_what_is_soft_is_named_beside_presses_that_the_tip_fell_through(world):
+    """Until it fell through, a press says of the law what the others do; nothing is left to `unexplained`."""
+    presses, soft = world[1].presses, 0.6 * world[3]
+    at = np.column_stack([np.interp(presses.t, world[0].t, f) for f in soft.T])
+    through = passed_through(presses, at, range(1, len(presses), 2), turns=True)
+    result = judged(world, np.column_stack([np.interp(world[0].t, presses.t, f) for f in through.T]))
+    assert set(result.effects) == {"tunnelling", "mesh_stiffness"}
+    assert result.unexplained < 0.05 and shares(result) == pytest.approx(1.0)
+
+
+def test_mujoco_as_documented_lets_a_deep_press_through(tmp_path, monkeypatch):
+    pytest.importorskip("mujoco")
+    monkeypatch.chdir(tmp_path)  # it leaves its warnings in a file where it runs
+    radius, up = 0.005, np.array([0.0, 0.0, 1.0])
+    mesh = box_mesh((5, 5, 3), (0.05, 0.05, 0.03))
+    block = Model(mesh, Material(30e3, 0.45), Support(np.zeros(3), up), Tool(radius), 0.01)
+    deep = np.interp(np.arange(0, 1.3, 0.005), [0.0, 0.5, 0.8, 1.3], [-1e-3, 8e-3, 8e-3, -1e-3])
+    centre = up * (0.03 + radius - deep)[:, None]
+    force = replay(create("mujoco", block), np.arange(len(deep)) * 0.005, centre, progress=silent)
+    normal = np.broadcast_to(up, force.shape)
+    at = Signal(
+        np.arange(len(deep)) * 0.005, force, deep, normal, (slice(0, len(deep)),), np.zeros(len(deep), bool)
+    )
+    _, seen = seen_in_samples(at)
+    assert seen["tunnelling"][1]["share"] == 1 and force[:, 2].min() < 0
 
 
 def test_what_is_unclear_is_refused_with_the_option_that_settles_it(world):

@@ -59,7 +59,7 @@ def good() -> Reconstruction:
     "how",
     [
         "weak", "weak and rubbing", "pulls at last", "pulls and rubs", "negative, weak at last", "pulls",
-        "upside down", "offset 0.1", "offset 0.3",
+        "upside down", "offset 0.1",
     ],
 )  # fmt: skip
 def test_a_bad_place_ends_no_recording_of_points(good, how):

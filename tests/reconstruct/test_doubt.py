@@ -16,7 +16,7 @@ from reconstruct.geometry.known_shape import place
 from reconstruct.geometry.placed import nowhere
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.steps.s3_contacts.contacts import explore
-from reconstruct.steps.s7_modulus.held_out import held_out
+from reconstruct.steps.s7_modulus.held_out import held_out, told_by_others
 from reconstruct.steps.s7_modulus.modulus import fit_modulus
 
 from .exploration_of_cylinder import HEIGHT, RADIUS, explore_cylinder
@@ -64,7 +64,8 @@ def test_a_modulus_is_weighed_against_a_constant_push(depth_matters):
         push = np.where(found.depth > 1e-4, 0.5 - 60 * found.depth, 0.0)
         found = dataclasses.replace(found, force=push[:, None] * found.normal[found.press])
     sites = _half_space(found)
-    told = held_out(found, sites, fit_modulus(found, sites, NOISE_N))
+    fit = fit_modulus(found, sites, NOISE_N)
+    told = held_out(found, sites, fit, told_by_others(fit))
     assert told is not None
     assert (told.doubt == "") == depth_matters
     if depth_matters:

@@ -8,11 +8,16 @@ import dataclasses
 import numpy as np
 import pytest
 
+from mechanics.box_mesh import box_mesh
+from mechanics.material import Material
+from mechanics.model import Model, Support, Tool
 from mechanics.recording import Recording
 from mechanics.sites import TouchSites
+from mechanics.tetmesh import TetMesh
 from reconstruct.geometry.placed import nowhere
 from reconstruct.geometry.stated import GeometryOptions
 from reconstruct.pipeline import ReconstructOptions, reconstruct_fully
+from reconstruct.placing import presses_on
 from reconstruct.steps.s3_contacts.contacts import explore
 from reconstruct.steps.s3_contacts.straightened import slid_in, straightened
 from reconstruct.steps.s7_modulus.modulus import fit_modulus
@@ -92,3 +97,15 @@ def presses_straight():
 
     recording = raster((3, 2), tilt=False)
     return explore(recording, boundary=nowhere(recording), unbroken=True).presses
+
+
+@pytest.mark.parametrize("kind", ["slab", "shape"])
+def test_slides_over_another_recordings_slab_are_straightened_too(kind):
+    """Of compare and diagnose with a model that was made from something else."""
+    box = box_mesh((16, 30, 3), (0.16, 0.30, 0.03))
+    mesh = TetMesh(box.points - [0.0, 0.0, 0.03], box.tetrahedra, box.fixed, box.touchable).quadratic()
+    below = Support(np.array([0.0, 0.0, -0.03]), np.array([0.0, 0.0, 1.0]))
+    model = Model(mesh, Material(MODULUS_PA, 0.49), below, Tool(TIP_M), 0.01)
+    model = model.replaced(about={"geometry": {"kind": kind}})
+    recording = dataclasses.replace(sliding(0.3, leaves=True), description={"object": {"half_space": True}})
+    assert slid_in(presses_on(recording, model)).any() == (kind == "shape")

@@ -10,10 +10,9 @@ from render.force_error import error_figures, force_errors, law_share
 
 
 def test_the_law_is_surer_on_flat_ground_than_deep_on_a_bump_or_beside_a_rim():
-    flat, bump, *edges = (float(law_share(1.0, *at)) for at in (np.zeros(5), *(0.3 * np.eye(5))))
+    flat, bump, *edges = (float(law_share(1.0, *at)) for at in (np.zeros(4), *(0.3 * np.eye(4))))
     assert 0 < flat < bump and flat < min(edges)
-    assert float(law_share(1.5, 0.3, 0, 0, 0, 0)) > bump
-    assert float(law_share(0.2, 0, 0, 0.04, 0, 0)) > float(law_share(1.0, 0, 0, 0.04, 0, 0))
+    assert float(law_share(1.5, 0.3, 0, 0, 0)) > bump
 
 
 def test_error_grows_with_the_force_and_is_told_in_its_three_parts(block_renderer):

@@ -7,8 +7,8 @@ import pytest
 
 import render
 from mechanics.errors import ModelError, OptionError
+from mechanics.one_d_laws import Law, spread_law
 from mechanics.press_making import no_presses
-from render.one_d import Law, spread_law
 
 TIP = 0.005
 

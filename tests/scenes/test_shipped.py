@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from mechanics.compliance import compliance_file, compliance_key, load_or_condense
-from mechanics.errors import FileError
+from mechanics.errors import FileError, PalpateWarning
 from mechanics.model import Model
 from mechanics.model_files import read_model, write_model
+from mechanics.progress import Progress
 from palpate.warm_up import block_renderer
 from render.fem import FemRenderer
-from scenes import shipped
+from scenes import build, shipped
+from scenes.scene import Scene, load_scene
 
 MAKE = "what is shipped is not what this program makes: run 'python -m tools.shipped_models' and commit it"
 MOST_BYTES = 15_000_000
@@ -64,8 +66,56 @@ def test_packing_moves_no_force_of_one_tip_and_little_of_three(
 
 
 def test_a_damaged_archive_is_an_error_of_one_line(packed: tuple[Model, Path], tmp_path: Path) -> None:
-    cut = tmp_path / "cut.zip"
-    cut.write_bytes(packed[1].read_bytes()[:2000])
+    whole, cut = packed[1].read_bytes(), tmp_path / "cut.zip"
+    random = np.random.default_rng(3)
+    for _ in range(20):
+        data = bytearray(whole)
+        at = int(random.integers(len(data) - 40))
+        data[at : at + 40] = random.bytes(40)
+        cut.write_bytes(data)
+        with pytest.raises(shipped.DamagedError, match="damaged") as told:
+            shipped.unpack(cut, tmp_path / "cut")
+        assert len(str(told.value).splitlines()) == 1
+        assert not (tmp_path / "cut").exists()
+    cut.write_bytes(whole[:2000])
     with pytest.raises(FileError, match="damaged"):
         shipped.unpack(cut, tmp_path / "cut")
     assert not (tmp_path / "cut").exists()
+
+
+def test_a_damaged_archive_is_said_and_its_model_made_anew(
+    packed: tuple[Model, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    made: list[str] = []
+
+    def maker(scene: Scene, progress: Progress) -> Model:
+        made.append(scene.name)
+        return packed[0].replaced(path=None)
+
+    cut = tmp_path / "cut.zip"
+    cut.write_bytes(packed[1].read_bytes()[:2000])
+    scene = load_scene("demo")
+    monkeypatch.setitem(build._MAKERS, scene.kind, maker)
+    monkeypatch.setattr(build, "shipped_model", lambda name: cut)
+    with pytest.warns(PalpateWarning, match=r"cut.zip' is damaged .*; the model is made anew") as told:
+        model = build.model_of(scene, cache=tmp_path / "cache")
+    assert made == ["demo"] and len(told) == 1
+    assert np.array_equal(model.mesh.points, packed[0].mesh.points)
+    build.model_of(scene, cache=tmp_path / "cache")  # which is kept, and says nothing more
+    assert made == ["demo"]
+
+
+def test_a_damaged_folder_of_the_cache_is_unpacked_again(
+    packed: tuple[Model, Path], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def maker(scene: Scene, progress: Progress) -> Model:
+        raise AssertionError("what is shipped need not be made")
+
+    scene = load_scene("demo")
+    monkeypatch.setitem(build._MAKERS, scene.kind, maker)
+    monkeypatch.setattr(build, "shipped_model", lambda name: packed[1])
+    path = build.model_of(scene, cache=tmp_path).path
+    assert path is not None
+    (path / "mesh.vtu").write_bytes(b"nothing")
+    again = build.model_of(scene, cache=tmp_path)
+    assert np.array_equal(again.mesh.points, packed[0].mesh.points)

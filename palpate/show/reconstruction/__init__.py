@@ -8,8 +8,9 @@ import numpy as np
 
 from palpate.show import model as made
 from palpate.show.reconstruction.exploration import force_over_time
-from palpate.show.reconstruction.page import meaning, next_steps, report, tell, view
+from palpate.show.reconstruction.page import lost, meaning, next_steps, report, tell, view
 from reconstruct.pipeline import Reconstruction
+from reconstruct.steps.s7_modulus.held_out import HeldOut
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,7 +30,7 @@ def lines(result: Reconstruction) -> list[str]:
     more = len(not_used) - _NAMED
     contacts = "1 contact" if len(not_used) == 1 else f"{len(not_used)} contacts"
     lines = [
-        f"{exploration.recording.name}: {len(exploration.presses)} presses, "
+        f"{exploration.recording.name}: {len(exploration.presses)} presses, {lost(result)}"
         f"Young's modulus {model.material.young_modulus_pa / 1e3:.2f} kPa "
         f"(95 % sure: {low / 1e3:.2f} to {high / 1e3:.2f} kPa)",
     ]
@@ -73,8 +74,7 @@ def as_json(result: Reconstruction) -> dict[str, Any]:
         "rejected": [{"t_s": t, "reason": reason} for t, reason in exploration.rejected],
         "findings": [f.as_json() for f in result.findings],
         "doubt": result.doubt,
-        "held_out_rmse_n": result.held_out.model_n if result.held_out else None,
-        "held_out_constant_rmse_n": result.held_out.constant_n if result.held_out else None,
+        **_held_out(result.held_out),
         "noise_n": exploration.noise_n,
         "force_delay_s": exploration.delay_s,
         "force_delay_sd_s": exploration.delay_error_s,
@@ -106,6 +106,17 @@ def as_json(result: Reconstruction) -> dict[str, Any]:
     if result.paper_fit:
         figures["not_used"] = [{"t_s": t, "reason": reason} for t, reason in result.paper_fit.not_used]
     return figures
+
+
+def _held_out(told: HeldOut | None) -> dict[str, Any]:
+    floor = told is not None and bool(told.floor)
+    return {
+        "held_out_rmse_n": told.model_n if told else None,
+        "held_out_constant_rmse_n": told.constant_n if told else None,
+        "held_out_floor": told.floor if told and floor else None,
+        "held_out_floor_rmse_n": told.floor_n if told and floor else None,
+        "beaten_by": (told.beaten_by or None) if told else None,
+    }
 
 
 def draw(result: Reconstruction, ax: Axes) -> None:

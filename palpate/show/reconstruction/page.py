@@ -176,8 +176,10 @@ def tell(result: Reconstruction, page: Page, picture: Figure | None = None) -> N
     """The answer, the object, and how it came about, into a page. picture: `object_figure`'s."""
     model = result.model
     low, high = model.material.young_modulus_ci95_pa
+    first = lost(result)
     page.lead(
-        f"{len(model.presses)} presses became a model of {model.material.young_modulus_pa / 1e3:.1f} kPa "
+        f"{first[:1].upper()}{first[1:]}{len(model.presses)} presses became a model of "
+        f"{model.material.young_modulus_pa / 1e3:.1f} kPa "
         f"(Young's modulus; 95 % sure: {low / 1e3:.1f} to {high / 1e3:.1f} kPa)."
     )
     page.paragraph(meaning(result))
@@ -200,6 +202,19 @@ def next_steps(result: Reconstruction) -> list[str]:
         f"feel it: `palpate touch {where}`",
         f"see what it leaves out: `palpate diagnose {recording} --model {where} --report PAGE.html`",
     ]
+
+
+def lost(result: Reconstruction) -> str:
+    """That a 1D model predicts places better that were held out, and what may help, before what else is said;
+    '' where none does."""
+    told = result.held_out
+    if told is None or not told.beaten_by:
+        return ""
+    one = result.model.provenance["options"]["modulus_field"]["field"] == "homogeneous"
+    return (
+        f"{told.beaten_by}, a 1D model, errs by {1e3 * told.floor_n:.2g} mN on places that were held out and "
+        f"this model by {1e3 * told.model_n:.2g} mN{' (--field auto may help)' if one else ''}; "
+    )
 
 
 def meaning(result: Reconstruction) -> str:

@@ -20,6 +20,8 @@ _ALONG, _RADII = 0.2, 0.05
 """A press slides where, up to its peak, the tip goes along the surface by more than the first share of what
 it goes in, and by more than the second of its radius. A tip that is taken to stick errs by 2 % below that."""
 _ROWS, _LEAST = 250, 4
+FLAT = ("slab", "half-space")
+"""Kinds of geometry whose top is flat."""
 
 
 def slid_in(presses: Presses) -> np.ndarray:
@@ -35,6 +37,13 @@ def slid_in(presses: Presses) -> np.ndarray:
         aside = float(np.linalg.norm(moved + deep * presses.normal[i]))
         found[i] = deep > 0 and aside > max(_ALONG * abs(deep), _RADII * presses.tip_radius_m)
     return found
+
+
+def laid(presses: Presses, points: np.ndarray, normals: np.ndarray, kind: str) -> Presses:
+    """The presses on a surface: at its points (p, 3) m, along its outward normals (p, 3); over a flat one
+    those that slide are made straight. kind: of the geometry, as a known one says it ('' for others)."""
+    placed = presses.on_surface(points, normals)
+    return straightened(placed) if kind in FLAT else placed
 
 
 def straightened(presses: Presses) -> Presses:

@@ -203,32 +203,36 @@ class FieldOptions:
 
     field: str = option(
         "homogeneous",
-        "a smooth field of the modulus: never, or where the presses ask for one",
-        choices=("homogeneous", "auto"),
+        "a smooth field of the modulus: never, where the presses ask for one, or where they do and a 1D "
+        "model predicts them better than one modulus does",
+        choices=("homogeneous", "auto", "where-beaten"),
     )
 
 
-def fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Estimate | None:
-    """The likeliest field of the model's presses, which touch at `sites`, by the model's dent law; None where
-    they ask for none. noise_n: N, of a raw force component."""
+def told_by_others(own: PressModuli, found: Estimate) -> np.ndarray:
+    """(p,) Pa, each press's modulus, as if the object were of one, as the presses of other sites tell it."""
+    log_modulus = found.level + own.shares.weight @ found.field.at(own.shares.nodes)
+    number = np.clip(np.searchsorted(found.site, own.site), 0, len(found.site) - 1)
+    told = np.where(found.site[number] == own.site, found.foretold[number], log_modulus)
+    return np.exp(told)
+
+
+def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> tuple[Model, np.ndarray | None]:
+    """The model with the field that its presses, which touch at `sites`, ask for by its dent law, and what
+    `told_by_others` says of them; itself and None where they ask for none. noise_n: N, of a raw component.
+
+    The modulus becomes that of the field's own level, with its 95 % interval.
+    """
     presses = model.presses
     places = places_at(model, presses, sites)
     own = press_moduli(presses, sites, places, model.material.dent_law, noise_n)
     found = fit_field(own, np.arange(len(presses)))
-    return found if asked_for(found) else None
-
-
-def with_fitted_field(model: Model, sites: TouchSites, noise_n: float) -> Model:
-    """The model with the field that its presses ask for; itself where they ask for none.
-
-    The modulus becomes that of the field's own level, with its 95 % interval.
-    """
-    found = fitted_field(model, sites, noise_n)
-    if found is None:
-        return model
+    if found is None or not asked_for(found):
+        return model, None
     modulus = float(np.exp(found.level))
     share = float(np.exp(1.96 * np.hypot(found.level_sd, LEVEL_BIAS)))
     levelled = model.with_material(
         young_modulus_pa=modulus, young_modulus_ci95_pa=(modulus / share, modulus * share)
     )
-    return stiffness_field.EFFECT.applied(levelled, stiffness_field.keys_of(found.field))
+    there = stiffness_field.EFFECT.applied(levelled, stiffness_field.keys_of(found.field))
+    return there, told_by_others(own, found)

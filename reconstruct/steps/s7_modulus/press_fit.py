@@ -142,8 +142,13 @@ def touched_by_law(
         return presses
     data, deepest = press_data(presses), float(presses.depth_m.max()) + 1e-3
     fits = [fit_law(data, sites, presses.tip_radius_m, law, deepest, law_error, noise_n) for law in laws]
-    best = min(fits, key=lambda fit: fit.cost[carried].sum())
-    into = np.where(carried & best.telling, best.onset_shift_m, 0.0)
+    return touched_as_fitted(presses, min(fits, key=lambda fit: fit.cost[carried].sum()))
+
+
+def touched_as_fitted(presses: Presses, fit: LawFit) -> Presses:
+    """The presses with first touches where a fit has them, where they were not recorded."""
+    carried = np.isin(presses.kinds, CARRIED_BACK)
+    into = np.where(carried & fit.telling, fit.onset_shift_m, 0.0)
     return replace(
         presses, centre=presses.centre - into[:, None] * presses.normal, depth_m=presses.depth_m - into
     )

@@ -22,7 +22,7 @@ from mechanics.solver import Solver
 from mechanics.tetmesh import FACES, TetMesh, lone_faces
 
 CORRELATION_M = 0.025
-_BATCH = 16
+_BATCH, _ROWS = 16, 512
 
 
 @dataclass(frozen=True)
@@ -55,9 +55,12 @@ def compliance_covariance(
     free = ~faces.base
     sd = np.asarray(uncertainty_m)[faces.triangles[free]].mean(axis=1)
     centres = faces.centres[free]
-    squared = cdist(centres, centres, "sqeuclidean")
-    kernel = squared_exponential(squared, correlation_m) * np.outer(sd, sd)
-    local = gradient[:, free] @ kernel @ gradient[:, free].T
+    moved = gradient[:, free] * sd
+    spread = np.empty_like(moved)
+    for a in range(0, len(centres), _ROWS):  # all faces with all would be gigabytes
+        squared = cdist(centres[a : a + _ROWS], centres, "sqeuclidean")
+        spread[:, a : a + _ROWS] = moved @ squared_exponential(squared, correlation_m).T
+    local = spread @ moved.T
     if pose is None:
         return local
     shift = _by_pose(gradient, faces, sites, pose)

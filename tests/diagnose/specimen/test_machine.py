@@ -3,12 +3,14 @@ matters, and no number outside its own interval."""
 
 from __future__ import annotations
 
+import dataclasses
+
 import numpy as np
 import pytest
 
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.material import material_of
-from diagnose.specimen.result import MachineTests
+from diagnose.specimen.result import MachineTests, Material
 from diagnose.specimen.yielding import machine_of, way_of
 from mechanics.dent import dent_law
 from palpate.show.material import as_json, in_words, lines
@@ -90,6 +92,15 @@ def test_an_answer_that_misses_more_than_a_constant_says_so_first():
     made = material([Curve(np.arange(400) / 100, travel, swings, name) for name in "ab"])
     assert made.missed > made.error["constant"] and not made.predicts
     assert "NO ANSWER" in lines(made)[0] and as_json(made)["predicts"] is False
+
+
+def test_what_was_named_in_vain_is_in_the_first_line():
+    error = {"ideal": 0.39, "verdict": 0.41, "constant": 0.56, "kelvin-voigt": 0.5, "hunt-crossley": 0.5}
+    said = "tip radius explains the gap"
+    made = Material("indentation", ("a",), 6, "curves", 4e4, (3e4, 5e4), "linear", error, said)
+    assert "the ideal model predicts held-out data better than with what was found" in lines(made)[0]
+    better = dataclasses.replace(made, error={**error, "verdict": 0.38})
+    assert "the ideal model" not in lines(better)[0]
 
 
 def test_a_loop_of_creep_widens_the_interval_down_to_the_lasting_modulus_and_is_said():

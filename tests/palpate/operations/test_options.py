@@ -92,6 +92,8 @@ def other(option):
         return option.default + 1
     if isinstance(option.default, str):
         return "adhesion"
+    if option.name == "most":  # a number of effects, None by default
+        return 2
     value = 0.4 if option.default is None else option.default * 0.5 + 1e-3
     return min(max(value, option.low), option.high)
 

@@ -17,6 +17,7 @@ from devices.haply import HaplyOptions
 from devices.registry import DeviceChoice
 from mechanics.errors import DeviceError, PalpateError
 from palpate.servo import Recorder, SafetyOptions, Servo, ServoOptions
+from palpate.servo.started import StartedServo
 
 from ...devices.fake_inverse import FakeInverse
 from ...support.waiting import PATIENCE_S, eventually
@@ -262,6 +263,25 @@ def test_a_model_that_is_not_there_is_told():
     with Servo("nowhere/model", options=ServoOptions()) as servo:
         with pytest.raises(PalpateError, match="nowhere/model"):
             servo.start()
+
+
+def test_a_servo_that_waits_for_its_job_runs_it_once_all_is_compiled():
+    hand = DeviceChoice("simulated", {})
+    with StartedServo(("tick",)) as started:
+        with Servo(PlaneSource(500.0), device=hand, started=started) as servo:
+            asked = []
+            servo.start(compiled=lambda: asked.append(servo.report().ticks))
+            assert asked == [0], "it ticks after that"
+            assert servo.process_id == started.process.pid
+            assert eventually(lambda: servo.report().ticks > 10)
+        assert started.process.returncode == 0
+
+
+def test_a_servo_that_never_gets_a_job_is_ended():
+    with StartedServo() as started:
+        assert os.path.exists(started.block.path) and started.process.poll() is None
+    assert started.process.poll() is not None
+    assert not os.path.exists(started.block.path)
 
 
 BEATING = """

@@ -52,7 +52,7 @@ def test_a_page_brings_its_numbers_its_drawings_and_what_copies_them():
     text = page.html()
     packed = re.search(r'<script type="text/plain" class="svg">([^<]+)</script>', text)
     assert b"<svg" in gzip.decompress(base64.b64decode(packed[1]))
-    assert '<code class="command">palpate check REC</code>' in text and "<code>this</code>; go on." in text
+    assert '<code class="command">palpate check REC</code>' in text and "<li>go on</li>" in text
     held = re.search(r'<script type="application/json" class="result">(.*?)</script>', text, re.DOTALL)
     assert json.loads(held[1]) == {"a_n": [1.0, None], "words": "</script>"}
     assert "navigator.clipboard" in text and "@media print" in text

@@ -9,6 +9,7 @@ from collections.abc import Callable
 import numpy as np
 
 from palpate.window.frames import Frame
+from palpate.window.guide import Guide
 from palpate.window.window import TouchWindow
 
 from ...support.waiting import PATIENCE_S
@@ -52,7 +53,7 @@ class Driven:
     def mouse_at(self, point_m: np.ndarray) -> None:
         """Over a place of the scene, as the first picture shows it."""
         renderer = self.window.picture_renderers[0]
-        renderer.SetWorldPoint(*point_m, 1.0)
+        renderer.SetWorldPoint([*point_m.tolist(), 1.0])
         renderer.WorldToDisplay()
         self.pixel(*renderer.GetDisplayPoint()[:2])
 
@@ -83,10 +84,12 @@ class Driven:
             self.interactor.InvokeEvent(f"MouseWheel{'Forward' if steps > 0 else 'Backward'}Event")
         self.interactor.SetControlKey(0)
 
-    def key(self, symbol: str) -> None:
+    def key(self, symbol: str, *, wait: bool = True) -> None:
+        """wait: for what it sets off."""
         self.interactor.SetKeySym(symbol)
         self.interactor.InvokeEvent("KeyPressEvent")
-        self.session.worker.wait()
+        if wait:
+            self.session.worker.wait()
 
     def until(self, condition: Callable[[Frame], bool]) -> Frame:
         """Frames go by until `condition(frame)`; a frame that never comes fails the test."""
@@ -170,7 +173,7 @@ class Driven:
 
     def picture(self) -> np.ndarray:
         self.window.plotter.render()
-        return self.window.plotter.screenshot(return_img=True)
+        return np.asarray(self.window.plotter.screenshot(return_img=True))
 
 
 def along_the_foot(driven: Driven, side: np.ndarray) -> None:
@@ -178,7 +181,7 @@ def along_the_foot(driven: Driven, side: np.ndarray) -> None:
     right = np.array([-side[1], side[0], 0.0])
     reach = HALF + 0.008
     driven.mouse_at(HALF * side + 0.006 * side - reach * right)
-    driven.until(lambda f: np.linalg.norm(f.tip_m - driven.window.pointer.tip_m) < 1e-4)
+    driven.until(lambda f: bool(np.linalg.norm(f.tip_m - driven.window.pointer.tip_m) < 1e-4))
     driven.wait(0.3)
     driven.button(True)
     start, duration = driven.wait(0.6).time_s, 2 * reach / TRACING_M_PER_S
@@ -188,3 +191,19 @@ def along_the_foot(driven: Driven, side: np.ndarray) -> None:
         share = (driven.wait(0.01).time_s - start) / duration
     driven.button(False)
     driven.wait(0.4)
+
+
+def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
+    """One press where and as deep as it is suggested, seen from outside; waits for the next suggestion."""
+    s, made = guide.suggestion, guide.state.made
+    assert s.point is not None and s.normal is not None
+    if np.hypot(*s.normal[:2]) > 0.15:
+        driven.look_from(float(np.arctan2(s.normal[1], s.normal[0])))
+    driven.look_down(float(np.clip(np.arcsin(s.normal[2]), 0.3, 1.2)))
+    driven.window.pointer.go_deep(1e3 * s.depth_m)
+    driven.mouse_at(s.point)
+    driven.wait(1.5)
+    driven.button(True)
+    driven.wait(s.depth_m / 0.02 + 0.8)
+    driven.button(False)
+    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy)

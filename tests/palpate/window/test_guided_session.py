@@ -21,24 +21,9 @@ from palpate.window.window import TouchWindow
 from reconstruct.pipeline import reconstruct
 from scenes.scene import Scene
 
-from .driven import SIDES, Driven, along_the_foot
+from .driven import SIDES, Driven, along_the_foot, as_the_ghost_says
 
 MOST = 12
-
-
-def as_the_ghost_says(driven: Driven, guide: Guide) -> None:
-    """One press where and as deep as it is suggested, seen from outside; waits for the next suggestion."""
-    s, made = guide.suggestion, guide.state.made
-    if np.hypot(*s.normal[:2]) > 0.15:
-        driven.look_from(float(np.arctan2(s.normal[1], s.normal[0])))
-    driven.look_down(float(np.clip(np.arcsin(s.normal[2]), 0.3, 1.2)))
-    driven.window.pointer.go_deep(1e3 * s.depth_m)
-    driven.mouse_at(s.point)
-    driven.wait(1.5)
-    driven.button(True)
-    driven.wait(s.depth_m / 0.02 + 0.8)
-    driven.button(False)
-    driven.until(lambda frame: guide.state.made > made and not driven.session.worker.busy)
 
 
 @pytest.mark.slow

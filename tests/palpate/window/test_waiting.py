@@ -23,14 +23,14 @@ def waiting():
 
 def test_it_draws_how_far_a_job_has_come_and_returns_what_it_made(waiting: WaitingWindow) -> None:
     seen, go_on = threading.Event(), threading.Event()
-    update = waiting.plotter.update
+    draw = waiting.plotter.render
 
     def drawn() -> None:
-        update()
+        draw()
         if "mesh   50 %" in waiting.head.text:
             seen.set()
 
-    waiting.plotter.update = drawn
+    waiting.plotter.render = drawn
 
     def job(tell) -> str:
         tell("mesh", 0.5)

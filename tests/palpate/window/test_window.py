@@ -29,7 +29,7 @@ from palpate.window.window import COLUMN, TouchWindow
 from scenes.phantoms import Region
 from scenes.scene import Scene, load_scene
 
-from ...support.waiting import eventually
+from ...support.waiting import PATIENCE_S, eventually
 from .driven import Driven
 
 SIZE = (640, 480)
@@ -215,6 +215,65 @@ def test_an_inclusion_is_dragged_and_felt(driven: Driven) -> None:
     release(driven)  # what stuck to the tip while the ball moved stays until it leaves
     assert sizes(press(driven))[0] == pytest.approx(sizes(plain)[0], rel=1e-3)
     release(driven)
+
+
+class Held:
+    """What a job calls is held up until `go_on` is set; it tells half of its work before."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch, owner: object, name: str) -> None:
+        self.reached, self.go_on = threading.Event(), threading.Event()
+        inner = getattr(owner, name)
+
+        def held(*args, **keywords):
+            tell = next((each for each in args if getattr(each, "__name__", "") == "tell"), None)
+            if tell is not None:
+                tell("half of it", 0.5)
+            self.reached.set()
+            assert self.go_on.wait(PATIENCE_S)
+            return inner(*args, **keywords)
+
+        monkeypatch.setattr(owner, name, held)
+
+
+def test_a_ball_says_what_it_waits_for_and_is_felt_under_the_tip_that_holds_on(
+    driven: Driven, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = press(driven)
+    held = Held(monkeypatch, driven.session._inclusion, "follow")
+    driven.key("i", wait=False)
+    driven.until(lambda f: seen_through(driven) and held.reached.is_set())  # the ball is there at once
+    driven.says("Computing the ball: half of it")
+    meanwhile = driven.frame()
+    assert meanwhile.busy == "computing the ball: half of it" and not driven.session.inclusion_felt
+    assert sizes(meanwhile)[0] == pytest.approx(sizes(before)[0], rel=0.01), "what was felt is felt on"
+    assert "busy" in driven.window.boards[0].text, "how much of it is done is shown"
+    held.go_on.set()
+    driven.inclusion_settled()
+    driven.until(lambda f: sizes(f)[0] > 1.05 * sizes(before)[0])  # nobody pressed anew
+    driven.says("Computing the ball", says=False)
+    driven.key("i")
+    driven.until(lambda f: not seen_through(driven))
+    driven.inclusion_settled()
+    release(driven)
+
+
+def test_tab_says_what_it_loads_and_the_old_renderer_is_felt_until_then(
+    driven: Driven, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    before = press(driven)
+    held = Held(monkeypatch, driven.session.servo, "set_renderer")
+    driven.key("Tab", wait=False)
+    driven.until(lambda f: held.reached.is_set())
+    driven.says("Loading the next renderer: half of it")
+    meanwhile = driven.wait(0.05)
+    assert meanwhile.views[0].name == "fem" == driven.session.renderer_name
+    assert sizes(meanwhile)[0] == pytest.approx(sizes(before)[0], rel=0.01)
+    held.go_on.set()
+    driven.until(lambda f: f.views[0].name == "kelvin-voigt" and sizes(f)[0] > 0.1)
+    driven.says("Loading", says=False)
+    release(driven)
+    driven.session.set_renderer("fem")
+    driven.session.worker.wait()
 
 
 def test_a_session_is_recorded(driven: Driven, block: Model, tmp_path: Path) -> None:
