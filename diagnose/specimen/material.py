@@ -27,7 +27,7 @@ from mechanics.effects.tool_compliance import EFFECT as TOOL
 from mechanics.effects.viscoelasticity import EFFECT as PRONY
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
-from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO
+from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO, quantity_words
 from reconstruct.external.relaxation import held_out_relaxation
 from reconstruct.external.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
 
@@ -187,7 +187,8 @@ def _indentation(
     assert made.attribution is not None
     ideal, at_bound = made.attribution.ideal.found.modulus / bench.similarity.modulus, made.at_bound
     if made.effects:
-        notes.append(f"without {_listed(made.effects)} the modulus would be {ideal:.4g} Pa")
+        plain = quantity_words("young_modulus_pa", ideal)
+        notes.append(f"without {_listed(made.effects)} the modulus would be {plain}")
     tested = {e.name for e in effects()} - set(made.left_out)
     return Material(
         kind="indentation",

@@ -37,7 +37,7 @@ def lines(result: Material) -> list[str]:
     text += [f"  {_called(name)}: {in_words(name, v)}" for name, v in result.parameters.items()]
     text += [f"  {note}" for note in result.notes]
     if result.unknown:
-        text.append(f"not told by such a test: {', '.join(result.unknown)}")
+        text.append(f"not told by such a test: {_unknown(result)}")
     return text
 
 
@@ -118,7 +118,7 @@ def tell(result: Material, page: Page) -> None:
     for note in result.notes:
         page.paragraph(f"{note[:1].upper()}{note[1:]}.")
     if result.unknown:
-        page.paragraph(f"Such a test cannot tell: {', '.join(result.unknown)}.")
+        page.paragraph(f"Such a test cannot tell: {_unknown(result)}.")
 
 
 def lead(result: Material) -> str:
@@ -187,6 +187,10 @@ _KILO = 1e3
 
 def _way(name: str) -> str:
     return _WAYS.get(name, name)
+
+
+def _unknown(result: Material) -> str:
+    return ", ".join(each.replace("_", " ") for each in result.unknown)
 
 
 def _by(result: Material) -> str:
