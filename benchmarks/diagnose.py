@@ -26,7 +26,7 @@ from benchmarks._diagnosis_tables import TARGETS, pictures, show
 from benchmarks.evidence import Figure, rates
 from benchmarks.timing import table
 from mechanics.errors import OptionError
-from palpate.operations._flags import finite
+from palpate.operations._to_argparse import finite
 from palpate.tasks.driver import Outcome
 from palpate.tasks.engine import run_with_bar
 from palpate.tasks.graph import Graph, Task

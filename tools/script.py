@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from types import ModuleType
 
 from mechanics.errors import PalpateError
-from palpate.operations._flags import OneLineParser
+from palpate.operations._to_argparse import OneLineParser
 from palpate.output import emit_json
 
 

@@ -10,7 +10,7 @@
     def stretch(asked: StretchOperands, call: Call) -> Curve: ...
 
 From the fields come the Python call's signature and docstring, `pp.options("stretch")`, and the flags and
-help of `palpate stretch` (`palpate.operations._flags`).
+help of `palpate stretch` (`palpate.operations._to_argparse`).
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ from mechanics.errors import OptionError, PalpateError
 from mechanics.files import FolderKind, Kind, check_target, written_at
 from mechanics.scratch import sweep_scratch
 from palpate.operations._declare import STREAMS, Operation
-from palpate.operations._flags import OneLineParser, add_operation
 from palpate.operations._list import OPERATIONS, module_of
+from palpate.operations._to_argparse import OneLineParser, add_operation
 from palpate.output import Output
 
 

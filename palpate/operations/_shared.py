@@ -10,7 +10,7 @@ from mechanics.errors import OptionError
 from mechanics.key_values import pairs
 from mechanics.surface_files import UNITS, is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand
-from palpate.operations._flags import natural
+from palpate.operations._to_argparse import natural
 from render.registry import names, simulator_names
 
 if TYPE_CHECKING:

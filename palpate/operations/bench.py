@@ -16,7 +16,7 @@ from typing import Any
 from mechanics.errors import OptionError
 from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._flags import OneLineParser
+from palpate.operations._to_argparse import OneLineParser
 from palpate.output import Output, emit_json
 
 _HELPERS = ("evidence", "timing")

@@ -13,8 +13,8 @@ import argparse
 from dataclasses import dataclass
 
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._flags import add_operation
 from palpate.operations._list import commands
+from palpate.operations._to_argparse import add_operation
 from palpate.output import Output
 
 SHELLS = ("bash", "zsh", "fish")

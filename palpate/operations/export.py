@@ -16,8 +16,8 @@ from typing import TYPE_CHECKING
 
 from palpate.exporting.registry import FORMATS
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._flags import vector
 from palpate.operations._shared import model_operand
+from palpate.operations._to_argparse import vector
 from palpate.operations.load import load
 from palpate.output import Output
 

@@ -18,7 +18,6 @@ from typing import TYPE_CHECKING, Any
 
 from mechanics.errors import OptionError
 from palpate.operations._declare import Call, operand, operation
-from palpate.operations._flags import finite, vector
 from palpate.operations._shared import (
     SAMPLES,
     columns_operand,
@@ -27,6 +26,7 @@ from palpate.operations._shared import (
     tip_radius_operand,
     units_operand,
 )
+from palpate.operations._to_argparse import finite, vector
 from palpate.output import Output
 
 if TYPE_CHECKING:

@@ -15,7 +15,6 @@ from typing import TYPE_CHECKING
 
 from mechanics.surface_files import is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._flags import vector
 from palpate.operations._run import say_next
 from palpate.operations._shared import (
     MeshFileOptions,
@@ -25,6 +24,7 @@ from palpate.operations._shared import (
     renderer_operand,
     tip_radius_operand,
 )
+from palpate.operations._to_argparse import vector
 from palpate.operations.renderer import touched_scene
 from palpate.output import Output
 from render.options import RenderOptions

@@ -20,9 +20,9 @@ from mechanics.files import JSON, PNG, atomic_file
 from mechanics.key_values import number, pairs
 from mechanics.names import unknown
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._flags import natural
 from palpate.operations._run import say_next
 from palpate.operations._shared import SAMPLES, report_operand, save_operand, seed_operand
+from palpate.operations._to_argparse import natural
 from palpate.output import Output, emit_json
 from scenes.laboratory.effects import REGISTRY
 from scenes.laboratory.hand import HandOptions

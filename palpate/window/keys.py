@@ -37,7 +37,7 @@ KEYS: dict[str, Key] = {
     "f": Key("Next friction: stick, 1, 0.5, 0.2, 0.05"),
     "arrows": Key("Move the ball, with PageUp and PageDown in height"),
 }
-"""By name; palpate.window.controls maps VTK's key symbols to these."""
+"""By name; palpate.window.mouse_and_keys maps VTK's key symbols to these."""
 
 SHOWN = {
     "plus": "+",

@@ -1,5 +1,5 @@
 """The touch window: force, next step and buttons on the left, pictures, live plots below them, settings or
-help on the right; palpate.window.controls moves the tip.
+help on the right; palpate.window.mouse_and_keys moves the tip.
 
 One timer drives everything: `tick` writes the mouse's pose for the servo process, reads its newest state,
 moves what is drawn. The servo never waits for a picture.
@@ -21,10 +21,10 @@ from mechanics.files import PNG, atomic_file
 from palpate.window.axes import Axes
 from palpate.window.board import PAPER, Board, Item
 from palpate.window.charts import LiveCharts
-from palpate.window.controls import Controls
 from palpate.window.frames import Frame, View, level
 from palpate.window.game import Game
 from palpate.window.ghost import GhostTip
+from palpate.window.mouse_and_keys import Controls
 from palpate.window.orbit import Orbit
 from palpate.window.pace import Pace
 from palpate.window.panel import NextStep, aside_rows, main_rows

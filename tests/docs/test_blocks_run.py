@@ -20,7 +20,7 @@ from tests.support.waiting import eventually
 REPOSITORY = Path(__file__).resolve().parents[2]
 DOCS = REPOSITORY / "docs"
 GUIDE = [p for folder in ("tutorials", "howto") for p in sorted((DOCS / folder).glob("*.md"))]
-OTHERS = ("pip", "dask", "python3", ".venv/bin/python", ".venv/bin/palpate")
+OTHERS = ("pip", "dask", "python3", "source", ".venv/bin/python", ".venv/bin/palpate")
 """Other programs; of them CI runs what installs and starts this one."""
 
 

@@ -15,8 +15,8 @@ import pytest
 from mechanics.options import option
 from palpate import cli
 from palpate.operations._declare import Call, operation
-from palpate.operations._flags import add_operation
 from palpate.operations._list import commands
+from palpate.operations._to_argparse import add_operation
 from palpate.output import emit_json
 
 

@@ -13,9 +13,9 @@ import pytest
 from mechanics.names import near, unknown
 from palpate import cli
 from palpate.child import module_environment
-from palpate.operations._flags import in_order
 from palpate.operations._list import commands
 from palpate.operations._run import command_operation, parser_of
+from palpate.operations._to_argparse import in_order
 from palpate.operations.completion import SHELLS, completion
 
 UNITS = {"m", "n", "s", "hz", "pa", "kg", "n/m", "m/s", "mm", "deg", "rad", "n/s", "n_s/m", "m_per_s", "1"}
