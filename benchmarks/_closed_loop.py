@@ -22,6 +22,7 @@ from devices.safety import WORDS, SafetyOptions, safety_parameters
 from mechanics.kernels import kept
 from palpate.servo.layout import CONTACT_TICKS, ENABLE, TICKS, total_bytes, views
 from palpate.servo.loop import make_program, one_tick
+from palpate.servo.seqlock import write_block
 from palpate.servo.tick import (
     IN_CALIBRATED,
     IN_CONNECTED,
@@ -39,7 +40,6 @@ from palpate.servo.tick import (
     OUT_FORCE,
     OUT_HOLD,
     TickParameters,
-    put_pose,
     tick_arrays,
 )
 from render.coupling import (
@@ -171,7 +171,7 @@ def _run(
         pose[IN_TIME] = (START_NS + read[tick] * substep_ns) * 1e-9
         pose[IN_SEQUENCE] = tick
         pose[IN_WORK] = work
-        put_pose(arrays, pose)
+        write_block(arrays.inbox_version, arrays.inbox, pose)
         out[tick, 9] = out[tick, 10] = work
         for at in range(read[tick], read[tick + 1]):
             if at == read[tick] + lag[tick]:

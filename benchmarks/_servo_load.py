@@ -31,6 +31,7 @@ from palpate.servo.layout import (
 )
 from palpate.servo.loop import Program, make_program, one_tick
 from palpate.servo.realtime import real_time_thread
+from palpate.servo.seqlock import write_block
 from palpate.servo.tick import (
     IN_POSITION,
     IN_SEQUENCE,
@@ -39,7 +40,6 @@ from palpate.servo.tick import (
     TickArrays,
     TickParameters,
     account,
-    put_pose,
     tick_arrays,
 )
 from render.passivity import PassivityOptions, passivity_parameters
@@ -115,7 +115,7 @@ def _timed(
         pose[IN_SEQUENCE] = start + tick
         deadline = arrays.shared.counts[DEADLINE]
         pose[IN_TIME] = deadline * 1e-9
-        put_pose(arrays, pose)
+        write_block(arrays.inbox_version, arrays.inbox, pose)
         if wait:
             compiled_sleep_until(arrays.timespec, deadline)
         began = compiled_now_ns(arrays.timespec)

@@ -9,7 +9,7 @@ import mechanics
 
 ROOT = Path(mechanics.__file__).parents[1]
 ALONE = {"part", "inner", "fresh_part"}
-COMPILED = ALONE | {"kernel", "loop_kernel", "shared_part", "njit"}
+COMPILED = ALONE | {"kernel", "step_kernel", "loop_kernel", "shared_part", "njit"}
 
 
 def decorators(function: ast.FunctionDef) -> set[str]:
