@@ -8,9 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+import palpate as pp
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
-from diagnose.explore.explorer import Explorer
 from diagnose.explore.goals import GoalOptions
 from diagnose.explore.segments import Instrument
 from mechanics.model import Model
@@ -35,7 +35,7 @@ def test_a_guided_person_knows_the_object_after_a_dozen_presses(block: Model, tm
         session.start()
         session.enable()
         instrument = Instrument(session.servo.tip_radius_m, session.servo.options.rate_hz, {})
-        explorer = Explorer(instrument, GoalOptions(modulus_within=0.1, most=MOST))
+        explorer = pp.Explorer(instrument, GoalOptions(modulus_within=0.1, most=MOST))
         guide = Guide(explorer, session.servo, block, session.worker, tmp_path / "guided.csv.gz")
         scene = Scene("block", "model", "", title="Block")
         window = TouchWindow(session, scene, channel, off_screen=True, guide=guide)
