@@ -15,6 +15,8 @@ from render.registry import create
 from scenes.phantoms import Region
 from scenes.scene import ball_of
 
+from .small import block_model
+
 
 def force(renderer: Renderer, x: float, y: float, depth: float = 0.004) -> float:
     """N, of a press onto the block's top."""
@@ -26,7 +28,8 @@ def force(renderer: Renderer, x: float, y: float, depth: float = 0.004) -> float
 
 
 @pytest.mark.slow
-def test_a_ball_that_came_by_dragging_is_felt_as_one_from_the_start(block: Model, tmp_path: Path) -> None:
+def test_a_ball_that_came_by_dragging_is_felt_as_one_from_the_start(tmp_path: Path) -> None:
+    block = block_model(tmp_path, cells=(6, 6, 3))
     plain = create("fem", block)
     moving = MovingInclusion(block, plain)
     balls = [Region("ball", (x, -0.002, 0.022), 0.008, 8.0) for x in (-0.02, -0.012, 0.003)]
