@@ -159,6 +159,7 @@ def _beef(folder: Path, arguments: argparse.Namespace) -> Rows:
             tip_radius_m=BEEF_TIP_M,
             layer_m=BEEF_LAYER_M,
             specimens=True,
+            fast=True,
             progress=False,
         )
         yield f"{len(files)} pieces of {session}", made

@@ -38,7 +38,8 @@ def test_no_press_of_the_stiff_sample_is_below_any_of_the_soft_ones(results):
 def test_stiffness_follows_the_height_of_the_cylinder_and_the_modulus_does_not(results):
     trends = {t.name: t for t in height_trends(results[NAMES[0]].model)}
     assert trends["k_v"].pearson < -0.9 and trends["k_h"].pearson < -0.9
-    assert abs(trends["e_pa"].pearson) < 0.5
+    # of the presses' moduli, which scatter by a percent, even a percent from foot to top correlates
+    assert abs(trends["e_pa"].change) < 0.02 < 0.2 < abs(trends["k_v"].change)
     each = results[NAMES[0]].press_modulus_pa
     assert np.std(each) / np.mean(each) < 0.03
 
