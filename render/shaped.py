@@ -102,7 +102,8 @@ def on_shape(
     creased[rim] = False  # no tip gets under it
     if not creased.any() or edge > 2 * EDGE_ROUNDING_M:
         return OnShape(placed, normals, triangles, np.arange(len(triangles)), weights)
-    hollow = creased & _beside_hollows(shape, placed)
+    hollows = _hollows(shape)
+    hollow = creased & _beside(hollows, placed)
     sharp = creased & ~hollow
     if hollow.any():
         own = np.setdiff1d(used, rim)
@@ -118,7 +119,7 @@ def on_shape(
     normals = np.vstack([normals, facing])
     own = np.setdiff1d(triangles[free[within] > 0], rim)
     if hollow.any():
-        own = own[~_beside_hollows(shape, placed)[own]]
+        own = own[~_beside(hollows, placed[own])]
     rims = np.flatnonzero(sharp)
     between = pseudonormals(placed, triangles)[rims]
     away = line.query(placed[own], distance_upper_bound=RIM_STRIP_M)[0]
@@ -136,13 +137,15 @@ def _line(shape: TrueShape, rims: np.ndarray, base: np.ndarray) -> cKDTree:
     return cKDTree(points)
 
 
-def _beside_hollows(shape: TrueShape, points: np.ndarray) -> np.ndarray:
-    """(v,) bool, so close to a concave crease that it is eased."""
+def _hollows(shape: TrueShape) -> cKDTree:
+    """Points along the concave creases; it may hold none."""
     middles, _, turn = shape.creases_cut(_CREASE_SPACING_M)
-    if not (turn < 0).any():
-        return np.zeros(len(points), dtype=bool)
-    away = cKDTree(middles[turn < 0]).query(points, distance_upper_bound=_HOLLOW_REACH_M)[0]
-    return np.isfinite(away)
+    return cKDTree(middles[turn < 0])
+
+
+def _beside(hollows: cKDTree, points: np.ndarray) -> np.ndarray:
+    """(v,) bool, so close to a concave crease that it is eased."""
+    return np.isfinite(hollows.query(points, distance_upper_bound=_HOLLOW_REACH_M)[0])
 
 
 def _on_creases(

@@ -132,6 +132,7 @@ class Explorer:
         except (ContactError, SurfaceError, MeshError, DiagnosisError, ModelError) as error:
             self._trouble, self._air_hides = str(error), isinstance(error, LoudAirError)
         self._steps.append(Step(self._last, self.state))
+        self._last = None  # it is done, and what comes next depends on what it told
 
     def _tested(self, before: Estimate) -> None:
         """Each new touch tests the surface as it was: by how many of its standard deviations it was off."""

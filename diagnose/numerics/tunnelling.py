@@ -23,8 +23,6 @@ FELL_TO, CAME_BACK = 0.7, 0.1
 again as the tip comes back."""
 DEEPER = 0.02
 """Of a press's greatest depth, by which the tip is deeper than where it was pushed most."""
-
-
 STAYED = 0.2
 """Share of its samples in which a silent tip is at rest or on its way in: else it is let go by damping."""
 _STEP = 5

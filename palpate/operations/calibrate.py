@@ -50,11 +50,11 @@ class CalibrateOperands:
 
 
 def _answer(result: Calibration, asked: CalibrateOperands, out: Output) -> int:
-    named = (
-        "" if asked.save is None else f'under [tool] in a recording\'s .toml: calibration = "{asked.save}"'
-    )
-    lines = [f"written: {asked.save}", f"next: let recordings be read by it, {named}"] if named else []
-    return answer(result, asked, out, lines=lines or ["next: keep it for recordings: --save TOOL.toml"])
+    lines = ["next: keep it for recordings: --save TOOL.toml"]
+    if asked.save is not None:
+        key = f'under [tool] in a recording\'s .toml: calibration = "{asked.save}"'
+        lines = [f"written: {asked.save}", f"next: let recordings be read by it, {key}"]
+    return answer(result, asked, out, lines=lines)
 
 
 @operation(CalibrateOperands, GeometryOptions, often="shape slab_m unit", answer=_answer)

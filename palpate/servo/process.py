@@ -40,8 +40,6 @@ from render.scene import TouchScene, in_the_air, scene_of
 
 GO = "go"
 """What follows a job once all is compiled that another process compiles for it."""
-
-
 STEPS_IN = 30
 """Ticks in which a press that is under way is made again by another renderer."""
 
