@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError
 from mechanics.model.model import Model
 from mechanics.presses.table import LEAD_S, Presses

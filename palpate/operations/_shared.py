@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 
 PAGE = "palpate.show.page:PAGE"
 MODEL = "mechanics.model.files:MODEL"
-SAMPLES = "mechanics.recording.recording:SAMPLES"
+SAMPLES = "mechanics.recording.files:SAMPLES"
 
 
 def recording_operand(
