@@ -168,23 +168,23 @@ class PartialFactor:
         self.size, self._kept = upper.shape[0], np.asarray(kept)
         self._rows = upper.indptr.astype(np.int32)
         self._columns = upper.indices.astype(np.int32)
-        self._solvers: dict[int, _Phases] = {}
+        self._kind = _DEFINITE
         self._now: _Phases | None = None
 
     def refresh(self, values: np.ndarray) -> np.ndarray:
         """Factorise the matrix of these values (nnz,); the Schur complement (k, k) on the kept unknowns.
 
-        Cholesky where the matrix is positive definite, LDL' where it is not.
+        Cholesky where the matrix is positive definite; LDL' from the first that is not.
         """
-        try:
-            return self._refresh(values, _DEFINITE)
-        except ArithmeticError:
-            return self._refresh(values, _INDEFINITE)
+        if self._kind == _DEFINITE:
+            with contextlib.suppress(ArithmeticError):
+                return self._refresh(values)
+            self._kind = _INDEFINITE
+        return self._refresh(values)
 
-    def _refresh(self, values: np.ndarray, kind: int) -> np.ndarray:
-        if kind not in self._solvers:
-            self._solvers[kind] = _Phases(kind, self._rows, self._columns, self._kept)
-        self._now = self._solvers[kind]
+    def _refresh(self, values: np.ndarray) -> np.ndarray:
+        if self._now is None or self._now.kind != self._kind:
+            self._now = _Phases(self._kind, self._rows, self._columns, self._kept)
         return self._now.factorise(values)
 
     def forward(self, right: np.ndarray) -> np.ndarray:

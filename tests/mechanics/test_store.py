@@ -15,6 +15,8 @@ from mechanics.model.files import read_model, write_model
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
 
+from ..support.waiting import PATIENCE_S
+
 ARRAYS = {"a": np.arange(12.0).reshape(3, 4), "b": np.arange(5, dtype=np.float32), "c": np.array([7])}
 
 
@@ -114,9 +116,9 @@ def test_two_processes_at_once_never_read_the_others_half(tmp_path):
     workers = [context.Process(target=_contend, args=(path, v, queue)) for v in (1, 2)]
     for worker in workers:
         worker.start()
-    results = [queue.get(timeout=60) for _ in range(12)]
+    results = [queue.get(timeout=PATIENCE_S) for _ in range(12)]
     for worker in workers:
-        worker.join(timeout=30)
+        worker.join(timeout=PATIENCE_S)
         assert worker.exitcode == 0
     assert all(results)
     assert os.listdir(tmp_path) == ["x.bin"]

@@ -300,7 +300,7 @@ def test_the_loop_of_other_platforms_runs_swaps_and_stops(monkeypatch):
         assert servo.shared.counts[TICKS] >= before
     finally:
         servo.shared.control[STOP] = 1
-        assert loop.join(20.0)
+        assert loop.join(PATIENCE_S)
     assert servo.shared.counts[STATUS] == 0
 
 
