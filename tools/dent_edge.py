@@ -2,7 +2,7 @@
 
 Bodies of unit modulus stand on their base: a tip of 5 mm presses, sticking, into the top of prisms beside a
 rim, into their flanks above the base, and into flat layers (mechanics.press_solver, neo-Hookean). The amounts
-of mechanics.edges that are not zero are fitted to the logarithm of the forces, through the touch law itself.
+of mechanics.contact.edges that are not zero are fitted to the logarithm of the forces, through the touch law.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ import numpy as np
 from scipy.optimize import least_squares
 
 from benchmarks.felt_surface import meshed
-from mechanics.box_mesh import box_mesh
-from mechanics.edges import fitted, laid
-from mechanics.files import atomic_file
-from mechanics.patch import usual_width
+from mechanics.compliance.patch import usual_width
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.edges import fitted, laid
+from mechanics.contact.touch import TouchedPlaces, touch_forces
+from mechanics.disk.files import atomic_file
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import TouchedPlaces, touch_forces
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from tools.script import script
 
 RADIUS_M, NU = 5e-3, 0.49
@@ -83,14 +83,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--angles", type=float, nargs="+", default=list(ANGLES), help="of the rims, degrees")
     parser.add_argument("--layers", type=float, nargs="*", default=list(LAYERS_M), help="how thick, m")
     parser.add_argument("--seed", type=int, default=0, help="of where along the edges (default: 0)")
-    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.edges)")
+    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.contact.edges)")
 
 
 @dataclass(frozen=True)
 class Pressed:
     """A place that was pressed. depths: (d,) m. force: (d,) m^2 along the normal, nan where there was no
-    equilibrium. far: (3, 3) 1/m, under the patch alone. laid: (g,) of mechanics.edges, over the patch's
-    width."""
+    equilibrium. far: (3, 3) 1/m, under the patch alone. laid: (g,) 1/m, of mechanics.contact.edges over the
+    patch's width."""
 
     normal: np.ndarray
     depths: np.ndarray
