@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     RecordingLike = str | Path | mechanics.recording.Recording | Simulation
     ModelLike = str | Path | mechanics.model.Model | Reconstruction | Scene
 
+EXACT = "solve each touched place at finite strain, in place of the table (some 14 s a place)"
 PAGE = "palpate.show.page:PAGE"
 MODEL = "mechanics.model_files:MODEL"
 SAMPLES = "mechanics.recording:SAMPLES"
