@@ -15,13 +15,13 @@ from typing import Any
 import numpy as np
 from scipy.signal import lfilter
 
-from mechanics.box_mesh import box_mesh
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.press_cutting import FoundPresses, cut
-from mechanics.recording import Recording
-from mechanics.sites import touch_sites
-from mechanics.touch import touch_force
+from mechanics.compliance.sites import touch_sites
+from mechanics.contact.touch import touch_force
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
+from mechanics.presses.cutting import FoundPresses, cut
+from mechanics.recording.recording import Recording
+from mechanics.shape.box_mesh import box_mesh
 
 MODULUS_PA, POISSON, RADIUS_M, NOISE_N, RATE_HZ = 20e3, 0.49, 0.005, 0.008, 500.0
 DEPTHS_M, SPEEDS_M_PER_S, HOLDS_S = (0.0022, 0.0032, 0.0042), (0.006, 0.02, 0.06), (0.1, 0.5)

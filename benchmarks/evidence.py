@@ -19,8 +19,8 @@ from typing import Any
 
 from scipy.stats import binomtest
 
+from mechanics.disk.files import JSON, atomic_file, read_text
 from mechanics.errors import FileError
-from mechanics.files import JSON, atomic_file, read_text
 
 
 @dataclass(frozen=True)

@@ -28,11 +28,11 @@ from diagnose.verdict.conclusion import conclude
 from diagnose.verdict.result import Diagnosis
 from mechanics.effects.base import Role
 from mechanics.effects.registry import effects
-from mechanics.model import Model
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
 from mechanics.progress import Clock, Progress, silent
-from mechanics.recording import Recording
-from reconstruct.placing import presses_on
+from mechanics.recording.recording import Recording
+from reconstruct.presses_on_model import presses_on
 
 
 def diagnose(

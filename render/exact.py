@@ -16,6 +16,8 @@ from typing import Any
 
 import numpy as np
 
+from mechanics.disk.files import cache_folder
+from mechanics.disk.store import content_key, load_or_build
 from mechanics.effects.adhesion import EFFECT as ADHESION
 from mechanics.effects.compliant_base import EFFECT as YIELDING_BASE
 from mechanics.effects.jkr_adhesion import EFFECT as JKR
@@ -23,14 +25,12 @@ from mechanics.effects.skin_layer import EFFECT as SKIN
 from mechanics.effects.strain_stiffening import EFFECT as STIFFENING
 from mechanics.effects.unbonded_base import EFFECT as UNBONDED
 from mechanics.errors import OptionError
-from mechanics.files import cache_folder
 from mechanics.press_solver.press import LAWS, PressOptions, PressSolver
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 from mechanics.progress import Progress, silent
-from mechanics.store import content_key, load_or_build
 from render.base import Renderer
 from render.effects import STICKING, rendered_touch
-from render.fem import FemRenderer
+from render.fem.renderer import FemRenderer
 from render.force_error import force_errors
 
 DEPTHS = 6

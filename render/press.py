@@ -15,16 +15,16 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechanics.disk.files import Kind, atomic_file, read_text
 from mechanics.errors import OptionError, RecordingError
-from mechanics.files import Kind, atomic_file, read_text
 from mechanics.quantities import TIP_RADIUS
 from mechanics.result import Result
 from render.base import Renderer
-from render.bvh import STACK, closest_triangle
 from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of
-from render.surface import SurfaceArrays
-from render.walking import foot
+from render.surface.bvh import STACK, closest_triangle
+from render.surface.contact_surface import SurfaceArrays
+from render.surface.walking import foot
 
 if TYPE_CHECKING:
     from render.exact import ExactPlaces, SolvedPlace

@@ -9,14 +9,14 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from mechanics.disk.files import Kind, atomic_file
 from mechanics.errors import OptionError
-from mechanics.files import Kind, atomic_file
-from mechanics.model import Model
-from mechanics.presses import LEAD_S, Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import LEAD_S, Presses
 from mechanics.progress import Progress, Remaining, silent
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import runs
 from mechanics.result import Result
-from mechanics.samples import runs
 from render.base import Renderer
 from render.force_error import error_figures, force_errors
 from render.scene import TouchScene, scene_of

@@ -3,7 +3,7 @@
 Bodies of unit modulus stand on their base: a tip of 5 mm presses, sticking, into the top of prisms beside a
 rim, into their flanks above the base, and into flat layers (mechanics.press_solver, neo-Hookean). At each
 depth the dent's table and the far field under the patch leave something of the displacement; over the force
-it is a compliance. The amounts of mechanics.edges are fitted to it, by what they change of the force.
+it is a compliance. The amounts of mechanics.contact.edges are fitted to it, by what they change of the force.
 """
 
 from __future__ import annotations
@@ -16,14 +16,14 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.felt_surface import meshed
-from mechanics.box_mesh import box_mesh
-from mechanics.dent import dent_law, grid
-from mechanics.edges import fitted, laid
-from mechanics.files import atomic_file
-from mechanics.patch import usual_width
+from mechanics.compliance.patch import usual_width
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.dent import dent_law, grid
+from mechanics.contact.edges import fitted, laid
+from mechanics.disk.files import atomic_file
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
 from tools.script import script
 
 RADIUS_M, NU = 5e-3, 0.49
@@ -82,7 +82,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--angles", type=float, nargs="+", default=list(ANGLES), help="of the rims, degrees")
     parser.add_argument("--layers", type=float, nargs="*", default=list(LAYERS_M), help="how thick, m")
     parser.add_argument("--seed", type=int, default=0, help="of where along the edges (default: 0)")
-    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.edges)")
+    parser.add_argument("-o", "--output", help="CSV of widths and amounts (mechanics.contact.edges)")
 
 
 def left_over(

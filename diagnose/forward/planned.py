@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from diagnose.forward.prediction import Forward
-from mechanics.presses import Presses
-from mechanics.side_of_play import sides
+from mechanics.presses.table import Presses
+from mechanics.recording.side_of_play import sides
 
 DEEPEST_M = 0.009
 CLEARANCE_M = 2e-3

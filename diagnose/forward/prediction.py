@@ -15,13 +15,13 @@ import numpy as np
 
 from diagnose.forward import kernel
 from diagnose.forward.touches import place_of
-from mechanics.dent import bend_of, effective_radius
+from mechanics.compliance.pressed_places import Places, solve_places
+from mechanics.contact.dent import bend_of, effective_radius
 from mechanics.effects.laws_along_path import new_memory, path_numbers
 from mechanics.effects.settings import Settings
-from mechanics.kinematics import acceleration
-from mechanics.model import Model
-from mechanics.pressed_places import Places, solve_places
-from mechanics.presses import Presses
+from mechanics.model.model import Model
+from mechanics.presses.table import Presses
+from mechanics.recording.kinematics import acceleration
 
 KEPT = 8
 """Integrated touches that are kept."""
@@ -76,7 +76,7 @@ class Forward:
 
     @property
     def lead(self) -> np.ndarray:
-        """(n, 3) side of the tip in a play that the reading follows (mechanics.side_of_play)."""
+        """(n, 3) side of the tip in a play that the reading follows (mechanics.recording.side_of_play)."""
         return self.touches.columns["lead"]
 
     @property

@@ -20,10 +20,10 @@ import numpy as np
 
 from diagnose.instrument.jackknife import all_but_one, covariance
 from mechanics.frames import tangents
-from mechanics.presses import Presses
-from mechanics.recording import Recording
-from mechanics.samples import runs
-from mechanics.side_of_play import leads
+from mechanics.presses.table import Presses
+from mechanics.recording.recording import Recording
+from mechanics.recording.samples import runs
+from mechanics.recording.side_of_play import leads
 
 KINDS = ("trace", "rigid", "retrace")
 BLOCK_S = 0.05

@@ -22,7 +22,7 @@ from diagnose.forward.prediction import Forward
 from diagnose.forward.touches import FOLLOWED
 from diagnose.options import NuisanceOptions
 from mechanics.effects.settings import Settings
-from mechanics.presses import Presses
+from mechanics.presses.table import Presses
 
 _FEW_COLUMNS = 3
 _MODES = 2

@@ -28,8 +28,8 @@ from mechanics.effects.viscoelasticity import EFFECT as PRONY
 from mechanics.errors import OptionError
 from mechanics.progress import Progress, silent
 from mechanics.quantities import POISSON_RATIO, USUAL_POISSON_RATIO, quantity_words
-from reconstruct.external.relaxation import held_out_relaxation
-from reconstruct.external.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
+from reconstruct.machine_curves.relaxation import held_out_relaxation
+from reconstruct.machine_curves.uniaxial import CEILING, LAWS, MOST_STRAIN, chosen, fit_law, held_out
 
 UNIAXIAL_UNKNOWN = (
     "friction at the faces",

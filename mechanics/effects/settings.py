@@ -8,9 +8,9 @@ from typing import Protocol
 
 import numpy as np
 
-from mechanics.dent import DentLaw, dent_law
+from mechanics.compliance.pressed_places import Places
+from mechanics.contact.dent import DentLaw, dent_law
 from mechanics.effects.law import Law
-from mechanics.pressed_places import Places
 
 STICKS = float("inf")
 
@@ -20,8 +20,8 @@ class Touch:
     """What one tip feels where it touches; prediction and renderer read it.
 
     dent_law: name of the dent's law; factors: functions of Poisson's ratio that give the factors on its
-    normal force and sideways stiffness, (k,) each, at mechanics.dent.grid(). tip_ratio: radius of the tip
-    over the stated one. friction: Coulomb's coefficient. numbers: (k,) of each law along the path.
+    normal force and sideways stiffness, (k,) each, at mechanics.contact.dent.grid(). tip_ratio: radius of the
+    tip over the stated one. friction: Coulomb's coefficient. numbers: (k,) of each law along the path.
     """
 
     dent_law: str = "linear"

@@ -17,7 +17,7 @@ import numpy as np
 from diagnose.specimen.bench import Curve
 from mechanics.bounds import LARGEST_N
 from mechanics.errors import ContactError, RecordingError
-from mechanics.recording import WIDEST_PATH_M, NotRead
+from mechanics.recording.recording import WIDEST_PATH_M, NotRead
 from palpate.importing.mapping import Column, Said, find_columns
 from palpate.importing.meaning import (
     MOST_ODDS,

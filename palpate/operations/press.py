@@ -13,7 +13,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from mechanics.surface_files import is_surface_file
+from mechanics.disk.surface_files import is_surface_file
 from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._run import say_next
 from palpate.operations._shared import (

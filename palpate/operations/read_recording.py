@@ -11,7 +11,7 @@ from palpate.operations._declare import REQUIRED, Call, operand, operation
 from palpate.operations._shared import tip_radius_operand
 
 if TYPE_CHECKING:
-    from mechanics.recording import Recording
+    from mechanics.recording.recording import Recording
     from palpate.operations._shared import RecordingLike
 
 
@@ -29,9 +29,9 @@ def read_recording(asked: ReadOperands, call: Call) -> Recording:
     Times s, positions of the tip's centre m, forces on the tool N, device frame.
     Raises RecordingError for what is missing or impossible.
     """
-    from mechanics.recording import Recording as Plain
-    from mechanics.recording import check_sane
-    from mechanics.recording import read_recording as read
+    from mechanics.recording.recording import Recording as Plain
+    from mechanics.recording.recording import check_sane
+    from mechanics.recording.recording import read_recording as read
     from scenes.embedded import embedded_names, embedded_recording
 
     source = asked.source

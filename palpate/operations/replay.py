@@ -19,9 +19,9 @@ from render.options import RenderOptions
 from render.support import SupportOptions
 
 if TYPE_CHECKING:
-    import mechanics.model
-    import mechanics.recording
-    from mechanics.presses import Presses
+    import mechanics.model.model
+    import mechanics.recording.recording
+    from mechanics.presses.table import Presses
     from palpate.operations._shared import ModelLike, RecordingLike
     from render.base import Renderer
     from render.replay import ReplayResult
@@ -49,7 +49,7 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     mask `contact`, and the error rmse_n, N, over it. The same input gives the same bits. Raises OptionError,
     and ContactError for a recording that lies far from the model.
     """
-    from reconstruct.placing import check_near
+    from reconstruct.presses_on_model import check_near
     from reconstruct.steps.s3_contacts.quasi_static import is_points
     from render.exact import ExactPlaces, deepest_of_sites, exact_replay, said_beforehand
     from render.replay import ReplayResult, replay_error, replay_recording
@@ -85,10 +85,12 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     )
 
 
-def _touched(recording: mechanics.recording.Recording, model: mechanics.model.Model) -> Presses:
+def _touched(
+    recording: mechanics.recording.recording.Recording, model: mechanics.model.model.Model
+) -> Presses:
     """The recording's presses on the model; none where it holds none."""
-    from mechanics.press_making import no_presses
-    from reconstruct.placing import presses_on
+    from mechanics.presses.making import no_presses
+    from reconstruct.presses_on_model import presses_on
 
     try:
         return presses_on(recording, model)

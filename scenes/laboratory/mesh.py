@@ -13,8 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
+from mechanics.disk.files import atomic_file, cache_folder, temporary_folder
 from mechanics.errors import MeshError
-from mechanics.files import atomic_file, cache_folder, temporary_folder
 from scenes.laboratory.refine import boundary_faces, refine
 from scenes.laboratory.surface import Surface
 from scenes.phantoms import Phantom

@@ -16,7 +16,7 @@ from diagnose.search.fit import settings_of
 from diagnose.search.whiten import Whitener
 from mechanics.effects.base import Effect
 from mechanics.effects.registry import effect
-from mechanics.side_of_play import leads, play, sides
+from mechanics.recording.side_of_play import leads, play, sides
 
 WIDTH = 0.4e-3
 TRIED = ("viscoelasticity", "time_delay", "mullins_softening", "backlash")

@@ -17,7 +17,7 @@ from diagnose.search.attribution import attribute
 from diagnose.search.evidence import Search
 from mechanics.effects.registry import effect
 from mechanics.frames import tangents
-from mechanics.recording import Recording
+from mechanics.recording.recording import Recording
 
 NORMAL = np.array([0.1, -0.2, 0.97]) / np.linalg.norm([0.1, -0.2, 0.97])
 

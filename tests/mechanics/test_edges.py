@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from mechanics.edges import edge_correction
+from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
+from mechanics.contact.edges import edge_correction
+from mechanics.contact.touch import forces_at
 from mechanics.press_solver.press import PressOptions, PressSolver
-from mechanics.sites import LoadPatch, patch_width, touch_sites, touch_solver
-from mechanics.tetmesh import TetMesh
-from mechanics.touch import forces_at
-from mechanics.true_shape import TrueShape
+from mechanics.shape.tetmesh import TetMesh
+from mechanics.shape.true_shape import TrueShape
 
 SIZE_M = (0.08, 0.08, 0.04)
 UP, OUT = np.array([0.0, 0.0, 1.0]), np.array([1.0, 0.0, 0.0])
@@ -22,7 +22,7 @@ HALF_SPACE = (1 - 0.49**2) / (2 * np.sqrt(np.pi) * 0.004)
 @pytest.fixture(scope="module")
 def block() -> TetMesh:
     """A block whose shape is known, standing on its fixed base."""
-    from mechanics.box_mesh import box_mesh
+    from mechanics.shape.box_mesh import box_mesh
 
     mesh = box_mesh((8, 8, 4), SIZE_M)
     shell = trimesh.creation.box(SIZE_M)

@@ -1,8 +1,9 @@
 """Each press fitted by the touch law: its modulus in closed form, its first touch as a nuisance.
 
-For a given path the force of the touch law (mechanics.touch) is proportional to the modulus, f = e g(d), with
-d the tip's displacement since first touch and g the law for unit modulus; so e is linear least squares, and
-only the shift u0 of the first touch along the normal is searched (Gauss-Newton, all presses at once).
+For a given path the force of the touch law (mechanics.contact.touch) is proportional to the modulus, f = e
+g(d), with d the tip's displacement since first touch and g the law for unit modulus; so e is linear least
+squares, and only the shift u0 of the first touch along the normal is searched (Gauss-Newton, all presses at
+once).
 """
 
 from __future__ import annotations
@@ -12,9 +13,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from mechanics.presses import Presses
-from mechanics.sites import TouchSites
-from mechanics.touch import forces_at
+from mechanics.compliance.sites import TouchSites
+from mechanics.contact.touch import forces_at
+from mechanics.presses.table import Presses
 
 _BLOCK_S = 0.004
 _LEAD_S = 0.03
