@@ -112,7 +112,7 @@ def _played(t: np.ndarray, position: np.ndarray, width: float) -> np.ndarray:
         # the hand moves the tip, and the reading follows once the play is taken up
         return position - 0.5 * width * leads(t, position)
     out = np.empty_like(position)
-    play(np.array([0, len(position)]), np.ascontiguousarray(position), width, out)
+    play(np.array([0, len(position)]), np.ascontiguousarray(position), np.zeros((1, 3)), width, out)
     return out
 
 
