@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import cache_folder
+from mechanics.disk.scratch import cache_folder
 from mechanics.disk.store import content_key, load_or_build
 from mechanics.effects.adhesion import EFFECT as ADHESION
 from mechanics.effects.compliant_base import EFFECT as YIELDING_BASE
