@@ -14,7 +14,7 @@ from mechanics.press_solver.even_surface import even_surface
 from mechanics.press_solver.felt_surface import FeltSurface
 from mechanics.press_solver.graded_mesh import drawn_to, graded_mesh
 from mechanics.press_solver.settling import Settling
-from mechanics.tetmesh import TetMesh
+from mechanics.shape.tetmesh import TetMesh
 
 _LONGEST = 1.3
 """Longest over typical edge of a tetrahedron."""

@@ -17,14 +17,15 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechanics.files import PNG, Kind, atomic_file, reading
+from mechanics.disk.reading import reading
+from mechanics.disk.writing import PNG, Kind, atomic_file
 from palpate.output import plain
 from palpate.show.glossary import Terms
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from mechanics.model import Model
+    from mechanics.model.model import Model
     from palpate.show.view3d import View
 
 PAGE = Kind("a page of palpate", (b"<!doctype html>",), holds=b"Made by palpate", likely_bytes=1 << 23)

@@ -8,12 +8,12 @@ import os
 import numpy as np
 import pytest
 
-from mechanics.compliance import load_or_condense
+from mechanics.compliance.compliance import load_or_condense
+from mechanics.disk.store import content_key, load_or_build, read_arrays, write_arrays
 from mechanics.errors import CacheError
-from mechanics.material import Material
-from mechanics.model import Model, Support, Tool
-from mechanics.model_files import read_model, write_model
-from mechanics.store import content_key, load_or_build, read_arrays, write_arrays
+from mechanics.model.files import read_model, write_model
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Support, Tool
 
 from ..support.waiting import PATIENCE_S
 

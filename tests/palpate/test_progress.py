@@ -11,8 +11,8 @@ import pytest
 from mechanics.progress import Remaining
 from palpate import output
 from palpate.output import progress_bar
-from palpate.tasks.engine import run_with_bar
-from palpate.tasks.graph import Graph
+from palpate.parallel.engine import run_with_bar
+from palpate.parallel.graph import Graph
 
 from ..support.waiting import eventually
 

@@ -19,12 +19,12 @@ import pytest
 from distributed import Client
 
 import palpate as pp
-from mechanics.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.child import module_environment
-from palpate.tasks.cluster import DaskExecutor
-from palpate.tasks.driver import run
-from palpate.tasks.graph import Graph, Task
-from palpate.tasks.local import LocalExecutor
+from palpate.parallel.cluster import DaskExecutor
+from palpate.parallel.driver import run
+from palpate.parallel.graph import Graph, Task
+from palpate.parallel.local import LocalExecutor
 from scenes.embedded import embedded_recording
 
 from ...support.waiting import PATIENCE_S, eventually
@@ -149,7 +149,7 @@ class NoExecutor:
 
 
 def test_a_scheduler_that_is_not_there_is_told_in_a_line(monkeypatch):
-    monkeypatch.setattr("palpate.tasks.cluster._CONNECT_S", 1.0)
+    monkeypatch.setattr("palpate.parallel.cluster._CONNECT_S", 1.0)
     with pytest.raises(pp.OptionError, match="no Dask scheduler answers at 'tcp://127.0.0.1:9'"):
         DaskExecutor("tcp://127.0.0.1:9")
 

@@ -338,7 +338,7 @@ class Breaking:
     """A DeviceChoice of a device that gives a few readings and then fails."""
 
     def make(self):
-        from devices.simulated import SimulatedHand
+        from devices.virtual_hand import SimulatedHand
 
         class Hand(SimulatedHand):
             def read(self):

@@ -14,9 +14,9 @@ import pyvista
 from devices.channel import PoseChannel
 from devices.registry import DeviceChoice
 from mechanics.errors import ModelError
-from mechanics.material import Ball
-from mechanics.model import Model
-from mechanics.recording import read_recording
+from mechanics.model.material import Ball
+from mechanics.model.model import Model
+from mechanics.recording.recording import read_recording
 from palpate.operations.touch import Touched
 from palpate.window.axes import ROOM
 from palpate.window.board import BODY
