@@ -20,7 +20,7 @@ from mechanics.compliance.patch import usual_width
 from mechanics.compliance.sites import LoadPatch, patch_width, touch_sites, touch_solver
 from mechanics.contact.edges import fitted, laid
 from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.press_solver.press import PressOptions, PressSolver
 from mechanics.shape.box_mesh import box_mesh
 from mechanics.shape.tetmesh import TetMesh

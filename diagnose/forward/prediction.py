@@ -80,6 +80,12 @@ class Forward:
         return self.touches.columns["lead"]
 
     @property
+    def unsure(self) -> np.ndarray:
+        """(n, 3) standard deviation of that side."""
+        known = self.touches.columns.get("unsure")
+        return np.zeros_like(self.lead) if known is None else known
+
+    @property
     def quaternion(self) -> np.ndarray | None:
         """(n, 4) tool to device, scalar first, where it is recorded."""
         return self.touches.quaternion

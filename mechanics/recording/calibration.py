@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file, read_toml
+from mechanics.disk.reading import read_toml
 from mechanics.disk.schema import ANY, Key, Schema, check_table
 from mechanics.disk.toml_text import dump_toml
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import RecordingError
 from mechanics.quantities import TIP_RADIUS
 from mechanics.recording.samples import delayed
@@ -111,7 +112,7 @@ def _played(t: np.ndarray, position: np.ndarray, width: float) -> np.ndarray:
         # the hand moves the tip, and the reading follows once the play is taken up
         return position - 0.5 * width * leads(t, position)
     out = np.empty_like(position)
-    play(np.array([0, len(position)]), np.ascontiguousarray(position), width, out)
+    play(np.array([0, len(position)]), np.ascontiguousarray(position), np.zeros((1, 3)), width, out)
     return out
 
 

@@ -24,9 +24,10 @@ if TYPE_CHECKING:
     RecordingLike = str | Path | mechanics.recording.recording.Recording | Simulation
     ModelLike = str | Path | mechanics.model.model.Model | Reconstruction | Scene
 
+EXACT = "solve each touched place at finite strain, in place of the table (some 14 s a place)"
 PAGE = "palpate.show.page:PAGE"
 MODEL = "mechanics.model.files:MODEL"
-SAMPLES = "mechanics.recording.recording:SAMPLES"
+SAMPLES = "mechanics.recording.files:SAMPLES"
 
 
 def recording_operand(

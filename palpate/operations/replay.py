@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from mechanics.errors import ContactError, OptionError
 from palpate.operations._declare import REQUIRED, Call, operand, operation
-from palpate.operations._shared import output_operand, recording_operand, renderer_operand
+from palpate.operations._shared import EXACT, output_operand, recording_operand, renderer_operand
 from palpate.operations.read_recording import read_recording
 from palpate.operations.renderer import touched_scene
 from render.options import RenderOptions
@@ -37,6 +37,7 @@ class ReplayOperands:
     recording: RecordingLike = recording_operand()
     renderer: str = renderer_operand()
     _: KW_ONLY
+    exact: bool = operand(False, EXACT)
     output: str | None = output_operand("write the forces", "FORCES.csv", "render.replay:FORCES")
 
 
@@ -50,6 +51,7 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
     """
     from reconstruct.presses_on_model import check_near
     from reconstruct.steps.s3_contacts.quasi_static import is_points
+    from render.exact import ExactPlaces, deepest_of_sites, exact_replay, said_beforehand
     from render.replay import ReplayResult, replay_error, replay_recording
 
     make = touched_scene(asked.model, asked.renderer, call)
@@ -63,7 +65,14 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         scene = make(tell)
         check_near(measured, scene.model)
         forces = replay_recording(scene, measured, tell)
-    error = replay_error(measured, _touched(measured, scene.model), forces)
+    presses, exact = _touched(measured, scene.model), None
+    if asked.exact:
+        places = ExactPlaces(scene.renderer, measured.tip_radius_m)
+        call.out.say(f"--exact: {said_beforehand(len(deepest_of_sites(presses)))}")
+        with call.progress("solving") as tell:
+            exact = exact_replay(places, presses, measured.t, measured.position, forces, tell)
+        forces = exact.force_n
+    error = replay_error(measured, presses, forces)
     return ReplayResult(
         **vars(error),
         recording=measured,
@@ -72,6 +81,7 @@ def replay(asked: ReplayOperands, call: Call) -> ReplayResult:
         t=measured.t,
         force_n=forces,
         used=scene.renderer,
+        exact=exact,
     )
 
 

@@ -56,8 +56,11 @@ class Bench:
         self.normals = np.array([[0, 0, 1.0]] * len(top) + [[1.0, 0, 0]] * len(side))
         self.sites = touch_sites(self.mesh, self.points, self.normals, NU)
 
-    def record(self, alter=None, *, law: str = "neo-hookean", seed: int = 0) -> tuple[Recording, Model]:
-        """(recording, model). alter(t, position, force) -> (position, force) acts before the noise."""
+    def record(
+        self, alter=None, *, law: str = "neo-hookean", seed: int = 0, tremor_m: float = 0.0
+    ) -> tuple[Recording, Model]:
+        """(recording, model). alter(t, position, force) -> (position, force) acts before the noise. tremor_m:
+        rms along each axis, of 9 Hz."""
         rng = np.random.default_rng(seed)
         clock = 0.0
         rate = 500.0
@@ -80,6 +83,9 @@ class Bench:
             drag = 0.0008 * np.clip(into / depth, 0, 1) * (1 if number % 2 else -1)
             across = np.array([0.0, 1.0, 0.0])
             d = -into[:, None] * n + drag[:, None] * across
+            if tremor_m > 0:
+                phase = 2 * np.pi * (9 * local[:, None] + rng.uniform(size=3))
+                d = d + np.sqrt(2) * tremor_m * np.sin(phase)
             f = touch_force(
                 d,
                 n,
