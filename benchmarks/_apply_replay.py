@@ -16,7 +16,7 @@ import numpy as np
 from diagnose.apply import corrected, improved, with_effects, with_replayed_modulus
 from diagnose.options import DiagnoseOptions
 from diagnose.pipeline import diagnose
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.effects.registry import effect
 from mechanics.errors import RecordingError
 from mechanics.model.files import read_model, write_model

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from benchmarks._diagnosis_cases import FINITE, Case
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
 from palpate.parallel.graph import Task, finished
 from scenes.laboratory.specimen import VERSION

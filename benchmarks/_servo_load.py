@@ -13,7 +13,7 @@ from benchmarks._closed_loop import enabled_pose
 from benchmarks.compliance import block
 from devices.safety import SafetyOptions, safety_parameters
 from devices.virtual_hand import SPEC
-from mechanics.disk.files import cache_folder
+from mechanics.disk.scratch import cache_folder
 from mechanics.kernels import kept
 from mechanics.model.files import read_model, write_model
 from mechanics.model.material import Material

@@ -126,5 +126,5 @@ def _solved(
     ball[:, 2] = -np.abs(ball[:, 2])
     soft = np.array([np.exp(-log_ratio(p + 0.7 * tip * ball)).mean() for p in points])
     far = (solved.far + (1 - soft)[:, None, None] * half) / soft[:, None, None]
-    sites = TouchSites(points, normals, solved.curvature, far, solved.patch_width_m, NU)
+    sites = TouchSites(points, normals, solved.curvature, far, solved.patch_width_m, NU, solved.bracing)
     return sites, 1 / soft

@@ -29,7 +29,7 @@ from benchmarks.evidence import Figure
 from benchmarks.timing import table
 from mechanics.errors import OptionError
 from mechanics.progress import Progress
-from mechanics.recording.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.batching.plan import Choice
 from palpate.batching.run import Batch, batch
 from palpate.child import module_environment

@@ -19,7 +19,8 @@ from typing import Any
 
 from scipy.stats import binomtest
 
-from mechanics.disk.files import JSON, atomic_file, read_text
+from mechanics.disk.reading import read_text
+from mechanics.disk.writing import JSON, atomic_file
 from mechanics.errors import FileError
 
 

@@ -20,8 +20,8 @@ from benchmarks._known_shapes import SHAPES, KnownShape
 from benchmarks.evidence import Figure
 from benchmarks.felt_surface import NU, TIP_M, meshed, own_compliance_near
 from benchmarks.timing import table
-from mechanics.disk.files import atomic_file
 from mechanics.disk.store import content_key
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool

@@ -31,7 +31,8 @@ from benchmarks.varied.draws import Draw, draw
 from benchmarks.varied.objects import solved, thing
 from benchmarks.varied.recorded import Varied, record
 from diagnose.pipeline import diagnose
-from mechanics.disk.files import atomic_file, cache_folder
+from mechanics.disk.scratch import cache_folder
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import PalpateError
 from mechanics.model.model import Model
 from palpate.output import progress_bar

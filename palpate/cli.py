@@ -87,7 +87,7 @@ def _run(command: argparse.ArgumentParser, name: str, words: list[str]) -> int:
     """The one place where errors become a line and an exit code."""
     import warnings
 
-    from mechanics.disk.files import refusal
+    from mechanics.disk.reading import refusal
     from mechanics.errors import PalpateError, PalpateWarning
     from palpate.operations._run import run_command
 

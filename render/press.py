@@ -15,7 +15,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file, read_text
+from mechanics.disk.reading import read_text
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError, RecordingError
 from mechanics.quantities import TIP_RADIUS
 from mechanics.result import Result

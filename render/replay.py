@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError
 from mechanics.model.model import Model
 from mechanics.presses.table import LEAD_S, Presses

@@ -12,7 +12,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.files import no_file
+from mechanics.disk.reading import no_file
 from mechanics.disk.surface_files import SUFFIXES, is_surface_file, read_surface
 from mechanics.errors import SceneError
 from mechanics.names import unknown

@@ -14,7 +14,7 @@ A TOML file whose keys carry their units. Allowed tables and keys:
     [device]     axes, motion_scale, force_scale, clutch_button, reach_m
     [render]     renderer, beside, colour, friction
 
-Paths are relative to the scene's file and stay in its folder (mechanics.disk.files.named_in).
+Paths are relative to the scene's file and stay in its folder (mechanics.disk.reading.named_in).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from pathlib import Path
 from typing import Any
 
 from devices.mapper import MapperOptions, axis_matrix
-from mechanics.disk.files import named_in, read_toml
+from mechanics.disk.reading import named_in, read_toml
 from mechanics.disk.schema import Key, Listed, Schema, check_table
 from mechanics.disk.surface_files import SUFFIXES, is_surface_file
 from mechanics.errors import OptionError, SceneError

@@ -23,8 +23,8 @@ import numpy as np
 
 from mechanics.compliance.compliance import compliance_file
 from mechanics.compliance.surface_compliance import SurfaceCompliance
-from mechanics.disk.files import atomic_folder
 from mechanics.disk.store import write_arrays
+from mechanics.disk.writing import atomic_folder
 from mechanics.errors import FileError
 from mechanics.model.files import MODEL
 

@@ -17,7 +17,7 @@ from pypardiso import PyPardisoSolver
 
 from mechanics.compliance.patch import half_space_compliance
 from mechanics.contact.dent import dent_law, effective_radius, grid
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from tools.dent_table import COARSE, Grading, HalfSpace, Press, lagrange, rule
 from tools.script import script
 

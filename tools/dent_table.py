@@ -20,7 +20,7 @@ import scipy.sparse as sp
 from pypardiso import PyPardisoSolver
 
 from mechanics.contact.dent import dent_law, grid
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.effects.strain_stiffening import hardening
 from mechanics.elastic.elasticity import lame_parameters
 from tools.script import script

@@ -9,7 +9,7 @@ from typing import Any
 
 from benchmarks._diagnosis_blind import opened_case, verdict_path
 from benchmarks._diagnosis_cases import Case, cases
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import OptionError
 
 

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from benchmarks.varied.draws import Draw
-from mechanics.disk.files import atomic_file
 from mechanics.disk.toml_text import dump_toml
+from mechanics.disk.writing import atomic_file
 from mechanics.recording.recording import QUATERNION_COLUMNS, REQUIRED_COLUMNS, Recording, description_table
 
 SCRIPTS = (

@@ -209,5 +209,6 @@ def solved_sites(
         far=np.concatenate([p.far for p, _ in parts]),
         patch_width_m=float(width),
         poisson_ratio=poisson_ratio,
+        bracing=np.concatenate([p.bracing for p, _ in parts]),
     )
     return sites, np.array([gradient for _, gradient in parts])

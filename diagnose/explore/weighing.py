@@ -185,8 +185,9 @@ def forward_of(estimate: Estimate) -> tuple[Forward, np.ndarray] | None:
     sites, _ = solved_sites(e.solved, touches.point, touches.normal, model.material.poisson_ratio)
     far = np.einsum("pij,pjk,plk->pil", touches.frame, sites.far, touches.frame)
     places = Places(
-        model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature
-    )
+        model, touches.point, touches.normal, touches.frame, np.ascontiguousarray(far), sites.curvature,
+        sites.bracing,
+    )  # fmt: skip
     forward = Forward(touches, places)
     if e.exploration is not None:
         # bias, drift and the tool's weight are read in free air, not in presses

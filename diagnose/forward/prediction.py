@@ -130,7 +130,7 @@ class Forward:
         f = self._kept.get(key)
         if f is None:
             curvature = np.broadcast_to(np.asarray(self.places.curvature, dtype=float), (len(t),))
-            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature)
+            radius, bend = effective_radius(tip, curvature), bend_of(tip, curvature, self.places.bracing)
             f = np.zeros_like(y)
             modulus = usual * s.stiffness
             far, mu = np.ascontiguousarray(s.far), float(s.touch.friction)

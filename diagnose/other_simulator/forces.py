@@ -11,7 +11,7 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.files import reading
+from mechanics.disk.reading import reading
 from mechanics.errors import OptionError, RecordingError
 from mechanics.options import option
 from mechanics.presses.table import LEAD_S, Presses

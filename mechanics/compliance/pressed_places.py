@@ -15,7 +15,7 @@ from mechanics.compliance.sites import touch_sites, touch_solver
 from mechanics.disk.store import content_key, load_or_build
 from mechanics.model.model import Model
 
-VERSION = 5
+VERSION = 6
 UNIFORM = "uniform solver"
 """Stage: the factorisation that the places were solved by, of the object of one modulus."""
 GRAIN_M = 0.0008
@@ -27,7 +27,8 @@ class Places:
     """p presses on a model; device frame, SI units.
 
     point, normal: (p, 3). frame: (p, 3, 3) rows normal, tangent, tangent. far: (p, 3, 3) far field in those
-    frames, unit modulus, 1/m. curvature: (p,) 1/m. stages: what effects asked to compute, by name.
+    frames, unit modulus, 1/m. curvature, bracing: (p,) 1/m (TouchSites). stages: what effects asked to
+    compute, by name.
     """
 
     model: Model
@@ -36,6 +37,7 @@ class Places:
     frame: np.ndarray
     far: np.ndarray
     curvature: np.ndarray
+    bracing: np.ndarray
     stages: dict[str, Any] = field(default_factory=dict)
 
     @cached_property
@@ -90,11 +92,12 @@ def solve_places(model: Model, point: np.ndarray, normal: np.ndarray, frame: np.
         if ratio is None:
             stages[UNIFORM] = solver
         sites = touch_sites(mesh, point[first], normal[first], nu, solver=solver)
-        return {"far": sites.far, "curvature": sites.curvature}
+        return {"far": sites.far, "curvature": sites.curvature, "bracing": sites.bracing}
 
     sites = _stored("sites", model, point, normal, solve)
     far = np.einsum("pij,pjk,plk->pil", frame, sites["far"][place], frame)
-    return Places(model, point, normal, frame, np.ascontiguousarray(far), sites["curvature"][place], stages)
+    bent = (sites["curvature"][place], sites["bracing"][place])
+    return Places(model, point, normal, frame, np.ascontiguousarray(far), *bent, stages)
 
 
 def _shared(point: np.ndarray, normal: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

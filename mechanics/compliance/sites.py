@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from mechanics.compliance.compression import own_blocks
 from mechanics.compliance.near_field import contact_width, sharpening
 from mechanics.compliance.patch import half_space_compliance, usual_width
-from mechanics.contact.edges import edge_correction
+from mechanics.contact.edges import edge_law
 from mechanics.elastic.solver import Solver
 from mechanics.elastic.support import BaseHold
 from mechanics.errors import MeshError
@@ -36,6 +36,8 @@ class TouchSites:
     far: (k, 3, 3) far-field compliance, 1/m: displacement of the patch a unit force, less that of a
     half-space.
     patch_width_m, poisson_ratio: what they hold for.
+    bracing: (k,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges); none
+    unless given.
     """
 
     points: np.ndarray
@@ -44,6 +46,7 @@ class TouchSites:
     far: np.ndarray
     patch_width_m: float
     poisson_ratio: float
+    bracing: np.ndarray | float = 0.0
 
     def __len__(self) -> int:
         return len(self.points)
@@ -52,11 +55,13 @@ class TouchSites:
         """Some of the sites, in order."""
         return TouchSites(
             self.points[rows], self.normals[rows], self.curvature[rows], self.far[rows], self.patch_width_m,
-            self.poisson_ratio,
+            self.poisson_ratio, self.bracing[rows],
         )  # fmt: skip
 
     def __post_init__(self) -> None:
-        for name in ("points", "normals", "curvature", "far"):
+        given = np.broadcast_to(np.asarray(self.bracing, dtype=float), (len(self.points),))
+        object.__setattr__(self, "bracing", given)
+        for name in ("points", "normals", "curvature", "far", "bracing"):
             array = np.array(
                 getattr(self, name), dtype=float, order="C"
             )  # a copy: the caller's stays writable
@@ -163,13 +168,15 @@ def touch_sites(
     far = own_blocks(solver, points, width, lambda share: progress("touch sites", share))
     far += sharpening(solver, points, width, patch.tip_radius_m)
     far -= half_space_compliance(normals, poisson_ratio, width)
+    bracing: np.ndarray | float = 0.0
     if patch.width_m is None:
         far += shape_under_one_patch(solver, points, normals, width)
-        far += edge_correction(mesh, points, normals)
+        missed = edge_law(mesh, points, normals)
+        far, bracing = far + missed.far, missed.bracing
     if curvature is None:
         curvature = mean_curvature(mesh, points, normals, patch.tip_radius_m)
     bent = np.broadcast_to(np.asarray(curvature, dtype=float), (len(points),))
-    return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio))
+    return TouchSites(points, normals, bent, far, float(width), float(poisson_ratio), bracing)
 
 
 def patch_compliance(solver: Solver, patches: Sequence[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:

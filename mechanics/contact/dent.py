@@ -119,9 +119,11 @@ def _read(name: str, poisson_ratio: float) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def _beyond_hertz() -> np.ndarray:
-    """(n,) g of the tables: from bodies of revolution with a bump or a hollow (tools.dent_bend)."""
+    """(n,) g of the tables: from bodies of revolution with a bump or a hollow (tools.dent_bend); deeper than
+    they were pressed it goes on as it ends."""
     x, slope = np.loadtxt(Path(__file__).with_name("dent_bend.csv"), delimiter=",", unpack=True)
-    return np.interp(grid(), x, slope)
+    last = (slope[-1] - slope[-2]) / (x[-1] - x[-2])
+    return np.interp(grid(), x, slope) + last * np.maximum(grid() - x[-1], 0.0)
 
 
 _FOLLOWED = ("linear", "neo-hookean")
@@ -170,10 +172,13 @@ def effective_radius(tip_radius_m: float, curvature: float | np.ndarray) -> floa
     return 1.0 / np.maximum(1.0 / tip_radius_m + curvature, 0.25 / tip_radius_m)
 
 
-def bend_of(tip_radius_m: float, curvature: float | np.ndarray) -> float | np.ndarray:
-    """Mean curvature times the tip's radius, as `dent_force` takes it: within what `effective_radius` keeps
-    and the table of curved bodies was solved for."""
-    return np.clip(np.asarray(curvature, dtype=float) * tip_radius_m, *BENT)
+def bend_of(
+    tip_radius_m: float, curvature: float | np.ndarray, bracing: float | np.ndarray = 0.0
+) -> float | np.ndarray:
+    """Mean curvature times the tip's radius, as `dent_force` takes it, within what `effective_radius` keeps
+    and the table of curved bodies was solved for, and what a base close below adds (mechanics.contact.edges).
+    """
+    return np.clip(np.asarray(curvature, dtype=float) * tip_radius_m, *BENT) + bracing * tip_radius_m
 
 
 @kernel

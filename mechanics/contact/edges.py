@@ -2,15 +2,17 @@
 
 The patch of a touch (mechanics.compliance.sites) is a Gaussian that reaches round a rim, where no tip
 presses, and is wider than a contact whose strain meets the base. Solved presses beside rims and above the
-base say what compliance that puts in or leaves out (tools.dent_edge). It is laid on as Gaussians summed over
-the length of the rims and the area of the base, so it is smooth from place to place, adds up where edges
-meet, and ends some patch widths away.
+base say what compliance that puts in or leaves out, and how much harder a deep dent is above the base
+(tools.dent_edge). It is laid on as Gaussians summed over the length of the rims and the area of the base, so
+it is smooth from place to place, adds up where edges meet, and ends some patch widths away. Both are numbers
+of a place: the force at it stays the slope of one energy.
 """
 
 from __future__ import annotations
 
 from functools import lru_cache
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -28,19 +30,28 @@ _ON_BASE = 0.12
 _AT_ONCE = 1000
 
 
-def edge_correction(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
-    """(k, 3, 3) 1/m: to add to the far field of places (k, 3) m with unit normals (k, 3), unit modulus.
+class EdgeLaw(NamedTuple):
+    """far: (k, 3, 3) 1/m, to add to the far field, unit modulus, along the normals alone. bracing: (k,) 1/m,
+    to add to the mean curvature by which a deep dent departs from Hertz (mechanics.contact.dent.bend_of): a
+    base close below makes it harder, the more the deeper."""
 
-    Along the normals alone. The base counts on every mesh, rims where its shape is known.
-    """
-    added = laid(mesh, points, normals) @ fitted()[2] / usual_width(mesh)
-    return added[:, None, None] * normals[:, :, None] * normals[:, None, :]
+    far: np.ndarray
+    bracing: np.ndarray
+
+
+def edge_law(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> EdgeLaw:
+    """At places (k, 3) m with unit normals (k, 3). The base counts on every mesh, rims where its shape is
+    known."""
+    _, _, amount, bracing = fitted()
+    near, width = laid(mesh, points, normals), usual_width(mesh)
+    added = near @ amount / width
+    return EdgeLaw(added[:, None, None] * normals[:, :, None] * normals[:, None, :], near @ bracing / width)
 
 
 def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(k,) how near places (k, 3) are to a rim, by the first Gaussian, and to the base; 0 far away, 1 on a
     straight rim of a right angle."""
-    _, over_base, _ = fitted()
+    over_base = fitted()[1]
     near = laid(mesh, points, normals)
     return near[:, np.argmin(over_base)], near[:, np.argmax(over_base)]
 
@@ -48,7 +59,7 @@ def nearness(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> tuple[np
 def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
     """(k, g) what each Gaussian comes to at places (k, 3): 1 on a straight rim that turns by a right angle,
     and, but for the cosine, on a plane base."""
-    widths, over_base, _ = fitted()
+    widths, over_base, *_ = fitted()
     sigma = widths * usual_width(mesh)
     middles, area = _base(mesh, _STEP * sigma[over_base].min())
     samples, length = _rims(mesh, _STEP * sigma[~over_base].min())
@@ -62,12 +73,12 @@ def laid(mesh: TetMesh, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
 
 
 @lru_cache(maxsize=1)
-def fitted() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def fitted() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """(g,) widths of Gaussians over the patch's; whether each is laid over the base, or else along the rims;
-    its amount: compliance times the patch's width and the modulus."""
+    their amounts: compliance times the patch's width and the modulus; bracing times the patch's width."""
     table = np.loadtxt(Path(__file__).with_name("dent_edge.csv"), delimiter=",", ndmin=2)
-    widths, over_base, amount = table.T
-    return widths, over_base > 0, amount
+    widths, over_base, amount, bracing = table.T
+    return widths, over_base > 0, amount, bracing
 
 
 def _summed(

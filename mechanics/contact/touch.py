@@ -202,11 +202,12 @@ def moduli(young_modulus_pa: float, poisson_ratio: float) -> tuple[float, float]
 @dataclass(frozen=True)
 class TouchedPlaces:
     """Where k touches are. normals: (k, 3) outward unit. far: (k, 3, 3) 1/m, unit modulus (TouchSites.far).
-    curvature: (k,) or one, 1/m, mean, convex positive."""
+    curvature: (k,) or one, 1/m, mean, convex positive. bracing: (k,) or one, 1/m (TouchSites.bracing)."""
 
     normals: np.ndarray
     far: np.ndarray
     curvature: np.ndarray | float = 0.0
+    bracing: np.ndarray | float = 0.0
 
 
 def touch_force(
@@ -257,7 +258,7 @@ def touch_forces(
     starts = np.ascontiguousarray(starts, dtype=np.int64)
     count = len(starts) - 1
     curvature = np.broadcast_to(np.asarray(places.curvature, dtype=float), (count,))
-    radii, bends = effective_radius(tip_radius_m, curvature), bend_of(tip_radius_m, curvature)
+    radii, bends = effective_radius(tip_radius_m, curvature), bend_of(tip_radius_m, curvature, places.bracing)
     plane_strain, stick = moduli(young_modulus_pa, poisson_ratio)
     out = np.zeros_like(displacement)
     frames = local_frames(places.normals)
@@ -275,11 +276,11 @@ def forces_at(
     tip_radius_m: float,
     law: str | DentLaw,
 ) -> np.ndarray:
-    """`touch_forces` of one touch at each of the k sites, with their normals, far fields and curvatures."""
+    """`touch_forces` of one touch at each of the k sites, by what they are."""
     return touch_forces(
         displacement,
         starts,
-        TouchedPlaces(sites.normals, sites.far, sites.curvature),
+        TouchedPlaces(sites.normals, sites.far, sites.curvature, sites.bracing),
         young_modulus_pa=young_modulus_pa,
         poisson_ratio=sites.poisson_ratio,
         tip_radius_m=tip_radius_m,

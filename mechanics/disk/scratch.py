@@ -1,4 +1,5 @@
-"""Temporary files and folders: named by host and process, so that what a killed process left is swept."""
+"""Temporary files and folders, named by host and process, so that what a killed process left is swept; and
+where what can be made again is kept."""
 
 from __future__ import annotations
 
@@ -67,3 +68,13 @@ def _alive(process: int) -> bool:
     except (PermissionError, OverflowError):
         return True
     return True
+
+
+def cache_folder() -> Path:
+    """Where what can be made again is kept: $PALPATE_CACHE, or the system's folder for caches."""
+    named = os.environ.get("PALPATE_CACHE")
+    if named:
+        return Path(named)
+    from platformdirs import user_cache_path
+
+    return user_cache_path("palpate", appauthor=False)

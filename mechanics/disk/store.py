@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import CacheError
 
 _MAGIC = b"PALPATE2"

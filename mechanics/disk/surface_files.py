@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from mechanics.disk.files import bounded_memory, no_file
+from mechanics.disk.reading import bounded_memory, no_file
 from mechanics.disk.vtk_files import read_vtk
 from mechanics.errors import SurfaceError
 from mechanics.quantities import parse_unit

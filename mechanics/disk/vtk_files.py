@@ -12,7 +12,7 @@ from xml.etree import ElementTree
 
 import numpy as np
 
-from mechanics.disk.files import reading
+from mechanics.disk.reading import reading
 from mechanics.errors import PalpateError
 
 

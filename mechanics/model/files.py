@@ -21,10 +21,11 @@ from typing import Any
 import numpy as np
 
 from mechanics.contact.dent import dent_laws
-from mechanics.disk.files import FolderKind, Kind, atomic_folder, read_toml
+from mechanics.disk.reading import read_toml
 from mechanics.disk.schema import ANY, Key, Named, Schema, check_table
 from mechanics.disk.toml_text import dump_toml
 from mechanics.disk.vtk_files import read_vtk, vtk_bytes
+from mechanics.disk.writing import FolderKind, Kind, atomic_folder
 from mechanics.effects.registry import effect_keys
 from mechanics.errors import MeshError, ModelError
 from mechanics.model.material import (

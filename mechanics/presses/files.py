@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import atomic_file
 from mechanics.disk.store import read_arrays, write_arrays
+from mechanics.disk.writing import atomic_file
 from mechanics.errors import CacheError, ModelError
 from mechanics.presses.table import FITS, PRESS_COLUMNS, ROW_COLUMNS, Noise, Presses
 from mechanics.recording.segments import KINDS, Segment

@@ -14,9 +14,10 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file, read_toml
+from mechanics.disk.reading import read_toml
 from mechanics.disk.schema import ANY, Key, Schema, check_table
 from mechanics.disk.toml_text import dump_toml
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import RecordingError
 from mechanics.quantities import TIP_RADIUS
 from mechanics.recording.samples import delayed

@@ -18,76 +18,30 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.bounds import LARGEST_N
-from mechanics.disk.files import (
-    Kind,
-    atomic_file,
-    check_target,
-    named_in,
-    no_file,
-    read_toml,
-    sha256_of_file,
-)
-from mechanics.disk.schema import ANY, Key, Listed, Schema, check_table
+from mechanics.disk.reading import named_in, read_toml, sha256_of_file
+from mechanics.disk.schema import check_table
 from mechanics.disk.store import content_key
-from mechanics.disk.surface_files import UNITS
 from mechanics.disk.toml_text import dump_toml
+from mechanics.disk.writing import atomic_file, check_target
 from mechanics.errors import PalpateWarning, RecordingError
-from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from mechanics.quantities import POISSON_RATIO
 from mechanics.recording.calibration import Calibration, read_calibration
-from mechanics.recording.samples_file import MOST_SAMPLES, QUATERNION_COLUMNS, REQUIRED_COLUMNS, read_samples
+from mechanics.recording.files import (
+    QUATERNION_COLUMNS,
+    REQUIRED_COLUMNS,
+    SAMPLES,
+    SCHEMA,
+    description_of,
+    read_samples,
+    recording_files,
+    samples_path,
+)
+from mechanics.recording.sane import check_sane
 from mechanics.recording.segments import STATED, Segment
 from mechanics.result import Result
 
-SCHEMA: Schema = {
-    "recording": {
-        "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
-        "force_on": Key(str, choices=("tool", "object"), required=True),
-        "boundary_phase": Key(size=2, unit="s"),
-        "quasi_static": Key(bool),
-        "read_rate_hz": Key(low=1e-3, high=1e5, unit="Hz"),
-    },
-    "tool": {
-        "tip_radius_m": TIP_RADIUS,
-        "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
-        "calibration": Key(str),
-    },
-    "sensor": {
-        "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
-        "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
-    },
-    "object": {
-        "name": Key(str),
-        "poisson_ratio": POISSON_RATIO,
-        "model": Key(str),
-        "shape": Key(str),
-        "shape_unit": Key(str, choices=tuple(UNITS)),
-        "shape_pose": Key(str, choices=("auto", "given")),
-        "shape_up": Key(str),
-        "shape_sink_m": Key(low=0.0, high=1.0, unit="m"),
-        "slab_m": Key(low=1e-6, high=2.0, unit="m"),
-        "half_space": Key(bool),
-    },
-    "segment": Listed(
-        {
-            "kind": Key(str, choices=STATED, required=True),
-            "start_s": Key(unit="s", required=True),
-            "end_s": Key(unit="s", required=True),
-        }
-    ),
-    "import": ANY,
-    "truth": ANY,
-}
-"""What a recording's TOML may hold; further keys are left alone."""
-
-WIDEST_PATH_M = 1.5
-"""Greatest extent of a recorded path: objects are at most 1 m."""
-_UNITS = {"micrometres": 1e-6, "millimetres": 1e-3, "centimetres": 1e-2, "inches": 0.0254}
-_HAND_M = (0.02, 0.6)
-"""Extent of a path that a hand makes round an object, to guess a wrong unit by."""
 _QUICKEST_HZ = 2e4
 """No hand's exploration is sampled faster: a slower clock is then no clock in milliseconds."""
-_RATE_FACTOR = 1.5
 
 
 class NotRead(PalpateWarning):
@@ -229,69 +183,6 @@ def _check_samples(recording: Recording) -> None:
             )
 
 
-def check_sane(recording: Recording) -> None:
-    """What no exploration of an object of 1 mm to 1 m by hand can be; raises RecordingError."""
-    t, rate = recording.t, recording.sample_rate_hz
-    block = min(100, len(t) - 1)
-    read = block / float(np.median(t[block:] - t[:-block]))
-    if not _near(read, rate):
-        units = {"milliseconds": 1e3, "microseconds": 1e6}
-        like = next((unit for unit, scale in units.items() if _near(read * scale, rate)), "")
-        raise RecordingError(
-            f"t steps by {1 / read:.4g}, in seconds {read:.4g} Hz, where sample_rate_hz is {rate:g}: "
-            + (f"these look like {like}; write t in seconds" if like else "state the true rate")
-        )
-    if (t[-1] - t[0]) * max(rate, read) > MOST_SAMPLES:
-        gap = int(np.argmax(np.diff(t)))
-        raise RecordingError(
-            f"the clock runs from {t[0]:.6g} to {t[-1]:.6g} s (longest gap {t[gap + 1] - t[gap]:.4g} s, "
-            f"after data row {gap + 1}): at most {MOST_SAMPLES / rate:.6g} s at {rate:g} Hz; mend the clock "
-            "or cut the recording"
-        )
-    extent = float(np.ptp(recording.position, axis=0).max())
-    if extent > WIDEST_PATH_M:
-        guesses = [u for u, s in _UNITS.items() if _HAND_M[0] <= extent * s <= _HAND_M[1]]
-        like = f"these look like {' or '.join(guesses)}; " if guesses else ""
-        raise RecordingError(
-            f"the tip's path is {extent:.4g} m across: {like}x, y, z must be metres, at most "
-            f"{WIDEST_PATH_M:g} m across"
-        )
-    loud = np.flatnonzero((np.abs(recording.force_on_tool) > LARGEST_N).any(axis=1))
-    if len(loud):
-        raise RecordingError(
-            f"{len(loud)} samples have a force above {LARGEST_N:g} N (first in data row {loud[0] + 1}): no "
-            "sensor reads that; remove or repair those rows"
-        )
-
-
-def _near(value: float, other: float) -> bool:
-    return other / _RATE_FACTOR < value < other * _RATE_FACTOR
-
-
-def recording_files(path: Path | str) -> tuple[Path, Path]:
-    """(samples, description) for a recording named by its .csv, .csv.gz or .toml."""
-    path = Path(path)
-    if path.name.endswith(".csv.gz"):
-        stem = path.name.removesuffix(".csv.gz")
-    elif path.suffix in (".csv", ".toml"):
-        stem = path.name.removesuffix(path.suffix)
-    else:
-        raise RecordingError(f"'{path}' is no recording: name its .csv, .csv.gz or .toml")
-    if path.suffix == ".toml":
-        candidates = [path.with_name(stem + ending) for ending in (".csv.gz", ".csv")]
-        samples = next((c for c in candidates if c.exists()), candidates[1])
-    else:
-        samples = path
-    description = path.with_name(stem + ".toml")
-    for file in (samples, description):
-        if not file.is_file():
-            raise RecordingError(
-                f"'{file}' {no_file(file)}: a recording is NAME.csv (or NAME.csv.gz) "
-                "and NAME.toml side by side"
-            )
-    return samples, description
-
-
 def read_recording(path: Path | str) -> Recording:
     """Read and validate a recording.
 
@@ -356,7 +247,7 @@ def read_recording(path: Path | str) -> Recording:
                 Segment(s["kind"], float(s["start_s"]), float(s["end_s"])) for s in table.get("segment", ())
             ),
         )
-        check_sane(recording)
+        check_sane(t, recording.sample_rate_hz, recording.position, force)
     except RecordingError as error:
         raise RecordingError(f"'{samples}': {error}") from error
     beside = [s for s in recording.segments if s.end_s < t[0] or s.start_s > t[-1]]
@@ -376,7 +267,7 @@ def read_recording(path: Path | str) -> Recording:
 
 def base_model_of(recording: Recording) -> Path:
     """The MODEL folder whose base stands in; raises RecordingError where the recording's TOML names none, or
-    one that is not within its folder (mechanics.disk.files.named_in)."""
+    one that is not within its folder (mechanics.disk.reading.named_in)."""
     if recording.base_model is None:
         raise RecordingError("the recording names no model whose base stands in: [object] model = PATH")
     if recording.path is None:
@@ -388,29 +279,6 @@ def _optional_float(value: Any) -> float | None:
     return None if value is None else float(value)
 
 
-def samples_path(path: Path | str) -> Path:
-    """Where the samples of a recording to be written go; raises RecordingError for another ending."""
-    path = Path(path)
-    if path.suffix == ".toml":
-        path = path.with_suffix(".csv.gz")
-    if not path.name.endswith((".csv", ".csv.gz")):
-        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
-    return path
-
-
-def _description_of(path: Path) -> list[tuple[Path, Kind]]:
-    path = samples_path(path)
-    stem = path.name.removesuffix(".gz").removesuffix(".csv")
-    return [(path.with_name(stem + ".toml"), DESCRIPTION)]
-
-
-DESCRIPTION = Kind("a recording's description", (b"[recording]",))
-SAMPLES = Kind(
-    "a recording", (",".join(REQUIRED_COLUMNS).encode(),), likely_bytes=1 << 24, goes=samples_path,
-    beside=_description_of,
-)  # fmt: skip
-
-
 def write_recording(
     path: Path | str, recording: Recording, *, truth: Mapping[str, Any] | None = None
 ) -> Path:
@@ -419,7 +287,7 @@ def write_recording(
     Times are written to 0.1 ms, positions to 1 nm, forces to 1 uN. Returns the path of the samples.
     """
     path = samples_path(path)
-    [(description, kind)] = _description_of(path)
+    [(description, kind)] = description_of(path)
     check_target(description, kind)
     columns = [recording.t[:, None], recording.position, recording.force_on_tool]
     formats = ["%.4f"] + ["%.9f"] * 3 + ["%.6f"] * 3

@@ -10,9 +10,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mechanics.disk.files import read_toml, reading, sha256_of_file
+from mechanics.disk.reading import read_toml, reading, sha256_of_file
 from mechanics.errors import OptionError, RecordingError
-from mechanics.recording.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.operations._declare import check_options
 from palpate.parallel.graph import Task
 

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from dataclasses import replace
 from pathlib import Path
 
-from mechanics.disk.files import Kind, atomic_file, sole_writer
+from mechanics.disk.writing import Kind, atomic_file, sole_writer
 from mechanics.errors import PalpateError
 from mechanics.progress import Progress
 from palpate.batching.plan import Choice, absolute, find, tasks_of, undescribed

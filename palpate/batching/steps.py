@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mechanics.disk.files import PNG, atomic_file
+from mechanics.disk.writing import PNG, atomic_file
 from mechanics.errors import RecordingError
 from mechanics.recording.recording import Recording
 from palpate.batching.plan import MODEL, STEPS, THUMBNAIL, content_of

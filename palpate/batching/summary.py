@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.result import Result
 from palpate.parallel.driver import Outcome
 

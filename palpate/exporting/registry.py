@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import Kind, atomic_file
 from mechanics.disk.surface_files import UNITS
+from mechanics.disk.writing import Kind, atomic_file
 from mechanics.errors import OptionError
 from mechanics.model.model import Model
 from mechanics.progress import Progress, silent

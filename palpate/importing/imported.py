@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from mechanics.disk.files import atomic_file
+from mechanics.disk.writing import atomic_file
 from mechanics.recording.recording import Recording
 from mechanics.result import Result
 from palpate.importing.convert import Understood

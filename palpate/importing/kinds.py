@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from pathlib import Path
 
-from mechanics.disk.files import no_file
+from mechanics.disk.reading import no_file
 from mechanics.disk.surface_files import is_surface_file
 from mechanics.errors import RecordingError
 from palpate.importing.mapping import Said, find_columns

@@ -16,7 +16,8 @@ import numpy as np
 from diagnose.specimen.bench import Curve
 from diagnose.specimen.result import MachineTests
 from mechanics.errors import OptionError, RecordingError
-from palpate.importing.curves import LEAST_ROWS, SaidOfCurves, numbers_in, read_curves, stated_radius
+from palpate.importing.curve_meaning import SaidOfCurves
+from palpate.importing.curves import LEAST_ROWS, numbers_in, read_curves, stated_radius
 from palpate.importing.meaning import MOST_ODDS, Unclear
 from palpate.importing.sheets import SHEET_SUFFIXES
 from palpate.importing.tables import TEXT_SUFFIXES, read_tables

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import bounded_memory, no_file
+from mechanics.disk.reading import bounded_memory, no_file
 from mechanics.errors import RecordingError
 
 

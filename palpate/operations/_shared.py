@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 EXACT = "solve each touched place in place of reading the table (some 10 s of processor time a place)"
 PAGE = "palpate.show.page:PAGE"
 MODEL = "mechanics.model.files:MODEL"
-SAMPLES = "mechanics.recording.recording:SAMPLES"
+SAMPLES = "mechanics.recording.files:SAMPLES"
 
 
 def recording_operand(

@@ -10,7 +10,7 @@ import sys
 from collections.abc import Callable
 from typing import Any, NoReturn
 
-from mechanics.disk.files import JSON
+from mechanics.disk.writing import JSON
 from mechanics.errors import OptionError
 from mechanics.names import near, unknown
 from mechanics.options import check_range, flag_of

@@ -12,7 +12,7 @@ import sys
 from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 
-from mechanics.disk.files import check_target, sole_writer
+from mechanics.disk.writing import check_target, sole_writer
 from mechanics.model.files import MODEL
 from palpate.demo import DemoOptions, DemoResult, run_demo
 from palpate.operations._declare import Call, operand, operation

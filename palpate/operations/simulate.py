@@ -15,7 +15,7 @@ from dataclasses import KW_ONLY, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechanics.disk.files import JSON, PNG, atomic_file
+from mechanics.disk.writing import JSON, PNG, atomic_file
 from mechanics.errors import OptionError
 from mechanics.key_values import number, pairs
 from mechanics.names import unknown

@@ -23,7 +23,7 @@ import numpy as np
 from devices.channel import PoseChannel
 from devices.mapper import MapperOptions, Mapping
 from devices.registry import DEVICES, DeviceChoice, options_of, spec_of
-from mechanics.disk.files import PNG
+from mechanics.disk.writing import PNG
 from mechanics.errors import DeviceError, OptionError
 from mechanics.model.model import Model
 from mechanics.names import unknown

@@ -11,8 +11,9 @@ from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 from typing import Any
 
-from mechanics.disk.files import atomic_file, sha256_of_file
+from mechanics.disk.reading import sha256_of_file
 from mechanics.disk.store import content_key
+from mechanics.disk.writing import atomic_file
 from palpate.version import __version__
 
 

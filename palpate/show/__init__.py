@@ -130,7 +130,7 @@ class _Presenter:
         return ax
 
     def show(self, result: Result, plotter: Plotter | None, screenshot: str | Path | None) -> Plotter | None:
-        from mechanics.disk.files import PNG, atomic_file
+        from mechanics.disk.writing import PNG, atomic_file
         from palpate.show.notebook import in_notebook, show_view
         from palpate.show.scenery import new_plotter
 

@@ -16,7 +16,8 @@ from importlib.resources import files
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from mechanics.disk.files import PNG, Kind, atomic_file, reading
+from mechanics.disk.reading import reading
+from mechanics.disk.writing import PNG, Kind, atomic_file
 from palpate.output import plain
 from palpate.show.glossary import Terms
 

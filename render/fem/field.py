@@ -10,7 +10,7 @@ from mechanics.compliance.near_field import surface_softness
 from mechanics.compliance.patch import half_space_compliance
 from mechanics.compliance.sites import principal_curvatures
 from mechanics.compliance.surface_compliance import SurfaceCompliance
-from mechanics.contact.edges import edge_correction
+from mechanics.contact.edges import edge_law
 from mechanics.model.model import Model
 from render.surface.contact_surface import ContactSurface
 
@@ -20,6 +20,7 @@ class Field(NamedTuple):
 
     curvatures: (v, 2) 1/m the principal ones whose mean that is, convex positive, the greatest first.
 
+    bracing: (v,) 1/m, by which a base close below makes deep dents harder (mechanics.contact.edges).
     softness: (v,) of the material under a tip, global modulus over its own.
     parents: (k, 3) numbers of each fine triangle's mesh corners among the compliance's, -1 on the base.
     """
@@ -27,6 +28,7 @@ class Field(NamedTuple):
     far: np.ndarray
     curvature: np.ndarray
     curvatures: np.ndarray
+    bracing: np.ndarray
     softness: np.ndarray
     parents: np.ndarray
 
@@ -43,8 +45,9 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
     parents = np.ascontiguousarray(number[surface.parents])
     touched = np.unique(arrays.triangles[arrays.free > 0])
     points, normals = arrays.vertices[touched], arrays.normals[touched]
-    far = np.zeros((len(arrays.vertices), 3, 3))
-    far[touched] = compliance.far_at(points, normals) + edge_correction(mesh, points, normals)
+    far, bracing = np.zeros((len(arrays.vertices), 3, 3)), np.zeros(len(arrays.vertices))
+    missed = edge_law(mesh, points, normals)
+    far[touched], bracing[touched] = compliance.far_at(points, normals) + missed.far, missed.bracing
     softness = np.ones(len(arrays.vertices))
     softness[touched] = surface_softness(mesh, model.surface_ratio, points, model.tool.tip_radius_m)
     width = float(compliance.own_width_m[0])
@@ -54,4 +57,4 @@ def far_field(model: Model, surface: ContactSurface, compliance: SurfaceComplian
         )
     curvatures = np.zeros((len(arrays.vertices), 2))
     curvatures[touched] = principal_curvatures(mesh, points, normals, model.tool.tip_radius_m)
-    return Field(far, curvatures.mean(axis=1), curvatures, softness, parents)
+    return Field(far, curvatures.mean(axis=1), curvatures, bracing, softness, parents)

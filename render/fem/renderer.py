@@ -52,6 +52,7 @@ class FemRenderer(Renderer):
             surface=self.contact.arrays,
             far=field.far,
             curvature=field.curvature,
+            bracing=field.bracing,
             softness=field.softness,
             parents=field.parents,
             parent_weights=self.contact.parent_weights,

@@ -25,7 +25,7 @@ def settle(p, state, i):
     place(p.surface, t, weights, state.points[i], state.normals[i])
     turn_frame(state.frames[i], state.normals[i])
     frame, local, young = state.frames[i], state.local_far[i], p.young_modulus_pa[0]
-    curvature = softness = 0.0
+    curvature = bracing = softness = 0.0
     turned = state.vectors
     for r in range(3):
         for c in range(3):
@@ -33,6 +33,7 @@ def settle(p, state, i):
     for corner in range(3):
         v, w = p.surface.triangles[t, corner], weights[corner] / young
         curvature += weights[corner] * p.curvature[v]
+        bracing += weights[corner] * p.bracing[v]
         softness += weights[corner] * p.softness[v]
         for r in range(3):
             for c in range(3):
@@ -53,7 +54,7 @@ def settle(p, state, i):
     radius = state.radii_m[i] * p.effects.dent_radius[0]
     state.radius[i] = 1.0 / max(1.0 / radius + curvature, 0.25 / radius)
     state.curvature[i] = curvature
-    state.bend[i] = min(max(curvature * radius, BENT[0]), BENT[1])
+    state.bend[i] = min(max(curvature * radius, BENT[0]), BENT[1]) + bracing * radius
     state.young[i] = young / softness
 
 

@@ -20,10 +20,10 @@ from scipy.spatial import cKDTree
 
 from mechanics.compliance.sites import TouchSites
 from mechanics.contact.touch import TouchedPlaces, touch_forces
-from mechanics.disk.files import atomic_file
 from mechanics.disk.store import content_key
 from mechanics.disk.toml_text import plain
 from mechanics.disk.vtk_files import vtk_bytes
+from mechanics.disk.writing import atomic_file
 from mechanics.model.model import Model
 from render.base import Renderer
 from render.effects import rendered_touch

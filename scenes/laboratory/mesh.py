@@ -13,7 +13,8 @@ from pathlib import Path
 
 import numpy as np
 
-from mechanics.disk.files import atomic_file, cache_folder, temporary_folder
+from mechanics.disk.scratch import cache_folder
+from mechanics.disk.writing import atomic_file, temporary_folder
 from mechanics.errors import MeshError
 from scenes.laboratory.refine import boundary_faces, refine
 from scenes.laboratory.surface import Surface

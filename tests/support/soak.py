@@ -21,7 +21,7 @@ from scipy.stats import theilslopes
 from benchmarks._servo_load import block_model
 from benchmarks.timing import table
 from devices.safety import LATCHING, SILENT, WORDS
-from mechanics.disk.files import cache_folder
+from mechanics.disk.scratch import cache_folder
 from mechanics.model.files import read_model, write_model
 from mechanics.model.model import Model
 from mechanics.recording.recording import read_recording

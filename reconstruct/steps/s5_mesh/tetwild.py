@@ -13,7 +13,8 @@ import sys
 
 import numpy as np
 
-from mechanics.disk.files import reading, temporary_folder
+from mechanics.disk.reading import reading
+from mechanics.disk.writing import temporary_folder
 from mechanics.errors import MeshError
 
 MOST_TETRAHEDRA = 150_000

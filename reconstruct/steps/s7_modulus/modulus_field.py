@@ -29,7 +29,7 @@ from mechanics.compliance.smooth_field import (
     views_of,
 )
 from mechanics.compliance.solved_fields import far_in_field
-from mechanics.contact.edges import edge_correction
+from mechanics.contact.edges import edge_law
 from mechanics.contact.touch import forces_at
 from mechanics.effects import stiffness_field
 from mechanics.model.model import Model
@@ -103,7 +103,7 @@ def places_at(model: Model, presses: Presses, sites: TouchSites) -> Places:
     """The presses' places on a model of one modulus, where they are solved as touch sites already."""
     frame = presses.frame
     far = np.einsum("pij,pjk,plk->pil", frame, sites.far, frame)
-    return Places(model, presses.point, presses.normal, frame, far, sites.curvature)
+    return Places(model, presses.point, presses.normal, frame, far, sites.curvature, sites.bracing)
 
 
 def press_moduli(
@@ -192,9 +192,8 @@ def with_field(sites: TouchSites, places: Places, field: SmoothField | None) -> 
     # a dent of `under` times the modulus in a far field of 1 is that of one modulus in a stiffer far field
     scale = under[:, None, None]
     far = scale * solved[places.place] + (scale - 1) * half[places.place]
-    far += scale * edge_correction(mesh, sites.points, sites.normals)
-    nu = sites.poisson_ratio
-    return FieldSites(TouchSites(sites.points, sites.normals, sites.curvature, far, width, nu), under)
+    far += scale * edge_law(mesh, sites.points, sites.normals).far
+    return FieldSites(replace(sites, far=far, patch_width_m=width), under)
 
 
 @dataclass(frozen=True)

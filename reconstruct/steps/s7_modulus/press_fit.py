@@ -161,14 +161,8 @@ def far_sensitivity(
     """(k,) m: change of ln e of every press per unit of change of its far-field compliance along the normal,
     1/m; 0 where a press tells no modulus."""
     step = 0.05 * np.abs(np.einsum("ka,kab,kb->k", sites.normals, sites.far, sites.normals)) + 0.1
-    changed = TouchSites(
-        sites.points,
-        sites.normals,
-        sites.curvature,
-        sites.far + step[:, None, None] * np.einsum("ka,kb->kab", sites.normals, sites.normals),
-        sites.patch_width_m,
-        sites.poisson_ratio,
-    )
+    along = np.einsum("ka,kb->kab", sites.normals, sites.normals)
+    changed = replace(sites, far=sites.far + step[:, None, None] * along)
     other = fit_law(data, changed, tip_radius_m, fit.law, fit.depth_m, law_error, noise_n, fit)
     known = (other.modulus_pa > 0) & (fit.modulus_pa > 0)
     ratio = np.where(known, other.modulus_pa, 1.0) / np.where(known, fit.modulus_pa, 1.0)

@@ -19,7 +19,7 @@ import pytest
 from distributed import Client
 
 import palpate as pp
-from mechanics.recording.recording import recording_files
+from mechanics.recording.files import recording_files
 from palpate.child import module_environment
 from palpate.parallel.cluster import DaskExecutor
 from palpate.parallel.driver import run

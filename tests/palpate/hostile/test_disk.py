@@ -11,7 +11,9 @@ import warnings
 import numpy as np
 import pytest
 
-from mechanics.disk.files import (
+from mechanics.disk.scratch import sweep, temporary_prefix
+from mechanics.disk.store import read_arrays, write_arrays
+from mechanics.disk.writing import (
     JSON,
     Kind,
     atomic_file,
@@ -20,8 +22,6 @@ from mechanics.disk.files import (
     sole_writer,
     temporary_folder,
 )
-from mechanics.disk.scratch import sweep, temporary_prefix
-from mechanics.disk.store import read_arrays, write_arrays
 from mechanics.errors import CacheError, FileError
 from mechanics.model.files import MODEL, read_model, write_model
 from mechanics.recording.recording import read_recording
@@ -100,7 +100,7 @@ def test_room_and_permission_are_seen_before_the_work(tmp_path):
 
 def test_a_full_disk_of_scratch_or_cache_is_seen_before_the_work(monkeypatch, tmp_path):
     full = shutil.disk_usage("/")._replace(free=1000)
-    monkeypatch.setattr("mechanics.disk.files.shutil.disk_usage", lambda _: full)
+    monkeypatch.setattr("mechanics.disk.writing.shutil.disk_usage", lambda _: full)
     with pytest.raises(FileError, match="set PALPATE_CACHE to a folder on another disk"):
         check_room(tmp_path / "deep" / "laboratory", 1 << 20)
     assert not list(tmp_path.iterdir()), "an empty folder is left"

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from mechanics.disk.files import named_in
+from mechanics.disk.reading import named_in
 from mechanics.errors import RecordingError, SceneError
 from mechanics.recording.recording import NotRead, base_model_of, read_recording
 

@@ -1,4 +1,5 @@
-"""The samples of a recording, NAME.csv or NAME.csv.gz: columns of numbers under a header."""
+"""The two files of a recording: NAME.csv or NAME.csv.gz, columns of numbers under a header, and NAME.toml,
+whose keys stand here with their ranges."""
 
 from __future__ import annotations
 
@@ -10,8 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from mechanics.disk.files import reading
+from mechanics.disk.reading import no_file, reading
+from mechanics.disk.schema import ANY, Key, Listed, Schema
+from mechanics.disk.surface_files import UNITS
+from mechanics.disk.writing import Kind
 from mechanics.errors import RecordingError
+from mechanics.quantities import POISSON_RATIO, TIP_RADIUS
+from mechanics.recording.segments import STATED
 
 REQUIRED_COLUMNS = ("t", "x", "y", "z", "fx", "fy", "fz")
 QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
@@ -86,3 +92,92 @@ def read_samples(path: Path) -> dict[str, np.ndarray]:
             f"'{path}' has more than {MOST_SAMPLES} samples: cut it, or sample it more slowly"
         )
     return dict(zip(wanted, values.T, strict=True))
+
+
+SCHEMA: Schema = {
+    "recording": {
+        "sample_rate_hz": Key(low=60.0, high=1e5, unit="Hz"),
+        "force_on": Key(str, choices=("tool", "object"), required=True),
+        "boundary_phase": Key(size=2, unit="s"),
+        "quasi_static": Key(bool),
+        "read_rate_hz": Key(low=1e-3, high=1e5, unit="Hz"),
+    },
+    "tool": {
+        "tip_radius_m": TIP_RADIUS,
+        "mass_kg": Key(low=0.0, high=5.0, unit="kg"),
+        "calibration": Key(str),
+    },
+    "sensor": {
+        "force_noise_std_n": Key(low=0.0, high=10.0, unit="N"),
+        "position_resolution_m": Key(low=0.0, high=0.01, unit="m"),
+    },
+    "object": {
+        "name": Key(str),
+        "poisson_ratio": POISSON_RATIO,
+        "model": Key(str),
+        "shape": Key(str),
+        "shape_unit": Key(str, choices=tuple(UNITS)),
+        "shape_pose": Key(str, choices=("auto", "given")),
+        "shape_up": Key(str),
+        "shape_sink_m": Key(low=0.0, high=1.0, unit="m"),
+        "slab_m": Key(low=1e-6, high=2.0, unit="m"),
+        "half_space": Key(bool),
+    },
+    "segment": Listed(
+        {
+            "kind": Key(str, choices=STATED, required=True),
+            "start_s": Key(unit="s", required=True),
+            "end_s": Key(unit="s", required=True),
+        }
+    ),
+    "import": ANY,
+    "truth": ANY,
+}
+"""What a recording's TOML may hold; further keys are left alone."""
+
+
+def recording_files(path: Path | str) -> tuple[Path, Path]:
+    """(samples, description) for a recording named by its .csv, .csv.gz or .toml."""
+    path = Path(path)
+    if path.name.endswith(".csv.gz"):
+        stem = path.name.removesuffix(".csv.gz")
+    elif path.suffix in (".csv", ".toml"):
+        stem = path.name.removesuffix(path.suffix)
+    else:
+        raise RecordingError(f"'{path}' is no recording: name its .csv, .csv.gz or .toml")
+    if path.suffix == ".toml":
+        candidates = [path.with_name(stem + ending) for ending in (".csv.gz", ".csv")]
+        samples = next((c for c in candidates if c.exists()), candidates[1])
+    else:
+        samples = path
+    description = path.with_name(stem + ".toml")
+    for file in (samples, description):
+        if not file.is_file():
+            raise RecordingError(
+                f"'{file}' {no_file(file)}: a recording is NAME.csv (or NAME.csv.gz) "
+                "and NAME.toml side by side"
+            )
+    return samples, description
+
+
+def samples_path(path: Path | str) -> Path:
+    """Where the samples of a recording to be written go; raises RecordingError for another ending."""
+    path = Path(path)
+    if path.suffix == ".toml":
+        path = path.with_suffix(".csv.gz")
+    if not path.name.endswith((".csv", ".csv.gz")):
+        raise RecordingError(f"'{path}' must end in .csv, .csv.gz or .toml")
+    return path
+
+
+def description_of(path: Path) -> list[tuple[Path, Kind]]:
+    path = samples_path(path)
+    stem = path.name.removesuffix(".gz").removesuffix(".csv")
+    return [(path.with_name(stem + ".toml"), DESCRIPTION)]
+
+
+DESCRIPTION = Kind("a recording's description", (b"[recording]",))
+SAMPLES = Kind(
+    "a recording", (",".join(REQUIRED_COLUMNS).encode(),), likely_bytes=1 << 24, goes=samples_path,
+    beside=description_of,
+)  # fmt: skip
