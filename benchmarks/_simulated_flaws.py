@@ -16,7 +16,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from mechanics.compliance.sites import touch_sites
-from mechanics.contact.touch import touch_force
+from mechanics.contact.touch import forces_at
 from mechanics.model.material import Material
 from mechanics.model.model import Model, Support, Tool
 from mechanics.presses.cutting import FoundPresses, cut
@@ -24,8 +24,26 @@ from mechanics.recording.recording import Recording
 from mechanics.shape.box_mesh import box_mesh
 
 MODULUS_PA, POISSON, RADIUS_M, NOISE_N, RATE_HZ = 20e3, 0.49, 0.005, 0.008, 500.0
-DEPTHS_M, SPEEDS_M_PER_S, HOLDS_S = (0.0022, 0.0032, 0.0042), (0.006, 0.02, 0.06), (0.1, 0.5)
 SIZE_M = (0.08, 0.08, 0.04)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """A block and where and how it is pressed, twice a place. size_m: of its sides. top, side: (x, y) m on
+    its top, (y, z) m on its wall at +x. across_m: sideways at the greatest depth. rest_s: in air, before and
+    after."""
+
+    size_m: tuple[float, float, float] = SIZE_M
+    top: tuple[tuple[float, float], ...] = tuple(
+        (x, y) for x in (-0.022, 0.0, 0.022) for y in (-0.022, 0.0, 0.022)
+    )
+    side: tuple[tuple[float, float], ...] = ((-0.018, 0.02), (0.0, 0.026), (0.018, 0.014), (0.004, 0.012))
+    depths_m: tuple[float, ...] = (0.0022, 0.0032, 0.0042)
+    speeds_m_per_s: tuple[float, ...] = (0.006, 0.02, 0.06)
+    holds_s: tuple[float, ...] = (0.1, 0.5)
+    across_m: float = 0.0008
+    rest_s: tuple[float, float] = (0.5, 0.4)
+    poisson: float = POISSON
 
 
 @dataclass(frozen=True)
@@ -51,11 +69,12 @@ class Given:
 class Block:
     """The block, its presses, and the force of our law along them."""
 
-    def __init__(self, seed: int = 0) -> None:
+    def __init__(self, seed: int = 0, layout: Layout = Layout()) -> None:
         rng = np.random.default_rng(seed)
-        self.mesh = box_mesh((6, 6, 4), SIZE_M).quadratic()
-        top = [(x, y, SIZE_M[2]) for x in (-0.022, 0.0, 0.022) for y in (-0.022, 0.0, 0.022)]
-        side = [(0.04, y, z) for y, z in ((-0.018, 0.02), (0.0, 0.026), (0.018, 0.014), (0.004, 0.012))]
+        self.layout, size = layout, layout.size_m
+        self.mesh = box_mesh((6, 6, 4), size).quadratic()
+        top = [(x, y, size[2]) for x, y in layout.top]
+        side = [(size[0] / 2, y, z) for y, z in layout.side]
         self.points = np.array(top + side)
         self.normals = np.array([[0, 0, 1.0]] * len(top) + [[1.0, 0, 0]] * len(side))
         self.presses, self.t, self.centre = self._explored(rng)
@@ -63,14 +82,16 @@ class Block:
 
     def _explored(self, rng: np.random.Generator) -> tuple[list[Press], np.ndarray, np.ndarray]:
         presses, times, centres, clock, row = [], [], [], 0.0, 0
+        plan, (before, after) = self.layout, self.layout.rest_s
         order = [int(i) for _ in range(2) for i in rng.permutation(len(self.points))]
         for number, place in enumerate(order):
-            depth, speed = DEPTHS_M[(number * 7) % 3], SPEEDS_M_PER_S[number % 3]
-            hold, ramp, before = HOLDS_S[number % 2], depth / speed, 0.5
-            local = np.arange(0.0, before + 2 * ramp + hold + 0.4, 1 / RATE_HZ)
-            knots = np.cumsum([0.0, before, ramp, hold, ramp, 0.4])
-            into = np.interp(local, knots, [-before * speed, 0.0, depth, depth, 0.0, -0.4 * speed])
-            across = 0.0008 * np.clip(into / depth, 0, 1) * (1 if number % 2 else -1)
+            depth = plan.depths_m[(number * 7) % len(plan.depths_m)]
+            speed = plan.speeds_m_per_s[number % len(plan.speeds_m_per_s)]
+            hold, ramp = plan.holds_s[number % len(plan.holds_s)], depth / speed
+            local = np.arange(0.0, before + 2 * ramp + hold + after, 1 / RATE_HZ)
+            knots = np.cumsum([0.0, before, ramp, hold, ramp, after])
+            into = np.interp(local, knots, [-before * speed, 0.0, depth, depth, 0.0, -after * speed])
+            across = plan.across_m * np.clip(into / depth, 0, 1) * (1 if number % 2 else -1)
             n = self.normals[place]
             centres.append(
                 self.points[place] + (RADIUS_M - into[:, None]) * n + across[:, None] * [0.0, 1.0, 0.0]
@@ -100,10 +121,10 @@ class Block:
             into = press.into + offset(press) + (given.radius_m - RADIUS_M)
             n = self.normals[press.place]
             d = -into[:, None] * n + press.across[:, None] * [0.0, 1.0, 0.0]
-            f = stiffer(press) * touch_force(
-                d, n, sites.far[press.place], young_modulus_pa=given.modulus_pa,
-                poisson_ratio=given.poisson, tip_radius_m=given.radius_m,
-                curvature=sites.curvature[press.place], law=law,
+            own = sites.of(slice(press.place, press.place + 1))
+            f = stiffer(press) * forces_at(
+                own, d, np.array([0, len(d)]), young_modulus_pa=given.modulus_pa,
+                tip_radius_m=given.radius_m, law=law,
             )  # fmt: skip
             if np.isfinite(given.friction):
                 push = f @ n
@@ -120,7 +141,7 @@ class Block:
         """The block as it was recorded, and its model."""
         recording = Recording(
             t=self.t, position=self.centre, force_on_tool=force + rng.normal(0, NOISE_N, force.shape),
-            sample_rate_hz=RATE_HZ, tip_radius_m=RADIUS_M, poisson_ratio=POISSON,
+            sample_rate_hz=RATE_HZ, tip_radius_m=RADIUS_M, poisson_ratio=self.layout.poisson,
         )  # fmt: skip
         place = np.array([p.place for p in self.presses])
         onset = np.array([self.t[p.rows][np.argmax(p.into > 0)] for p in self.presses])
@@ -128,8 +149,8 @@ class Block:
         normal = self.normals[place]
         table = cut(recording, FoundPresses(onset, peak, self.points[place] + RADIUS_M * normal, normal))
         model = Model(
-            self.mesh, Material(MODULUS_PA, POISSON), Support(np.zeros(3), np.array([0, 0, 1.0])),
-            Tool(RADIUS_M), mesh_size_m=0.013, presses=table,
+            self.mesh, Material(MODULUS_PA, self.layout.poisson), Support(np.zeros(3), np.array([0, 0, 1.0])),
+            Tool(RADIUS_M), mesh_size_m=self.layout.size_m[0] / 6, presses=table,
         )  # fmt: skip
         return recording, model
 

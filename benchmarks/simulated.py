@@ -5,8 +5,16 @@ that leave it beside as another good solver's do (2 % a place, 0.1 mm of first t
 case is sealed by a salted hash before its verdict. A control has no flaw. A third of the cases is measured by
 a sensor that reads late: that is no flaw of the simulator.
 
-First place: the flaw that changes the force most is named first, or as a candidate beside it. Shrinkage: the
-gap that was said to be left once that flaw is mended, against the one of the same simulation without it.
+First place: the flaw that changes the force most, alone, is named first, or as a candidate beside it.
+Shrinkage: the gap that was said to be left once that flaw is mended, against the one of the same simulation
+without it.
+
+--adapter NAME plants them in another simulator instead (`_adapter_flaws`): its settings made worse, its
+parameters wrong, over a control that is as resolved as can be afforded. A flaw is said by any name whose
+advice mends the setting that was changed (an element's size: mesh stiffness or contact nodes). What the
+control is named for is the simulator's own: it counts as a false alarm where the control's force is within
+5 % of our law (rms), or where a parameter is named; else it is true, and is left out of what is asked of the
+planted ones, unless a planted one is called the same. Shrinkage is then not asked.
 """
 
 from __future__ import annotations
@@ -22,8 +30,9 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._adapter_flaws import ALIKE, CONTROLS, AdapterFlaw, Runs, drawn_plan
 from benchmarks._simulated_flaws import FLAWS, Block, Flaw, Given, simulated
-from benchmarks.evidence import Figure, rates
+from benchmarks._simulated_scores import figures_of, print_cases
 from benchmarks.timing import table
 from diagnose.options import AttributionOptions, DiagnoseOptions
 from diagnose.other_simulator.forces import Forces, ForcesOptions
@@ -39,8 +48,6 @@ from palpate.output import progress_bar
 from scenes.laboratory.sealing import digest
 
 LATE_S = 0.03
-FAR = 4.0
-"""Times what can be seen at all, from which the targets hold."""
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -48,6 +55,9 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--singles", type=int, default=39, help="cases with one flaw")
     parser.add_argument("--pairs", type=int, default=12, help="cases with two")
     parser.add_argument("--controls", type=int, default=12, help="cases with none")
+    parser.add_argument(
+        "--adapter", choices=CONTROLS, help="plant them in this simulator instead of in our own law's forces"
+    )
     parser.add_argument("--seed", type=int, default=0, help="of all that is drawn")
     parser.add_argument(
         "--work", type=Path, help="folder that keeps every judged case; all that lie there are counted"
@@ -83,8 +93,7 @@ class _Case:
     @property
     def named(self) -> list[str]:
         """Numerics and parameters that the verdict names, as it orders them."""
-        own = {n for part in ("numerics", "parameters") for n in self.verdict.parts[part].names}
-        return [n for n in self.verdict.effects if n in own]
+        return _named(self.verdict)
 
     @property
     def visible(self) -> float:
@@ -98,16 +107,14 @@ class _Case:
 
 def run(arguments: argparse.Namespace) -> dict[str, Any]:
     """Plant, seal, judge, open; print what was found."""
+    if arguments.adapter is not None:
+        return _run_adapter(arguments)
     block = Block()
     world = cache(lambda late: _world(block, late))
     drawn = np.random.default_rng(arguments.seed)
     plan = [_single(drawn, k) for k in range(arguments.singles)]
     plan += [_pair(drawn) for _ in range(arguments.pairs)] + [()] * arguments.controls
-    rows: dict[str, dict[str, Any]] = {}
-    if arguments.work is not None:
-        arguments.work.mkdir(parents=True, exist_ok=True)
-        rows = {path.stem: json.loads(path.read_text()) for path in sorted(arguments.work.glob("*.json"))}
-        _check_seals(list(rows.values()))
+    rows = _kept(arguments.work)
     with progress_bar("cases") as tell:
         # a mixture from the first on, as a run may be ended early
         for k, number in enumerate(drawn.permutation(len(plan))):
@@ -117,15 +124,112 @@ def run(arguments: argparse.Namespace) -> dict[str, Any]:
                 continue
             seed = 1000 * arguments.seed + int(number)
             rows[name] = _row(_judged(block, world(number % 3 == 2), plan[number], seed, int(number)))
-            if arguments.work is not None:
-                (arguments.work / f"{name}.json").write_text(json.dumps(rows[name], indent=1, default=float))
+            _keep(arguments.work, name, rows[name])
     return _said(list(rows.values()))
 
 
-def _said(rows: list[dict[str, Any]]) -> dict[str, Any]:
+def _run_adapter(arguments: argparse.Namespace) -> dict[str, Any]:
+    """The same with flaws planted in a simulator (`_adapter_flaws`), whose control comes first."""
+    adapter, work = arguments.adapter, arguments.work
+    runs = Runs(None if work is None else work / "runs")
+    rng = np.random.default_rng(arguments.seed)
+    plan = drawn_plan(adapter, rng, arguments.singles, arguments.pairs)
+    worlds = [_world(runs.block, late, k) for k, late in enumerate((False, True))]
+    rows = _kept(work, f"{adapter}-")
+    own: list[str] = []
+    gaps: dict[str, float] = {}
+    cases = [((), k) for k in range(max(arguments.controls, 1))] + [(p, 0) for p in plan]
+    with progress_bar("cases") as tell:
+        for number, (planted, k) in enumerate(cases):
+            tell("cases", number / len(cases))
+            name = f"{adapter}-{arguments.seed}-{number}"
+            if name not in rows:
+                world = worlds[k % 2] if k < 2 else _world(runs.block, k % 2 == 1, k)
+                rows[name] = _adapter_row(runs, adapter, world, planted, own, gaps)
+                _keep(work, name, rows[name])
+            if number == 0:
+                own = rows[name]["named"]
+            if k == 0:
+                gaps[_key(planted)] = rows[name]["gap_n"]
+    return _said(list(rows.values()), f"{adapter}: ")
+
+
+def _key(planted: Sequence[tuple[AdapterFlaw, dict[str, float]]]) -> str:
+    return json.dumps([[flaw.name, change] for flaw, change in planted])
+
+
+def _adapter_row(
+    runs: Runs,
+    adapter: str,
+    world: _Reality,
+    planted: Sequence[tuple[AdapterFlaw, dict[str, float]]],
+    own: list[str],
+    gaps: dict[str, float],
+) -> dict[str, Any]:
+    """Run, seal, judge one case. gaps: N by `_key`, of what was judged in the same world before."""
+    counted = world.model.presses.touching(world.recording.t)
+
+    def force(changes: Sequence[tuple[AdapterFlaw, dict[str, float]]]) -> np.ndarray:
+        simulation = CONTROLS[adapter]
+        for _, change in changes:
+            simulation = simulation.but(change)
+        return runs.force(adapter, simulation)
+
+    def rms(f: np.ndarray) -> float:
+        return float(np.sqrt((f[counted] ** 2).sum(axis=1).mean()))
+
+    whole, control = force(planted), force(())
+    sizes = {flaw.name: rms(force([(flaw, change)]) - control) for flaw, change in planted}
+    largest = max(sizes, key=lambda n: sizes[n], default="")
+    rest = _key([each for each in planted if each[0].name != largest])
+    simulation = CONTROLS[adapter]
+    for _, change in planted:
+        simulation = simulation.but(change)
+    truth = {"flaws": [[flaw.name, *change.values()] for flaw, change in planted]}
+    salt = secrets.token_hex(16)
+    sealed = digest(truth, salt)
+    verdict = _verdict(world, Forces(runs.block.t, whole, adapter), simulation.stated)
+    named = _named(verdict)
+    off = rms(control - runs.law) / rms(runs.law)
+    right = {flaw.name: list(flaw.right) for flaw, _ in planted}
+    at = [n for n in named if n in right.get(largest, []) and n not in own]
+    known = {e.name: e.gap_after_n for e in verdict.entries}
+    limits = {e.name: e.detectable_n for e in verdict.entries if np.isfinite(e.detectable_n)}
+    least = max(
+        0.02 * rms(whole), min((limits[n] for n in right.get(largest, []) if n in limits), default=0.0)
+    )
+    wrongly = set(named) if off < ALIKE else set(verdict.parts["parameters"].names)
+    return {
+        "truth": truth, "salt": salt, "sealed": sealed, "late_sensor": world.late, "sizes_n": sizes,
+        "right": right, "own": own, "own_share": off, "named": named,
+        "times_visible": sizes[largest] / least if largest else 0.0,
+        "left_n": gaps.get(rest, verdict.gap_before_n), "kind": verdict.kind,
+        "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
+        "shares": {name: part.share for name, part in verdict.parts.items()},
+        "said_left_n": known[at[0]] if at else None, "gap_n": verdict.gap_before_n,
+        "adds_up": _adds_up(verdict), "false_alarm": bool(wrongly),
+    }  # fmt: skip
+
+
+def _kept(folder: Path | None, start: str = "") -> dict[str, dict[str, Any]]:
+    """Rows by name that lie in a folder, their seals checked."""
+    if folder is None:
+        return {}
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = {path.stem: json.loads(path.read_text()) for path in sorted(folder.glob(f"{start}*.json"))}
+    _check_seals(list(rows.values()))
+    return rows
+
+
+def _keep(folder: Path | None, name: str, row: dict[str, Any]) -> None:
+    if folder is not None:
+        (folder / f"{name}.json").write_text(json.dumps(row, indent=1, default=float))
+
+
+def _said(rows: list[dict[str, Any]], of: str = "") -> dict[str, Any]:
     """Print every case and the counts; the figures with the cases."""
-    _print(rows)
-    figures = _figures(rows)
+    print_cases(rows)
+    figures = figures_of(rows, of)
     said = [[f.what, f"{f.value:.3g} {f.unit}", f.target] for f in figures]
     print(table(["figure", "value", "target"], said))
     return {"figures": figures, "cases": rows}
@@ -137,11 +241,11 @@ def _check_seals(rows: Sequence[dict[str, Any]]) -> None:
         raise OptionError(f"cases {broken} are not what was sealed: judge them again")
 
 
-def _world(block: Block, late: bool) -> _Reality:
-    force = block.force()
+def _world(block: Block, late: bool, seed: int | None = None) -> _Reality:
+    force = block.force(Given(poisson=block.layout.poisson))
     if late:
         force = np.column_stack([np.interp(block.t - LATE_S, block.t, f) for f in force.T])
-    recording, model = block.measured(np.random.default_rng(int(late)), force)
+    recording, model = block.measured(np.random.default_rng(int(late) if seed is None else seed), force)
     return _Reality(recording, model, diagnose(recording, model, DiagnoseOptions(fast=True)), late)
 
 
@@ -181,87 +285,31 @@ def _judged(
     rest, _ = simulated(block, [(f, x) for f, x in planted if f.name != largest], seed)
     salt = secrets.token_hex(16)
     sealed = digest({"flaws": [[f.name, x] for f, x in planted]}, salt)
-    asked = Asked(Forces(block.t, force, "planted"), _stated(given), ForcesOptions(clock_offset_s=0.0))
-    verdict = diagnose_simulated(
-        world.recording, world.model, asked, DiagnoseOptions(bootstrap=100), reality=world.diagnosis,
-        attribution=AttributionOptions(most=2),
-    )  # fmt: skip
+    verdict = _verdict(world, Forces(block.t, force, "planted"), _stated(given))
     left = rms(measured - rest[counted])
     return _Case(number, tuple(planted), sizes, left, sealed, salt, verdict, world.late)
 
 
+def _verdict(world: _Reality, forces: Forces, stated: Stated) -> SimulatedGap:
+    """What is said, of nothing but the forces and what the simulation was given."""
+    return diagnose_simulated(
+        world.recording, world.model, Asked(forces, stated, ForcesOptions(clock_offset_s=0.0)),
+        DiagnoseOptions(bootstrap=100), reality=world.diagnosis, attribution=AttributionOptions(most=2),
+    )  # fmt: skip
+
+
+def _named(verdict: SimulatedGap) -> list[str]:
+    own = {n for part in ("numerics", "parameters") for n in verdict.parts[part].names}
+    return [n for n in verdict.effects if n in own]
+
+
+def _adds_up(verdict: SimulatedGap) -> bool:
+    whole = sum(part.share for part in verdict.parts.values()) + verdict.unexplained
+    return bool(abs(whole - 1) < 1e-9)
+
+
 def _stated(given: Given) -> Stated:
     return Stated(given.modulus_pa, given.poisson, given.friction, given.radius_m, frozenset(KEYS))
-
-
-def _print(rows: Sequence[dict[str, Any]]) -> None:
-    lines = []
-    for number, row in enumerate(rows):
-        said = " ".join(f"{name}={x:.3g}" for name, x in row["truth"]["flaws"]) or "none"
-        left = row["said_left_n"]
-        lines.append(
-            [number, said, f"{row['times_visible']:.1f}", " ".join(row["named"]) or "none",
-             " ".join(row["candidates"]), f"{row['gap_n']:.3f}", "-" if left is None else f"{left:.3f}",
-             f"{row['left_n']:.3f}"]
-        )  # fmt: skip
-    print(table(["case", "planted", "times visible", "named", "or", "gap [N]", "said left", "left"], lines))
-
-
-def _truth(row: dict[str, Any]) -> list[str]:
-    """Names of what was planted, the largest first."""
-    return sorted(row["sizes_n"], key=lambda n: -row["sizes_n"][n])
-
-
-def _strictly(row: dict[str, Any]) -> bool:
-    """Whether the largest flaw is named first."""
-    return row["named"][:1] == _truth(row)[:1]
-
-
-def _first(row: dict[str, Any]) -> bool:
-    """The same, or it is a candidate beside what is named."""
-    return _strictly(row) or (bool(row["named"]) and _truth(row)[0] in row["candidates"])
-
-
-def _all_of(row: dict[str, Any]) -> bool:
-    """Whether everything planted is named or a candidate."""
-    return set(_truth(row)) <= {*row["named"], *row["candidates"]}
-
-
-def _figures(rows: Sequence[dict[str, Any]]) -> list[Figure]:
-    single = [r for r in rows if len(r["sizes_n"]) == 1]
-    far = [r for r in single if r["times_visible"] >= FAR]
-    pairs = [r for r in rows if len(r["sizes_n"]) == 2]
-    controls = [r for r in rows if not r["sizes_n"]]
-    counted = {
-        f"first place, one flaw of {FAR:g} times what can be seen": (sum(map(_first, far)), len(far)),
-        "first place strictly, the same": (sum(map(_strictly, far)), len(far)),
-        "in names or candidates, the same": (sum(map(_all_of, far)), len(far)),
-        "only that flaw named, the same": (sum(r["named"] == _truth(r) for r in far), len(far)),
-        "first place, one flaw of any size": (sum(map(_first, single)), len(single)),
-        "dominant of pairs": (sum(map(_first, pairs)), len(pairs)),
-        "both of pairs in names or candidates": (sum(map(_all_of, pairs)), len(pairs)),
-        "false alarms on controls": (sum(bool(r["named"]) for r in controls), len(controls)),
-        "parts and the rest add up to 1": (sum(r["adds_up"] for r in rows), len(rows)),
-    }
-    targets = {"first place, one flaw of 4": 85.0, "dominant of pairs": 90.0, "parts and": 100.0}
-    figures = []
-    for figure in rates(counted):
-        least = next((t for name, t in targets.items() if figure.what.startswith(name)), None)
-        if figure.what.startswith("false alarms"):
-            figure = figure.at_most(2.0)
-        figures.append(figure if least is None else figure.at_least(least))
-    off = []
-    for r in rows:
-        measured = r["gap_n"] ** 2 - r["left_n"] ** 2
-        # where mending it changes nothing to speak of there is no shrinkage to predict
-        if r["said_left_n"] is not None and measured > 0.1 * r["gap_n"] ** 2:
-            off.append(abs((r["gap_n"] ** 2 - r["said_left_n"] ** 2) / measured - 1))
-    if off:
-        low, high = np.quantile(off, [0.25, 0.75])
-        what = f"shrinkage predicted against measured, median of {len(off)} (quartiles)"
-        spread = (100 * float(low), 100 * float(high))
-        figures.append(Figure(what, 100 * float(np.median(off)), spread, "%").at_most(15.0))
-    return figures
 
 
 def _predicted(case: _Case) -> float | None:
@@ -272,7 +320,6 @@ def _predicted(case: _Case) -> float | None:
 
 def _row(case: _Case) -> dict[str, Any]:
     verdict = case.verdict
-    whole = sum(part.share for part in verdict.parts.values()) + verdict.unexplained
     return {
         "truth": {"flaws": [[f.name, x] for f, x in case.planted]}, "salt": case.salt, "sealed": case.sealed,
         "late_sensor": case.late, "sizes_n": case.sizes, "times_visible": case.visible,
@@ -280,5 +327,5 @@ def _row(case: _Case) -> dict[str, Any]:
         "candidates": list(verdict.candidates), "reality": list(verdict.parts["reality"].names),
         "shares": {name: part.share for name, part in verdict.parts.items()},
         "said_left_n": _predicted(case), "gap_n": verdict.gap_before_n,
-        "adds_up": bool(abs(whole - 1) < 1e-9),
+        "adds_up": _adds_up(verdict),
     }  # fmt: skip

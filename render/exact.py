@@ -35,7 +35,7 @@ from render.force_error import force_errors
 
 DEPTHS = 6
 """At which a place is solved, evenly to the deepest."""
-CPU_S = 14.0
+CPU_S = 10.0
 """A place's on one core of 2025: what is said beforehand."""
 UNSOLVED = (ADHESION.name, JKR.name, SKIN.name, YIELDING_BASE.name, UNBONDED.name)
 """Effects of a model that the solver of a press does not know."""
@@ -90,6 +90,12 @@ def press_options(renderer: FemRenderer) -> PressOptions:
     return PressOptions(law=law, stiffening=stiffening, coupled=law != "linear", friction=friction)
 
 
+def check_renderer(name: str) -> None:
+    """Raise OptionError for a renderer whose law no press is solved beside."""
+    if name != FemRenderer.name:
+        raise OptionError(f"--exact solves presses beside the law of '{FemRenderer.name}', not of '{name}'")
+
+
 class ExactPlaces:
     """Solves places of one renderer's model with one tip. Raises OptionError (`press_options`), and for a
     renderer that is not the finite-element one."""
@@ -97,8 +103,8 @@ class ExactPlaces:
     def __init__(
         self, renderer: Renderer, tip_radius_m: float | None = None, options: PressOptions | None = None
     ) -> None:
-        if not isinstance(renderer, FemRenderer):
-            raise OptionError(f"presses are solved beside the law of 'fem', not of '{renderer.name}'")
+        check_renderer(renderer.name)
+        assert isinstance(renderer, FemRenderer)
         model, touch = renderer.model, rendered_touch(renderer.model, renderer.options)
         self.renderer, self.tip_m = renderer, float(tip_radius_m or model.tool.tip_radius_m)
         self.options = options or press_options(renderer)

@@ -44,7 +44,8 @@ class Numerics:
     """named: strongest first. candidates: not told apart from them.
 
     By name: keys of every effect that was looked at; intervals at 95 %; probability, gain, confidence_set_p;
-    detectable_n, N rms from which these presses show it at all; force, the (n, 3) N that it adds to the law's
+    detectable_n, N rms from which these presses show it at all; values, of its parameters, where it is named;
+    force, the (n, 3) N that it adds to the law's
     force, of a fit that has not seen the place ("all": of those named together). law: (n, 3) N, our law at
     the stated parameters; with_numerics: with what was named; local frames. strain: finite strain, where the
     simulator has it. remainder: something is left that nothing here explains. reasons: in words."""
@@ -63,6 +64,7 @@ class Numerics:
     gain: dict[str, float] = field(default_factory=dict)
     detectable_n: dict[str, float] = field(default_factory=dict)
     confidence_set_p: dict[str, float] = field(default_factory=dict)
+    values: dict[str, np.ndarray] = field(default_factory=dict)
     found: Attribution | None = None
 
 
@@ -127,7 +129,7 @@ def numerics_of(forward: StatedForward, rules: AttributionOptions, progress: Pro
     return Numerics(
         kept.names, rivals if kept.names else (), keys, intervals, probability, force, law, together,
         law_of(best.found), remainder, tuple(reasons), gain, limits,
-        found.confidence_set_p, found,
+        found.confidence_set_p, {name: best.found.of(name) for name in kept.names}, found,
     )  # fmt: skip
 
 

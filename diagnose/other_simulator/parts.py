@@ -154,6 +154,10 @@ class Weighing:
         """(g,) rows of each place."""
         return np.bincount(self.group[self.group >= 0], minlength=self.places)
 
+    def rms_n(self, force: np.ndarray) -> float:
+        """N, rms of a 3-vector without noise: one that a law says."""
+        return float(np.sqrt(self.squares(force).sum() / self.counts.sum()))
+
     def gap_n(self, gap: np.ndarray) -> float:
         """N, rms of the 3-vector."""
         return float(np.sqrt(self.squares(gap).sum() / self.counts.sum() + self.added))

@@ -10,12 +10,12 @@ from typing import Any
 
 import numpy as np
 
-from diagnose.forward.touches import LEAST_PRESSES, LEAST_ROWS, reached, touches_of
-from diagnose.numerics.base import signal_of
 from diagnose.numerics.registry import NAMES, numerical
 from diagnose.options import AttributionOptions, DiagnoseOptions, NuisanceOptions
-from diagnose.other_simulator.against_law import LEAST_SHARE, Numerics, numerics_of, seen_in_samples
-from diagnose.other_simulator.forces import Aligned, Forces, ForcesOptions, aligned
+from diagnose.other_simulator.advice import advice_of
+from diagnose.other_simulator.against_law import Numerics
+from diagnose.other_simulator.beside import Sides, beside, named_numerics
+from diagnose.other_simulator.forces import Forces, ForcesOptions, aligned
 from diagnose.other_simulator.parts import (
     Parameter,
     Reality,
@@ -26,16 +26,15 @@ from diagnose.other_simulator.parts import (
     wrong_parameters,
 )
 from diagnose.other_simulator.result import Part, SimulatedGap, Simulator
-from diagnose.other_simulator.stated import Stated, StatedForward
+from diagnose.other_simulator.sizes import sizes_alone
+from diagnose.other_simulator.stated import Stated
 from diagnose.pipeline import diagnose, with_tip_of
 from diagnose.search.gaps import closed_share
 from diagnose.verdict.answer import Answer, Findings
 from diagnose.verdict.result import Diagnosis, EffectEntry
 from diagnose.verdict.where import locate
-from mechanics.compliance.pressed_places import Places
 from mechanics.errors import DiagnosisError
 from mechanics.model.model import Model
-from mechanics.presses.table import MARGIN_S, Presses
 from mechanics.progress import Progress, part, silent
 from mechanics.recording.recording import Recording
 from reconstruct.presses_on_model import presses_on
@@ -55,20 +54,6 @@ class Asked:
     advice: dict[str, str] = dataclasses.field(default_factory=dict)
     run_as: str = ""
     poisson_limit: float = math.inf
-
-
-@dataclasses.dataclass
-class _Sides:
-    """The simulation's presses beside the real ones. forward: of all its presses, with the mended signal;
-    raw: (n, 3) N, local, the force as it came; rows: of the real touches; fell_s: (p,) s, from when on the
-    tip had fallen through, inf where it did not; seen: what the samples themselves showed."""
-
-    forward: StatedForward
-    raw: np.ndarray
-    rows: np.ndarray
-    fell_s: np.ndarray
-    seen: dict[str, dict[str, float]]
-    notes: tuple[str, ...]
 
 
 def diagnose_simulated(
@@ -99,105 +84,11 @@ def diagnose_simulated(
             recording, model, options, part(progress, 0.0, 0.6), nuisance=nuisance, attribution=attribution
         )
     findings: Findings = reality.findings
-    sides = _beside(presses, with_tip_of(model, presses), given, findings, asked.stated)
-    numerics = _numerics(sides, rules, part(progress, 0.6, 0.95))
+    sides = beside(presses, with_tip_of(model, presses), given, findings, asked.stated)
+    numerics = named_numerics(sides, rules, part(progress, 0.6, 0.95))
     result = _concluded(_weighed(asked, options, rules, reality, sides, numerics))
     progress("done", 1.0)
     return result
-
-
-def _beside(presses: Presses, model: Model, given: Aligned, findings: Findings, stated: Stated) -> _Sides:
-    """The forces as touches, row by row beside the real ones."""
-    met = reached(presses) if model.fitted_to(presses) else np.ones(len(presses), dtype=bool)
-    run = np.flatnonzero(given.usable)
-    own = presses.rows(run)
-    signal, seen = seen_in_samples(signal_of(presses.of(run), given.force[own]))
-    force = given.force.copy()
-    force[own] = signal.force
-
-    def touches(force: np.ndarray) -> Presses:
-        nothing = np.zeros_like(force)
-        return touches_of(dataclasses.replace(presses, force=force, free_air=nothing).of(met))
-
-    raw, mended = touches(given.force), touches(force)
-    keep = np.isin(raw.onset_s, presses.onset_s[given.usable])
-    fell_s = np.full(len(presses), np.inf)
-    np.minimum.at(fell_s, presses.press[own][signal.left], signal.t[signal.left])
-    real = findings.forward
-    rows = raw.rows(np.flatnonzero(keep))
-    forward = StatedForward(mended.of(keep), _of(real.places, keep), stated)
-    fell_s = fell_s[np.searchsorted(presses.onset_s, forward.touches.onset_s)]
-    keys = {name: values for name, (_, values) in seen.items()}
-    return _Sides(forward, raw.local_force[rows], rows, fell_s, keys, given.notes)
-
-
-def _of(places: Places, keep: np.ndarray) -> Places:
-    """The places of some presses."""
-    if keep.all():
-        return places
-    own = ("point", "normal", "frame", "far", "curvature", "bracing")
-    cut = {name: getattr(places, name)[keep] for name in own}
-    return dataclasses.replace(places, **cut, stages={})
-
-
-def _numerics(sides: _Sides, rules: AttributionOptions, progress: Progress) -> Numerics:
-    """What is named against the law. Presses that the tip fell through have a say until they did, where that
-    is long enough, and get the law's force with what was named from there on."""
-    forward, t = sides.forward, sides.forward.touches
-    until = np.minimum(t.end_s, sides.fell_s - MARGIN_S)
-    cut = dataclasses.replace(t, end_s=until)
-    seen = np.bincount(t.press[(t.t > t.onset_s[t.press]) & cut.counted], minlength=len(t))
-    held = np.isinf(sides.fell_s) | (seen >= LEAST_ROWS)
-    if held.sum() < LEAST_PRESSES:
-        cut, held = t, np.ones(len(t), bool)
-    sides = dataclasses.replace(sides, fell_s=np.where(held, sides.fell_s, -np.inf))
-    if held.all() and np.isinf(sides.fell_s).all():
-        return _with_seen(sides, numerics_of(forward, rules, progress))
-    of_held = StatedForward(cut.of(held), _of(forward.places, held), forward.stated)
-    return _with_seen(sides, _over_all(sides, numerics_of(of_held, rules, progress), held))
-
-
-def _over_all(sides: _Sides, found: Numerics, held: np.ndarray) -> Numerics:
-    """The same over all presses: those that had no say have our law's force."""
-    forward, t = sides.forward, sides.forward.touches
-    rows = t.rows(np.flatnonzero(held))
-    law = law_at(forward, forward.stated, found)
-    together = law.copy()
-    together[rows] = found.with_numerics
-    force = {}
-    for name, own in found.force.items():
-        force[name] = np.zeros_like(law)
-        force[name][rows] = own
-    return dataclasses.replace(found, law=law, with_numerics=together, force=force)
-
-
-def _with_seen(sides: _Sides, found: Numerics) -> Numerics:
-    """With what the samples themselves showed, where it matters."""
-    t = sides.forward.touches
-    fell = t.t >= sides.fell_s[t.press]
-    mended = np.where(fell[:, None], found.with_numerics, t.local_force)
-    parts = {
-        "lost_contact": np.where(fell[:, None], 0.0, sides.raw - t.local_force),
-        "tunnelling": np.where(fell[:, None], sides.raw - found.with_numerics, 0.0),
-    }
-    typical = float(np.sqrt((mended[t.counted] ** 2).sum(axis=1).mean()))
-    sizes = {n: float(np.sqrt((f[t.counted] ** 2).sum(axis=1).mean())) for n, f in parts.items()}
-    named = [n for n in sides.seen if sizes[n] > LEAST_SHARE * typical]
-    all_of = found.force["all"] + sum((parts[n] for n in named), np.zeros_like(mended))
-    strength = {n: float((found.force[n][t.counted] ** 2).sum()) for n in found.named}
-    strength |= {n: float((parts[n][t.counted] ** 2).sum()) for n in named}
-    order = tuple(sorted(strength, key=lambda n: -strength[n]))
-    # a tip that is never felt at a place may go between nodes there
-    between = "tunnelling" in named and sides.seen["tunnelling"]["never_felt"] > 0
-    rivals = ("contact_nodes",) if between and "contact_nodes" not in order else ()
-    return dataclasses.replace(
-        found,
-        named=order,
-        candidates=(*found.candidates, *(r for r in rivals if r not in found.candidates)),
-        keys={**found.keys, **sides.seen},
-        probability={**found.probability, **{n: 1.0 if n in named else 0.0 for n in sides.seen}},
-        force={**found.force, **{n: parts[n] for n in sides.seen}, "all": all_of},
-    )
 
 
 @dataclasses.dataclass(frozen=True)
@@ -208,10 +99,11 @@ class _Weighed:
     seed: int
     resamples: int
     reality: Diagnosis
-    sides: _Sides
+    sides: Sides
     numerics: Numerics
     real: Reality
     wrong: list[Parameter]
+    measured: Stated
     weighing: Weighing
     gaps: dict[str, np.ndarray]
 
@@ -225,7 +117,7 @@ def _weighed(
     options: DiagnoseOptions,
     rules: AttributionOptions,
     reality: Diagnosis,
-    sides: _Sides,
+    sides: Sides,
     numerics: Numerics,
 ) -> _Weighed:
     """The gap, and what is left of it as the parts are taken off (`diagnose.other_simulator.parts`)."""
@@ -249,8 +141,9 @@ def _weighed(
     if weighing.gap_n(touched) ** 2 - weighing.gap_n(end) ** 2 < (rules.smallest * reality.noise_n) ** 2:
         real = dataclasses.replace(real, names=())  # true of the object, and no part of this gap
     return _Weighed(
-        asked, options.seed, options.bootstrap, reality, sides, numerics, real, wrong, weighing, gaps
-    )
+        asked, options.seed, options.bootstrap, reality, sides, numerics, real, wrong, measured, weighing,
+        gaps,
+    )  # fmt: skip
 
 
 def _concluded(w: _Weighed) -> SimulatedGap:
@@ -301,7 +194,10 @@ def _concluded(w: _Weighed) -> SimulatedGap:
         ),
         entries=_entries(w, names),
         young_modulus_pa=reality.young_modulus_pa,
-        advice=_advice(w),
+        advice=advice_of(
+            numerics, w.wrong, w.real.names, w.asked.advice,
+            unstated=bool(_unstated(w.asked.stated, numerics)), poisson_limit=w.asked.poisson_limit,
+        ),
         notes=(*w.sides.notes, *_defaults(w.asked.stated)),
         reasons=tuple(answer.reasons),
         reality=reality,
@@ -314,10 +210,9 @@ def _concluded(w: _Weighed) -> SimulatedGap:
 def _by_size(w: _Weighed) -> list[str]:
     """All that is named, what changes the force most first, whatever part it is in. What reality adds is one
     force, so its effects stand together."""
-    weighing, numerics = w.weighing, w.numerics
-    sizes = {name: weighing.gap_n(numerics.force[name]) for name in numerics.named}
-    sizes |= {p.name: weighing.gap_n(p.force) for p in w.wrong}
-    real = weighing.gap_n(w.gaps["touches"] - w.gaps["reality"])
+    wrong = [p.name for p in w.wrong]
+    sizes = sizes_alone(w.sides.forward, w.numerics, wrong, w.measured, w.weighing)
+    real = w.weighing.rms_n(w.gaps["touches"] - w.gaps["reality"])
     sizes |= {name: real for name in w.real.names}
     return sorted(sizes, key=lambda name: -sizes[name])
 
@@ -383,36 +278,3 @@ def _entries(w: _Weighed, order: list[str]) -> tuple[EffectEntry, ...]:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def _advice(w: _Weighed) -> tuple[str, ...]:
-    said = []
-    for name in (*w.numerics.named, *w.numerics.candidates):
-        words = w.asked.advice.get(name) or numerical(name).advice
-        which = "" if name in w.numerics.named else "or "
-        said.append(f"{which}{name.replace('_', ' ')}: {words}")
-    units = {
-        "stated_modulus": ("Young's modulus", "Pa"),
-        "stated_poisson_ratio": ("Poisson's ratio", ""),
-        "stated_friction": ("friction", ""),
-        "stated_tip_radius": ("the tip's radius", "m"),
-    }
-    if _unstated(w.asked.stated, w.numerics):
-        said.append("or stated modulus: nobody said what it was given; say it: --stated young_modulus_pa=PA")
-    for p in w.wrong:
-        what, unit = units[p.name]
-        now = f"{p.measured:.4g} {unit}".strip() if math.isfinite(p.measured) else "infinite: the tip sticks"
-        limit = w.asked.poisson_limit if p.name == "stated_poisson_ratio" else math.inf
-        if p.measured <= limit or not math.isfinite(p.measured):
-            words = f"give it {now} for {what} (it had {p.stated:.4g} {unit})"
-        elif p.stated < limit:
-            words = f"give it {limit:g} for {what}, the most that it takes (the recording says {now})"
-        else:
-            words = f"the recording says {now}, and {limit:g} is the most that it takes: this part stays"
-        said.append(f"{p.name.replace('_', ' ')}: {words}")
-    for name in w.real.names:
-        said.append(
-            f"{name.replace('_', ' ')}: no setting of an ideal elastic simulation has it; "
-            "'palpate diagnose REC --apply MODEL2' writes a model that does"
-        )
-    return tuple(said)

@@ -1,0 +1,227 @@
+"""Flaws planted in other simulators themselves: settings made worse, parameters given wrongly.
+
+A small block is pressed by each simulator as resolved as it can be afforded here (its control), and with
+one or two of its settings changed. What a change does is measured: the force with it less the force without.
+Every run is kept by all that it depends on, so a benchmark can be resumed.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import hashlib
+import json
+import math
+import tempfile
+from collections.abc import Callable
+from contextlib import chdir
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from benchmarks._simulated_flaws import MODULUS_PA, RADIUS_M, Block, Given, Layout
+from diagnose.other_simulator.stated import Stated
+from mechanics.model.material import Material
+from mechanics.model.model import Model, Tool
+from mechanics.progress import silent
+from mechanics.shape.box_mesh import box_mesh
+from mechanics.shape.tetmesh import TetMesh
+from render.options import BEST, RenderOptions
+from render.registry import create
+from render.replay import replay
+
+POISSON = 0.40
+"""Of the object: what every one of them can be given."""
+STICKS = 1.0
+"""Friction of a control: nowhere in these presses is the sideways force so large a share of the push."""
+LAYOUT = Layout(
+    size_m=(0.04, 0.04, 0.02),
+    top=((0.0, 0.0), (-0.008, -0.008), (-0.008, 0.008), (0.008, -0.008), (0.008, 0.008), (0.0, 0.012)),
+    side=(),
+    depths_m=(0.0012, 0.0018, 0.0024),
+    speeds_m_per_s=(0.02, 0.04, 0.08),
+    holds_s=(0.03, 0.08),
+    across_m=0.0004,
+    rest_s=(0.2, 0.15),
+    poisson=POISSON,
+)
+
+
+@dataclass(frozen=True)
+class Simulation:
+    """What one simulator is run with: cells of the block's mesh along a side; settings over its best ones;
+    and what it is given."""
+
+    cells: int
+    settings: dict[str, float] = field(default_factory=dict)
+    modulus_pa: float = MODULUS_PA
+    poisson: float = POISSON
+    friction: float = STICKS
+    radius_m: float = RADIUS_M
+
+    def but(self, change: dict[str, float]) -> Simulation:
+        """The same with settings or fields changed."""
+        fields = {k: v for k, v in change.items() if k in _FIELDS}
+        others = {k: v for k, v in change.items() if k not in _FIELDS}
+        return dataclasses.replace(self, settings=self.settings | others, **fields)
+
+    @property
+    def stated(self) -> Stated:
+        """All that it was given, said."""
+        given = frozenset(("young_modulus_pa", "poisson_ratio", "friction", "tip_radius_m"))
+        friction = self.friction if self.friction < STICKS else np.inf
+        return Stated(self.modulus_pa, self.poisson, friction, self.radius_m, given)
+
+
+ALIKE = 0.05
+"""Share of our law's force within which a control is taken to have no flaw of its own."""
+_FIELDS = {"cells", "modulus_pa", "poisson", "friction", "radius_m"}
+_WHOLE = {"edge_radii": math.inf}
+CONTROLS = {
+    "scikit-fem": Simulation(14, _WHOLE),
+    "mujoco": Simulation(14, _WHOLE),
+    "drake": Simulation(12, _WHOLE | {"timestep_s": 0.004, "sphere_radii": 0.4}),
+    "newton": Simulation(12, _WHOLE | {"timestep_s": 0.002}),
+}
+"""One mesh serves all presses of a run: a finer one under each costs twenty times as much."""
+
+
+@dataclass(frozen=True)
+class AdapterFlaw:
+    """right: the names that say it. draw(adapter, rng): what is changed; None where that simulator has no
+    such setting."""
+
+    name: str
+    right: tuple[str, ...]
+    draw: Callable[[str, np.random.Generator], dict[str, float] | None]
+
+
+def _within(rng: np.random.Generator, low: float, high: float, *, either: bool = False) -> float:
+    value = float(np.exp(rng.uniform(math.log(low), math.log(high))))
+    return 1 / value if either and rng.random() < 0.5 else value
+
+
+def _setting(ranges: dict[str, tuple[str, float, float]]) -> Any:
+    def draw(adapter: str, rng: np.random.Generator) -> dict[str, float] | None:
+        if adapter not in ranges:
+            return None
+        key, low, high = ranges[adapter]
+        return {key: _within(rng, low, high)}
+
+    return draw
+
+
+FLAWS: tuple[AdapterFlaw, ...] = (
+    AdapterFlaw(
+        "element size",
+        ("mesh_stiffness", "contact_nodes"),
+        lambda adapter, rng: {"cells": int(rng.integers(4, 9))},
+    ),
+    AdapterFlaw(
+        "contact stiffness",
+        ("contact_stiffness", "tunnelling"),
+        _setting({"scikit-fem": ("penalty", 0.3, 4.0), "mujoco": ("solref_s", 0.008, 0.03),
+                  "newton": ("contact_n_per_m", 50.0, 600.0)}),
+    ),
+    AdapterFlaw(
+        "damping",
+        ("numerical_damping",),
+        _setting({"mujoco": ("damping_s", 0.01, 0.06), "drake": ("damping_s", 0.01, 0.06),
+                  "newton": ("damping_s", 0.003, 0.03)}),
+    ),
+    AdapterFlaw(
+        "time step",
+        ("time_step", "numerical_damping"),
+        _setting({"mujoco": ("timestep_s", 0.003, 0.008), "drake": ("timestep_s", 0.01, 0.03),
+                  "newton": ("timestep_s", 0.004, 0.016)}),
+    ),
+    AdapterFlaw(
+        "poisson", ("stated_poisson_ratio",), lambda adapter, rng: {"poisson": float(rng.choice([0.1, 0.2]))}
+    ),
+    AdapterFlaw(
+        "modulus",
+        ("stated_modulus",),
+        lambda adapter, rng: {"modulus_pa": MODULUS_PA * _within(rng, 1.15, 2.0, either=True)},
+    ),
+    AdapterFlaw(
+        "friction", ("stated_friction",), lambda adapter, rng: {"friction": _within(rng, 0.03, 0.12)}
+    ),
+    AdapterFlaw(
+        "tip",
+        ("stated_tip_radius",),
+        lambda adapter, rng: {"radius_m": RADIUS_M * _within(rng, 1.05, 1.2, either=True)},
+    ),
+)  # fmt: skip
+
+
+def squeezed_mesh(cells: int) -> TetMesh:
+    """The block of LAYOUT, finer in the middle of its top."""
+    size = np.array(LAYOUT.size_m)
+    mesh = box_mesh((cells, cells, max(2, round(0.4 * cells))), LAYOUT.size_m)
+    side = mesh.points[:, :2] / (0.5 * size[:2])
+    below = 1 - mesh.points[:, 2] / size[2]
+    points = np.column_stack(
+        [0.5 * size[:2] * (0.7 * side + 0.3 * side**3), size[2] * (1 - 0.5 * below - 0.5 * below**2)]
+    )
+    return dataclasses.replace(mesh, points=points)
+
+
+class Runs:
+    """Runs of simulators over one block's presses, kept in a folder; None: only here."""
+
+    def __init__(self, folder: Path | None) -> None:
+        self.block, self.folder = Block(0, LAYOUT), folder
+        self.law = self.block.force(Given(poisson=POISSON))
+        _, self.model = self.block.measured(np.random.default_rng(0), self.law)
+        self._here: dict[str, np.ndarray] = {}
+
+    def force(self, adapter: str, simulation: Simulation) -> np.ndarray:
+        """(n, 3) N on the tool."""
+        words = json.dumps(
+            [adapter, dataclasses.asdict(simulation), dataclasses.asdict(LAYOUT)], sort_keys=True
+        )
+        key = hashlib.sha256(words.encode()).hexdigest()[:20]
+        path = None if self.folder is None else self.folder.resolve() / f"{key}.npy"
+        if key not in self._here and path is not None and path.exists():
+            self._here[key] = np.load(path)
+        if key not in self._here:
+            self._here[key] = self._run(adapter, simulation)
+            if path is not None:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                np.save(path, self._here[key])
+        return self._here[key]
+
+    def _run(self, adapter: str, simulation: Simulation) -> np.ndarray:
+        model: Model = dataclasses.replace(
+            self.model,
+            mesh=squeezed_mesh(simulation.cells),
+            material=Material(simulation.modulus_pa, simulation.poisson),
+            tool=Tool(simulation.radius_m),
+        )
+        said = ",".join(f"{key}={value!r}" for key, value in simulation.settings.items())
+        options = RenderOptions(friction=simulation.friction, simulator_settings=BEST, simulator_set=said)
+        # MuJoCo leaves its warnings in a file where it runs
+        with tempfile.TemporaryDirectory() as folder, chdir(folder):
+            touched = create(adapter, model, options)
+            return replay(touched, self.block.t, self.block.centre, progress=silent)
+
+
+def drawn_plan(
+    adapter: str, rng: np.random.Generator, singles: int, pairs: int
+) -> list[tuple[tuple[AdapterFlaw, dict[str, float]], ...]]:
+    """Cases of one flaw, of each kind in turn, and of two: two of the single ones at once, so that each alone
+    is run already."""
+    able = [flaw for flaw in FLAWS if flaw.draw(adapter, np.random.default_rng(0)) is not None]
+    alone = []
+    for k in range(singles):
+        flaw = able[k % len(able)]
+        change = flaw.draw(adapter, rng)
+        assert change is not None
+        alone.append((flaw, change))
+    both: list[tuple[Any, ...]] = []
+    while len(both) < pairs and len({flaw.name for flaw, _ in alone}) > 1:
+        one, two = sorted(rng.choice(len(alone), 2, replace=False))
+        if alone[one][0].name != alone[two][0].name:
+            both.append((alone[one], alone[two]))
+    return [*((each,) for each in alone), *both]
